@@ -21,7 +21,7 @@ QUERY = b"\xff"
 QUIET_S = 0.05
 #: Time of a command at 9600 baud: ten bits a byte.
 COMMAND_S = 4 * 10 / BAUDRATE
-MOST_RELAYS = 8
+MAX_RELAYS = 8
 _LINE = re.compile(rb"CH(\d+): *(ON|OFF) *\r\n")
 
 
@@ -54,7 +54,7 @@ class LcusRelay:
 
         model_config = ConfigDict(frozen=True, extra="forbid")
 
-        relay: int = Field(ge=1, le=MOST_RELAYS)
+        relay: int = Field(ge=1, le=MAX_RELAYS)
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._relay = settings.relay

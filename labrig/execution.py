@@ -39,9 +39,9 @@ ErrorT = TypeVar("ErrorT", bound=BaseException)
 COMES_BACK_S = 300.0
 LOOK_PERIOD_S = 2.0
 #: Number of lost devices in one unit at which the run ends.
-MOST_LOSSES = 3
+MAX_LOSSES = 3
 #: Largest number of files named in a warning.
-MOST_NAMED = 4
+MAX_NAMED = 4
 
 
 class Watch(Protocol):
@@ -177,10 +177,10 @@ class _Reconnecting:
         stop_here()
 
     def _give_up_units(self, error: DeviceLostError) -> None:
-        """Close the open units, so that they are repeated, up to `MOST_LOSSES` times."""
+        """Close the open units, so that they are repeated, up to `MAX_LOSSES` times."""
         units = self.folder.close_open_attempts(self.bench.clock.wall, "fail", str(error))
         self.losses.update(units or ["between units"])
-        if max(self.losses.values()) >= MOST_LOSSES:
+        if max(self.losses.values()) >= MAX_LOSSES:
             raise error
         repeated = "".join(f"; the unit {unit} is done again" for unit in units)
         self.observer.warn(
@@ -272,8 +272,8 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    n_more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {n_more} more" if n_more > 0 else "")
+    n_more = len(names) - MAX_NAMED
+    return ", ".join(names[:MAX_NAMED]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
 def _close(folder: RunFolder, bench: Bench, exit_status: str, reason: str) -> None:

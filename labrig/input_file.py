@@ -9,7 +9,7 @@ from labrig.errors import DiskError, UsageError
 DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDOUT}
 
 #: Limit that a table of a year's measurements does not reach, but `/dev/zero` does.
-MOST_TEXT_BYTES = 50_000_000
+MAX_TEXT_BYTES = 50_000_000
 
 
 def read_bytes(path: Path, most_bytes: int) -> bytes:
@@ -35,7 +35,7 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     return content
 
 
-def read_text(path: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
+def read_text(path: Path, most_bytes: int = MAX_TEXT_BYTES) -> str:
     """Read the text in the file at `path`, without a byte-order mark.
 
     Raises

@@ -23,7 +23,7 @@ from urllib.parse import parse_qs, urlsplit
 from labrig.errors import DiskError, LabrigError, UsageError
 
 LOOPBACK = "127.0.0.1"
-MOST_BODY_BYTES = 64 * 1024
+MAX_BODY_BYTES = 64 * 1024
 #: No content from other origins, and no embedding in another page.
 CONTENT_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'"
 KINDS = {
@@ -145,7 +145,7 @@ class LocalConversation(BaseHTTPRequestHandler):
     def body(self) -> bytes:
         """Read the request's body, also of a refused request, to keep the connection usable."""
         length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > MOST_BODY_BYTES:
+        if not length.isdecimal() or int(length) > MAX_BODY_BYTES:
             self.close_connection = True
             return b""
         return self.rfile.read(int(length))

@@ -134,8 +134,8 @@ class WordOrDuration:
 
 
 #: Largest number of repetitions in a protocol.
-MOST_COUNT = 1000
-Count = Annotated[int, Field(le=MOST_COUNT)]
+MAX_COUNT = 1000
+Count = Annotated[int, Field(le=MAX_COUNT)]
 #: Seconds, written with a unit of time.
 DurationS = Annotated[
     float, _validator(TIME_S, bare=False), _serializer("s"), _schema(TIME_S, bare=False)

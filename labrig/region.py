@@ -7,9 +7,9 @@ from pydantic import AfterValidator, Field, TypeAdapter
 from labrig.errors import UsageError
 
 #: Limit above the width of any sensor, which excludes infinity.
-MOST_PIXELS = 1_000_000
-Corner = Annotated[float, Field(ge=0, le=MOST_PIXELS)]
-Extent = Annotated[float, Field(gt=0, le=MOST_PIXELS)]
+MAX_PIXELS = 1_000_000
+Corner = Annotated[float, Field(ge=0, le=MAX_PIXELS)]
+Extent = Annotated[float, Field(gt=0, le=MAX_PIXELS)]
 
 
 def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[float, ...]:

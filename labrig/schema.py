@@ -52,10 +52,12 @@ def _rig() -> Any:
     roles: dict[str, Any] = {}
     for key, role in ROLES.items():
         fitting = [
-            entries[name] for name, driver in drivers.items() if issubclass(driver, role.does)
+            entries[name]
+            for name, driver in drivers.items()
+            if issubclass(driver, role.protocol_class)
         ]
         if fitting:
-            summary = inspect.cleandoc(role.does.__doc__ or "").splitlines()[0]
+            summary = inspect.cleandoc(role.protocol_class.__doc__ or "").splitlines()[0]
             roles[key] = (_one_of("driver", fitting), Field(None, description=summary))
     devices = create_model(
         "Devices",

@@ -22,12 +22,12 @@ from labrig.input_file import read_text
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 #: Size limit; the longest files are the calibrations that labrig writes, 0.1 MB.
-MOST_BYTES = 5_000_000
+MAX_BYTES = 5_000_000
 #: Limits of the depth, and of the values that aliases expand to.
-MOST_DEPTH = 30
-MOST_ALIASED = 100_000
+MAX_DEPTH = 30
+MAX_ALIASED = 100_000
 #: Largest length of a text quoted in a message.
-MOST_SHOWN = 80
+MAX_SHOWN = 80
 
 #: Characters that no name or path contains: NUL, and halves of surrogate pairs.
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
@@ -61,7 +61,7 @@ class _Loader(SafeLoader, Composer):
         if node is not None:
             extents: dict[yaml.Node, tuple[int, int]] = {}
             nodes, depth = _extent(node, extents)
-            if nodes - len(extents) > MOST_ALIASED or depth > MOST_DEPTH + 1:
+            if nodes - len(extents) > MAX_ALIASED or depth > MAX_DEPTH + 1:
                 raise _problem("its aliases stand for more than fits such a file", node)
         return node
 
@@ -74,8 +74,8 @@ class _Loader(SafeLoader, Composer):
             )
         if isinstance(event, yaml.ScalarEvent) and _NO_TEXT.search(event.value):
             raise _problem(f"expected text, got {_shortened(ascii(event.value))}", event)
-        if self._depth > MOST_DEPTH:
-            raise _problem(f"nested more than {MOST_DEPTH} deep", event)
+        if self._depth > MAX_DEPTH:
+            raise _problem(f"nested more than {MAX_DEPTH} deep", event)
         self._depth += 1
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
@@ -167,7 +167,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     DiskError
         The disk cannot be read.
     """
-    return parse_yaml(read_text(path, MOST_BYTES), str(path))
+    return parse_yaml(read_text(path, MAX_BYTES), str(path))
 
 
 def parse_yaml(text: str, source: str) -> dict[str, Any]:
@@ -279,4 +279,4 @@ def _kind(value: Any) -> str:
 
 def _shortened(text: str) -> str:
     text = " ".join(text.split())
-    return text if len(text) <= MOST_SHOWN else text[:MOST_SHOWN] + "…"
+    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "…"

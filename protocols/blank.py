@@ -28,7 +28,7 @@ from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, frame_times_s
-from .steps.sample_pose import charge, face_camera, lights_out, seen_s
+from .steps.sample_pose import charge, face_camera, lights_out, visible_after_s
 from .steps.sanity_checks import SanityChecks
 from .steps.scenes import Arrangement, PutBackUnit
 
@@ -170,8 +170,8 @@ class SequenceUnit:
         protocol = self.protocol
         session.wait_until_warm("camera")
         first_s, others_s = protocol.exposures_s(session.rig[CAMERA].offers())
-        earliest_s = seen_s(session) or EARLIEST_S
-        if protocol.first != "auto" and protocol.first < seen_s(session):
+        earliest_s = visible_after_s(session) or EARLIEST_S
+        if protocol.first != "auto" and protocol.first < visible_after_s(session):
             raise ProtocolError(
                 f"first: {duration_text(protocol.first)} after lamp off the door still moves; "
                 f"write first: auto, which is {duration_text(earliest_s)} on this rig"

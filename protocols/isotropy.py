@@ -99,20 +99,20 @@ class AngleUnit:
     ----------
     angle
         Angle of the sample against the camera's axis, in degrees.
-    stands
+    previous_angle
         Angle at which the unit before left the sample, in degrees.
     """
 
     protocol: Isotropy
     name: str
     angle: int
-    stands: int
+    previous_angle: int
 
     def run(self, session: Session) -> None:
         """Turn straight, charge, switch the lamp off, turn, photograph."""
         session.wait_until_warm("camera")
         schedule = metered_schedule(session, self.protocol, "meter")
-        if self.stands:
+        if self.previous_angle:
             session.ask(_turn(0, "it is charged the same way every time", 60.0))
         self.protocol.charge_sample(session, self.protocol.charge)
         lamp_off_s = session.clock.now()

@@ -24,7 +24,7 @@ from labrig.acquire import (
 from labrig.quantity import Count, DurationS, WordOrDuration
 
 from .steps.camera_settings import MARGIN_S, CameraSettings
-from .steps.sample_pose import charge, face_lamp, lights_out, seen_s
+from .steps.sample_pose import charge, face_lamp, lights_out, visible_after_s
 from .steps.scenes import (
     Arrangement,
     Bracketing,
@@ -145,7 +145,7 @@ class StripesUnit(SceneUnit):
         light(session, self.warm_up_s(session))
         charge(session, self.charge_s)
         offers, scene = session.rig[CAMERA].offers(), self.bracketing
-        at_s, steps = seen_s(session) + MARGIN_S, list[TimedAction]()
+        at_s, steps = visible_after_s(session) + MARGIN_S, list[TimedAction]()
         for fraction in STRIPES_LADDER:
             exposure_s = offers.exposure_at_most(scene.longest_s * fraction)
             steps.append(at(at_s, Shoot(self.role, scene.settings(exposure_s))))

@@ -12,9 +12,9 @@ from .filters import Filters
 from .simulation import Simulation
 
 #: Largest angle of a sample against the camera's axis.
-MOST_TILT_DEG = 85
+MAX_TILT_DEG = 85
 #: Least distance of a lamp from the sample.
-LEAST_LAMP_M = 0.2
+MIN_LAMP_M = 0.2
 
 
 class Changer:
@@ -104,14 +104,14 @@ class Changer:
 
     def _move_lamp(self, distance: str) -> None:
         number, _, unit = distance.partition(" ")
-        if unit != "m" or not re.fullmatch(r"\d+(\.\d+)?", number) or float(number) < LEAST_LAMP_M:
+        if unit != "m" or not re.fullmatch(r"\d+(\.\d+)?", number) or float(number) < MIN_LAMP_M:
             raise UsageError(
-                f"expected {LEAST_LAMP_M} m or more, such as '1.41 m' instead of the usual "
+                f"expected {MIN_LAMP_M} m or more, such as '1.41 m' instead of the usual "
                 f"{USUAL_LAMP_M:g} m, got '{distance}'"
             )
         self._change(lamp_m=float(number))
 
     def _tilt(self, degrees: str) -> None:
-        if not degrees.isdecimal() or int(degrees) > MOST_TILT_DEG:
-            raise UsageError(f"expected whole degrees from 0 to {MOST_TILT_DEG}, got '{degrees}'")
+        if not degrees.isdecimal() or int(degrees) > MAX_TILT_DEG:
+            raise UsageError(f"expected whole degrees from 0 to {MAX_TILT_DEG}, got '{degrees}'")
         self._change(tilt_deg=int(degrees))

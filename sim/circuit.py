@@ -21,7 +21,7 @@ class LampCircuit:
     ----------
     settings
         Settings of the lamp.
-    asked_on
+    register_on
         State of the register when the room is opened.
     faults
         Faults of the room, of which `lamp_dead`, `mercury_dead`, `relay_dead` and `relay_welded`
@@ -31,7 +31,11 @@ class LampCircuit:
     """
 
     def __init__(
-        self, settings: LampSettings, asked_on: bool, faults: Sequence[Fault], clock: VirtualClock
+        self,
+        settings: LampSettings,
+        register_on: bool,
+        faults: Sequence[Fault],
+        clock: VirtualClock,
     ) -> None:
         self._clock = clock
         self._bulb_dead = given(fault.lamp_dead for fault in faults)
@@ -44,7 +48,7 @@ class LampCircuit:
             for time_s in (span.at, span.until)
         }
         self._changes_s = sorted(time_s for time_s in changes if time_s > 0)
-        self._register_on = asked_on
+        self._register_on = register_on
         # Welded before the room was opened: it was closed then, and has not let go.
         self._closed = any(span.at < 0 and span.is_on(0.0) for span in self._welded)
         self._closed = self._contact(0.0)
@@ -99,5 +103,5 @@ class LampCircuit:
         return stuck or (self._register_on and not _any(self._dead, time_s))
 
 
-def _any(whens: Sequence[FaultTime], time_s: float) -> bool:
-    return any(span.is_on(time_s) for span in whens)
+def _any(fault_times: Sequence[FaultTime], time_s: float) -> bool:
+    return any(span.is_on(time_s) for span in fault_times)

@@ -56,18 +56,18 @@ class Stray:
 
     Attributes
     ----------
-    whens
+    fault_times
         Times at which the light is on.
     spectrum : ndarray, shape (160,)
         Irradiance on `WAVELENGTH_NM`, relative as a `Lamp`'s.
     """
 
-    whens: Sequence[FaultTime]
+    fault_times: Sequence[FaultTime]
     spectrum: FloatArray
 
     def is_on(self, time_s: float) -> bool:
         """Return whether the light is on at a time."""
-        return any(span.is_on(time_s) for span in self.whens)
+        return any(span.is_on(time_s) for span in self.fault_times)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Lights:
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
         """Return the times strictly between at which light or door is not smooth."""
-        spans = [span for stray in self._strays for span in stray.whens]
+        spans = [span for stray in self._strays for span in stray.fault_times]
         switches = {time_s for span in spans for time_s in (span.at, span.until)}
         inside = {time_s for time_s in switches if start_s < time_s < end_s}
         moving = [time_s for door in self._doors for time_s in door.corners(start_s, end_s)]
@@ -207,11 +207,11 @@ def room_light_spectrum() -> FloatArray:
     return spectrum
 
 
-def leak(level: float, whens: Sequence[FaultTime]) -> Stray:
+def leak(level: float, fault_times: Sequence[FaultTime]) -> Stray:
     """Return light from a screen or a crack, of `level` times the warm lamp's irradiance."""
     peaks = [
         height * np.exp(-(((WAVELENGTH_NM - at_nm) / wide_nm) ** 2) / 2)
         for at_nm, wide_nm, height in LEAK_PEAKS
     ]
     shape: FloatArray = np.sum(peaks, axis=0)
-    return Stray(whens, level * filament_spectrum(BURNING_K).sum() / shape.sum() * shape)
+    return Stray(fault_times, level * filament_spectrum(BURNING_K).sum() / shape.sum() * shape)

@@ -80,14 +80,14 @@ class Phosphor:
         Excitation matrix, κ = excitation @ irradiance.
     patch : ndarray, shape (states,)
         Index of the patch, or part of one, to which a state belongs.
-    quickening
+    rate_factor
         Function of time: factor by which re-radiation is faster than `k_r_per_s`.
     """
 
     k_r_per_s: FloatArray
     excitation: FloatArray
     patch: NDArray[np.intp]
-    quickening: Callable[[float], float] = lambda _: 1.0
+    rate_factor: Callable[[float], float] = lambda _: 1.0
 
     def evolve(
         self,
@@ -115,7 +115,7 @@ class Phosphor:
         level : ndarray, shape (states,)
             Concentrations at `end_s`.
         exposure_s : ndarray, shape (states,)
-            ∫ v q r dt from `start_s` to `end_s`, with q the `quickening`.
+            ∫ v q r dt from `start_s` to `end_s`, with q the `rate_factor`.
         """
         state = np.array([level, np.zeros_like(level)])
         corners = [start_s, *light.corners(start_s, end_s), end_s]
@@ -157,7 +157,7 @@ class Phosphor:
         lasting_s = np.diff(spans)
         times_s = spans[:, :1] + lasting_s * NODES
         each_s = times_s.ravel().tolist()
-        faster = np.array([self.quickening(at_s) for at_s in each_s]).reshape(times_s.shape)
+        faster = np.array([self.rate_factor(at_s) for at_s in each_s]).reshape(times_s.shape)
         visible_rate = np.array([visible(at_s) for at_s in each_s]).reshape(times_s.shape) * faster
         # In the dark states of one rate are alike, of which there may be hundreds.
         k_r_per_s, rate_index = self._rates if light is None else (self.k_r_per_s, np.s_[:])

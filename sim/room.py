@@ -207,7 +207,7 @@ class Room:
         off_s = lamps.last_switch_off(self._clock.now())
         level = effective = None
         cells = self._samples.cells
-        faster = cells.quickening(self._clock.now() if off_s is None else off_s)
+        faster = cells.rate_factor(self._clock.now() if off_s is None else off_s)
         if off_s is not None:
             arrangements = self._changer.arrangements
             level_at_off = self._samples.level_at(off_s, self._lights(), arrangements)

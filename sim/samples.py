@@ -16,7 +16,7 @@ from .lvf import Lvf
 from .optics import emission
 from .phosphor import Light, Phosphor, phosphor
 from .simulation import Simulation
-from .temperature import quickening
+from .temperature import rate_factor
 
 FloatArray = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Samples:
         charges = [patch.initial_charge for patch in simulation.patches]
         self._patches = replace(
             phosphor(self.materials, charges, simulation.lamp.irradiance),
-            quickening=quickening(simulation.temperature),
+            rate_factor=rate_factor(simulation.temperature),
         )
         patch_states = [
             np.flatnonzero(self._patches.patch == n) for n in range(len(self.materials))

@@ -30,7 +30,7 @@ def celsius(settings: TemperatureSettings | None, time_s: float) -> float:
     return AMBIENT_C if settings is None else settings.celsius(time_s)
 
 
-def quickening(settings: TemperatureSettings | None) -> Callable[[float], float]:
+def rate_factor(settings: TemperatureSettings | None) -> Callable[[float], float]:
     """Return the factor by which re-radiation is faster than at 21 °C, at a time."""
     if settings is None:
         return lambda _: 1.0

@@ -64,7 +64,7 @@ def test_linux_holds_it_no_longer_than_labrig_lives(stand_in: Stand) -> None:
 
 
 @pytest.mark.parametrize("script", [REFUSES, None])
-def test_linux_without_the_service_is_said_once(
+def test_linux_without_the_service_is_reported_once(
     stand_in: Stand, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, script: str | None
 ) -> None:
     told = list[str]()
@@ -105,7 +105,7 @@ def test_windows_is_asked_and_released(monkeypatch: pytest.MonkeyPatch, granted:
     assert len(told) == (not granted)
 
 
-def test_another_system_is_said() -> None:
+def test_another_system_is_reported() -> None:
     told = list[str]()
     with kept_awake(told.append, "plan9"):
         pass

@@ -80,7 +80,7 @@ def test_sleep_after_the_last_wait_is_noticed_at_the_end() -> None:
         clock.asleep_s += 1.0
 
 
-def test_nobody_is_told_of_sleep_who_did_not_ask_or_of_a_hiccup() -> None:
+def test_nobody_is_reported_of_sleep_who_did_not_ask_or_of_a_hiccup() -> None:
     clock = SleepyClock()
     clock.asleep_s += 3600.0
     clock.sleep(5.0)

@@ -399,7 +399,7 @@ def test_stray_bytes_cost_a_unit_and_not_the_run(
     assert [attempt.exit_status for attempt in record.attempts].count("fail") == 2
 
 
-def test_who_stops_waiting_for_a_lost_relay_is_told_that_the_lamp_may_be_on(
+def test_who_stops_waiting_for_a_lost_relay_is_reported_that_the_lamp_may_be_on(
     labrig: Labrig,
     rig: Make,
     protocol: Path,

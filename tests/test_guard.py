@@ -82,7 +82,7 @@ def heard(tmp_path: Path, said: bytes) -> bool:
         (b"++-", False),
     ],
 )
-def test_what_was_said_last_counts(tmp_path: Path, said: bytes, on: bool) -> None:
+def test_what_was_reported_last_counts(tmp_path: Path, said: bytes, on: bool) -> None:
     assert heard(tmp_path, said) is on
 
 

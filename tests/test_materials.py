@@ -23,7 +23,7 @@ SENSOR = {"width": 384, "height": 256}
 #: Of 20 comparisons with a σ that is right: at 3 σ every twentieth change of the room's random
 #: numbers would fail one, at 4 σ one of 800. How often rates are within 1 and 2 σ, over many seeds:
 #: `python -m tests.acceptance.coverage_pipeline` and `tests.acceptance.decays_of_all_materials`.
-MOST_SIGMAS = 4.0
+MAX_SIGMAS = 4.0
 TABLE_1 = [name for name in EXPONENTIAL if not name.startswith("double-")]
 
 
@@ -43,12 +43,12 @@ def check(fit: dict[str, Any], name: str) -> None:
     true = sorted((state.k_r_per_s for state in read_material(name).states), reverse=True)
     assert fit["n_states"] == len(true), name
     for state, k_r_per_s in zip(fit["states"], true, strict=True):
-        assert abs(state["k_r_per_s"] - k_r_per_s) < MOST_SIGMAS * state["k_r_sigma_per_s"], name
+        assert abs(state["k_r_per_s"] - k_r_per_s) < MAX_SIGMAS * state["k_r_sigma_per_s"], name
         assert state["k_r_sigma_per_s"] < 0.1 * k_r_per_s, "a σ of nothing proves nothing"
 
 
 @pytest.mark.parametrize("name", ["double-close-uneven", "double-medium-faint"])
-def test_two_states_are_told_apart(
+def test_two_states_are_distinguished(
     labrig: Labrig, make_rig: Make, tmp_path: Path, name: str
 ) -> None:
     rig = make_rig(sample=name, sensor=SENSOR)
@@ -73,4 +73,4 @@ def test_eleven_patches_in_one_charge_give_the_rates_of_one_by_one(
     check(fit_of(alone), name)
     (one,), (other,) = fit_of(alone)["states"], fit_of(together, name)["states"]
     sigma = (one["k_r_sigma_per_s"] ** 2 + other["k_r_sigma_per_s"] ** 2) ** 0.5
-    assert abs(one["k_r_per_s"] - other["k_r_per_s"]) < MOST_SIGMAS * sigma
+    assert abs(one["k_r_per_s"] - other["k_r_per_s"]) < MAX_SIGMAS * sigma

@@ -138,7 +138,7 @@ def test_a_misfit_names_the_key_and_the_remedy(content: dict[str, object], expec
     assert expected in str(caught.value)
 
 
-def test_a_missing_or_binary_file_is_said(tmp_path: Path) -> None:
+def test_a_missing_or_binary_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such file"):
         read_model(tmp_path / "none.yaml", Outer)
     (tmp_path / "photo.yaml").write_bytes(b"\xff\xd8\xff\xe0")

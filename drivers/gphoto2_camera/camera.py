@@ -80,7 +80,7 @@ class Gphoto2Camera:
             model if is_named_twice else f"{maker} {model}".strip(),
             f"serial {setting_at_connect('serialnumber') or 'unknown'}",
             f"firmware {setting_at_connect('deviceversion') or 'unknown'}",
-            f"released by libgphoto2 {self._version}, {self._release.words}",
+            f"released by libgphoto2 {self._version}, {self._release.description}",
         ]
         return ", ".join(parts)
 

@@ -123,10 +123,10 @@ def _shutter_times(maker: str) -> Finding:
 
 def _release(release: Release) -> Finding:
     if isinstance(release, ButtonRelease):
-        return Finding("fine", f"released by {release.words}, without delay")
+        return Finding("fine", f"released by {release.description}, without delay")
     return Finding(
         "warn",
-        f"released by libgphoto2's {release.words}, up to 0.5 s after it is asked; a frame's "
+        f"released by libgphoto2's {release.description}, up to 0.5 s after it is asked; a frame's "
         "begin is taken in the middle of the time in which it may have been",
         "for a Canon EOS the driver ptp_camera knows it better",
     )

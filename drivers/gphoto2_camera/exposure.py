@@ -66,7 +66,7 @@ class Exposure:
         """
         self._require_manual()
         for name, label in self._labels_of(requested).items():
-            self._library.set_surely(name, label, self._settings.answer_timeout)
+            self._library.set_and_verify(name, label, self._settings.answer_timeout)
 
     def in_force(self) -> ExposureSettings:
         """Return the settings that the camera reports, with the actual shutter time.

@@ -114,7 +114,7 @@ class Library:
         doing = f"setting its {name} to {value}"
         return Span(*self._ask(doing, within_s, "set", name, value))
 
-    def set_surely(self, name: str, value: str, within_s: float) -> None:
+    def set_and_verify(self, name: str, value: str, within_s: float) -> None:
         """Set a setting that has another value, and read back until the camera reports the new one.
 
         Raises

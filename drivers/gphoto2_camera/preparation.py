@@ -54,9 +54,9 @@ def _send_frames_to_pc(library: Library, answer_s: float) -> None:
     if other_names and is_full:
         # a Canon is told of the PC's room only when the target changes, and forgets it
         # when a program dies
-        library.set_surely(name, other_names[0], answer_s)
+        library.set_and_verify(name, other_names[0], answer_s)
     if to_pc:
-        library.set_surely(name, to_pc[0], answer_s)
+        library.set_and_verify(name, to_pc[0], answer_s)
 
 
 def _set_where(
@@ -71,5 +71,5 @@ def _set_where(
         return True
     label = next(filter(is_meant, setting.choices), None)
     if label is not None:
-        library.set_surely(name, label, answer_s)
+        library.set_and_verify(name, label, answer_s)
     return label is not None

@@ -19,7 +19,7 @@ class Release(Protocol):
     """A way to release a camera."""
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Description of the way of release, for people."""
 
     def get_ready(self) -> None:
@@ -46,7 +46,7 @@ class Release(Protocol):
 class ButtonRelease:
     """Release by half and full press apart: the second is one short transaction."""
 
-    words = "its remote button"
+    description = "its remote button"
 
     def __init__(self, library: Library, clock: Clock, half: str, full: str) -> None:
         self._library = library
@@ -97,7 +97,7 @@ class TriggerRelease:
     simulated camera, by `tests/acceptance/gphoto2_latency.py`.
     """
 
-    words = "trigger_capture"
+    description = "trigger_capture"
 
     def __init__(self, library: Library, maker: str) -> None:
         self._library = library

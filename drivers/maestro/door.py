@@ -7,10 +7,10 @@ from pydantic import model_validator
 from labrig.acquire import Connections
 
 from .servo import PulseS, ServoSettings, quarters
-from .swung import Swung
+from .swung import ServoDoor
 
 
-class MaestroDoor(Swung):
+class MaestroDoor(ServoDoor):
     """A trap door moved by a servo on a Pololu Maestro.
 
     The read-back is the pulse that the Maestro sends, not the angle of the door: a door that is

@@ -40,7 +40,7 @@ ERRORS = (
 )
 
 
-def told(bits: int) -> str:
+def error_text(bits: int) -> str:
     """Return all errors in the 16 bits that the command A1 reads, with remedies; empty for none."""
     errors = [error for bit, error in enumerate(ERRORS) if bits >> bit & 1]
     unknown_bits = [bit for bit in range(len(ERRORS), 16) if bits >> bit & 1]
@@ -192,7 +192,7 @@ class Servo:
         """
         if bits := self._errors():
             raise UnclearAnswerError(
-                f"{self.name} reports that {told(bits)}; it has sent all its channels home"
+                f"{self.name} reports that {error_text(bits)}; it has sent all its channels home"
             )
 
     @property

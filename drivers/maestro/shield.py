@@ -7,10 +7,10 @@ from pydantic import model_validator
 from labrig.acquire import Connections
 
 from .servo import PulseS, ServoSettings, quarters
-from .swung import Swung
+from .swung import ServoDoor
 
 
-class MaestroShield(Swung):
+class MaestroShield(ServoDoor):
     """A shield that a servo on a Pololu Maestro swings before the lamp.
 
     Its read-back and timing are those of `MaestroDoor`. Its safe position is uncovered: a hot lamp

@@ -7,7 +7,7 @@ from labrig.acquire import Connections
 from .servo import Servo, ServoSettings
 
 
-class Swung:
+class ServoDoor:
     """Part of the bench on one channel of a Pololu Maestro.
 
     Parameters

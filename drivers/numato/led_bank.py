@@ -94,7 +94,7 @@ class NumatoLedBank:
         if failure:
             raise failure
 
-    def lit(self) -> str | None:
+    def channel_on(self) -> str | None:
         """Return the name of the LED that the board reads as on.
 
         Raises

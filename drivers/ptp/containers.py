@@ -13,7 +13,7 @@ from .failures import MalformedError
 #: Bytes before parameters or payload.
 HEADER_BYTES = 12
 #: A command, response or event carries at most this many parameters (PIMA 15740, 9.3).
-MOST_PARAMETERS = 5
+MAX_PARAMETERS = 5
 
 _HEADER = struct.Struct("<IHHI")
 
@@ -85,7 +85,7 @@ def announced_length(beginning: bytes) -> int:
             f"expected a PTP container of at least {HEADER_BYTES} bytes from the camera", beginning
         )
     length, kind, _, _ = _HEADER.unpack_from(beginning)
-    longest = HEADER_BYTES + 4 * MOST_PARAMETERS
+    longest = HEADER_BYTES + 4 * MAX_PARAMETERS
     plausible = length >= HEADER_BYTES and kind in iter(Kind)
     if plausible and kind != Kind.DATA:
         plausible = length <= longest and length % 4 == 0

@@ -2,16 +2,16 @@
 
 from labrig.errors import DeviceError, DeviceLostError
 
-MOST_SHOWN_BYTES = 32
+MAX_SHOWN_BYTES = 32
 
 
 def shown(data: bytes) -> str:
     """Return bytes for a message: all of them in hexadecimal if few, else the first ones."""
     if not data:
         return "nothing"
-    if len(data) <= MOST_SHOWN_BYTES:
+    if len(data) <= MAX_SHOWN_BYTES:
         return f"'{data.hex(' ')}'"
-    return f"{len(data)} bytes '{data[:MOST_SHOWN_BYTES].hex(' ')} …'"
+    return f"{len(data)} bytes '{data[:MAX_SHOWN_BYTES].hex(' ')} …'"
 
 
 class NoAnswerError(DeviceError):

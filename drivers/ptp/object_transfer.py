@@ -9,7 +9,7 @@ from .session import Session, Timeouts
 
 PIECE_BYTES = 1024 * 1024
 #: Longest file, several times the largest RAW file; a longer announcement is damaged.
-MOST_FILE_BYTES = 512 * 1024 * 1024
+MAX_FILE_BYTES = 512 * 1024 * 1024
 #: A camera that still develops or writes is busy for seconds.
 PATIENT = Timeouts(answer_s=10.0, busy_s=10.0)
 
@@ -46,9 +46,9 @@ class ObjectTransfer:
             The camera announces more than any file has, sends more or fewer bytes than it
             announced, or fails to send.
         """
-        if size_bytes > MOST_FILE_BYTES:
+        if size_bytes > MAX_FILE_BYTES:
             raise DeviceError(
-                f"expected a file of at most {MOST_FILE_BYTES} bytes, the camera announces "
+                f"expected a file of at most {MAX_FILE_BYTES} bytes, the camera announces "
                 f"{size_bytes} for {name}: take the frame again"
             )
         received = bytearray()

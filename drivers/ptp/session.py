@@ -24,11 +24,11 @@ LAST_TRANSACTION_ID = 0xFFFFFFFE
 #: SessionNotOpen and InvalidTransactionID: no later transaction would fare better.
 SESSION_LOST = (0x2003, 0x2004)
 #: Left-over containers of earlier transactions that are passed over before giving up.
-MOST_STALE = 32
+MAX_STALE = 32
 FIRST_BACK_OFF_S = 0.02
 LONGEST_BACK_OFF_S = 0.5
 #: More than any answer but a frame: an EOS lists its properties in some 20 kB.
-MOST_ANSWER_BYTES = 4 * 1024 * 1024
+MAX_ANSWER_BYTES = 4 * 1024 * 1024
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Session:
         *params: int,
         data: bytes | None = None,
         timeouts: Timeouts = USUAL,
-        most_bytes: int = MOST_ANSWER_BYTES,
+        most_bytes: int = MAX_ANSWER_BYTES,
     ) -> Reply:
         """Do one operation, repeated while the camera is busy.
 
@@ -224,7 +224,7 @@ class Session:
         self._under_way = transaction_id
         self._link.send(command(operation, transaction_id, params), data, doing)
         incoming: bytes | None = None
-        for _ in range(MOST_STALE):
+        for _ in range(MAX_STALE):
             container = self._link.receive(doing, timeouts.answer_s, most_bytes)
             if container.kind is Kind.EVENT or container.transaction_id != transaction_id:
                 continue  # left over from a program that died, or out of order
@@ -241,6 +241,6 @@ class Session:
             incoming = container.payload
         raise MalformedError(
             f"{doing}: expected an answer to transaction {transaction_id}, the camera sent "
-            f"{MOST_STALE} containers of others",
+            f"{MAX_STALE} containers of others",
             encode(container),
         )

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
 from labrig.acquire.protocol import ProtocolModel
-from labrig.acquire.registered import load_driver
+from labrig.acquire.registry import load_driver
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import CAMERA, ROLES, Device
@@ -20,7 +20,7 @@ from labrig.record import PERSON, ActionRecord, FrameRecord
 from labrig.yaml_file import validate
 
 #: Largest number of steps: more than any run has, and laid out in about a second.
-MOST_STEPS = 50_000
+MAX_STEPS = 50_000
 
 T = TypeVar("T")
 
@@ -136,7 +136,7 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
     ------
     ProtocolError
         If a device is missing, a setting is not offered, a frame does not fit before the next
-        action, or there are more than `MOST_STEPS` steps.
+        action, or there are more than `MAX_STEPS` steps.
 
     Examples
     --------
@@ -232,9 +232,9 @@ class _PlanRecorder:
                 f"'{previous.action}' is not over; leave more time between frames (every:) or "
                 "expose for less"
             )
-        if len(self.steps) == MOST_STEPS:
+        if len(self.steps) == MAX_STEPS:
             raise ProtocolError(
-                f"expected at most {MOST_STEPS} steps, got more in {self.unit}; ask for fewer "
+                f"expected at most {MAX_STEPS} steps, got more in {self.unit}; ask for fewer "
                 "repeats or frames"
             )
         self.steps.append(Step(at_s, self.unit, device, action))

@@ -16,7 +16,7 @@ from labrig.analyse.series_fit import fit_series
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State
-from labrig.record import FrameRole, charges_s, glow_temperature_c
+from labrig.record import FrameRole, charge_durations_s, glow_temperature_c
 from labrig.reduce import NoiseModel, reduce_patches, variance_terms
 from labrig.region import Region
 from labrig.results import DecayPatch, DecayResult, FittedDecay, FloatArray, NoiseBudget, Series
@@ -24,7 +24,7 @@ from labrig.results import DecayPatch, DecayResult, FittedDecay, FloatArray, Noi
 #: Terms of the photon-transfer line: constant, ∝ light, ∝ light².
 _TERMS = 3
 #: Least signal of a frame in σ for relative uncertainties.
-LEAST_SIGNAL = 1e-3
+MIN_SIGNAL = 1e-3
 
 
 def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
@@ -35,7 +35,7 @@ def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
     brightest = fit.brightest
     signal = fit.predict(series.t_s, series.exposure_s)[:, brightest] - fit.offset
     # Comparisons with an unknown σ are false.
-    rows = np.flatnonzero(series.usable & (signal > LEAST_SIGNAL * series.sigma[:, brightest]))
+    rows = np.flatnonzero(series.usable & (signal > MIN_SIGNAL * series.sigma[:, brightest]))
     if len(rows) <= _TERMS:
         return None
     fitted, signal = series.take(rows), signal[rows]
@@ -45,8 +45,8 @@ def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
     dark_sigma = np.nan_to_num(fitted.dark_sigma[brightest])
     return NoiseBudget(
         t_s=(fitted.t_s + fitted.exposure_s / 2)[first],
-        photons=parts[first, 1],
-        reading=parts[first, 0],
+        photon=parts[first, 1],
+        read=parts[first, 0],
         uneven=parts[first, 2],
         flicker=np.full(len(first), fit.flicker),
         dark_level=dark_sigma / signal[first],
@@ -98,8 +98,8 @@ def analyse(part: Part) -> DecayResult:
             for name, fit in fits.items()
         },
         background=background,
-        states_asked=states,
-        charges_s=charges_s(run),
+        states_requested=states,
+        charge_durations_s=charge_durations_s(run),
         temperature_c=temperature_c,
         warnings=(
             *timing_warnings(run),

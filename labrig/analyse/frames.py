@@ -44,7 +44,7 @@ def require_calibrated_camera(
 
 
 #: Most damaged frames that a message names.
-MOST_NAMED = 4
+MAX_NAMED = 4
 
 
 def require_intact(run: RunRecord, roles: Sequence[str], overrides: Overrides) -> None:
@@ -84,7 +84,7 @@ def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overr
 
 def _damage_text(damaged: Mapping[FrameRecord, str]) -> str:
     """Return a line that names damaged frames and the remedy."""
-    listed = list(damaged.items())[:MOST_NAMED]
+    listed = list(damaged.items())[:MAX_NAMED]
     remainder = (
         f" and {len(damaged) - len(listed)} more are damaged" if len(damaged) > len(listed) else ""
     )

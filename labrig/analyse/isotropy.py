@@ -13,9 +13,10 @@ from labrig.analyse.frames import (
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.errors import DataError
+from labrig.number_format import plus_minus
 from labrig.reduce import reduce_patches
 from labrig.results import (
-    PAPER_REACH,
+    PAPER_FLUCTUATION,
     AngularGlow,
     FloatArray,
     IsotropyResult,
@@ -23,7 +24,6 @@ from labrig.results import (
     Series,
     is_within_paper,
 )
-from labrig.written_numbers import plus_minus
 
 BEFORE, AFTER = "angle-before", "angle-after"
 
@@ -44,15 +44,15 @@ def analyse(part: Part) -> IsotropyResult:
     regions = part.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
-    around = protocol.patch == "around"
+    encloses_sample = protocol.patch == "around"
     angles_deg = {f"angle-{angle}": angle for angle in protocol.angles}
     patches = {
-        name: _angular_glow(patch_series, angles_deg, flicker, around)
+        name: _angular_glow(patch_series, angles_deg, flicker, encloses_sample)
         for name, patch_series in series.items()
     }
     return IsotropyResult(
         patches=patches,
-        around=around,
+        encloses_sample=encloses_sample,
         warnings=(
             *timing_warnings(run, protocol.role),
             *stray,
@@ -66,7 +66,7 @@ def analyse(part: Part) -> IsotropyResult:
 
 
 def _angular_glow(
-    series: Series, angles_deg: Mapping[str, int], flicker: float, around: bool
+    series: Series, angles_deg: Mapping[str, int], flicker: float, encloses_sample: bool
 ) -> AngularGlow:
     units = {view.unit[0]: view for view in series.by_unit()}
     if BEFORE not in units or AFTER not in units or not angles_deg.keys() & units.keys():
@@ -86,7 +86,7 @@ def _angular_glow(
         log_ratio -= fraction * np.log(drift)
         sigma = np.hypot(sigma, np.hypot(fraction * drift_sigma, abs(drift - 1) / np.sqrt(12)))
         ratio = float(np.exp(log_ratio))
-        if around:
+        if encloses_sample:
             ratio /= float(np.cos(np.radians(angles_deg[unit])))
         views.append((angles_deg[unit], ratio, ratio * sigma))
     angle_deg, ratios, sigmas = zip(*sorted(views), strict=True)
@@ -144,7 +144,7 @@ def _warnings(glow: AngularGlow) -> Iterator[str]:
         yield (
             f"the emission is not isotropic: at {glow.worst_angle_deg}° it is "
             f"{plus_minus(glow.worst.value, glow.worst.sigma)} of the straight view (the paper's "
-            f"samples stay within {PAPER_REACH:.0%}); the model takes it for the same in all "
+            f"samples stay within {PAPER_FLUCTUATION:.0%}); the model takes it for the same in all "
             "directions. Does the patch still lie inside of the turned sample?"
         )
     if not is_within_paper(glow.drift):

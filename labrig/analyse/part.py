@@ -70,7 +70,7 @@ class Inputs:
         found: FileT | None = getattr(self, kind.name, None) or self.others.get(kind.name)
         return found
 
-    def with_those_of(self, result: RunResult) -> Self:
+    def updated_by(self, result: RunResult) -> Self:
         """Return these inputs updated by a result; mappings by patch keep the other patches."""
         provided: dict[str, Any] = {
             name: {**getattr(self, name, {}), **value} if isinstance(value, Mapping) else value

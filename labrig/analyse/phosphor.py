@@ -34,7 +34,7 @@ def analyse(part: Part) -> PhosphorResult:
             continue
         parts[link.name] = result
         warnings += [f"{link.name}: {warning}" for warning in result.warnings]
-        inputs = inputs.with_those_of(result)
+        inputs = inputs.updated_by(result)
     if not parts:
         raise next(iter(failures.values()))
     return PhosphorResult(

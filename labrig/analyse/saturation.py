@@ -28,8 +28,9 @@ from labrig.errors import DataError, FitError
 from labrig.fit import EPSILON, least_squares
 from labrig.fit.decay import exponential_means_and_slopes
 from labrig.material import exponential_means
+from labrig.number_format import plus_minus
 from labrig.protocols.saturation import Light, WeakerLight
-from labrig.record import FrameRole, RunRecord, charges_s
+from labrig.record import FrameRole, RunRecord, charge_durations_s
 from labrig.reduce import reduce_patches
 from labrig.results import (
     ChargeLevel,
@@ -42,7 +43,6 @@ from labrig.results import (
     SaturationResult,
     Series,
 )
-from labrig.written_numbers import plus_minus
 
 #: Range of lights κ in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
 FAINTEST, STRONGEST = 1e-4, 1e4
@@ -62,7 +62,7 @@ def charge_level(
     fraction: float,
     fraction_sigma: float,
     k_per_s: float,
-    charges_s: tuple[float, float],
+    charge_durations_s: tuple[float, float],
 ) -> ChargeLevel:
     """Return the level of a state under the full light.
 
@@ -74,22 +74,24 @@ def charge_level(
         Weaker light over the full one, q, and its relative standard uncertainty.
     k_per_s
         Rate of the state in 1/s.
-    charges_s
+    charge_durations_s
         Duration of the charges under the weaker and under the full light in seconds.
     """
-    r = _level(ratio, fraction, k_per_s, charges_s)
-    by_ratio = (_level(ratio * (1 + STEP), fraction, k_per_s, charges_s) - r) / STEP
-    by_fraction = (_level(ratio, fraction * (1 + STEP), k_per_s, charges_s) - r) / STEP
+    r = _level(ratio, fraction, k_per_s, charge_durations_s)
+    by_ratio = (_level(ratio * (1 + STEP), fraction, k_per_s, charge_durations_s) - r) / STEP
+    by_fraction = (_level(ratio, fraction * (1 + STEP), k_per_s, charge_durations_s) - r) / STEP
     sigma = np.hypot(by_ratio * ratio_sigma / ratio, by_fraction * fraction_sigma)
     # At an end of the range, where nothing changes any more, the σ is that just inside.
     least = ratio_sigma / ratio * fraction / (1 - fraction)
     return ChargeLevel(r, float(max(sigma, least)))
 
 
-def _level(ratio: float, fraction: float, k_per_s: float, charges_s: tuple[float, float]) -> float:
+def _level(
+    ratio: float, fraction: float, k_per_s: float, charge_durations_s: tuple[float, float]
+) -> float:
     def excess(log_kappa: float) -> float:
         kappa = float(np.exp(log_kappa))
-        weaker, full = charges_s
+        weaker, full = charge_durations_s
         return charged(fraction * kappa, k_per_s, weaker) / charged(kappa, k_per_s, full) - ratio
 
     low, high = np.log(FAINTEST * k_per_s), np.log(STRONGEST * k_per_s)
@@ -97,7 +99,7 @@ def _level(ratio: float, fraction: float, k_per_s: float, charges_s: tuple[float
         return 0.0
     if excess(high) <= 0:
         return 1.0
-    return charged(float(np.exp(brentq(excess, low, high))), k_per_s, charges_s[1])
+    return charged(float(np.exp(brentq(excess, low, high))), k_per_s, charge_durations_s[1])
 
 
 def curve(series: Series, fit: FittedDecay) -> Curve:
@@ -262,7 +264,7 @@ def _charges_s(run: RunRecord) -> dict[str, float]:
         for unit, attempt in run.completed().items()
         if any(frame.role == FrameRole.DECAY for frame in attempt.frames)
     ]
-    return dict(zip(units, charges_s(run), strict=True))
+    return dict(zip(units, charge_durations_s(run), strict=True))
 
 
 def _patch_saturation(
@@ -328,7 +330,7 @@ def _growths(before: Curve, last: Curve) -> Iterator[Measured]:
 
 
 def _warnings(patch: PatchSaturation) -> Iterator[str]:
-    if patch.in_time == "not saturated":
+    if patch.time_saturation == "not saturated":
         yield (
             "the glow still grows at the longest charge: charge for longer before decays whose "
             "amplitudes are to be compared"

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from labrig.errors import FitError, UsageError
 from labrig.fit import DecayFit, fit_decay
 from labrig.quantity import FRACTION, parse
-from labrig.results import Series, joined, read_series
+from labrig.results import Series, join_series, read_series
 
 #: Least counts in a Poisson weight, since fewer would weigh a point too much.
-LEAST_COUNTS = 5.0
+MIN_COUNTS = 5.0
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
 TYPICAL_FLICKER = 0.007
@@ -166,7 +166,7 @@ def fit_table(
         part = series.take(rows)
         part = replace(part, t_s=part.t_s - origin_s)
         if weights == "counts":
-            part = replace(part, sigma=np.sqrt(np.maximum(part.values, LEAST_COUNTS)))
+            part = replace(part, sigma=np.sqrt(np.maximum(part.values, MIN_COUNTS)))
         # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
         without_sigma = flicker == "auto" and np.isnan(part.sigma).all()
         fits.append(
@@ -180,7 +180,7 @@ def _join_regions(parts: Sequence[Series]) -> list[Series]:
     regions: dict[str, list[Series]] = {}
     for part in parts:
         regions.setdefault(part.region, []).append(part)
-    return [joined(same) for same in regions.values()]
+    return [join_series(same) for same in regions.values()]
 
 
 def _parse_sigma(text: str) -> float:

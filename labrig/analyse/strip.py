@@ -71,7 +71,7 @@ Found = TypeVar("Found")
 Slices = dict[str, Region]
 
 #: Fewest rows of colour-filter cells of a patch: a single one does not determine the noise.
-LEAST_CELLS = 2
+MIN_CELLS = 2
 
 
 @dataclass(frozen=True)
@@ -173,13 +173,13 @@ def _patch_slices(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) ->
         slices[name] = (left, first, width, last - first)
     rows = [round((y + h) * raw.height) - round(y * raw.height) for _, y, _, h in slices.values()]
     ends = [round(end[0] * raw.width) for end in (strip.left, strip.right)]
-    if min(rows) >= LEAST_CELLS * raw.cfa_side and x <= ends[0] and x + wide >= ends[1]:
+    if min(rows) >= MIN_CELLS * raw.cfa_side and x <= ends[0] and x + wide >= ends[1]:
         return slices
     upper = min(y for _, y, _, _ in strip_slices.values()) * raw.height
     lower = max(y + h for _, y, _, h in strip_slices.values()) * raw.height
     problem = (
         f"expected patch {patch.name} below the filter from end to end, in "
-        f"{LEAST_CELLS * raw.cfa_side} rows or more of its own: the filter lies in columns "
+        f"{MIN_CELLS * raw.cfa_side} rows or more of its own: the filter lies in columns "
         f"{ends[0]} to {ends[1]} and rows {upper:.0f} to {lower:.0f}, the patch in columns {x} to "
         f"{x + wide} and rows {y} to {y + high} ({max(min(rows), 0)} in common)"
     )

@@ -17,7 +17,7 @@ from labrig.yaml_file import read_yaml
 DIFFERENT_P = 0.01
 NO_GAIN = Measured(1.0, 0.0)
 #: Smallest p-value that is reported as a number.
-LEAST_P = 1e-9
+MIN_P = 1e-9
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class PatchComparison:
         if math.isnan(self.p_value):
             return "cannot be told: the uncertainties are not known"
         agree = "differ" if self.p_value < DIFFERENT_P else "agree"
-        p = f"p = {self.p_value:.2g}" if self.p_value >= LEAST_P else f"p < {LEAST_P:g}"
+        p = f"p = {self.p_value:.2g}" if self.p_value >= MIN_P else f"p < {MIN_P:g}"
         return f"the rates {agree} ({p})"
 
 
@@ -87,7 +87,7 @@ class Comparison:
 
     Attributes
     ----------
-    asked
+    protocol_differences
         Keys of the protocol that differ, each with both values.
     patches
         Comparisons of the patches fitted in both runs.
@@ -95,7 +95,7 @@ class Comparison:
         Patches fitted in only one of the runs.
     """
 
-    asked: tuple[tuple[str, Any, Any], ...]
+    protocol_differences: tuple[tuple[str, Any, Any], ...]
     patches: tuple[PatchComparison, ...]
     missing: tuple[str, ...]
 
@@ -149,7 +149,7 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
         for name in shared
     }
     return Comparison(
-        asked=tuple(
+        protocol_differences=tuple(
             (key, *values)
             for key, *values in _differing(*protocols)
             # listed in `missing`

@@ -12,7 +12,7 @@ from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
 
 #: Largest number of characters of a file name in a message.
-MOST_SHOWN = 200
+MAX_SHOWN = 200
 #: Surrogates, to which Python decodes bytes of an argument that are not UTF-8.
 _NO_TEXT = re.compile("[\ud800-\udfff]")
 
@@ -79,7 +79,7 @@ def _run(arguments: Sequence[str]) -> int:
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
-        name = str(error.filename or "disk")[:MOST_SHOWN]
+        name = str(error.filename or "disk")[:MAX_SHOWN]
         kind = UsageError if error.errno == errno.ENAMETOOLONG else DiskError
         return _print_error(f"{name}: {error.strerror or error}", kind.exit_code)
     except Exception as error:

@@ -77,7 +77,7 @@ def _print_prediction(prediction: "Prediction", duration_s: float) -> None:
             console.print(f"! {line}", style="yellow")
         if any(remedy.helps for remedy in prediction.remedies):
             console.print(_remedies(prediction, patch, duration_s))
-    useless = [remedy.change.says for remedy in prediction.remedies if not remedy.helps]
+    useless = [remedy.change.description for remedy in prediction.remedies if not remedy.helps]
     if useless:
         console.print(f"no help: {', '.join(useless)}")
     for line in prediction.warnings:
@@ -134,9 +134,9 @@ def _doubts(prediction: "Prediction", patch: str) -> list[str]:
             remedy for remedy in prediction.remedies if remedy.patches[patch].resolves_all_states
         ]
         cheapest = min(sufficient, key=lambda remedy: remedy.extra_time_s, default=None)
-        would = f"'{cheapest.change.says}' would" if cheapest else "nothing below is enough"
+        would = f"'{cheapest.change.description}' would" if cheapest else "nothing below is enough"
         doubts.append(
-            f"the fit will not resolve these {len(predicted.k_r_per_s)} states apart for sure: it "
+            f"the fit may not resolve these {len(predicted.k_r_per_s)} states: it "
             f"sees all of them with a chance of {100 * predicted.chance_of_all_states:.0f} %, and "
             f"their rates {predicted.least_apart:.1f} σ from each other; {would}"
         )
@@ -169,7 +169,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
             continue
         after = remedy.patches[patch]
         table.add_row(
-            remedy.change.says,
+            remedy.change.description,
             *(
                 _percent(sigma / rate)
                 for sigma, rate in zip(after.k_r_sigma_per_s, after.k_r_per_s, strict=True)

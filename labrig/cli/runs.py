@@ -164,9 +164,9 @@ def _print_comparison(comparison: "Comparison") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from labrig.written_numbers import plus_minus
+    from labrig.number_format import plus_minus
 
-    for key, value_a, value_b in comparison.asked:
+    for key, value_a, value_b in comparison.protocol_differences:
         typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
     if comparison.missing:
         typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
@@ -219,7 +219,7 @@ def _result_folders(folder: Path) -> list[str]:
 
 
 def _rates(patch: str, result: "FittedDecay") -> str:
-    from labrig.written_numbers import plus_minus
+    from labrig.number_format import plus_minus
 
     rates = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates)
     return f"{patch}: {rates}" if patch else rates

@@ -102,14 +102,14 @@ class Viewing:
         White point X, Y, Z with Y = 1, shape (3,).
     normalisation
         Normalisation of the photographs, see `Normalisation`.
-    words
+    description
         Description of the conversion for people.
     """
 
     to_xyz: FloatArray
     white: FloatArray
     normalisation: Normalisation
-    words: str
+    description: str
 
 
 def viewing(
@@ -155,7 +155,7 @@ def viewing(
         to_xyz=to_xyz,
         white=white_xyz(white, observer(CIE_1931)),
         normalisation="each" if each else "all",
-        words=(
+        description=(
             f"CIELAB with white {white} of the CIE 1931 2° observer; {source}; {factor} just "
             "reaches the white in X, Y or Z; the predictions have the same factor."
         ),

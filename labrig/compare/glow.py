@@ -11,7 +11,7 @@ from labrig.compare.nalbach2017 import DELTA_E, emission
 from labrig.errors import DataError, UsageError
 from labrig.material import Material, phi1
 from labrig.optics import CameraResponse, Spectrum
-from labrig.report import Table, middles_s
+from labrig.report import Table, exposure_middles_s
 from labrig.results import Series
 
 
@@ -82,7 +82,7 @@ RGB = ("R", "G", "B")
 #: Number of random draws of the photographs' noise.
 DRAWS = 64
 #: Signal-to-noise ratio from which a photograph has a colour.
-LEAST_FOR_COLOUR = 5.0
+MIN_FOR_COLOUR = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ def compare_glow(
     unit = np.array(series.unit)
     return GlowComparison(
         patch=series.region,
-        t_s=middles_s(series),
+        t_s=exposure_middles_s(series),
         first=unit == unit[0],
         seen=has_colour,
         photographed=scale * xyz,
@@ -189,7 +189,7 @@ def _has_colour(series: Series) -> NDArray[np.bool_]:
     """Whether each photograph is bright enough to have a colour, shape (n,); true without a σ."""
     with np.errstate(invalid="ignore"):
         signal_to_noise = np.linalg.norm(series.values / series.sigma, axis=1)
-    return np.asarray(~(signal_to_noise < LEAST_FOR_COLOUR))
+    return np.asarray(~(signal_to_noise < MIN_FOR_COLOUR))
 
 
 def _scale(series: Series, xyz: FloatArray, viewing: Viewing) -> FloatArray:
@@ -238,7 +238,7 @@ def glow_table(glows: Sequence[GlowComparison]) -> Table:
         rows=tuple(rows),
         caption="CIEDE2000 of photographed and predicted glow, mean over all times and, in "
         "brackets, the largest; noise: the mean that the photographs' noise alone makes. "
-        f"Photographs that stand out of their noise by less than {LEAST_FOR_COLOUR:g} σ are left "
+        f"Photographs that stand out of their noise by less than {MIN_FOR_COLOUR:g} σ are left "
         "out. The paper does not say which white and normalisation its figures belong to.",
     )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from labrig import colour_science
 from labrig.compare.colorimetry import FloatArray
 from labrig.compare.glow import GlowComparison
+from labrig.number_format import rounded
 from labrig.report import (
     EDGE_PT,
     FONT_PT,
@@ -22,7 +23,6 @@ from labrig.report import (
     into_gamut,
     new_figure,
 )
-from labrig.written_numbers import rounded
 
 #: Number of photographs side by side, and exponent of their spacing, dense at early times.
 COLUMNS = 9

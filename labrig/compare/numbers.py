@@ -32,7 +32,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
     """
     plain: dict[str, Any] = _plain(
         {
-            "words": comparison.words,
+            "words": comparison.description,
             "camera": comparison.camera.name if comparison.camera else None,
             "white": comparison.white,
             "left_out": list(comparison.left_out),
@@ -75,7 +75,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
                     ],
                     "notes": list(materials.notes),
                 }
-                for materials in comparison.beside
+                for materials in comparison.material_comparisons
             ],
             "spectra": {
                 spectrum.name: {

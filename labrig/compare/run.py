@@ -28,7 +28,7 @@ from labrig.optics import CameraResponse
 from labrig.results import (
     Series,
     find_fitted_decays,
-    joined,
+    join_series,
     read_fitted_decay,
     read_result,
     read_series,
@@ -91,7 +91,7 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
 
 def _read_patch(folder: Path, name: str | None, chain_folder: Path) -> MeasuredPatch:
     fit = read_fitted_decay(folder / "fit.json")
-    series = joined(read_series(folder / "series.csv"))
+    series = join_series(read_series(folder / "series.csv"))
     if fit.channels != series.channels:
         raise DataError(
             f"{folder}: expected fit.json and series.csv of the same channels, got "
@@ -124,13 +124,13 @@ class RunComparison:
         Spectral responses of the camera; None if they are not known.
     white
         CIE illuminant that is the white of CIELAB.
-    words
+    description
         Description of white, normalisation and source of the predicted colours.
     glows
         Photographed and predicted glow of each patch.
     residuals
         Residuals of each patch and weighting.
-    beside
+    material_comparisons
         Comparisons of measured with reference materials.
     spectra
         Emission spectra in three channels, each with its resolution: those of the patches where
@@ -141,10 +141,10 @@ class RunComparison:
 
     camera: CameraResponse | None
     white: str
-    words: str
+    description: str
     glows: tuple[GlowComparison, ...]
     residuals: tuple[Residuals, ...]
-    beside: tuple[MaterialComparison, ...]
+    material_comparisons: tuple[MaterialComparison, ...]
     spectra: tuple[tuple[ThreeChannels, str], ...]
     left_out: tuple[str, ...]
 
@@ -228,12 +228,15 @@ def compare_run(
     return RunComparison(
         camera=curves,
         white=white,
-        words=" ".join(
-            [conversion.words, *_curves_source(list(patches.values()), curves, bool(references))]
+        description=" ".join(
+            [
+                conversion.description,
+                *_curves_source(list(patches.values()), curves, bool(references)),
+            ]
         ),
         glows=tuple(glows),
         residuals=tuple(ratios),
-        beside=tuple(
+        material_comparisons=tuple(
             compare_materials(patches[name].material, reference)
             for name, reference in references.items()
         ),

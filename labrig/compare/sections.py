@@ -50,11 +50,13 @@ def _sections(comparison: RunComparison) -> Iterator[Section]:
             "Photographed and predicted glow; the brightest photograph just fills the screen. "
             "Numbers are CIEDE2000 to the photograph above; a dash: too dim to have a colour.",
         )
-        yield Section("Glow, photographed and predicted", (comparison.words,), (picture,), (table,))
+        yield Section(
+            "Glow, photographed and predicted", (comparison.description,), (picture,), (table,)
+        )
     if comparison.residuals:
         table = residuals_table(comparison.residuals)
         yield Section("Improvement by further states", tables=(table,))
-    for materials in comparison.beside:
+    for materials in comparison.material_comparisons:
         yield Section(
             f"Measured: {materials.names[0]}; reference: {materials.names[1]}",
             tables=(comparison_table(materials),),

@@ -21,7 +21,7 @@ from labrig.report import (
     css_colour,
     into_gamut,
     legend_above,
-    lined,
+    line_entry,
     new_figure,
     place,
 )
@@ -88,7 +88,10 @@ def spectra_figure(results: Sequence[ThreeChannels]) -> Figure:
     figure.text(0.5, EDGE_PT / height, "Wavelength / nm", ha="center", va="bottom", color=INK)
     legend_above(
         figure,
-        [lined("spectrum", INK), lined("best sum of three CIE 2015 functions", MUTED, DASHED)],
+        [
+            line_entry("spectrum", INK),
+            line_entry("best sum of three CIE 2015 functions", MUTED, DASHED),
+        ],
         columns=2,
     )
     return figure

@@ -16,9 +16,9 @@ from labrig.results import (
     PhosphorResult,
     RunResult,
     Series,
-    leaves,
+    field_unit,
+    iter_values,
     read_result,
-    unit_of,
 )
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _nodes(result: RunResult) -> "dict[str, Dataset]":
     if isinstance(result, DecayResult):
         return {"/": _decay(result, {})}
     variables: dict[str, dict[str, Column]] = {"/": {}}
-    for path, value in leaves(result):
+    for path, value in iter_values(result):
         *inner, name = (key.replace("/", "_") for key in path)
         if path != ("warnings",):
             place = "/" + "/".join(inner)
@@ -150,7 +150,7 @@ def _columns(dimension: str, name: str, value: Any) -> dict[str, Column]:
     if array.dtype.kind not in "iufbU" or not array.size:
         return {}
     dimensions = tuple(f"{dimension}_{axis}" for axis in range(array.ndim))
-    units = unit_of(name)
+    units = field_unit(name)
     return {name: (dimensions, array, {"units": units} if units else {})}
 
 

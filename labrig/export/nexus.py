@@ -27,8 +27,8 @@ from labrig.results import (
     PhosphorResult,
     RunResult,
     Series,
-    leaves,
-    unit_of,
+    field_unit,
+    iter_values,
 )
 
 TEXT = h5py.string_dtype()
@@ -87,7 +87,7 @@ def add_fields(entry: h5py.Group, result: RunResult, name: str, version: str) ->
     process = add_group(entry, valid, "NXprocess")
     add_text(process, "program", "labrig")
     add_text(process, "version", version)
-    for path, value in leaves(result):
+    for path, value in iter_values(result):
         group = process
         *groups, last = _valid_path("result", *path)
         for group_name in groups:
@@ -119,7 +119,7 @@ def _add(group: h5py.Group, name: str, field: str, value: Any) -> None:
     except ValueError:
         numbers = np.asarray(None)
     if numbers.dtype.kind in "iuf":
-        add_number(group, name, numbers, unit_of(field))
+        add_number(group, name, numbers, field_unit(field))
     elif numbers.dtype.kind == "b":
         add_number(group, name, numbers.astype(np.int8))
     elif isinstance(value, tuple | list):

@@ -61,7 +61,7 @@ class Sources:
             `MATERIAL`, or `PATCH=MATERIAL` for each patch.
         like
             Folder of an earlier run on the same bench.
-        metered
+        classify_ladder
             Exposure time of the first frame, such as `0.5 s`.
         response
             Spectral responses of the rig's camera.

@@ -78,7 +78,7 @@ def brightness_metered_as(
 
     Parameters
     ----------
-    metered
+    classify_ladder
         Protocol with `exposure: auto`.
     offers
         Settings that the camera offers.
@@ -89,7 +89,7 @@ def brightness_metered_as(
         dimmer in proportion.
     """
     reached_s = min(exposure_s, metered.longest_exposure_s(offers))
-    metered_bench = bench.seen_with(metered.camera)
+    metered_bench = bench.at_settings(metered.camera)
     low, high = np.log(DIMMEST), np.log(BRIGHTEST)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2

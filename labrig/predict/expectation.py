@@ -52,10 +52,10 @@ class Bench:
     flicker: float
     glows: Mapping[str, Glow]
 
-    def seen_with(self, settings: CameraSettings) -> "Bench":
+    def at_settings(self, settings: CameraSettings) -> "Bench":
         """Return the bench at a protocol's camera settings."""
         glows = {
-            patch: glow.seen_at(settings.iso, settings.f_number)
+            patch: glow.at_settings(settings.iso, settings.f_number)
             for patch, glow in self.glows.items()
         }
         return Bench(self.camera.at_iso(settings.iso), self.flicker, glows)
@@ -97,7 +97,7 @@ def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
     ProtocolError
         If too few frames of a patch remain that do not clip.
     """
-    bench = bench.seen_with(protocol.camera)
+    bench = bench.at_settings(protocol.camera)
     warnings: list[str] = []
     schedule = expected_schedule(protocol, offers, bench, warnings.append)
     series, clipped = {}, {}

@@ -12,7 +12,7 @@ from labrig.material import Material, State
 from labrig.optics import CHANNELS, CameraResponse
 
 #: Largest number of states that a fit resolves; a file with more approximates a power law.
-MOST_STATES = 3
+MAX_STATES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Glow:
     iso: float
     f_number: float | None
 
-    def seen_at(self, iso: float, f_number: float | None) -> "Glow":
+    def at_settings(self, iso: float, f_number: float | None) -> "Glow":
         """Return the glow at other camera settings; an unknown aperture is taken as unchanged."""
         light = 1.0
         if self.f_number is not None and f_number is not None:
@@ -65,9 +65,9 @@ def check_states(material: Material) -> None:
         If it has more states than a fit can resolve, or two with the same rate.
     """
     rates = sorted((state.k_r_per_s for state in material.states), reverse=True)
-    if len(rates) > MOST_STATES:
+    if len(rates) > MAX_STATES:
         raise UsageError(
-            f"{material.name}: expected at most {MOST_STATES} states, got {len(rates)}; no decay "
+            f"{material.name}: expected at most {MAX_STATES} states, got {len(rates)}; no decay "
             "tells so many apart (such a list stands for a power law, which has no rates to "
             "predict)"
         )

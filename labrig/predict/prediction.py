@@ -60,7 +60,7 @@ class Prediction:
             "decays": self.decays,
             "remedies": [
                 {
-                    "change": remedy.change.says,
+                    "change": remedy.change.description,
                     "keys": remedy.change.keys,
                     "gain": remedy.gain,
                     "extra_time_s": remedy.extra_time_s,
@@ -121,7 +121,7 @@ def predict(
     >>> patch = prediction.patches["sample"]
     >>> f"k_r = {patch.k_r_per_s[0]} ± {patch.k_r_sigma_per_s[0]:.0e} 1/s"
     'k_r = 0.032 ± 6e-05 1/s'
-    >>> prediction.remedies[0].change.says
+    >>> prediction.remedies[0].change.description
     'for: 3 min'
     """
     decay = predictable(protocol)

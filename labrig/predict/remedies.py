@@ -17,7 +17,7 @@ HELPS = 0.95
 #: Ratio that counts as half: dark frames are shared, so that 4 decays fall just short of it.
 HALF = 0.52
 #: Largest number of combined changes, and fraction of the lab time up to which one is cheap.
-MOST_TOGETHER = 3
+MAX_TOGETHER = 3
 CHEAP = 0.1
 
 
@@ -71,9 +71,11 @@ class Trials:
         ]
         single.sort(key=lambda remedy: remedy.gain)
         cheap = [remedy for remedy in single if remedy.extra_time_s <= CHEAP * self.duration_s]
-        by_name = {remedy.change.says: remedy for remedy in (*single, *self._combined(cheap))}
+        by_name = {
+            remedy.change.description: remedy for remedy in (*single, *self._combined(cheap))
+        }
         if not any(remedy.halves for remedy in by_name.values()):
-            by_name |= {remedy.change.says: remedy for remedy in self._combined(single)}
+            by_name |= {remedy.change.description: remedy for remedy in self._combined(single)}
         return tuple(sorted(by_name.values(), key=lambda remedy: remedy.gain))
 
     def remedy(self, change: Change) -> Remedy | None:
@@ -98,7 +100,7 @@ class Trials:
             return []
         combined, n_changes = helpful[0], 1
         for remedy in helpful[1:]:
-            if combined.halves or n_changes == MOST_TOGETHER:
+            if combined.halves or n_changes == MAX_TOGETHER:
                 break
             if remedy.change.contradicts(combined.change):
                 continue

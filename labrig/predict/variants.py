@@ -22,17 +22,17 @@ class Change:
 
     Attributes
     ----------
-    says
+    description
         Description of the change.
     keys
         Keys with their values, as in the protocol file.
     """
 
-    says: str
+    description: str
     keys: Keys
 
     def __and__(self, other: "Change") -> "Change":
-        return Change(f"{self.says}, {other.says}", _merged(self.keys, other.keys))
+        return Change(f"{self.description}, {other.description}", _merged(self.keys, other.keys))
 
     def contradicts(self, other: "Change") -> bool:
         """Whether both changes set the same key."""

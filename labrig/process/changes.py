@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from labrig.errors import DataError, UsageError
+from labrig.number_format import plus_minus, rounded
 from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
-from labrig.written_numbers import plus_minus, rounded
 from labrig.yaml_file import read_yaml
 
 #: Fraction of σ below which the change of a parameter, or of its σ, is not reported.

@@ -168,7 +168,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
     inputs = Inputs.of(rig)
     result: RunResult = analyse(Part(run, protocol, rig, overrides, inputs))
-    lvf = inputs.with_those_of(result).lvf
+    lvf = inputs.updated_by(result).lvf
     camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
     warnings = (*result.warnings, *unknown_camera, *temperature_warnings(run, protocol.rate_frames))
     result = replace(result, warnings=warnings)

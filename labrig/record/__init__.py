@@ -17,7 +17,7 @@ from labrig.record.history import (
     DeviceLine,
     RunDescription,
     TemperatureHistory,
-    charges_s,
+    charge_durations_s,
     degrees_text,
     frames_in_roles,
     glow_temperature_c,
@@ -34,8 +34,8 @@ from labrig.record.journal import (
     read_notes,
     write_durably,
 )
-from labrig.record.reading import Attempt, RunRecord, read_run
 from labrig.record.run_folder import RunFolder
+from labrig.record.run_record import Attempt, RunRecord, read_run
 
 __all__ = [
     "KNOWN_FOR_S",
@@ -57,7 +57,7 @@ __all__ = [
     "TemperatureHistory",
     "TemperatureRecord",
     "add_note",
-    "charges_s",
+    "charge_durations_s",
     "degrees_text",
     "frames_in_roles",
     "glow_temperature_c",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.record.frames import FrameRecord, FrameRole
-from labrig.record.reading import Attempt, RunRecord
+from labrig.record.run_record import Attempt, RunRecord
 
 FloatArray = NDArray[np.float64]
 
@@ -199,7 +199,7 @@ class Interruption:
     reason: str
 
 
-def charges_s(run: RunRecord) -> tuple[float, ...]:
+def charge_durations_s(run: RunRecord) -> tuple[float, ...]:
     """Return how long the lamp charged the sample before each recorded decay.
 
     The lamp is taken to switch in the middle of the transaction with its relay. Interruptions of
@@ -218,8 +218,8 @@ def charges_s(run: RunRecord) -> tuple[float, ...]:
     Examples
     --------
     >>> import labrig
-    >>> from labrig.record import charges_s
-    >>> [round(charge_s, 1) for charge_s in charges_s(labrig.read_run("runs/decay"))]
+    >>> from labrig.record import charge_durations_s
+    >>> [round(charge_s, 1) for charge_s in charge_durations_s(labrig.read_run("runs/decay"))]
     [600.0]
     """
     return tuple(

@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from labrig.errors import DiskError, UsageError
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, REAL_DISK, Disk, Journal, sync_folder, write_durably
-from labrig.record.reading import RunRecord, run_record
+from labrig.record.run_record import RunRecord, run_record
 
 #: File by which a run folder is recognised.
 PROTOCOL = "protocol.yaml"

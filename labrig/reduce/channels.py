@@ -11,7 +11,7 @@ from labrig.errors import DataError, FrameError
 from labrig.reduce.noise import TILE, Floats, Mosaic, PlaneNoise, plane_noise
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
 from labrig.reduce.raw import RawFrame
-from labrig.reduce.saturation import counted, is_clipped
+from labrig.reduce.saturation import count_levels, is_clipped
 from labrig.region import Region, region_pixels
 
 Indices: TypeAlias = npt.NDArray[np.intp]
@@ -112,7 +112,7 @@ def _median_of_neighbours(window: Mosaic, y: Indices, x: Indices, side: int) -> 
 PixelMask: TypeAlias = npt.NDArray[np.bool_]
 
 #: Side of the surroundings, in pixels of each position, from which noise is estimated.
-_LEAST_WINDOW = 2 * TILE
+_MIN_WINDOW = 2 * TILE
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +237,7 @@ def _count_region(
             slice(x + (column - x) % side, x + width, side),
         )
         plane = np.ascontiguousarray(raw.mosaic[slices])
-        level, pixels = counted(plane, None if hot is None else hot[slices])
+        level, pixels = count_levels(plane, None if hot is None else hot[slices])
         count = pixels.astype(np.float64)
         position = side * row + column
         planes.append(
@@ -255,7 +255,7 @@ def _count_region(
 
 def _grow(start: int, length: int, limit: int, side: int) -> tuple[int, int]:
     """Grow a side of a region about its middle to the length that noise needs, inside the frame."""
-    window_length = min(max(length, _LEAST_WINDOW * side), limit)
+    window_length = min(max(length, _MIN_WINDOW * side), limit)
     return min(max(start - (window_length - length) // 2, 0), limit - window_length), window_length
 
 

@@ -134,14 +134,14 @@ class LinearFrame:
             (4, len(value), len(self.raw.channels))
         )
         for plane in self._planes(area):
-            rows, counted = (plane.slices[0], plane.channel), kept[plane.slices]
-            value_sum[rows] += value[plane.slices].sum(axis=1, where=counted)
-            variance_sum[rows] += variance[plane.slices].sum(axis=1, where=counted)
-            pixels[rows] += counted.sum(axis=1)
-            saturated_pixels[rows] += (saturated[plane.slices] & counted).sum(axis=1)
+            rows, count_levels = (plane.slices[0], plane.channel), kept[plane.slices]
+            value_sum[rows] += value[plane.slices].sum(axis=1, where=count_levels)
+            variance_sum[rows] += variance[plane.slices].sum(axis=1, where=count_levels)
+            pixels[rows] += count_levels.sum(axis=1)
+            saturated_pixels[rows] += (saturated[plane.slices] & count_levels).sum(axis=1)
         return RegionSums(value_sum, variance_sum, pixels, saturated_pixels)
 
-    def of_region(self, region: Region) -> RegionSums:
+    def region_sums(self, region: Region) -> RegionSums:
         """Return the sums of each channel in a region, in fractions of the frame."""
         return self.sums(region_pixels(region, self.raw.width, self.raw.height))
 

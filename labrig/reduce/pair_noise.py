@@ -35,11 +35,11 @@ FEWEST_DOF = 50
 #: their structure is within the noise.
 SCALED_SIGMAS = 5.0
 #: Least fraction of the σ by a frame alone: frames without noise are no measurement of it.
-LEAST_FRACTION = 0.1
+MIN_FRACTION = 0.1
 #: Iterations of the weights by the fitted noise.
 REWEIGHTINGS = 4
 #: Regularisation that keeps a correlation below 1.
-LEAST_PRODUCT = 1e-6
+MIN_PRODUCT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ class PatchFrames:
             self.exposure_s[rows], self.deviations[rows], self.light[rows], self.sigma[rows]
         )
 
-    def and_then(self, others: "PatchFrames") -> "PatchFrames":
+    def concatenate(self, others: "PatchFrames") -> "PatchFrames":
         """Return these frames followed by `others`."""
         return PatchFrames(
             np.append(self.exposure_s, others.exposure_s),
@@ -166,7 +166,7 @@ def paired_noise(
     """
     sigma = frames.sigma.copy()
     channels = sigma.shape[1]
-    products = LEAST_PRODUCT * np.eye(channels)
+    products = MIN_PRODUCT * np.eye(channels)
     for name in dict.fromkeys(unit):
         rows = np.array([row for row, row_unit in enumerate(unit) if row_unit == name])
         paired = np.flatnonzero(usable[rows])
@@ -178,7 +178,7 @@ def paired_noise(
         if name in darks:
             dark_pairs = darks[name].pairs_of_like_exposure()
             pairs += [(len(rows) + first, len(rows) + second) for first, second in dark_pairs]
-            part = part.and_then(darks[name])
+            part = part.concatenate(darks[name])
         first, second = np.array(pairs).T
         for channel in range(channels):
             sigma[rows, channel] = _sigma_of_means(part, channel, first, second)[: len(rows)]
@@ -242,7 +242,7 @@ def _sigma_of_means(
     terms = variance_terms(light)
     pair_terms = terms[second] + np.square(scale)[:, np.newaxis] * terms[first]
     variance = np.square(sigma)
-    least = LEAST_FRACTION**2 * variance
+    least = MIN_FRACTION**2 * variance
     for _ in range(REWEIGHTINGS):
         expected = variance[second] + np.square(scale) * variance[first]
         noise = NoiseModel.fit(pair_terms, scatter, sigma_dn2=expected)

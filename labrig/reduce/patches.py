@@ -87,7 +87,7 @@ def calibrated(
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
 TWO_DEGREES = 2 ** (2 / 6) - 1
 #: Largest correlation of the errors of different channels.
-MOST_COMMON = 0.99
+MAX_COMMON = 0.99
 #: Dark frames held in memory at once, to find hot pixels.
 _DARKS_FOR_HOT = 5
 
@@ -350,7 +350,7 @@ def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | N
         drift_fraction, drift_fraction
     )
     # A dark level known without noise would make the errors all one.
-    return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MOST_COMMON * correlation)
+    return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MAX_COMMON * correlation)
 
 
 def _frame_size(shot: MeasuredFrame) -> tuple[int, int]:

@@ -230,9 +230,9 @@ def _libraw_pattern(raw: Any) -> tuple[Letters, Floats]:
 
 
 #: Largest size of a RAW file in bytes.
-MOST_BYTES = 1_000_000_000
+MAX_BYTES = 1_000_000_000
 #: Fewest rows and columns of one position of the CFA from which noise can be estimated.
-_LEAST_PIXELS = 3
+_MIN_PIXELS = 3
 _EXPECTED = "expected a RAW file with one colour in every pixel"
 #: First bytes of RAW files: TIFF (most, NEF, ARW and DNG among them) and its variants of Olympus,
 #: Panasonic and Phase One; CIFF; Fujifilm; Minolta; Sigma.
@@ -281,7 +281,7 @@ class RawFrame:
                 f"{_EXPECTED}, in a square of R, G and B that repeats or without filters, got "
                 f"'{self.cfa}'; labrig cannot reduce this kind of sensor"
             )
-        least = _LEAST_PIXELS * self.cfa_side
+        least = _MIN_PIXELS * self.cfa_side
         if self.mosaic.ndim != 2 or min(self.mosaic.shape) < least:
             raise FrameError(
                 f"{_EXPECTED}, {least} x {least} or more, got an image of shape {self.mosaic.shape}"
@@ -357,7 +357,7 @@ def read_raw(source: str | Path | bytes, name: str = "the frame") -> RawFrame:
         content = source
     else:
         name = str(source)
-        content = read_bytes(Path(source), MOST_BYTES)
+        content = read_bytes(Path(source), MAX_BYTES)
     try:
         return _decode(content)
     except FrameError as error:

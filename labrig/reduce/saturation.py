@@ -14,7 +14,7 @@ from labrig.reduce.noise import Mosaic
 #: Pixels below which sorting them is faster than going through all levels.
 _FEW_PIXELS = 50_000
 #: OpenCV counts into 32-bit floats, which hold whole numbers up to this.
-_MOST_PIXELS = 2**24
+_MAX_PIXELS = 2**24
 
 
 def histogram(plane: Mosaic) -> npt.NDArray[np.int64]:
@@ -22,13 +22,13 @@ def histogram(plane: Mosaic) -> npt.NDArray[np.int64]:
     import cv2  # counts ten times as fast as NumPy
 
     counts = np.zeros(65536, np.int64)
-    for rows in np.array_split(plane, -(-plane.size // _MOST_PIXELS)):
+    for rows in np.array_split(plane, -(-plane.size // _MAX_PIXELS)):
         part = cv2.calcHist([np.ascontiguousarray(rows)], [0], None, [65536], [0, 65536])
         counts += np.asarray(part).ravel().astype(np.int64)
     return counts
 
 
-def counted(
+def count_levels(
     plane: Mosaic, left_out: npt.NDArray[np.bool_] | None
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Count the pixels at each level that occurs.
@@ -60,10 +60,10 @@ def counted(
 CLIPPED_FRACTION = 0.001
 
 #: Fraction of the range above black below which a plateau is not saturation.
-_LEAST_FULL = 0.5
+_MIN_FULL = 0.5
 #: Fraction of the frame's pixels, and number of pixels, that a plateau holds at least.
-_LEAST_FRACTION = 1e-4
-_LEAST_PIXELS = 50
+_MIN_FRACTION = 1e-4
+_MIN_PIXELS = 50
 #: Pixels of a plateau over those of any of the levels next below it.
 _STANDS_OUT = 10
 #: Number of these levels, of those that occur (compressed files leave levels out). A frame with
@@ -112,8 +112,8 @@ def clip_level(mosaic: Mosaic, black: float, white: float) -> float:
         Black and white level of the file in DN.
     """
     highest = int(mosaic.max())
-    lowest = black + _LEAST_FULL * (white - black)
-    least = max(_LEAST_FRACTION * mosaic.size, _LEAST_PIXELS)
+    lowest = black + _MIN_FULL * (white - black)
+    least = max(_MIN_FRACTION * mosaic.size, _MIN_PIXELS)
     if not lowest < highest < white or np.count_nonzero(mosaic == highest) < least:
         return white  # nearly every frame: the histogram would take ten times as long
     counts = histogram(mosaic)

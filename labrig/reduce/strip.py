@@ -24,16 +24,16 @@ FAINTEST = 3e-4
 #: Neighbourhood as a fraction of the frame's width, within which the strip's light may double.
 NEAR = 0.01
 #: Largest tilt: upright regions along the strip would mix too many wavelengths beyond it.
-MOST_TILT_DEGREES = 5.0
+MAX_TILT_DEGREES = 5.0
 #: Least ratio of a strip's length to its height, and least fraction of the frame that it fills.
-LEAST_ELONGATION = 2.0
-LEAST_FRACTION = 0.005
+MIN_ELONGATION = 2.0
+MIN_FRACTION = 0.005
 #: Range of the lit fraction of the rectangle; more than 1 is rounding.
 FULL = (0.9, 1.1)
 #: Margins at each long side and at each end, as fractions of the strip's height and length.
 LONG_MARGIN, END_MARGIN = 0.12, 0.01
 #: Least width of a slice in pixels: a cell of the colour filter.
-_LEAST_SLICE = 2
+_MIN_SLICE = 2
 #: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
 FLICKER = 0.005
 #: Relative independent error of a place: the sensor's pattern, dust.
@@ -117,19 +117,19 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
             "the frames are too short"
         )
     (middle_x, middle_y), across, down, angle = _rectangle(lit_mask)
-    if across * down < LEAST_FRACTION * width * height or across < LEAST_ELONGATION * down:
+    if across * down < MIN_FRACTION * width * height or across < MIN_ELONGATION * down:
         raise DataError(
             f"expected a long strip on a dark ground, found {across:.0f} x {down:.0f} pixels that "
             "are lit; keep other light away and the holder round the filter dark"
         )
-    if abs(angle) > MOST_TILT_DEGREES:
+    if abs(angle) > MAX_TILT_DEGREES:
         raise DataError(
             f"the strip is tilted by {angle:+.1f}° against the frame, at most "
-            f"{MOST_TILT_DEGREES:g}° are allowed; turn the filter or the camera"
+            f"{MAX_TILT_DEGREES:g}° are allowed; turn the filter or the camera"
         )
-    if across * (1 - 2 * END_MARGIN) < _LEAST_SLICE * SLICES:
+    if across * (1 - 2 * END_MARGIN) < _MIN_SLICE * SLICES:
         raise DataError(
-            f"the strip is {across:.0f} pixels long, {_LEAST_SLICE * SLICES} or more are needed "
+            f"the strip is {across:.0f} pixels long, {_MIN_SLICE * SLICES} or more are needed "
             f"for {SLICES} positions; move the camera nearer"
         )
     if not FULL[0] < np.count_nonzero(lit_mask) / (across * down) < FULL[1]:

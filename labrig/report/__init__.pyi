@@ -8,7 +8,7 @@ from .curve_sketch import (
     draw_curves as draw_curves,
 )
 from .decay_figures import (
-    middles_s as middles_s,
+    exposure_middles_s as exposure_middles_s,
 )
 from .figure_style import (
     DASHED as DASHED,
@@ -20,7 +20,7 @@ from .figure_style import (
     WIDTH_PT as WIDTH_PT,
     figure_style as figure_style,
     legend_above as legend_above,
-    lined as lined,
+    line_entry as line_entry,
     new_figure as new_figure,
     place as place,
 )
@@ -31,7 +31,7 @@ from .page import (
     Report as Report,
     write_report as write_report,
 )
-from .registered import (
+from .registry import (
     render as render,
 )
 from .run_sections import (

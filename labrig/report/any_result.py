@@ -5,17 +5,17 @@ from typing import Any
 import numpy as np
 
 from labrig.report.sections import Rendered, Section, Source, Table
-from labrig.results import RunResult, leaves
+from labrig.results import RunResult, iter_values
 
 #: Largest number of values that are shown; of longer arrays only the shape is shown.
-MOST_SHOWN = 12
+MAX_SHOWN = 12
 
 
 def render(result: RunResult, source: Source) -> Rendered:
     """Return a table of all fields of the result; names of nested fields are joined by dots."""
     rows = tuple(
         (".".join(path).replace("_", " "), _value_text(value))
-        for path, value in leaves(result)
+        for path, value in iter_values(result)
         if path != ("warnings",)
     )
     table = Table(("Quantity", "Value"), rows, "Value with its standard uncertainty (1 σ).")
@@ -26,11 +26,11 @@ def render(result: RunResult, source: Source) -> Rendered:
 def _value_text(value: Any) -> str:
     """Return a value of a result as text."""
     if isinstance(value, np.ndarray):
-        if value.size > MOST_SHOWN:
+        if value.size > MAX_SHOWN:
             return f"{' × '.join(map(str, value.shape))} numbers"
         return ", ".join(f"{number:.6g}" for number in value.ravel())
     if isinstance(value, tuple | list):
-        if len(value) > MOST_SHOWN:
+        if len(value) > MAX_SHOWN:
             return f"{len(value)} values"
         return ", ".join(map(_value_text, value)) or "none"
     if isinstance(value, float):

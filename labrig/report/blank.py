@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from labrig.calibration import BlankFile
+from labrig.number_format import plus_minus, rounded
 from labrig.report.figure_style import (
     DASHED,
     LEFT_PT,
@@ -16,15 +17,14 @@ from labrig.report.figure_style import (
     channel_colour,
     error_bars,
     legend_above,
-    lined,
-    marked,
+    line_entry,
+    marker_entry,
     new_figure,
     place,
     points,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import BlankResult
-from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 250.0
 
@@ -85,10 +85,10 @@ def _figure(result: BlankResult) -> Figure:
         colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
         error_bars(axes, stray.start_s, stray.rate[:, number], stray.sigma[:, number], colour)
         points(axes, stray.start_s, stray.rate[:, number], marker, colour, PAPER)
-        entries.append(marked(name, marker, colour, PAPER))
+        entries.append(marker_entry(name, marker, colour, PAPER))
     if file.first_clean_s is not None:
         axes.axvline(file.first_clean_s, color=MUTED, linewidth=1.0, linestyle=DASHED)
-        entries.append(lined("end of the transient", MUTED, DASHED))
+        entries.append(line_entry("end of the transient", MUTED, DASHED))
     axes.set_xlabel("Begin of the exposure after lamp off / s")
     axes.set_ylabel("Signal above background / (DN/s)")
     legend_above(figure, entries, columns=4)

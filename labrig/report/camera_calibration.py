@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from labrig.calibration import CameraFile, Linearity
+from labrig.number_format import exposure_text, plus_minus, rounded
 from labrig.optics import Factor
 from labrig.report.figure_style import (
     INK,
@@ -20,7 +21,7 @@ from labrig.report.figure_style import (
     channel_colour,
     error_bars,
     legend_above,
-    marked,
+    marker_entry,
     new_figure,
     place,
     points,
@@ -32,7 +33,6 @@ from labrig.results import (
     Measured,
     PhotonTransfer,
 )
-from labrig.written_numbers import exposure_text, plus_minus, rounded
 
 HEIGHT_PT = 230.0
 
@@ -87,7 +87,7 @@ def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
         variance = np.array([point.light_variance_dn2 for point in transfer.points]) - read**2
         points(axes, level, variance, marker, colour, PAPER)
         axes.plot(level, level / transfer.noise.gain_e_per_dn, color=colour, linewidth=1.0)
-        entries.append(marked(f"ISO {transfer.noise.iso:g}", marker, colour, PAPER))
+        entries.append(marker_entry(f"ISO {transfer.noise.iso:g}", marker, colour, PAPER))
     axes.set_xlabel("Level above dark / DN")
     axes.set_ylabel("Photon variance / DN²")
     legend_above(figure, entries, columns=6)
@@ -239,7 +239,7 @@ def _flat_figure(fitted: FittedFlat, channels: Sequence[str]) -> Figure:
         distance = np.sqrt(fitted.rho2[number])
         points(axes, distance, fitted.light[number], marker, colour, PAPER, size=2.6)
         axes.plot(rho, fitted.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
-        entries.append(marked(name, marker, colour, PAPER))
+        entries.append(marker_entry(name, marker, colour, PAPER))
     axes.set_xlabel("Distance from the middle / half the diagonal")
     axes.set_ylabel("Relative illumination")
     legend_above(figure, entries, columns=4)

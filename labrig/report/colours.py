@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import colour_science
+from labrig.number_format import rounded
 from labrig.optics import CameraResponse
 from labrig.results import Series
-from labrig.written_numbers import rounded
 
 FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -178,9 +178,9 @@ def css_colour(linear: FloatArray) -> str:
 
 
 #: Number of swatches that fit side by side on a desktop with a legible time below each.
-MOST_SWATCHES = 18
+MAX_SWATCHES = 18
 #: Signal-to-noise ratio below which no hue is shown.
-LEAST_FOR_HUE = 5.0
+MIN_FOR_HUE = 5.0
 _RGB = ("R", "G", "B")
 
 
@@ -198,7 +198,7 @@ class Swatch:
         CSS colour at full brightness; empty where noise hides it.
     measured
         Measured signals as text, such as `R 170, G 4200, B 7700 DN/s`.
-    fills
+    is_brightest
         Whether this is the brightest swatch, which just fills the display.
     """
 
@@ -206,7 +206,7 @@ class Swatch:
     glow: str
     hue: str
     measured: str
-    fills: bool
+    is_brightest: bool
 
 
 def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
@@ -218,13 +218,13 @@ def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
     if series.channels != _RGB or not len(rows):
         return ()
     rows = rows[np.argsort(series.t_s[rows], kind="stable")]
-    if len(rows) > MOST_SWATCHES:
-        rows = rows[np.rint(np.linspace(0, len(rows) - 1, MOST_SWATCHES)).astype(int)]
+    if len(rows) > MAX_SWATCHES:
+        rows = rows[np.rint(np.linspace(0, len(rows) - 1, MAX_SWATCHES)).astype(int)]
     values, sigma = series.values[rows], series.sigma[rows]
     linear = into_gamut(values @ screen.glow.T)
     signal_to_noise = np.sqrt(np.sum((values / sigma) ** 2, axis=1))
     # Without a known σ there is no reason to doubt.
-    visible = ~(signal_to_noise < LEAST_FOR_HUE) & (linear.max(axis=1) > 0)
+    visible = ~(signal_to_noise < MIN_FOR_HUE) & (linear.max(axis=1) > 0)
     linear[~visible] = 0.0
     brightest = linear.max(axis=1)
     full_scale = max(float(brightest.max()), 1e-12)
@@ -234,7 +234,7 @@ def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
             glow=css_colour(colour / full_scale),
             hue=css_colour(colour / peak) if is_visible else "",
             measured=_signals_text(series.values[row]),
-            fills=peak == full_scale,
+            is_brightest=peak == full_scale,
         )
         for row, colour, peak, is_visible in zip(rows, linear, brightest, visible, strict=True)
     )

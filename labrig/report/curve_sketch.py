@@ -15,7 +15,7 @@ from labrig.optics import (
 BARS = " ▁▂▃▄▅▆▇█"
 COLUMNS = 48
 #: Largest number of curves that are described; a catalogue has hundreds.
-MOST_CURVES = 12
+MAX_CURVES = 12
 PICTURES = (".png", ".svg", ".pdf")
 _COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 
@@ -36,9 +36,9 @@ def describe_curves(file: CurveFile) -> str:
 
     Examples
     --------
-    >>> from labrig.optics import read_sound_curves
+    >>> from labrig.optics import read_checked_curves
     >>> from labrig.report import describe_curves
-    >>> print(describe_curves(read_sound_curves("canon_eos_5d_mark_ii", ["G"])))
+    >>> print(describe_curves(read_checked_curves("canon_eos_5d_mark_ii", ["G"])))
     Canon EOS 5D Mark II: one curve (...canon_eos_5d_mark_ii.json)
       G  380-780 nm, step 5; 0.000163 to 1, highest at 520 nm
          |      ▁▁▁▁▂▃▅▆▇█████▇▇▆▅▄▃▂▁▁                   |
@@ -46,10 +46,10 @@ def describe_curves(file: CurveFile) -> str:
     curves = list(file.curves.items())
     count = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
     lines = [f"{file.title}: {count} ({file.path})"]
-    widest = max(len(name) for name, _ in curves[:MOST_CURVES])
-    lines += [_describe_curve(name.ljust(widest), curve) for name, curve in curves[:MOST_CURVES]]
-    if len(curves) > MOST_CURVES:
-        lines.append(f"and {len(curves) - MOST_CURVES} more; choose with --curve NAME")
+    widest = max(len(name) for name, _ in curves[:MAX_CURVES])
+    lines += [_describe_curve(name.ljust(widest), curve) for name, curve in curves[:MAX_CURVES]]
+    if len(curves) > MAX_CURVES:
+        lines.append(f"and {len(curves) - MAX_CURVES} more; choose with --curve NAME")
     return "\n".join(lines)
 
 
@@ -86,9 +86,9 @@ def draw_curves(file: CurveFile, path: Path) -> None:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.optics import read_sound_curves
+    >>> from labrig.optics import read_checked_curves
     >>> from labrig.report import draw_curves
-    >>> camera = read_sound_curves("canon_eos_5d_mark_ii")
+    >>> camera = read_checked_curves("canon_eos_5d_mark_ii")
     >>> draw_curves(camera, Path("camera.svg"))
     >>> draw_curves(camera, Path("camera.bmp"))
     Traceback (most recent call last):
@@ -106,7 +106,7 @@ def draw_curves(file: CurveFile, path: Path) -> None:
             low, high = curve.value - curve.sigma, curve.value + curve.sigma
             axes.fill_between(curve.wavelength_nm, low, high, color=line.get_color(), alpha=0.25)
     axes.set(xlabel="Wavelength / nm", title=file.title)
-    if 1 < len(file.curves) <= MOST_CURVES:
+    if 1 < len(file.curves) <= MAX_CURVES:
         axes.legend(frameon=False)
     try:
         figure.savefig(path, dpi=150)

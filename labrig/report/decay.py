@@ -30,9 +30,9 @@ from labrig.report.report_model import (
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.report.timing import (
     FrameTiming,
-    Lateness,
+    LatenessStatistics,
+    frame_lateness,
     frame_timings,
-    lateness,
 )
 from labrig.results import DecayPatch, DecayResult, FittedDecay, Series
 
@@ -213,7 +213,7 @@ class _Content:
     report: DecayReport
     patches: tuple[_Patch, ...]
     colours_known: bool
-    late: Lateness | None = None
+    late: LatenessStatistics | None = None
     patch: _Patch | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
@@ -230,9 +230,9 @@ def render(result: DecayResult, source: Source) -> Rendered:
         daylight=tuple(frame for frame in frames if frame.role == FrameRole.DAYLIGHT),
         glow=_glow(frames, first),
         camera=source.camera,
-        charges_s=result.charges_s,
+        charge_durations_s=result.charge_durations_s,
         background=result.background,
-        states=result.states_asked,
+        states=result.states_requested,
     )
     lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
     results, method_sections = decay_sections(report, source.anchor)
@@ -256,7 +256,7 @@ def decay_sections(
         _patch(number, patch, screen, anchor) for number, patch in enumerate(report.patches, 1)
     )
     timings = frame_timings(report.frames, report.patches)
-    late = lateness(timings)
+    late = frame_lateness(timings)
     content = _Content(report, patches, screen.known, late)
     sensor = sensor_of([photograph.frame for photograph in report.glow])
     results = (

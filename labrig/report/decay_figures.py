@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from labrig.fit.decay import exponential_means_and_slopes
+from labrig.number_format import power_of_ten, rounded
 from labrig.report.figure_style import (
     BAND_OPACITY,
     DASH_DOTTED,
@@ -26,21 +27,20 @@ from labrig.report.figure_style import (
     PAPER,
     SHADE,
     LineStyle,
+    band_entry,
     channel_colour,
     error_bars,
     legend_above,
-    lined,
+    line_entry,
     mark_decades,
-    marked,
+    marker_entry,
     new_figure,
     place,
     points,
-    shaded,
 )
 from labrig.report.report_model import PatchReport
 from labrig.report.timing import FrameTiming
 from labrig.results import FittedDecay, FloatArray, NoiseBudget, Series
-from labrig.written_numbers import power_of_ten, rounded
 
 #: Number of points of a fitted curve.
 POINTS = 160
@@ -72,7 +72,7 @@ class Curve:
     brightest: int
 
 
-def middles_s(series: Series) -> FloatArray:
+def exposure_middles_s(series: Series) -> FloatArray:
     """Return the middle of each exposure, where figures draw its value.
 
     Parameters
@@ -88,9 +88,9 @@ def middles_s(series: Series) -> FloatArray:
     Examples
     --------
     >>> import labrig
-    >>> from labrig.report import middles_s
+    >>> from labrig.report import exposure_middles_s
     >>> (series,) = labrig.read_series("series.csv")
-    >>> [f"{t_s:.2f}" for t_s in middles_s(series)[:4]]
+    >>> [f"{t_s:.2f}" for t_s in exposure_middles_s(series)[:4]]
     ['1.31', '6.31', '11.31', '16.31']
     """
     return series.t_s + series.exposure_s / 2
@@ -133,7 +133,7 @@ HEIGHT_PT = 256.0
 #: Lower end of a logarithmic axis as a fraction of the noise at the end of the decay.
 FRACTION_OF_NOISE = 0.5
 #: Largest number of decades of a logarithmic axis.
-MOST_DECADES = 6.0
+MAX_DECADES = 6.0
 #: Range of the highest value within which an axis needs no power of ten, in DN/s.
 PLAIN_FROM, PLAIN_TO = 0.02, 1e5
 #: Values excluded from the fit are shown up to this many times the highest fitted value.
@@ -168,7 +168,7 @@ def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Figure:
         below = series.values[:, number] < low
         if below.any():
             axes.plot(
-                middles_s(series)[below],
+                exposure_middles_s(series)[below],
                 np.full(np.count_nonzero(below), low),
                 linestyle="none",
                 marker=7,  # a caret that points down, its tip on the value
@@ -195,7 +195,7 @@ def log_axis_ends(series: Series) -> tuple[float, float]:
     late = np.argsort(series.t_s, kind="stable")[-max(1, len(series.t_s) // 4) :]
     noise = series.sigma[late][np.isfinite(series.sigma[late])]
     floor = FRACTION_OF_NOISE * float(np.median(noise)) if noise.size else 0.0
-    low = max(positive * 0.7, floor, highest * 10.0**-MOST_DECADES)
+    low = max(positive * 0.7, floor, highest * 10.0**-MAX_DECADES)
     return min(low, highest / 10), highest * 1.6
 
 
@@ -232,7 +232,7 @@ def _highest(series: Series) -> float:
 
 def _draw(axes: Axes, series: Series, fit: FittedDecay | None) -> None:
     """Draw the signals with ± 1 σ, and the fit with its band and its states."""
-    t_s, usable = middles_s(series), series.usable
+    t_s, usable = exposure_middles_s(series), series.usable
     for number, name in enumerate(series.channels):
         marker = MARKERS[number % len(MARKERS)]
         colour = channel_colour(name, number)
@@ -270,16 +270,16 @@ def _brightest_colour(fit: FittedDecay) -> str:
 def _legend(figure: Figure, series: Series, fit: FittedDecay | None) -> None:
     """Add the legend of channels, fit and states."""
     entries: list[Artist] = [
-        marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
+        marker_entry(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
         for number, name in enumerate(series.channels)
     ]
     if fit is not None:
         brightest = series.channels[fit.brightest]
-        entries += [lined("fit", MUTED), shaded("± 1 σ", _brightest_colour(fit))]
+        entries += [line_entry("fit", MUTED), band_entry("± 1 σ", _brightest_colour(fit))]
         if fit.n_states > 1:
-            entries.append(lined(f"each state, {brightest}", INK, DASHED, width=0.9))
+            entries.append(line_entry(f"each state, {brightest}", INK, DASHED, width=0.9))
     if not series.usable.all():
-        entries.append(marked("left out", "o", MUTED, PAPER))
+        entries.append(marker_entry("left out", "o", MUTED, PAPER))
     legend_above(figure, entries, columns=7)
 
 
@@ -335,7 +335,7 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     several = len(series.channels) > 1
     figure = new_figure(RESIDUALS_HEIGHT_PT if several else LOW_HEIGHT_PT)
     upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=30)
-    t_s, usable = middles_s(series), series.usable
+    t_s, usable = exposure_middles_s(series), series.usable
     last = float(t_s.max())
     upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
     upper.axhline(0, color=MUTED, linewidth=0.8)
@@ -376,19 +376,19 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
 def _residual_legend(figure: Figure, series: Series) -> None:
     """Add the legend of channels and common-mode deviations."""
     entries = [
-        marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
+        marker_entry(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
         for number, name in enumerate(series.channels)
     ]
     if len(series.channels) > 1:
-        entries.append(marked("in common", ".", INK))
+        entries.append(marker_entry("in common", ".", INK))
     if not series.usable.all():
-        entries.append(marked("left out", "o", MUTED, PAPER))
+        entries.append(marker_entry("left out", "o", MUTED, PAPER))
     legend_above(figure, entries, columns=7)
 
 
 NOISE_HEIGHT_PT = 268.0
 #: Parts of the noise that are nowhere above this fraction of the total σ are not drawn.
-LEAST_FRACTION = 0.03
+MIN_FRACTION = 0.03
 _LINES: dict[str, tuple[str, LineStyle]] = {
     "photon noise": (OTHER_CHANNELS[1], "-"),
     "read noise": (OTHER_CHANNELS[2], DASHED),
@@ -397,7 +397,7 @@ _LINES: dict[str, tuple[str, LineStyle]] = {
     "dark level": (MUTED, LONG_DASHED),
 }
 #: Upper end of the axis of relative σ in per cent.
-MOST_PERCENT = 300.0
+MAX_PERCENT = 300.0
 
 
 def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
@@ -406,13 +406,13 @@ def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
     Each is a standard uncertainty relative to the fitted signal, shape (n,).
     """
     parts = {
-        "photon noise": budget.photons,
-        "read noise": budget.reading,
+        "photon noise": budget.photon,
+        "read noise": budget.read,
         "uneven light": budget.uneven,
         "flicker": budget.flicker,
         "dark level": budget.dark_level,
     }
-    threshold = LEAST_FRACTION * budget.together
+    threshold = MIN_FRACTION * budget.total
     return {name: part for name, part in parts.items() if (part > threshold).any()}
 
 
@@ -420,19 +420,19 @@ def noise_figure(budget: NoiseBudget) -> Figure:
     """Draw the relative standard uncertainty of the brightest channel, and its components."""
     figure = new_figure(NOISE_HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
-    total = 100 * budget.together
+    total = 100 * budget.total
     axes.set_yscale("log")
     # Broad and pale, since the largest part is nearly as large.
-    entries: list[Artist] = [lined("together", INK, width=4.5, opacity=BAND_OPACITY)]
+    entries: list[Artist] = [line_entry("together", INK, width=4.5, opacity=BAND_OPACITY)]
     drawn_parts = [total]
     axes.plot(budget.t_s, total, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
     for name, part in visible_parts(budget).items():
         percent, (colour, style) = 100 * part, _LINES[name]
         axes.plot(budget.t_s, percent, color=colour, linewidth=1.2, linestyle=style)
-        entries.append(lined(name, colour, style))
-        drawn_parts.append(percent[percent > LEAST_FRACTION * total])
+        entries.append(line_entry(name, colour, style))
+        drawn_parts.append(percent[percent > MIN_FRACTION * total])
     low, high = min(part.min() for part in drawn_parts), max(part.max() for part in drawn_parts)
-    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MOST_PERCENT), total.min()))
+    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MAX_PERCENT), total.min()))
     mark_decades(axes)
     last = float(budget.t_s.max())
     axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
@@ -451,7 +451,7 @@ def overview_figures(patches: Sequence[PatchReport]) -> list[Callable[[], Figure
     """Return functions that draw a small logarithmic decay of each patch, all on the same axes."""
     ends = [log_axis_ends(patch.series) for patch in patches]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    last_s = max(float(middles_s(patch.series).max()) for patch in patches) or 1.0
+    last_s = max(float(exposure_middles_s(patch.series).max()) for patch in patches) or 1.0
     return [partial(_small_decay, patch, low, high, last_s) for patch in patches]
 
 
@@ -472,7 +472,7 @@ def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> 
     for number, name in enumerate(series.channels):
         colour = channel_colour(name, number)
         axes.plot(
-            middles_s(series)[series.usable],
+            exposure_middles_s(series)[series.usable],
             series.values[series.usable, number],
             linestyle="none",
             marker=MARKERS[number % len(MARKERS)],
@@ -497,7 +497,7 @@ def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
         unit_timings = [timing for timing in timings if timing.unit == unit]
         marker = MARKERS[number % len(MARKERS)]
         colour = INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
-        entries.append(marked(unit, marker, colour))
+        entries.append(marker_entry(unit, marker, colour))
         axes.plot(
             [timing.t_s for timing in unit_timings],
             [1e3 * timing.late_s for timing in unit_timings],

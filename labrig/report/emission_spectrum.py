@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from labrig.number_format import plus_minus, rounded
 from labrig.report.figure_style import (
     BAND_OPACITY,
     INK,
@@ -17,14 +18,14 @@ from labrig.report.figure_style import (
     MARKERS,
     MUTED,
     OTHER_CHANNELS,
+    band_entry,
     error_bars,
     legend_above,
-    lined,
-    marked,
+    line_entry,
+    marker_entry,
     new_figure,
     place,
     points,
-    shaded,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
@@ -34,7 +35,6 @@ from labrig.results import (
     PatchSpectrum,
     SpectralComparison,
 )
-from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 256.0
 WAVELENGTH_LABEL = "Wavelength / nm"
@@ -221,10 +221,10 @@ def spectrum_figure(
         Names of the spectrum and of the band in the legend.
     """
     figure, axes = _axes(f"{names[0]} (largest value 1)")
-    entries: list[Artist] = [lined(names[0], INK)]
+    entries: list[Artist] = [line_entry(names[0], INK)]
     if band is not None:
         axes.fill_between(nm, *band, color=INK, alpha=BAND_OPACITY, linewidth=0)
-        entries.append(shaded(names[1], INK))
+        entries.append(band_entry(names[1], INK))
     axes.plot(nm, value, color=INK, linewidth=1.4)
     axes.set_ylim(0, 1.05 * float(np.max(value if band is None else band[1])))
     legend_above(figure, entries, COLUMNS)
@@ -247,7 +247,7 @@ def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
         axes.plot(nm, value, color=colour, linewidth=0.9)
         error_bars(axes, shifted_nm, value, sigma, colour)
         points(axes, shifted_nm, value, marker, colour, colour, size=3.0)
-        entries.append(marked(name, marker, colour))
+        entries.append(marker_entry(name, marker, colour))
     axes.set_ylim(0, None)
     legend_above(figure, entries, COLUMNS)
     return figure

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from labrig.number_format import plus_minus, rounded
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,
@@ -17,8 +18,8 @@ from labrig.report.figure_style import (
     RULE,
     error_bars,
     legend_above,
-    lined,
-    marked,
+    line_entry,
+    marker_entry,
     new_figure,
     place,
     points,
@@ -33,7 +34,6 @@ from labrig.results import (
     PatchExcitation,
     spans_decades,
 )
-from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 270.0
 #: Number of positions along the filter whose charging is drawn.
@@ -188,7 +188,9 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
         axes.plot(x[~detected], limits, linestyle="none", marker=7, markersize=6, color=colour)
         for at_nm, limit in zip(x[~detected], limits, strict=True):
             axes.plot([at_nm, at_nm], [0, limit], color=colour, linewidth=0.9, alpha=0.5)
-        entries.append(marked(f"state {number + 1}, k_r {state.k_r_per_s:.3g} s⁻¹", marker, colour))
+        entries.append(
+            marker_entry(f"state {number + 1}, k_r {state.k_r_per_s:.3g} s⁻¹", marker, colour)
+        )
     axes.set_ylim(0, None)
     axes.set_xlabel("Excitation wavelength / nm")
     axes.set_ylabel("k_e / 10⁻³ s⁻¹")
@@ -229,13 +231,13 @@ def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: Fl
         error_bars(axes, x, y, series.sigma[rows, site, channel], colour)
         points(axes, x, y, MARKERS[number], colour, colour, 4.2)
         axes.plot(x, fitted[rows, site, channel], color=colour, linewidth=1.0)
-        entries.append(marked(f"{position_nm[site]:.0f} nm", MARKERS[number], colour))
+        entries.append(marker_entry(f"{position_nm[site]:.0f} nm", MARKERS[number], colour))
     times_s = sorted({float(f"{time:.2g}") for time in charge_s})
     axes.set_xticks(times_s, [rounded(time, 2) for time in times_s])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel("Charge / s")
     axes.set_ylabel("First photograph / (DN/s)")
-    legend_above(figure, [*entries, lined("fit", MUTED)], columns=6)
+    legend_above(figure, [*entries, line_entry("fit", MUTED)], columns=6)
     return figure
 
 
@@ -300,5 +302,7 @@ def closure_figure(closure: Closure) -> Figure:
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
     lower.set_ylabel("Deviation / %")
     lower.set_xlabel("Charge / s")
-    legend_above(figure, [marked("measured", "o", INK), lined("predicted", MUTED)], columns=2)
+    legend_above(
+        figure, [marker_entry("measured", "o", INK), line_entry("predicted", MUTED)], columns=2
+    )
     return figure

@@ -7,20 +7,20 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from labrig.calibration import Change, FadeFile, Warming
+from labrig.number_format import plus_minus, rounded
 from labrig.report.figure_style import (
     CHANNEL,
     INK,
     LEFT_PT,
     OTHER_CHANNELS,
     legend_above,
-    lined,
+    line_entry,
     new_figure,
     place,
     points,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import FadeResult, LampChange, WarmingLight
-from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 250.0
 #: Colours of the bands that are drawn, from blue to red.
@@ -93,7 +93,7 @@ def _fractions(file: FadeFile, table: Change) -> Figure:
             color=colour, alpha=0.3, linewidth=0,
         )  # fmt: skip
         axes.plot(time_ms, fraction[:, band], color=colour, linewidth=1.2)
-        entries.append(lined(f"{low:g}–{high:g} nm", colour))
+        entries.append(line_entry(f"{low:g}–{high:g} nm", colour))
     axes.set_xlabel("Time after the switch / ms")
     axes.set_ylabel("Light / steady light")
     legend_above(figure, entries, columns=3)

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from labrig.written_numbers import power_of_ten
+from labrig.number_format import power_of_ten
 
 FloatArray = NDArray[np.float64]
 
@@ -229,10 +229,11 @@ def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> Non
 
     Examples
     --------
-    >>> from labrig.report import DASHED, figure_style, legend_above, lined, new_figure
+    >>> from labrig.report import DASHED, figure_style, legend_above, line_entry, new_figure
     >>> with figure_style():
     ...     figure = new_figure(200)
-    ...     legend_above(figure, [lined("fit", "black"), lined("state", "black", DASHED)], 2)
+    ...     entries = [line_entry("fit", "black"), line_entry("state", "black", DASHED)]
+    ...     legend_above(figure, entries, 2)
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['fit', 'state']
     """
@@ -252,7 +253,7 @@ def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> Non
     )
 
 
-def marked(label: str, marker: str, colour: str, face: str | None = None) -> Line2D:
+def marker_entry(label: str, marker: str, colour: str, face: str | None = None) -> Line2D:
     """Return the legend entry of points."""
     return Line2D(
         [],
@@ -266,7 +267,7 @@ def marked(label: str, marker: str, colour: str, face: str | None = None) -> Lin
     )
 
 
-def lined(
+def line_entry(
     label: str, colour: str, style: LineStyle = "-", width: float = 1.2, opacity: float = 1.0
 ) -> Line2D:
     """Return the legend entry of a curve.
@@ -291,8 +292,8 @@ def lined(
 
     Examples
     --------
-    >>> from labrig.report import INK, lined, legend_above, new_figure
-    >>> entry = lined("predicted", INK)
+    >>> from labrig.report import INK, line_entry, legend_above, new_figure
+    >>> entry = line_entry("predicted", INK)
     >>> legend_above(new_figure(200), [entry], columns=1)
     >>> entry.get_label()
     'predicted'
@@ -300,7 +301,7 @@ def lined(
     return Line2D([], [], color=colour, ls=style, linewidth=width, alpha=opacity, label=label)
 
 
-def shaded(label: str, colour: str) -> Patch:
+def band_entry(label: str, colour: str) -> Patch:
     """Return the legend entry of a band."""
     return Patch(color=colour, alpha=BAND_OPACITY, linewidth=0, label=label)
 

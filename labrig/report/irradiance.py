@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from labrig.calibration import IrradianceFile
+from labrig.number_format import plus_minus, rounded
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,
@@ -15,14 +16,13 @@ from labrig.report.figure_style import (
     SHADE,
     error_bars,
     legend_above,
-    lined,
+    line_entry,
     new_figure,
     place,
     points,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import IrradianceResult
-from labrig.written_numbers import plus_minus, rounded
 
 
 def render(result: IrradianceResult, source: Source) -> Rendered:
@@ -80,7 +80,7 @@ def _irradiance_figure(file: IrradianceFile) -> Figure:
         drawn = through[:, band] > 0.02 * through[:, band].max()
         error_bars(axes, position[drawn], through[drawn, band], sigma[drawn, band], colour)
         axes.plot(position[drawn], through[drawn, band], color=colour, linewidth=1.0)
-        entries.append(lined(f"{low:.0f}–{high:.0f} nm", colour))
+        entries.append(line_entry(f"{low:.0f}–{high:.0f} nm", colour))
     axes.set_ylim(0, None)
     axes.set_xlabel("Position from blue end to red end")
     axes.set_ylabel("Irradiance E")

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
+from labrig.number_format import plus_minus
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,
@@ -14,20 +15,19 @@ from labrig.report.figure_style import (
     MUTED,
     OTHER_CHANNELS,
     SHADE,
+    band_entry,
     error_bars,
     legend_above,
-    marked,
+    marker_entry,
     new_figure,
     place,
     points,
-    shaded,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
-from labrig.results import PAPER_REACH, AngularGlow, IsotropyResult, is_within_paper
-from labrig.written_numbers import plus_minus
+from labrig.results import PAPER_FLUCTUATION, AngularGlow, IsotropyResult, is_within_paper
 
 #: Least half height of the figure, as a multiple of the fluctuation of the paper's samples.
-LEAST_REACH = 1.5
+MIN_REACH = 1.5
 
 
 def render(result: IsotropyResult, source: Source) -> Rendered:
@@ -47,7 +47,7 @@ def _line(glow: AngularGlow) -> str:
         f"isotropy: within {abs(worst.value - 1):.1%} of the straight view up to "
         f"{glow.angle_deg.max()}° (at {glow.worst_angle_deg}°: "
         f"{plus_minus(worst.value, worst.sigma)}; the paper's samples: less than "
-        f"{PAPER_REACH:.0%})"
+        f"{PAPER_FLUCTUATION:.0%})"
     )
 
 
@@ -57,7 +57,7 @@ def _section(result: IsotropyResult) -> Section:
     geometry = (
         "The patches enclose the whole sample: what they show is its intensity, here divided by "
         "the cosine of the angle."
-        if result.around
+        if result.encloses_sample
         else "The patches lie inside of the sample: what they show is its radiance, which is the "
         "same at all angles if the emission is isotropic."
     )
@@ -66,7 +66,7 @@ def _section(result: IsotropyResult) -> Section:
     )
     caption = (
         "Glow at an angle relative to the straight view at the same time after lamp off; bars: "
-        f"1 σ; shaded: the {100 * PAPER_REACH:g} % that the paper's samples stay within."
+        f"1 σ; shaded: the {100 * PAPER_FLUCTUATION:g} % that the paper's samples stay within."
     )
     first = next(iter(patches.values()))
     rows = (
@@ -95,7 +95,7 @@ def _statement(name: str, glow: AngularGlow) -> str:
     return (
         f"{name}: the largest deviation is {worst.value - 1:+.1%} ± {worst.sigma:.1%} at "
         f"{glow.worst_angle_deg}°, {'no more' if is_within_paper(worst) else 'more'} than the "
-        f"paper's {PAPER_REACH:.0%}."
+        f"paper's {PAPER_FLUCTUATION:.0%}."
     )
 
 
@@ -103,17 +103,17 @@ def _figure(patches: Mapping[str, AngularGlow]) -> Figure:
     """Draw the glow over the angle, relative to the straight view."""
     figure = new_figure(220.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
-    axes.axhspan(1 - PAPER_REACH, 1 + PAPER_REACH, color=SHADE, zorder=0)
+    axes.axhspan(1 - PAPER_FLUCTUATION, 1 + PAPER_FLUCTUATION, color=SHADE, zorder=0)
     axes.axhline(1.0, color=MUTED, linewidth=0.9)
-    entries: list[Artist] = [shaded(f"paper: ± {100 * PAPER_REACH:g} %", MUTED)]
-    reach = LEAST_REACH * PAPER_REACH
+    entries: list[Artist] = [band_entry(f"paper: ± {100 * PAPER_FLUCTUATION:g} %", MUTED)]
+    reach = MIN_REACH * PAPER_FLUCTUATION
     for number, (name, glow) in enumerate(patches.items()):
         colour = (INK, *OTHER_CHANNELS)[number % (1 + len(OTHER_CHANNELS))]
         marker = MARKERS[number % len(MARKERS)]
         angle_deg = glow.angle_deg.astype(float)
         error_bars(axes, angle_deg, glow.ratio, glow.ratio_sigma, colour)
         points(axes, angle_deg, glow.ratio, marker, colour, colour)
-        entries.append(marked(name, marker, colour))
+        entries.append(marker_entry(name, marker, colour))
         reach = max(reach, 1.2 * float(np.max(np.abs(glow.ratio - 1) + glow.ratio_sigma)))
     axes.set_ylim(1 - reach, 1 + reach)
     axes.set_xlabel("Angle / °")

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from labrig.calibration import LVF_KIND, LvfFile
+from labrig.number_format import plus_minus, rounded
 from labrig.optics import CameraResponse, WavelengthMap
 from labrig.report.figure_style import (
     DASHED,
@@ -16,14 +17,13 @@ from labrig.report.figure_style import (
     channel_colour,
     error_bars,
     legend_above,
-    lined,
+    line_entry,
     new_figure,
     place,
     points,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import CameraCurves, FloatArray, LocatedLines, LvfCalibrationResult, StripLines
-from labrig.written_numbers import plus_minus, rounded
 
 _WAVELENGTH = "Wavelength / nm"
 #: Number of positions in the table; the file has all positions.
@@ -62,7 +62,7 @@ def _stripes_text(result: LvfCalibrationResult) -> str:
     """Return the statement on the shift of the strip between card and glow."""
     if result.stripes is None:
         sigma = rounded(result.placed.sigma_nm, 2)
-        return f"its place as on the card ± {sigma} nm ({result.why_no_stripes})"
+        return f"its place as on the card ± {sigma} nm ({result.no_stripes_reason})"
     shift = plus_minus(result.stripes.shift_nm, result.stripes.sigma_nm)
     return f"its glow is {shift} nm from where the card was lit"
 
@@ -189,7 +189,7 @@ def _profile_figure(strip_lines: StripLines, wavelengths: WavelengthMap) -> Figu
     axes.set_xlim(float(nm.min()), float(nm.max()))
     axes.set_xlabel(_WAVELENGTH)
     axes.set_ylabel("Light / brightest")
-    entries = [lined(name, channel_colour(name, number)) for number, name in enumerate(names)]
+    entries = [line_entry(name, channel_colour(name, number)) for number, name in enumerate(names)]
     legend_above(figure, entries, columns=4)
     return figure
 
@@ -205,7 +205,7 @@ def _line_residual_figure(residuals: dict[str, tuple[LocatedLines, FloatArray]])
         nm_per_position = abs(float(np.polyfit(lines.position, lines.wavelength_nm, 1)[0]))
         error_bars(axes, lines.wavelength_nm, residual_nm, lines.sigma * nm_per_position, colour)
         points(axes, lines.wavelength_nm, residual_nm, "o", colour, colour)
-        entries.append(lined(name, colour))
+        entries.append(line_entry(name, colour))
     axes.set_xlabel(_WAVELENGTH)
     axes.set_ylabel("Map − line / nm")
     legend_above(figure, entries, columns=2)
@@ -271,7 +271,7 @@ def _camera_figure(original: CameraCurves, fitted: CameraResponse) -> Figure:
             linestyle=DASHED,
         )
         axes.plot(fitted.wavelength_nm, fitted.sensitivity[:, number], color=colour, linewidth=1.2)
-        entries.append(lined(name, colour))
+        entries.append(line_entry(name, colour))
     axes.set_ylim(0, None)
     axes.set_xlabel(_WAVELENGTH)
     axes.set_ylabel("Sensitivity")

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from labrig.material import Material, MaterialComparison, State
+from labrig.number_format import plus_minus, rounded
 from labrig.report.sections import Table
-from labrig.written_numbers import plus_minus, rounded
 
 UNKNOWN = "–"
 

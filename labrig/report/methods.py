@@ -7,20 +7,22 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.errors import UsageError
+from labrig.number_format import exposure_text, rounded
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord, FrameRole
 from labrig.region import region_pixels
 from labrig.report.photographs import Sensor
 from labrig.report.report_model import DecayReport
-from labrig.report.timing import ON_TIME_S, Lateness
+from labrig.report.timing import ON_TIME_S, LatenessStatistics
 from labrig.results import FittedDecay
-from labrig.written_numbers import exposure_text, rounded
 
 #: Relative difference below which durations and exposures are given as one value.
 ALIKE = 0.02
 
 
-def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Iterator[str]:
+def recording(
+    report: DecayReport, sensor: Sensor | None, late: LatenessStatistics | None
+) -> Iterator[str]:
     """Yield the sentences on the measurement, from the charge to the values."""
     how = "simulated" if report.about.simulated else "measured"
     yield f"The decay of the phosphorescence of {report.about.title} was {how} with labrig."
@@ -37,12 +39,12 @@ def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None)
 
 def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
     """Yield the sentence on the charge."""
-    if not report.charges_s:
+    if not report.charge_durations_s:
         return
     repeats = len({frame.unit for frame in decays})
     sample = "samples were" if len(report.patches) > 1 else "sample was"
     before = f"Before each of {repeats} decays the {sample}" if repeats > 1 else f"The {sample}"
-    yield f"{before} charged under the lamp for {_range(report.charges_s, duration_text)}."
+    yield f"{before} charged under the lamp for {_range(report.charge_durations_s, duration_text)}."
 
 
 def _frames(
@@ -63,7 +65,7 @@ def _frames(
     )
 
 
-def _punctuality(late: Lateness) -> str:
+def _punctuality(late: LatenessStatistics) -> str:
     """Return the sentence on the lateness of the exposures."""
     if abs(late.worst_s) < ON_TIME_S:
         return f"Every exposure began within {_ms(ON_TIME_S)} of its planned time."
@@ -223,7 +225,7 @@ class Methods:
         return "\n\n".join([self.recording, *fitted, self.analysis, "\n".join(references)])
 
 
-def methods(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Methods:
+def methods(report: DecayReport, sensor: Sensor | None, late: LatenessStatistics | None) -> Methods:
     """Return the methods section of a run.
 
     Parameters

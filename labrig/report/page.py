@@ -24,13 +24,13 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from labrig.errors import DiskError
+from labrig.number_format import plus_minus, rounded
 from labrig.optics import CameraResponse
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord, RunDescription
 from labrig.report import parameters
 from labrig.report.figure_style import VARIABLES, figure_style
 from labrig.report.sections import Section
-from labrig.written_numbers import plus_minus, rounded
 
 FOLDER, PDF = "figures", "figures.pdf"
 #: Fonts of the SVG files: the font of the figures, then fonts of the same width.
@@ -90,7 +90,7 @@ class FigureFiles:
     ) -> None:
         self._pdf.close()  # type: ignore[no-untyped-call]
 
-    def add(self, figure: Figure, name: str, described: str) -> FigureFile:
+    def add(self, figure: Figure, name: str, description: str) -> FigureFile:
         """Draw a figure and add it to the files.
 
         Parameters
@@ -99,7 +99,7 @@ class FigureFiles:
             Figure that is drawn; its background becomes white.
         name
             Name, unique in the report; it begins the name of the file and the ids of its elements.
-        described
+        description
             Description for screen readers.
         """
         name = _slug(name)
@@ -108,7 +108,7 @@ class FigureFiles:
         figure.patch.set(visible=True, facecolor="white")
         self._pdf.savefig(figure)  # type: ignore[no-untyped-call]
         return FigureFile(
-            element=Markup(_element(svg, figure, name, described)),
+            element=Markup(_element(svg, figure, name, description)),
             svg_link=f"{FOLDER}/{name}.svg",
             pdf_link=f"{FOLDER}/{PDF}#page={len(self._files)}",
         )
@@ -195,9 +195,9 @@ def environment() -> Environment:
         utc=_utc,
         state_rows=parameters.state_rows,
         quality_rows=parameters.quality_rows,
-        paper_rows=parameters.paper_rows,
+        reradiance_rows=parameters.reradiance_rows,
         candidate_rows=parameters.candidate_rows,
-        why_so_many_states=parameters.why_so_many_states,
+        n_states_reason=parameters.n_states_reason,
     )
     templates.filters["quoted"] = shlex.quote
     templates.filters["indexed"] = _indexed

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
+from labrig.number_format import plus_minus, rounded
 from labrig.results import FittedDecay
-from labrig.written_numbers import plus_minus, rounded
 
 #: Relative σ of a rate from which its reciprocal is given without σ.
 WORST_FOR_LIFETIME = 0.5
@@ -95,7 +95,7 @@ def quality_rows(fit: FittedDecay) -> list[Row]:
     return [*rows, Row("Reduced χ²", "", (chi2,))]
 
 
-def paper_rows(fit: FittedDecay) -> list[Row]:
+def reradiance_rows(fit: FittedDecay) -> list[Row]:
     """Return rows of Λᵢ = aᵢ/kᵢ in each channel, assuming that every state was full: rᵢ(0) = 1."""
     rows = []
     for name, weight, weight_sigma in zip(
@@ -142,7 +142,7 @@ def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
     return rows
 
 
-def why_so_many_states(fit: FittedDecay) -> str:
+def n_states_reason(fit: FittedDecay) -> str:
     """Return the reason for the number of states in a sentence or two."""
     candidates = {candidate.n_states: candidate for candidate in fit.candidates}
     chosen = candidates.get(fit.n_states)

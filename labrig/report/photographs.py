@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import LabrigError, UsageError
+from labrig.number_format import exposure_text, rounded
 from labrig.record import FrameRecord
 from labrig.reduce import (
     LinearFrame,
@@ -24,20 +25,19 @@ from labrig.reduce import (
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.report_model import GlowPhotograph, PatchReport
-from labrig.written_numbers import exposure_text, rounded
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
 #: Largest fraction of saturated pixels in a well exposed daylight photograph; for display only.
 CLIPPED_FRACTION = 0.002
 #: Fraction of saturated cells above which a pixel is shown as saturated; for display only.
-BLOWN_LOOKS = 0.5
+SATURATED_CELL_FRACTION = 0.5
 #: Quantile of the pixels that is shown at full brightness, so that hot pixels have no influence.
 BRIGHT_QUANTILE = 0.995
 #: Linear level to which this quantile is scaled in a daylight photograph.
 DAYLIGHT_BRIGHT = 0.8
 #: Largest factor of brightening; beyond it there is only noise.
-MOST_BRIGHTENED = 4096.0
+MAX_BRIGHTENED = 4096.0
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class GlowPicture:
         Brightened picture as data URI.
     brightened
         Factor of brightening as text.
-    blown
+    has_saturation
         Whether parts are saturated; they are shown white, since their colour is not known.
     """
 
@@ -124,7 +124,7 @@ class GlowPicture:
     source: str
     brightened_source: str
     brightened: str
-    blown: bool
+    has_saturation: bool
 
 
 def sensor_of(frames: Sequence[FrameRecord]) -> Sensor | None:
@@ -180,26 +180,26 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
         if raw is not None:
             picture = small(binned(raw), GLOW_WIDTH)
             saturated = small(saturated_cells(raw).astype(np.float32), GLOW_WIDTH)
-            blown = (saturated > BLOWN_LOOKS)[..., np.newaxis]
+            has_saturation = (saturated > SATURATED_CELL_FRACTION)[..., np.newaxis]
             exposure_factor = _exposure_factor(photograph.frame)
             linear = into_gamut(_to_screen(raw, picture / exposure_factor, screen.glow))
-            prepared.append((photograph, linear, blown))
+            prepared.append((photograph, linear, has_saturation))
     if not prepared:
         return ()
     levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in prepared]
     full_scale = max(*levels, 1e-9)
     pictures = []
-    for (photograph, linear, blown), level in zip(prepared, levels, strict=True):
-        factor = float(f"{min(full_scale / max(level, 1e-9), MOST_BRIGHTENED):.1e}")
+    for (photograph, linear, has_saturation), level in zip(prepared, levels, strict=True):
+        factor = float(f"{min(full_scale / max(level, 1e-9), MAX_BRIGHTENED):.1e}")
         pictures.append(
             GlowPicture(
                 t_s=photograph.t_s,
-                source=_data_uri(encoded(np.where(blown, 1.0, linear / full_scale))),
+                source=_data_uri(encoded(np.where(has_saturation, 1.0, linear / full_scale))),
                 brightened_source=_data_uri(
-                    encoded(np.where(blown, 1.0, linear * factor / full_scale))
+                    encoded(np.where(has_saturation, 1.0, linear * factor / full_scale))
                 ),
                 brightened=rounded(factor, 2),
-                blown=bool(blown.any()),
+                has_saturation=bool(has_saturation.any()),
             )
         )
     return tuple(pictures)

@@ -82,7 +82,7 @@ class DecayReport:
         About six photographs of the glow in one decay, by rising time.
     camera
         Spectral responses of the camera, for colours; None if not known.
-    charges_s
+    charge_durations_s
         Measured length of the charge before each decay in s.
     background
         Region whose level was subtracted from each frame; None if dark frames were subtracted.
@@ -96,6 +96,6 @@ class DecayReport:
     daylight: tuple[FrameRecord, ...] = ()
     glow: tuple[GlowPhotograph, ...] = ()
     camera: CameraResponse | None = None
-    charges_s: tuple[float, ...] = ()
+    charge_durations_s: tuple[float, ...] = ()
     background: Region | None = None
     states: int | None = None

@@ -28,7 +28,7 @@ HEIGHT_PT = 180.0
 #: Longest run in s whose time axis is in minutes; that of longer runs is in hours.
 LONGEST_IN_MINUTES_S = 3 * 3600.0
 #: Smallest span of the temperature axis in °C, so that the noise of a steady room looks small.
-LEAST_SPAN_C = 2.0
+MIN_SPAN_C = 2.0
 
 
 def temperature_figure(
@@ -56,7 +56,7 @@ def temperature_figure(
     points(axes, time_s / unit_s, celsius, "o", MUTED, MUTED, size=2.2)
     axes.plot(time_s / unit_s, smooth, color=INK, linewidth=1.2, zorder=4)
     middle = (float(celsius.min()) + float(celsius.max())) / 2
-    reach = max(float(np.ptp(celsius)) * 1.1, LEAST_SPAN_C) / 2
+    reach = max(float(np.ptp(celsius)) * 1.1, MIN_SPAN_C) / 2
     axes.set_ylim(middle - reach, middle + reach)
     axes.set_xlabel(f"Time since the run began / {unit}")
     axes.set_ylabel("Temperature / °C")

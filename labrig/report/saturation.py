@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
+from labrig.number_format import plus_minus, rounded
 from labrig.quantity import duration_text
 from labrig.report.figure_style import (
     DASHED,
@@ -17,9 +18,9 @@ from labrig.report.figure_style import (
     PAPER,
     error_bars,
     legend_above,
-    lined,
+    line_entry,
     mark_decades,
-    marked,
+    marker_entry,
     new_figure,
     place,
     points,
@@ -33,7 +34,6 @@ from labrig.results import (
     RatesTest,
     SaturationResult,
 )
-from labrig.written_numbers import plus_minus, rounded
 
 
 def render(result: SaturationResult, source: Source) -> Rendered:
@@ -60,7 +60,7 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
     shorter, longer = (duration_text(float(patch.charge_s[row])) for row in last)
     yield (
         f"from {shorter} to {longer} of charge the glow changes by {begin} at lamp off, {end} at "
-        f"the end of the decay: {patch.in_time}"
+        f"the end of the decay: {patch.time_saturation}"
     )
     states = zip(patch.levels, patch.rates.shared_per_s, strict=False)
     for number, (level, k_per_s) in enumerate(states, start=1):
@@ -152,7 +152,7 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
         rows = patch.rows(light)
         minutes = patch.charge_s[rows] / 60
         is_full = light == FULL_LIGHT
-        entries.append(lined(f"{light} light", MUTED, style))
+        entries.append(line_entry(f"{light} light", MUTED, style))
         for state in range(patch.rates.amplitude.shape[1]):
             colour, marker = _colour_and_marker(state)
             y, sigma = (
@@ -163,7 +163,7 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
             error_bars(axes, minutes, y, sigma, colour)
             points(axes, minutes, y, marker, colour, colour if is_full else PAPER)
             if is_full:
-                entries.append(marked(f"state {state + 1}", marker, colour))
+                entries.append(marker_entry(f"state {state + 1}", marker, colour))
     axes.set_xlim(0, None)
     axes.set_ylim(0, None)
     axes.set_xlabel("Charge / min")
@@ -185,7 +185,7 @@ def _decays_figure(patch: PatchSaturation) -> Figure:
         middle_s = curve.t_s + curve.exposure_s / 2
         points(upper, middle_s, curve.value / begin_signal, marker, colour, colour, size=3.0)
         points(lower, middle_s, patch.rates.residuals[number], marker, colour, colour, size=3.0)
-        entries.append(marked(name, marker, colour))
+        entries.append(marker_entry(name, marker, colour))
         smallest = float(np.min(curve.value[curve.value > 0], initial=np.inf))
         lowest = min(lowest, smallest / begin_signal)
     upper.set_ylim(max(lowest / 1.5, 1e-5), 1.5)

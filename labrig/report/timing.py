@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.number_format import rounded
 from labrig.record import ActionRecord, FrameRecord, FrameRole
 from labrig.report.report_model import PatchReport
-from labrig.written_numbers import rounded
 
 #: Devices and their actions between a charge and its first frame.
 MOVES = (("lamp", "off"), ("shield", "cover"), ("door", "open"))
@@ -40,7 +40,7 @@ class FrameTiming:
 
 
 @dataclass(frozen=True)
-class Lateness:
+class LatenessStatistics:
     """Statistics of the lateness of frames.
 
     Attributes
@@ -78,13 +78,13 @@ def frame_timings(
     )
 
 
-def lateness(timings: Sequence[FrameTiming]) -> Lateness | None:
+def frame_lateness(timings: Sequence[FrameTiming]) -> LatenessStatistics | None:
     """Return the statistics of the lateness; None without frames."""
     if not timings:
         return None
     late_s = np.array([timing.late_s for timing in timings])
     worst = max(timings, key=lambda timing: abs(timing.late_s))
-    return Lateness(
+    return LatenessStatistics(
         n_frames=len(timings),
         median_s=float(np.median(late_s)),
         p95_s=float(np.percentile(late_s, 95)),

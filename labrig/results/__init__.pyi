@@ -61,7 +61,7 @@ from .irradiance import (
     StripScale as StripScale,
 )
 from .isotropy import (
-    PAPER_REACH as PAPER_REACH,
+    PAPER_FLUCTUATION as PAPER_FLUCTUATION,
     AngularGlow as AngularGlow,
     IsotropyResult as IsotropyResult,
     is_within_paper as is_within_paper,
@@ -82,8 +82,8 @@ from .measured import (
     FloatArray as FloatArray,
     IntArray as IntArray,
     Measured as Measured,
-    leaves as leaves,
-    unit_of as unit_of,
+    field_unit as field_unit,
+    iter_values as iter_values,
     with_uncertainty as with_uncertainty,
 )
 from .phosphor import (
@@ -111,7 +111,7 @@ from .series import (
     write_series as write_series,
 )
 from .series_table import (
-    joined as joined,
+    join_series as join_series,
     parse_series as parse_series,
     read_series as read_series,
 )

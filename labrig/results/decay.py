@@ -23,7 +23,7 @@ class NoiseBudget:
     ----------
     t_s
         Middles of the exposures of the first decay in seconds after lamp-off, rising, shape (n,).
-    photons, reading, uneven
+    photon, read, uneven
         Photon noise, read noise, and the part that is proportional to the light but uneven over the
         patch, shape (n,). Their sum in quadrature is the series' σ.
     flicker
@@ -33,16 +33,16 @@ class NoiseBudget:
     """
 
     t_s: FloatArray
-    photons: FloatArray
-    reading: FloatArray
+    photon: FloatArray
+    read: FloatArray
     uneven: FloatArray
     flicker: FloatArray
     dark_level: FloatArray
 
     @property
-    def together(self) -> FloatArray:
+    def total(self) -> FloatArray:
         """Total relative standard uncertainty of one value, shape (n,)."""
-        parts = (self.photons, self.reading, self.uneven, self.flicker, self.dark_level)
+        parts = (self.photon, self.read, self.uneven, self.flicker, self.dark_level)
         return np.asarray(np.sqrt(np.square(parts).sum(axis=0)))
 
 
@@ -97,9 +97,9 @@ class DecayResult(RunResult):
         Decay of each patch by its name.
     background
         Region whose level was subtracted from each frame; None if dark frames served for that.
-    states_asked
+    states_requested
         Number of states that was requested; None if the data decided.
-    charges_s
+    charge_durations_s
         Measured duration of the charge before each decay in seconds.
     temperature_c
         Mean temperature over the photographs of the glow in °C; None if unknown.
@@ -115,8 +115,8 @@ class DecayResult(RunResult):
 
     patches: Mapping[str, DecayPatch]
     background: Region | None = None
-    states_asked: int | None = None
-    charges_s: tuple[float, ...] = ()
+    states_requested: int | None = None
+    charge_durations_s: tuple[float, ...] = ()
     temperature_c: float | None = None
 
     @property

@@ -12,7 +12,7 @@ from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 
 #: Largest fluctuation of the paper's samples (section 4).
-PAPER_REACH = 0.05
+PAPER_FLUCTUATION = 0.05
 #: Significance in σ of a deviation beyond that.
 SIGMAS = 2.0
 
@@ -39,7 +39,7 @@ def is_within_paper(ratio: Measured) -> bool:
     >>> is_within_paper(Measured(0.93, 0.02)), is_within_paper(Measured(0.93, 0.005))
     (True, False)
     """
-    return abs(ratio.value - 1) < PAPER_REACH + SIGMAS * ratio.sigma
+    return abs(ratio.value - 1) < PAPER_FLUCTUATION + SIGMAS * ratio.sigma
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class IsotropyResult(RunResult):
     ----------
     patches
         Angular glow of each patch by its name.
-    around
+    encloses_sample
         Whether the patches enclose the whole sample, so that its intensity was divided by the
         cosine of the angle; else they lie inside of it and show its radiance.
 
@@ -101,7 +101,7 @@ class IsotropyResult(RunResult):
     kind: ClassVar[str] = "isotropy"
 
     patches: Mapping[str, AngularGlow]
-    around: bool
+    encloses_sample: bool
 
     def write_files(self, folder: Path) -> None:
         """Write `isotropy.csv`."""

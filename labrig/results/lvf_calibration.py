@@ -187,7 +187,7 @@ class LvfCalibrationResult(RunResult):
         Degree of the map: 1 is straight, 2 bent.
     placed
         The strip on the sample by its lines.
-    stripes, why_no_stripes
+    stripes, no_stripes_reason
         The strip on the sample by its glow; None if there are no stripes, and the reason for it.
     card
         Signal of the grey card in the slices of the strip, without the strip.
@@ -223,7 +223,7 @@ class LvfCalibrationResult(RunResult):
     map_order: int
     placed: PlacedStrip
     stripes: Stripes | None
-    why_no_stripes: str
+    no_stripes_reason: str
     card: SliceValues
     through_filters: Mapping[str, SliceValues]
     filter_misfits: tuple[FilterMisfit, ...]

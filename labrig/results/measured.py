@@ -40,7 +40,7 @@ IntArray = Annotated[
 
 
 #: Fewest decimals of a rounded value; a larger σ is written with a power of ten.
-MOST_ROUNDED = -2
+MAX_ROUNDED = -2
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def with_uncertainty(value: float, sigma: float) -> str:
         exponent = math.floor(math.log10(abs(value))) if value else 0
         if exponent < -3:
             return f"{with_uncertainty(value / 10.0**exponent, sigma / 10.0**exponent)}e{exponent}"
-    if decimals < MOST_ROUNDED:
+    if decimals < MAX_ROUNDED:
         exponent = math.floor(math.log10(max(abs(value), sigma)))
         return f"{with_uncertainty(value / 10.0**exponent, sigma / 10.0**exponent)}e{exponent}"
     if decimals < 0:
@@ -161,7 +161,7 @@ ONLY = "only"
 Path = tuple[str, ...]
 
 
-def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+def iter_values(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     """Iterate over every plain value in a result and its path.
 
     A plain value is a number, a text, an array, a `Measured` or a sequence of these. Results within
@@ -184,9 +184,9 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     Examples
     --------
     >>> import labrig
-    >>> from labrig.results import leaves
+    >>> from labrig.results import iter_values
     >>> fit = labrig.read_result("runs/decay").patches["sample"].fit
-    >>> for path, value in leaves(fit):
+    >>> for path, value in iter_values(fit):
     ...     if path[-1] == "k_r_per_s":
     ...         print("/".join(path), f"{value:.2g}")
     states/1/k_r_per_s 0.2
@@ -198,10 +198,10 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
         return
     for name, item in inner:
         if not isinstance(item, RunResult):
-            yield from leaves(item, (*path, name))
+            yield from iter_values(item, (*path, name))
 
 
-def unit_of(name: str) -> str:
+def field_unit(name: str) -> str:
     """Return the unit that the name of a field ends with.
 
     Parameters
@@ -216,8 +216,8 @@ def unit_of(name: str) -> str:
 
     Examples
     --------
-    >>> from labrig.results import unit_of
-    >>> unit_of("k_r_sigma_per_s"), unit_of("centre_nm"), unit_of("chi2")
+    >>> from labrig.results import field_unit
+    >>> field_unit("k_r_sigma_per_s"), field_unit("centre_nm"), field_unit("chi2")
     ('1/s', 'nm', '')
     """
     base = name.removesuffix("_sigma").replace("_sigma_", "_")

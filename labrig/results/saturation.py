@@ -154,7 +154,7 @@ class PatchSaturation:
     levels: tuple[ChargeLevel, ...]
 
     @property
-    def in_time(self) -> Literal["saturated in time", "not saturated", "not decided"]:
+    def time_saturation(self) -> Literal["saturated in time", "not saturated", "not decided"]:
         """Whether a longer charge still brightens the glow."""
         growths = self.growth_at_begin, self.growth_at_end
         if any(growth.value - SIGMAS * growth.sigma > PLATEAU for growth in growths):

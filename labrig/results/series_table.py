@@ -18,7 +18,7 @@ from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 
 
-def joined(parts: Sequence[Series]) -> Series:
+def join_series(parts: Sequence[Series]) -> Series:
     """Join series one below the other.
 
     Parameters
@@ -36,10 +36,10 @@ def joined(parts: Sequence[Series]) -> Series:
     --------
     >>> from dataclasses import replace
     >>> import labrig
-    >>> from labrig.results import joined
+    >>> from labrig.results import join_series
     >>> first = labrig.read_series("series.csv")[0]
     >>> second = replace(first, unit=("decay-2",) * len(first.unit))
-    >>> both = joined([first, second])
+    >>> both = join_series([first, second])
     >>> len(first.t_s), len(both.t_s), sorted(set(both.unit))
     (18, 36, ['decay-1', 'decay-2'])
     """

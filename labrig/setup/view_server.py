@@ -129,7 +129,7 @@ class EditableProtocol:
         return dict(regions)
 
 
-MOST_PATCHES = 200
+MAX_PATCHES = 200
 #: Tolerance of the page's rounding, by which a region may exceed the frame.
 ROUNDING = 1e-6
 #: Names on one line of YAML, without control characters and line ends.
@@ -155,7 +155,7 @@ class DrawnPatches(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    patches: tuple[DrawnPatch, ...] = Field(min_length=1, max_length=MOST_PATCHES)
+    patches: tuple[DrawnPatch, ...] = Field(min_length=1, max_length=MAX_PATCHES)
 
     def by_name(self) -> dict[str, Region]:
         """Return the regions by name.

@@ -9,8 +9,8 @@ from labrig.acquire import ExposureSettings, Plan, Step
 from labrig.record import PERSON, ActionRecord, Attempt, FrameRecord
 
 #: Largest numbers of past and coming steps, as many as the page shows.
-MOST_DONE = 2
-MOST_NEXT = 6
+MAX_DONE = 2
+MAX_NEXT = 6
 #: Devices of steps that are waits, and of choices of the protocol.
 WAITING, FINDING = "-", "protocol"
 #: Key by which a step of the plan is found for a journal line.
@@ -77,12 +77,11 @@ class PlannedUnit:
             "at_s": at_s,
             "until_s": self.duration_s if due is None else due - self.begins_s,
             "done": [
-                {"time": record.start_time, "what": _text_of(record)}
-                for record in past[-MOST_DONE:]
+                {"time": record.start_time, "what": _text_of(record)} for record in past[-MAX_DONE:]
             ],
             "next": [
                 {"at_s": step.at_s - self.begins_s, "what": step_text(step.device, step.action)}
-                for step in coming[:MOST_NEXT]
+                for step in coming[:MAX_NEXT]
             ],
         }
 

@@ -13,7 +13,7 @@ from labrig.region import Region
 #: Quantile of the pixels that becomes full brightness, so that hot pixels have no influence.
 BRIGHT_QUANTILE = 0.995
 #: Largest factor of brightening; more would only show noise.
-MOST_BRIGHTENED = 4096.0
+MAX_BRIGHTENED = 4096.0
 GAMMA = 2.2
 
 
@@ -53,7 +53,7 @@ def glance(path: Path, patches: Mapping[str, Region], width: int) -> Preview:
     measured = {name: measure(raw, region) for name, region in patches.items()}
     linear = np.clip(small(binned(raw), width), 0.0, None)
     level = float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE))
-    brightened = min(1 / max(level, 1e-9), MOST_BRIGHTENED)
+    brightened = min(1 / max(level, 1e-9), MAX_BRIGHTENED)
     picture = 255 * np.clip(linear * brightened, 0.0, 1.0) ** (1 / GAMMA)
     return Preview(
         values={

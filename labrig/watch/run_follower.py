@@ -10,17 +10,17 @@ from typing import Any
 from labrig.acquire import ProtocolModel, plan, read_protocol, read_rig_file
 from labrig.catalogue import RunStatus, status_of
 from labrig.errors import DataError, LabrigError, UsageError
+from labrig.number_format import plus_minus
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.region import Region
 from labrig.results import read_fitted_decays
 from labrig.watch.planned_unit import PlannedUnit, planned_units
 from labrig.watch.preview import Preview, glance
-from labrig.written_numbers import plus_minus
 
 PICTURE_WIDTH = 720
 #: Number of earlier decay frames read per look, so that the page does not wait for thousands.
-MOST_EARLIER = 4
+MAX_EARLIER = 4
 
 #: Section → key → plain value. Everything that grows with a run has keys of its own, so that only
 #: new values are sent.
@@ -189,7 +189,7 @@ class RunFollower:
             for frame in attempt.frames
             if frame.role == FrameRole.DECAY and frame.path.name not in self._points
         ]
-        for attempt, frame in earlier[:MOST_EARLIER]:
+        for attempt, frame in earlier[:MAX_EARLIER]:
             self._read_frame(attempt, frame)
         return is_new or bool(earlier)
 

@@ -22,13 +22,13 @@ FloatArray = npt.NDArray[np.float64]
 SEEN_SIGMA = 5.0
 SEEN_DN = 1.0
 #: Time in which every phosphor that was just charged fades by more than two per cent.
-LEAST_S = 10.0
+MIN_S = 10.0
 FADED = 0.02
 #: Fading between two checks `LOOK_AGAIN_S` apart, which are made in doubt.
 FADED_IN_DOUBT = 0.05
 LOOK_AGAIN_S = 60.0
 #: Largest noise of two levels that can be compared.
-MOST_NOISE = 0.01
+MAX_NOISE = 0.01
 #: Number of shutter times at the begin of the ladder that are too short for a glow to clip.
 SHORT = 3
 #: A glow that stays level in the second half of a decay at more than this fraction of its first
@@ -153,7 +153,7 @@ def dark_level(darks: Sequence[MeteringFrame], exposure_s: float) -> FloatArray:
     return np.apply_along_axis(lambda level: np.interp(exposure_s, times_s, level), 0, mean)
 
 
-def metered(glows: Sequence[Glow]) -> Afterglow:
+def classify_ladder(glows: Sequence[Glow]) -> Afterglow:
     """Classify a ladder of exposures, by rising shutter time."""
     if not any(glow.seen for glow in glows):
         return Afterglow.ABSENT
@@ -162,7 +162,7 @@ def metered(glows: Sequence[Glow]) -> Afterglow:
     return Afterglow.FADING
 
 
-def decayed(
+def classify_decay(
     first: Sequence[Glow], middle: Glow, last: Sequence[Glow], reference: Sequence[Glow]
 ) -> Afterglow:
     """Classify some frames of a decay.
@@ -191,7 +191,7 @@ def decayed(
     return Afterglow.LINGERING if lingers else Afterglow.FADING
 
 
-def looked_at(frames: Sequence[Glow], repeats: Sequence[Glow]) -> Afterglow:
+def classify_repeats(frames: Sequence[Glow], repeats: Sequence[Glow]) -> Afterglow:
     """Classify doubtful frames by repeating their shutter times after a while."""
     pairs = [pair for pair in zip(frames, repeats, strict=True) if not pair[0].clips]
     if not pairs:
@@ -201,7 +201,7 @@ def looked_at(frames: Sequence[Glow], repeats: Sequence[Glow]) -> Afterglow:
     return Afterglow.STEADY if steady else Afterglow.FADING
 
 
-def went_out(under_lamp: Glow, after_lamp_off: Glow) -> bool:
+def has_gone_out(under_lamp: Glow, after_lamp_off: Glow) -> bool:
     """Return whether a frame after lamp off is darker than the same under the lamp."""
     brightest = int(np.argmax(under_lamp.rate))
     if under_lamp.clips or not under_lamp.seen:
@@ -215,8 +215,8 @@ def _is_steady(first: Sequence[Glow], last: Sequence[Glow], faded: float) -> boo
     first_rate = float(np.mean([glow.rate[brightest] for glow in first]))
     last_rate = float(np.mean([glow.rate[brightest] for glow in last]))
     noise = max(float(glow.sigma[brightest]) for glow in (*first, *last))
-    long_enough = last[-1].at_s - first[0].at_s > LEAST_S
-    return long_enough and noise < MOST_NOISE * first_rate and last_rate > (1 - faded) * first_rate
+    long_enough = last[-1].at_s - first[0].at_s > MIN_S
+    return long_enough and noise < MAX_NOISE * first_rate and last_rate > (1 - faded) * first_rate
 
 
 def _expected(first: Glow, reference: Sequence[Glow]) -> float:

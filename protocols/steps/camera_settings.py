@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire import MOST_STEPS, CameraOffers
+from labrig.acquire import MAX_STEPS, CameraOffers
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
 
@@ -16,10 +16,10 @@ def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]
         There are more frames than a run may have steps.
     """
     count = (until_s - first_s) / every_s + 1e-9
-    if count >= MOST_STEPS:
+    if count >= MAX_STEPS:
         raise ProtocolError(
             f"a frame every {duration_text(every_s)} until {duration_text(until_s)} makes "
-            f"{count:.3g} frames, expected at most {MOST_STEPS}; take fewer"
+            f"{count:.3g} frames, expected at most {MAX_STEPS}; take fewer"
         )
     return [first_s + number * every_s for number in range(int(count) + 1)]
 

@@ -33,7 +33,7 @@ def still_grows(glows: FloatArray, growth: float) -> bool:
     return bool((last > (1 + growth) * previous).any())
 
 
-def most_informative_s(charges_s: Sequence[float], glows: FloatArray) -> float:
+def most_informative_s(charge_durations_s: Sequence[float], glows: FloatArray) -> float:
     """Return the charge time, between the shortest and the longest, that adds most information.
 
     D-optimal for a and s of every bright place (Fedorov, *Theory of Optimal Experiments*, 1972):
@@ -41,12 +41,12 @@ def most_informative_s(charges_s: Sequence[float], glows: FloatArray) -> float:
 
     Parameters
     ----------
-    charges_s
+    charge_durations_s
         Durations of the charges so far in seconds, shape (charges,).
     glows
         Glow just after each charge, shape (charges, patches, places).
     """
-    done_s, bright = np.asarray(charges_s, dtype=np.float64), _bright(glows)
+    done_s, bright = np.asarray(charge_durations_s, dtype=np.float64), _bright(glows)
     candidates_s = np.geomspace(done_s.min(), done_s.max(), CANDIDATES)
     gain = np.zeros(CANDIDATES)
     for place in bright.reshape(len(done_s), -1).T:
@@ -64,21 +64,21 @@ def _bright(glows: FloatArray) -> FloatArray:
     return np.maximum(np.take_along_axis(glows, order[np.newaxis], axis=2), 1e-9)
 
 
-def _rate(charges_s: FloatArray, glow: FloatArray) -> float:
+def _rate(charge_durations_s: FloatArray, glow: FloatArray) -> float:
     """Return s, by least squares on the logarithms, which gives a in closed form."""
 
     def residuals(log_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         s = float(np.exp(log_s[0]))
-        difference = np.log(-np.expm1(-s * charges_s)) - np.log(glow)
-        slope = _slopes(charges_s, s)[:, 1:]
+        difference = np.log(-np.expm1(-s * charge_durations_s)) - np.log(glow)
+        slope = _slopes(charge_durations_s, s)[:, 1:]
         return difference - difference.mean(), slope - slope.mean(axis=0)
 
-    low, high = np.log(0.01 / charges_s.max()), np.log(10 / charges_s.min())
+    low, high = np.log(0.01 / charge_durations_s.max()), np.log(10 / charge_durations_s.min())
     fit = least_squares(residuals, [(low + high) / 2], lower=low, upper=high, tolerance=1e-6)
     return float(np.exp(fit.parameters[0]))
 
 
-def _slopes(charges_s: FloatArray, s: float) -> FloatArray:
+def _slopes(charge_durations_s: FloatArray, s: float) -> FloatArray:
     """Return the derivatives of ln y by ln a and ln s, shape (n, 2)."""
-    x = s * charges_s
+    x = s * charge_durations_s
     return np.column_stack([np.ones_like(x), x / np.expm1(x)])

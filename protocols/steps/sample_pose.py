@@ -71,7 +71,7 @@ def lights_out(session: Session) -> Sequence[TimedAction]:
     return steps
 
 
-def seen_s(session: Session) -> float:
+def visible_after_s(session: Session) -> float:
     """Return the time from `lights_out` until the camera sees the whole sample, in seconds."""
     if not has_door(session):
         return 0.0
@@ -86,9 +86,9 @@ def check_visible(session: Session, first_s: float) -> None:
     ProtocolError
         The first photograph is too early; the message has the earliest time.
     """
-    if first_s < seen_s(session):
+    if first_s < visible_after_s(session):
         raise ProtocolError(
             f"the first frame {duration_text(first_s)} after lamp off would show a door that still "
-            f"moves; it is open {duration_text(seen_s(session))} after lamp off, so write first: "
-            f"{duration_text(round(seen_s(session) + 0.05, 1))}"
+            f"moves; it is open {duration_text(visible_after_s(session))} after lamp off, so write "
+            f"first: {duration_text(round(visible_after_s(session) + 0.05, 1))}"
         )

@@ -16,12 +16,12 @@ from .afterglow import (
     LOOK_AGAIN_S,
     Afterglow,
     Glow,
+    classify_decay,
+    classify_ladder,
+    classify_repeats,
     dark_level,
-    decayed,
     glow,
-    looked_at,
-    metered,
-    went_out,
+    has_gone_out,
 )
 from .darkness import DARK, Darkness, darkness, levels
 from .metering import FrameCache, MeteringFrame
@@ -102,7 +102,9 @@ class SanityChecks:
         DeviceError
             The frames show no glow; the message names what to check.
         """
-        self._require(lambda: metered(self._glows(self._unit_frames(FrameRole.METER))), shorter)
+        self._require(
+            lambda: classify_ladder(self._glows(self._unit_frames(FrameRole.METER))), shorter
+        )
 
     def require_decay(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse a series of frames that is no decay.
@@ -124,7 +126,9 @@ class SanityChecks:
             count = min(2, middle)
             chosen = [*frames[:count], frames[middle], *frames[-count:]]
             glows = self._glows(chosen)
-            return decayed(glows[:count], glows[count], glows[count + 1 :], self._reference_glows())
+            return classify_decay(
+                glows[:count], glows[count], glows[count + 1 :], self._reference_glows()
+            )
 
         self._require(decide, shorter)
 
@@ -149,7 +153,9 @@ class SanityChecks:
 
         def gone_out() -> bool:
             under_lamp_frame = self._unit_frames(FrameRole.DAYLIGHT)[under_lamp.index(compared)]
-            return went_out(*self._glows([under_lamp_frame, *self._unit_frames(FrameRole.LOOK)]))
+            return has_gone_out(
+                *self._glows([under_lamp_frame, *self._unit_frames(FrameRole.LOOK)])
+            )
 
         compared = self.session.choose("frame to compare with", longest_open, under_lamp[-1])
         look_again = Shoot(FrameRole.LOOK, compared)
@@ -202,7 +208,7 @@ class SanityChecks:
 
         def decide() -> Afterglow:
             glows = self._glows(self._unit_frames(FrameRole.LOOK))
-            return looked_at(glows[: len(shorter)], glows[len(shorter) :])
+            return classify_repeats(glows[: len(shorter)], glows[len(shorter) :])
 
         self._shoot(shorter)
         self.session.wait(LOOK_AGAIN_S, "is it a lamp, or does it fade?")

@@ -108,7 +108,7 @@ def light(session: Session, warm_up_s: float) -> None:
         session.wait(warm_up_s, "the lamp warms up")
 
 
-def left_by(before: Arrangement, session: Session) -> Arrangement | None:
+def arrangement_after(before: Arrangement, session: Session) -> Arrangement | None:
     """Return the arrangement after the unit before; None in a resumed run.
 
     The bench may have been put to another use before a run is resumed.
@@ -171,7 +171,7 @@ class PutBackUnit:
     def run(self, session: Session) -> None:
         """Switch the lamp off, have filters and card taken away."""
         session.perform(LAMP_OFF)
-        arrangement = left_by(self.before, session)
+        arrangement = arrangement_after(self.before, session)
         Arrangement().set_up(session, arrangement, "the next measurement finds the bench as usual")
 
 
@@ -357,7 +357,7 @@ class SceneUnit:
 
     def arrange(self, session: Session) -> None:
         """Ask for the arrangement."""
-        self.wanted.set_up(session, left_by(self.before, session), self.why)
+        self.wanted.set_up(session, arrangement_after(self.before, session), self.why)
 
     def warm_up_s(self, session: Session) -> float:
         """Return the warm-up time of the lamp in use, in seconds."""

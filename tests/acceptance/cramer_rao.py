@@ -40,7 +40,7 @@ class PatchNoise:
     ----------
     mixing
         (3, 3) what of the light on pixels of each colour (column) is seen in each mean (row).
-    photons
+    photon
         (3, 3, 3) covariance for one electron expected in each pixel of the last axis' colour, in
         electrons².
     dark

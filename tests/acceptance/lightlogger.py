@@ -34,10 +34,10 @@ SEEN_NM = (400.0, 700.0)
 #: Readings are whole numbers, repeatable to about this share.
 RELATIVE_SIGMA = 0.01
 #: Of the channel's highest reading, when its sensitivity is fitted.
-LEAST_FRACTION = 0.002
+MIN_FRACTION = 0.002
 #: Ways in which a fitted sensitivity may be wrong that are kept of its samples.
 UNSURE = 6
-LEAST_SIGMA = 0.001
+MIN_SIGMA = 0.001
 #: Fraction of the brightest channel that others see of light which is not theirs.
 CROSSTALK = 0.005
 
@@ -52,7 +52,7 @@ class Setting:
 
     @property
     def sigma(self) -> FloatArray:
-        crosstalk = np.hypot(CROSSTALK * self.reading.max(), LEAST_SIGMA)
+        crosstalk = np.hypot(CROSSTALK * self.reading.max(), MIN_SIGMA)
         sigma: FloatArray = np.hypot(RELATIVE_SIGMA * self.reading, crosstalk)
         return sigma
 
@@ -91,7 +91,7 @@ def sensor(trained: list[Setting]) -> SpectralSystem:
     design, modes = [], []
     for channel in range(18):
         readings = np.array([setting.reading[channel] for setting in trained])
-        sigma = np.hypot(RELATIVE_SIGMA * readings, LEAST_FRACTION * readings.max())
+        sigma = np.hypot(RELATIVE_SIGMA * readings, MIN_FRACTION * readings.max())
         fit = fit_spectrum(readings, sigma, SpectralSystem(KNOTS_NM, lights))
         design.append(_in_knots(Spectrum("channel", KNOTS_NM, fit.value)))
         deviation = (fit.samples - fit.value) / np.sqrt(len(fit.samples))

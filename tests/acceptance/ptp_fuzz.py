@@ -12,7 +12,7 @@ from time import perf_counter
 
 from tests.drivers.ptp.fuzz.sessions import WAYS, Tally, session, sessions, template
 
-MOST_MEMORY_BYTES = 2 << 30
+MAX_MEMORY_BYTES = 2 << 30
 
 
 def report(name: str, cases: int, seed: int) -> Tally:
@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--session", type=int, help="only this one of that way, with its traceback")
     parser.add_argument("--texts", action="store_true", help="an example of each refusal")
     asked = parser.parse_args()
-    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY_BYTES, MOST_MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
     if asked.session is not None:
         session(asked.way, asked.seed, asked.session, Tally())
         return

@@ -13,7 +13,7 @@ class NotingLamp:
     """A lamp; fails on demand."""
 
     def __init__(self, clock: VirtualClock, note: Note, fail: Exception | None = None) -> None:
-        self.lit = False
+        self.channel_on = False
         self.fail = fail
         self._clock = clock
         self._note = note
@@ -25,19 +25,19 @@ class NotingLamp:
         self._clock.sleep(0.001)
         if self.fail:
             raise self.fail
-        self.lit = True
+        self.channel_on = True
         self._note("lamp on")
 
     def off(self) -> None:
         self._clock.sleep(0.001)
-        self.lit = False
+        self.channel_on = False
         self._note("lamp off")
 
     def reads_back(self) -> bool:
         return True
 
     def is_on(self) -> bool:
-        return self.lit
+        return self.channel_on
 
     def make_safe(self) -> None:
         self.off()

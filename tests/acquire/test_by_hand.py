@@ -128,16 +128,16 @@ def test_two_steps_are_taken_back_one_after_the_other(bench: Bench) -> None:
 
 
 def test_the_lamp_is_off_while_somebody_takes_a_step_back(bench: Bench) -> None:
-    lit = []
+    channel_on = []
     ask = bench.watching.ask
 
     def look(step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
-        lit.append(bench.lamp.lit)
+        channel_on.append(bench.lamp.channel_on)
         return ask(step, last, meanwhile)
 
     bench.watching.ask = look  # type: ignore[method-assign]
     bench.run(["", "", None, ""])
-    assert lit == [False, True, True, False, True]
+    assert channel_on == [False, True, True, False, True]
 
 
 def test_a_process_that_dies_after_a_step_was_taken_back_does_not_count_it(bench: Bench) -> None:

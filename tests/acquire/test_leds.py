@@ -88,7 +88,7 @@ def test_what_protocols_do_with_them_is_lit_recorded_and_read_back(
         assert bench.room is not None
         states = bench.room.room.leds.states
         (attempt,) = folder.read().completed().values()
-    assert [lit for _, lit in states] == [set(), {1}, set(), {2}, set()]
+    assert [channel_on for _, channel_on in states] == [set(), {1}, set(), {2}, set()]
     assert [(one.device, one.action) for one in attempt.actions] == [
         ("lamp", "on"), ("lamp", "off"),
         ("leds", "450 nm on"), ("leds", "525 nm on"), ("leds", "off"),
@@ -108,7 +108,7 @@ def test_they_are_planned(rig: Path) -> None:
     assert "did you mean '450 nm'?" in str(caught.value)
 
 
-def test_a_rig_without_them_is_told_so(make_rig: Make) -> None:
+def test_a_rig_without_them_is_reported_so(make_rig: Make) -> None:
     path = make_rig()
     with pytest.raises(ProtocolError, match=r"needs a bank of LEDs, .* has none"):
         plan(Colours(protocol="colours"), read_rig_file(path), str(path))
@@ -131,8 +131,8 @@ class Shared(PlannedLedBank):
     def reads_back(self) -> bool:
         return True
 
-    def lit(self) -> str | None:
-        return None if self._clock.now() > 30.0 else super().lit()
+    def channel_on(self) -> str | None:
+        return None if self._clock.now() > 30.0 else super().channel_on()
 
 
 class Unlit:
@@ -151,7 +151,7 @@ def test_what_somebody_else_switched_ends_the_unit(tmp_path: Path) -> None:
         run_units([Unlit()], bench, folder, Watching(), {})
     assert "the bank of LEDs was switched 450 nm on 1 min ago and reads off" in str(caught.value)
     assert clock.now() == pytest.approx(60.0, abs=1.0)
-    assert bench[LEDS].lit() is None
+    assert bench[LEDS].channel_on() is None
 
 
 def test_the_rig_check_lights_each(rig: Path, labrig: Callable[..., Ended]) -> None:

@@ -32,8 +32,8 @@ class SharedLamp(NotingLamp):
         self.read_s.append(now_s)
         while self.at_s and self.at_s[0] <= now_s:
             self.at_s.pop(0)
-            self.lit = not self.lit
-        return self.lit
+            self.channel_on = not self.channel_on
+        return self.channel_on
 
 
 class Charge:

@@ -118,7 +118,7 @@ def test_interrupted_anywhere_then_resumed_every_unit_is_there_once(
         except Interrupted as stop:
             assert stop.signum == signal.SIGINT
         rig.make_safe()
-        assert not lamp.lit
+        assert not lamp.channel_on
         folder.close_open_attempts(clock.wall, "abort", "test")
         before = folder.read().completed()
         watching = Watching()
@@ -141,7 +141,7 @@ def test_whatever_a_driver_raises_is_a_device_error_and_the_lamp_goes_off(
     with folder, pytest.raises(DeviceError, match="lamp: its driver failed"):
         run_units([Flash("a")], rig, folder, Watching(), {})
     rig.make_safe()
-    assert not lamp.lit
+    assert not lamp.channel_on
 
 
 def test_safety_tries_every_device_and_names_those_that_failed() -> None:

@@ -86,10 +86,10 @@ def test_what_is_gone_is_not_asked_again_and_the_others_are(rig: Rig, clock: Vir
 def test_connecting_asks_again_what_answers_unclearly(clock: VirtualClock) -> None:
     rig = Rig("bench", clock, {}, {})
     lamp = NotingLamp(clock, list[str]().append)
-    lamp.lit = True
+    lamp.channel_on = True
     lamp.make_safe = Stubborn(clock, lamp.off, 5.0, UnclearAnswerError("?"))  # type: ignore[method-assign]
     rig.connect("lamp", lambda: lamp)
-    assert not lamp.lit
+    assert not lamp.channel_on
 
 
 @pytest.mark.parametrize(

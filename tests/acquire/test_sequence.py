@@ -118,7 +118,7 @@ def test_a_late_photograph_is_returned_too(folder: RunFolder) -> None:
     assert attempt.frames[0].late_s == pytest.approx(0.08, abs=1e-6)
 
 
-def test_a_rig_without_a_door_is_told_what_it_lacks(folder: RunFolder) -> None:
+def test_a_rig_without_a_door_is_reported_what_it_lacks(folder: RunFolder) -> None:
     bench = Bench()
     del bench.rig.devices["door"]
     with pytest.raises(ProtocolError, match="needs a door"):

@@ -39,7 +39,7 @@ def test_equal_results(put: Put) -> None:
     assert changes(old, new) == ()
 
 
-def test_moves_are_told_in_sigma(put: Put) -> None:
+def test_moves_are_reported_in_sigma(put: Put) -> None:
     made_with = MADE_WITH | {"labrig": "0.2.0", "libraries": {"numpy": "2.1.0"}}
     old = put("old", fit((0.03, 800.0)))
     new = put("new", fit((0.0306, 800.0), offset=0.002), made_with=made_with)

@@ -75,7 +75,7 @@ def frames_of(run: Path, lines: list[str], end: str = "\n") -> IntactFrames:
     return intact_frames(read_run(run), Overrides())
 
 
-def test_a_torn_last_line_does_not_count_and_is_said(run: Path) -> None:
+def test_a_torn_last_line_does_not_count_and_is_reported(run: Path) -> None:
     decay_only = LINES[: next(i for i, line in enumerate(LINES) if '"daylight"' in line)]
     assert len(frames_of(run, [*decay_only, LINES[0][:100]], end="").decay) == 12
     assert "torn" in timing_warnings(read_run(run))[0]

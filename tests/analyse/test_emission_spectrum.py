@@ -171,7 +171,7 @@ def test_damaged_frames_are_named(blue: Path) -> None:
         frame.write_bytes(content)
 
 
-def test_states_of_different_colours_are_told(tmp_path: Path) -> None:
+def test_states_of_different_colours_are_reported(tmp_path: Path) -> None:
     material = two_colours(tmp_path / "two-colours.yaml")
     run = record(tmp_path, QUICK | {"white": False}, sample=str(material))
     found = analysed(run)
@@ -179,7 +179,7 @@ def test_states_of_different_colours_are_told(tmp_path: Path) -> None:
     assert any("the spectrum changes with time" in warning for warning in found.warnings)
 
 
-def test_a_mercury_lamp_that_did_not_light_is_told(tmp_path: Path) -> None:
+def test_a_mercury_lamp_that_did_not_light_is_reported(tmp_path: Path) -> None:
     keys = QUICK | {"lamps": ["halogen", "mercury"], "white": False, "times": ["2 s", "12 s"]}
     run = record(tmp_path, keys, faults=["mercury_dead"])
     found = analysed(run)

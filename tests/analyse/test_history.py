@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from labrig.record import ActionRecord, Attempt, FrameRecord, RunRecord
-from labrig.record.history import charges_s, interruptions
+from labrig.record.history import charge_durations_s, interruptions
 from labrig.report.run_sections import lamp_sections
 from tests.conftest import Ended
 
@@ -43,16 +43,16 @@ def test_looks_at_the_glow_are_no_charge() -> None:
         [taken("plateau", 301.0), taken("decay", 700.0), taken("decay", 705.0)],
         [lamp("on", 0), lamp("off", 300), lamp("on", 302), lamp("off", 699), lamp("on", 800)],
     )
-    assert charges_s(run_of(plateau)) == pytest.approx([300 + 397])
+    assert charge_durations_s(run_of(plateau)) == pytest.approx([300 + 397])
 
 
 def test_units_without_a_decay_and_failed_ones_have_no_charge() -> None:
     dark = attempt([taken("dark", 0.0)], [lamp("off", 0)])
     failed = attempt([taken("decay", 11.0)], [lamp("on", 0), lamp("off", 10)], "fail")
-    assert charges_s(run_of(dark, failed)) == ()
+    assert charge_durations_s(run_of(dark, failed)) == ()
 
 
-def test_attempts_that_did_not_count_are_told() -> None:
+def test_attempts_that_did_not_count_are_reported() -> None:
     told = interruptions(run_of(attempt([], [], "fail"), attempt([], []), attempt([], [], None)))
     assert [one.reason for one in told] == ["unplugged", "labrig was cut off"]
     assert {(one.unit, one.began) for one in told} == {("decay-1", "2026-01-01 00:00:00 UTC")}
@@ -62,7 +62,7 @@ def test_attempts_that_did_not_count_are_told() -> None:
     ("reads_back", "said"),
     [(True, "nothing else had switched it"), (False, "does not report its state"), (None, "")],
 )
-def test_whether_the_lamp_was_read_back_is_told(reads_back: bool | None, said: str) -> None:
+def test_whether_the_lamp_was_read_back_is_reported(reads_back: bool | None, said: str) -> None:
     charged = attempt([taken("decay", 11.0)], [lamp("on", 0), lamp("off", 10)])
     charged.start["lamp_reads_back"] = reads_back
     told = [text for section in lamp_sections(run_of(charged)) for text in section.text]
@@ -70,7 +70,7 @@ def test_whether_the_lamp_was_read_back_is_told(reads_back: bool | None, said: s
     assert all(said in text for text in told)
 
 
-def test_without_a_lamp_nothing_is_told_of_it() -> None:
+def test_without_a_lamp_nothing_is_reported_of_it() -> None:
     dark = attempt([taken("dark", 0.0)], [])
     dark.start["lamp_reads_back"] = True
     assert lamp_sections(run_of(dark)) == ()

@@ -96,7 +96,7 @@ def test_shares_of_bands_are_integrals_and_their_sigma_is_of_the_bands() -> None
     assert sigma[row].max() == pytest.approx(value[row].max() / 25, rel=0.6)
 
 
-def test_rounds_are_averaged_and_their_scatter_is_told() -> None:
+def test_rounds_are_averaged_and_their_scatter_is_reported() -> None:
     direct = SliceValues(np.full((4, 3), 100.0), np.full((4, 3), 0.1))
     through = [SliceValues(np.full((4, 3), v), np.full((4, 3), 0.01)) for v in (5.0, 5.2)]
     card = mean_ratio([(direct, one) for one in through])

@@ -53,7 +53,7 @@ def test_what_is_no_calibration_is_one_clear_line(text: str, said: str) -> None:
     ("protocol", "missing"),
     [("excitation", "irradiance"), ("emission_spectrum", "lvf_calibration"), ("phosphor", None)],
 )
-def test_what_is_still_to_be_measured_is_said_before_anything_begins(
+def test_what_is_still_to_be_measured_is_reported_before_anything_begins(
     protocol: str, missing: str | None, labrig: Callable[..., Ended]
 ) -> None:
     ended = labrig("plan", protocol, "--rig", "sim-phosphor")

@@ -43,7 +43,7 @@ def test_the_parts_add_up_to_the_sigma_of_the_series() -> None:
     np.testing.assert_allclose(np.sqrt(parts.sum(axis=1)), scattered.sigma[:, BRIGHTEST])
 
 
-def test_reading_photons_and_unevenness_are_told_apart() -> None:
+def test_reading_photons_and_unevenness_are_distinguished() -> None:
     light = SERIES.values[:, BRIGHTEST] * SERIES.exposure_s
     parts = noise_parts(SERIES, BRIGHTEST, SERIES.values[:, BRIGHTEST])
     expected = np.stack(
@@ -56,13 +56,11 @@ def test_a_budget_is_relative_to_the_signal_and_complete() -> None:
     budget = noise_budget(SERIES, FIT)
     assert budget is not None
     signal = FIT.predict(SERIES.t_s, SERIES.exposure_s)[:, BRIGHTEST] - FIT.offset
-    own = np.sqrt(budget.photons**2 + budget.reading**2 + budget.uneven**2)
+    own = np.sqrt(budget.photon**2 + budget.read**2 + budget.uneven**2)
     np.testing.assert_allclose(own * signal, SERIES.sigma[:, BRIGHTEST])
     np.testing.assert_allclose(budget.dark_level * signal, SERIES.dark_sigma[BRIGHTEST])
     np.testing.assert_allclose(budget.flicker, FIT.flicker)
-    np.testing.assert_allclose(
-        budget.together**2, own**2 + budget.flicker**2 + budget.dark_level**2
-    )
+    np.testing.assert_allclose(budget.total**2, own**2 + budget.flicker**2 + budget.dark_level**2)
 
 
 def test_only_the_first_of_some_decays_is_shown() -> None:

@@ -10,10 +10,10 @@ from labrig.acquire import read_protocol
 from labrig.calibration import write_irradiance_file
 from labrig.errors import UsageError
 from labrig.material import read_material
+from labrig.number_format import plus_minus
 from labrig.process import process_and_report
 from labrig.record import read_run
 from labrig.results.phosphor import PhosphorResult
-from labrig.written_numbers import plus_minus
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, record
 from tests.results.made import assert_read_back

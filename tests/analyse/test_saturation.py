@@ -42,7 +42,7 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     done = process_and_report(record(tmp_path, QUICK | HALF, seed=2))
     assert isinstance(done.result, SaturationResult)
     (patch,) = done.result.patches.values()
-    assert patch.in_time == "saturated in time"
+    assert patch.time_saturation == "saturated in time"
     (level,) = patch.levels
     assert abs(level.r - true_level(tmp_path / "rig.yaml", 1200.0)) < 3 * level.sigma
     assert level.sigma < 0.05
@@ -55,8 +55,8 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     assert_read_back(replace(done.result, patches={"sample": given_noise}))
     rows = (done.report.parent / "saturation.csv").read_text().splitlines()
     assert len(rows) == 1 + 6
-    in_time, of_level, rates = done.lines
-    assert "saturated in time" in in_time
+    time_saturation, of_level, rates = done.lines
+    assert "saturated in time" in time_saturation
     assert of_level.endswith("assumption r(0) = 1: no")
     assert "rates are the same after all 6 charges" in rates
     assert "The weaker light was 50% of the full one (σ 2% of that)" in done.report.read_text()
@@ -70,7 +70,7 @@ def test_a_power_laws_rates_depend_on_the_charge(tmp_path: Path) -> None:
     )  # fmt: skip
     result = analyse(part)
     (patch,) = result.patches.values()
-    assert patch.in_time == "not saturated"
+    assert patch.time_saturation == "not saturated"
     assert patch.levels == ()
     assert patch.rates.differ
     assert any("the rates depend on the charge" in warning for warning in result.warnings)
@@ -140,7 +140,7 @@ def test_noise_that_is_known_badly_is_no_misfit() -> None:
     assert compare_rates(of_two, [0.05], noise_dof=9.0).misfit
 
 
-def test_rates_that_differ_by_a_few_per_cent_are_told_apart() -> None:
+def test_rates_that_differ_by_a_few_per_cent_are_distinguished() -> None:
     curves = [decay([0.05], [1.0], 0), decay([0.053], [0.3], 1)]
     test = compare_rates(curves, [0.04])
     assert test.differ

@@ -28,7 +28,7 @@ def recorded(folder: Path, **simulation: Any) -> Path:
     return record(folder, DECAY, change)
 
 
-def test_a_drifting_room_is_shown_and_said(tmp_path: Path) -> None:
+def test_a_drifting_room_is_shown_and_reported(tmp_path: Path) -> None:
     run = recorded(tmp_path, temperature={"start": 19, "drift_per_hour": 9})
     result = process_run(run)
     (said,) = [line for line in result.warnings if "temperature" in line]

@@ -124,7 +124,7 @@ def test_the_same_paint_on_two_days_agrees_and_another_one_differs(
 ) -> None:
     first, again, other, _ = (run.folder for run in list_runs(week, RunFilter()))
     same = compare_runs(first, again)
-    assert same.asked == (("repeats", 1, 2),)
+    assert same.protocol_differences == (("repeats", 1, 2),)
     assert same.patches[0].p_value > 0.01
     # another seed is another camera: rates agree, amplitudes need not
     assert all(abs(one.pull) < 3 for one in same.patches[0].differences if one.unit == "1/s")
@@ -184,7 +184,7 @@ def test_a_reference_ties_the_amplitudes_of_two_days_together(
     assert "a of run B is multiplied by 1.2" in said
 
 
-def test_what_is_no_reference_is_said_in_a_line(
+def test_what_is_no_reference_is_reported_in_a_line(
     two_days: tuple[Path, Path], labrig: Labrig
 ) -> None:
     a, b = two_days
@@ -211,7 +211,7 @@ def test_one_patch_is_compared_with_one_patch_whatever_it_is_called(
     compared = compare_runs(first, renamed)
     assert [patch.patch for patch in compared.patches] == ["sample"]
     assert compared.missing == ()
-    assert compared.asked == (("repeats", 1, 2),)
+    assert compared.protocol_differences == (("repeats", 1, 2),)
 
 
 def test_results_are_shown_with_what_they_were_made_with(
@@ -226,7 +226,7 @@ def test_results_are_shown_with_what_they_were_made_with(
         assert line in shown, shown
 
 
-def test_what_cannot_be_compared_is_said_in_a_line(week: Path, labrig: Labrig) -> None:
+def test_what_cannot_be_compared_is_reported_in_a_line(week: Path, labrig: Labrig) -> None:
     first, *_, cut = (run.folder for run in list_runs(week, RunFilter()))
     ended = labrig("runs", "compare", first, cut)
     assert (ended.code, len(ended.err.splitlines())) == (4, 1)

@@ -29,7 +29,7 @@ def telling(make_rig: Make, command: object, **simulation: object) -> Path:
 @pytest.mark.parametrize(
     ("faults", "code", "status"), [([], 0, "done"), ([{"camera_unplugged": {}}], 3, "failed")]
 )
-def test_a_command_is_told_how_it_ended(
+def test_a_command_is_reported_how_it_ended(
     labrig: Labrig,
     make_rig: Make,
     make_protocol: Make,

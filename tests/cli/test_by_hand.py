@@ -60,7 +60,7 @@ def test_enter_a_remark_or_a_step_back(typed: TextIO, capfd: pytest.CaptureFixtu
     assert "undo (do again: put filter 36 in)" in said
 
 
-def test_nothing_to_take_back_is_said(typed: TextIO, capfd: pytest.CaptureFixture[str]) -> None:
+def test_nothing_to_take_back_is_reported(typed: TextIO, capfd: pytest.CaptureFixture[str]) -> None:
     typed.write("")
     answers = iter(["undo\n", "\n"])
     assert Terminal().ask(STEP, None, 60.0, lambda: void(typed.write(next(answers, "")))) == ""
@@ -71,7 +71,7 @@ def void(_: object) -> None:
     pass
 
 
-def test_an_input_that_has_ended_is_said(typed: TextIO) -> None:
+def test_an_input_that_has_ended_is_reported(typed: TextIO) -> None:
     typed.close()
     terminal = Terminal()
     for _ in range(2):  # the end may have been read before the question

@@ -174,7 +174,7 @@ def test_a_frame_changed_on_disk_is_noticed(labrig: Labrig, finished: Path) -> N
     assert labrig("process", finished, "--exclude", frame.name).code == 0
 
 
-def test_a_series_without_light_is_kept_and_said(labrig: Labrig, finished: Path) -> None:
+def test_a_series_without_light_is_kept_and_reported(labrig: Labrig, finished: Path) -> None:
     ended = labrig("process", finished, "--roi", "1,1,80,4")  # the cloth beside the sample
     one_line(ended, 4, "did the lamp light", "the run is kept")
     assert (finished / "result" / "report.html").exists()
@@ -232,7 +232,7 @@ def test_a_rig_copied_elsewhere_still_runs(
     assert labrig("resume", ended.run_folder).code == 0
 
 
-def test_a_run_whose_every_frame_clips_is_kept_and_said(
+def test_a_run_whose_every_frame_clips_is_kept_and_reported(
     labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:
     ended = labrig(

@@ -105,7 +105,7 @@ def test_a_warning_does_not_keep_a_run_from_starting(
     assert ended.code == 0, ended.err
 
 
-def test_a_room_that_is_not_dark_is_said(labrig: Labrig, make_rig: Make) -> None:
+def test_a_room_that_is_not_dark_is_reported(labrig: Labrig, make_rig: Make) -> None:
     rig = make_rig(sample="stickers", initial={"concentration": 0.9})
     report = json.loads(labrig("rig", "check", rig, "--json").out)
     (warned,) = [f for f in device(report, "camera")["findings"] if f["severity"] == "warn"]

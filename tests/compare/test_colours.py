@@ -115,7 +115,7 @@ def test_a_prediction_of_the_photographs_themselves_is_exact(normalisation: str)
         assert brightest[-1] < 0.1
 
 
-def test_noise_alone_is_told_as_it_is() -> None:
+def test_noise_alone_is_reported_as_it_is() -> None:
     glow = compare_glow(SERIES, {"true": truth()}, viewing(CAMERA), flicker=0.007)
     assert glow.noise == pytest.approx(glow.mean("true"), rel=0.35)
 

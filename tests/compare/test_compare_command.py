@@ -89,13 +89,15 @@ def test_two_states_are_nearer_to_the_photographs_than_one(labrig: Labrig, run: 
     assert all(abs(row["in_sigma"]) < 5 for row in table["rows"])
     assert len(said["spectra"]) == 12
     for stated in ("white D65", "one factor", "EOS 5D Mark II"):
-        assert stated in said["words"]
+        assert stated in said["description"]
 
 
-def test_the_white_and_normalisation_asked_for_are_used_and_said(labrig: Labrig, run: Path) -> None:
+def test_white_and_normalisation_are_used_and_reported(
+    labrig: Labrig, run: Path
+) -> None:
     said = compared(labrig, run, "--white", "D50", "--normalise", "each")
-    assert "white D50" in said["words"]
-    assert "a factor of its own" in said["words"]
+    assert "white D50" in said["description"]
+    assert "a factor of its own" in said["description"]
     glow = said["glow"]["double-wide"]
     assert glow["mean"] != compared(labrig, run)["glow"]["double-wide"]["mean"]
 
@@ -164,7 +166,7 @@ def test_curves_that_a_calibration_found_go_before_the_rigs(
         chain = PhosphorResult(parts={"lvf_calibration": calibration}, failed={}, materials={})
         monkeypatch.setattr("labrig.compare.run.read_result", lambda folder: chain)
     said = compared(labrig, copy)
-    assert "as the filter's calibration found them" in said["words"]
+    assert "as the filter's calibration found them" in said["description"]
     table = [[nm, *row] for nm, row in zip(found.wavelength_nm, found.sensitivity, strict=True)]
     lines = ["wavelength_nm,R,G,B", *(",".join(map(repr, map(float, row))) for row in table)]
     (tmp_path / "found.csv").write_text("\n".join(lines))
@@ -181,6 +183,6 @@ def test_without_camera_curves_it_says_so_and_does_the_rest(
     del rig["optics"]
     (copy / "rig.yaml").write_text(yaml.safe_dump(rig))
     said = compared(labrig, copy)
-    assert "linear sRGB" in said["words"]
+    assert "linear sRGB" in said["description"]
     assert said["spectra"] == {}
     assert "--camera" in said["left_out"][0]

@@ -15,8 +15,8 @@ from typing import Any
 import gphoto2
 
 POLL_MS = 200
-MOST_EVENTS = 200
-MOST_PRESSES = 10
+MAX_EVENTS = 200
+MAX_PRESSES = 10
 
 
 def connect(port: str) -> Any:
@@ -46,20 +46,20 @@ def download(camera: Any, path: Any) -> dict[str, Any]:
 
 def capture(camera: Any) -> Any:
     """Press again while the camera is busy, which libgphoto2 leaves to its callers."""
-    for _ in range(MOST_PRESSES):
+    for _ in range(MAX_PRESSES):
         try:
             return camera.capture(gphoto2.GP_CAPTURE_IMAGE)
         except gphoto2.GPhoto2Error as error:
             if error.code != gphoto2.GP_ERROR_CAMERA_BUSY:
                 raise
-    raise TimeoutError(f"busy at {MOST_PRESSES} presses")
+    raise TimeoutError(f"busy at {MAX_PRESSES} presses")
 
 
 def bulb(camera: Any, duration_s: float) -> dict[str, Any]:
     set_value(camera, "bulb", 1)
     time.sleep(duration_s)
     set_value(camera, "bulb", 0)
-    for _ in range(MOST_EVENTS):
+    for _ in range(MAX_EVENTS):
         kind, event = camera.wait_for_event(POLL_MS)
         if kind == gphoto2.GP_EVENT_FILE_ADDED:
             return download(camera, event)

@@ -21,7 +21,7 @@ from labrig.sim.camera.ptpip.packets import Packet, PacketType
 
 from . import transcript
 from .served import EOS, EPOCH_S, STANDARD, Film, served
-from .test_gphoto2_host import MOST_S, READY, STANDARD_READY, TO_CARD, TO_HOST, command
+from .test_gphoto2_host import MAX_S, READY, STANDARD_READY, TO_CARD, TO_HOST, command
 from .transcript import CAMERA, COMMAND, EVENT, HOST, Line
 
 SESSIONS = {
@@ -77,9 +77,7 @@ def record(name: str, steps: tuple[str, ...]) -> None:
     with recording(clock) as lines, tempfile.TemporaryDirectory() as home:
         with served(Film(size=PICTURE_BYTES), clock, body_of(name)) as server:
             environment = os.environ | {"HOME": home, "LANG": "C"}
-            subprocess.run(
-                command(server.port, *steps), env=environment, timeout=MOST_S, check=True
-            )
+            subprocess.run(command(server.port, *steps), env=environment, timeout=MAX_S, check=True)
         transcript.write(transcript.FOLDER / f"{name}.jsonl", lines)
 
 

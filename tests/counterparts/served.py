@@ -12,7 +12,7 @@ from labrig.sim.camera import BodySettings, Pace, PtpIpServer, Sensor, Simulated
 
 EPOCH_S = 1_767_225_600.0
 #: A server that does not end by then hangs.
-MOST_S = 20.0
+MAX_S = 20.0
 _SIGINT = 2
 
 
@@ -72,6 +72,6 @@ def served(
             yield server
         finally:
             clock.interrupt(_SIGINT)
-            thread.join(MOST_S)
+            thread.join(MAX_S)
             assert not thread.is_alive(), "the server does not end"
     assert not failures, failures

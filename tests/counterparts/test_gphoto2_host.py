@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 SCRIPT = Path(__file__).with_name("gphoto2_host.py")
-MOST_S = 60.0
+MAX_S = 60.0
 TO_HOST, TO_CARD = "set:capturetarget=Internal RAM", "set:capturetarget=Memory card"
 READY = ("set:iso=400", "set:aperture=4", "set:shutterspeed=1/4")
 #: A camera that knows the standard only tells seconds and the word of its property.
@@ -48,7 +48,7 @@ def running(arguments: list[str], home: dict[str, str]) -> Iterator[subprocess.P
     with subprocess.Popen(
         arguments, env=home, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        watchdog = threading.Timer(MOST_S, process.kill)
+        watchdog = threading.Timer(MAX_S, process.kill)
         watchdog.start()
         try:
             yield process
@@ -59,7 +59,7 @@ def running(arguments: list[str], home: dict[str, str]) -> Iterator[subprocess.P
 
 def gphoto2(port: int, home: dict[str, str], *steps: str) -> list[Any]:
     done = subprocess.run(
-        command(port, *steps), env=home, capture_output=True, text=True, timeout=MOST_S, check=False
+        command(port, *steps), env=home, capture_output=True, text=True, timeout=MAX_S, check=False
     )
     assert done.returncode == 0, done.stderr
     found: list[Any] = json.loads(done.stdout)
@@ -146,7 +146,7 @@ def test_one_host_after_another_and_after_one_that_was_killed(home: dict[str, st
             assert host.stdout is not None
             assert host.stdout.readline() == "here\n"
             done = subprocess.run(
-                command(server.port, "summary"), env=home, capture_output=True, timeout=MOST_S
+                command(server.port, "summary"), env=home, capture_output=True, timeout=MAX_S
             )
             assert done.returncode != 0, "one at a time"
         *_, picture = gphoto2(server.port, home, *READY, TO_HOST, "capture")
@@ -162,5 +162,5 @@ def test_the_command_serves_until_it_is_interrupted(home: dict[str, str]) -> Non
         (summary,) = gphoto2(int(address.rpartition(":")[2]), home, "summary")
         assert "Canon EOS 5D Mark II" in summary
         labrig.send_signal(signal.SIGINT)
-        said, complaint = labrig.communicate(timeout=MOST_S)
+        said, complaint = labrig.communicate(timeout=MAX_S)
     assert (labrig.returncode, said, complaint) == (130, "", "labrig: interrupted\n")

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 ROOT = Path(__file__).parents[2]
-MOST_S = 60.0
+MAX_S = 60.0
 #: Larger than one read, and a whole number of packets with its header.
 PICTURE_BYTES = 512 * 300 - 12
 
@@ -34,7 +34,7 @@ def drive(as_what: str, card: Path) -> dict[str, Any]:
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=MOST_S,
+        timeout=MAX_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr

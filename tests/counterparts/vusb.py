@@ -20,7 +20,7 @@ from tests.drivers.ptp.usb.wire import BULK_IN, BULK_OUT, INTERRUPT_IN, PACKET, 
 
 STATUS, STATUS_OK = 0x67, bytes((4, 0, 0x01, 0x20))
 GP_ERROR_TIMEOUT = -10
-MOST_BYTES = 1 << 16
+MAX_BYTES = 1 << 16
 
 
 class VirtualCamera:
@@ -46,8 +46,8 @@ class VirtualCamera:
 
     def read(self) -> bytes:
         """All that the camera has to say on its bulk pipe."""
-        buffer, received = ctypes.create_string_buffer(MOST_BYTES), b""
-        while count := self._do("read", self._port, buffer, MOST_BYTES):
+        buffer, received = ctypes.create_string_buffer(MAX_BYTES), b""
+        while count := self._do("read", self._port, buffer, MAX_BYTES):
             received += buffer.raw[:count]
         return received
 

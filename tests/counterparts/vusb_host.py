@@ -32,7 +32,7 @@ from .vusb import VirtualBus, VirtualCamera
 ADDRESS = "usb://04b0:0437"
 CLOCK = SystemClock()
 EVENT_S = 2.0
-MOST_FRAMES = 60
+MAX_FRAMES = 60
 
 
 class OnTheBus:
@@ -91,7 +91,7 @@ def until_full(bus: VirtualBus) -> dict[str, Any]:
     session, info = opened(bus)
     frames = StandardFrames(session, CLOCK, info, EVENT_S)
     said: list[str] = []
-    while len(said) < MOST_FRAMES and "StoreFull" not in " ".join(said):
+    while len(said) < MAX_FRAMES and "StoreFull" not in " ".join(said):
         frames.expect(CLOCK.now())
         session.transact(Standard.InitiateCapture, 0, 0)
         try:

@@ -33,7 +33,7 @@ def asked(first: bytes, second: bytes) -> Script:
     return [(QUERY, first), (QUERY, second)]
 
 
-def test_a_mute_board_is_told_and_never_asked_again() -> None:
+def test_a_mute_board_is_reported_and_never_asked_again() -> None:
     driver, port = lamp(
         [(OFF_1, b""), *asked(b"", b""), (ON_1, b""), (OFF_1, b""), (OFF_1, b""), (OFF_1, b"")]
     )
@@ -99,7 +99,7 @@ def test_another_answer_is_a_device_error(answer: bytes, said: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
-def test_a_register_that_stays_on_is_said() -> None:
+def test_a_register_that_stays_on_is_reported() -> None:
     driver, _ = lamp(
         [(OFF_1, b""), *asked(b"\1", b"\1"), (OFF_1, b""), (OFF_1, b""), *asked(b"\1", b"\1")]
     )
@@ -107,7 +107,7 @@ def test_a_register_that_stays_on_is_said() -> None:
         driver.make_safe()
 
 
-def test_a_board_that_fell_silent_is_said() -> None:
+def test_a_board_that_fell_silent_is_reported() -> None:
     driver, _ = lamp(
         [(OFF_1, b""), *asked(b"\0", b"\0"), (OFF_1, b""), (OFF_1, b""), *asked(b"", b"")]
     )

@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 from labrig.acquire import Guarded, LampShield, TrapDoor
 from labrig.clock import VirtualClock
 from labrig.drivers.maestro import MaestroDoor, MaestroShield
-from labrig.drivers.maestro.servo import ERRORS, Wire, quarters, seven_bits, told
+from labrig.drivers.maestro.servo import ERRORS, Wire, error_text, quarters, seven_bits
 from labrig.errors import DeviceError, DeviceLostError
 from labrig.sim.boards import MaestroBoard
 from labrig.yaml_file import validate
@@ -140,8 +140,8 @@ def test_two_equal_pulses_are_refused() -> None:
 
 
 @given(bits=st.integers(0, 0xFFFF))
-def test_errors_are_told_exactly_where_there_are_any(bits: int) -> None:
-    said = told(bits)
+def test_errors_are_reported_exactly_where_there_are_any(bits: int) -> None:
+    said = error_text(bits)
     assert bool(said) == bool(bits)
     for bit, (what, _) in enumerate(ERRORS):
         assert (what in said) == bool(bits >> bit & 1)
@@ -196,7 +196,7 @@ def test_two_channels_of_the_emulated_board(keys: dict[str, Any]) -> None:
     assert bench.widths_us(5) == [1800, 900, 1800]
 
 
-def test_the_time_out_closes_the_door_and_is_said() -> None:
+def test_the_time_out_closes_the_door_and_is_reported() -> None:
     bench = Bench(VirtualClock(), time_out_s=10.0)
     bench.door.open()
     opened_s = bench.clock.now()
@@ -214,7 +214,7 @@ def test_the_time_out_closes_the_door_and_is_said() -> None:
     bench.door.make_safe()
 
 
-def test_a_pulse_outside_the_channels_range_is_said() -> None:
+def test_a_pulse_outside_the_channels_range_is_reported() -> None:
     bench = Bench(VirtualClock(), open="2600 us")
     with pytest.raises(DeviceError, match=r"told to send 2600\.00 µs and sends 2500\.00 µs"):
         bench.door.open()

@@ -62,9 +62,9 @@ def test_one_is_off_and_read_back_before_the_next_is_on() -> None:
     driver.dark()
     driver.light("450 nm")
     driver.light("far red")
-    assert driver.lit() == "far red"
+    assert driver.channel_on() == "far red"
     driver.dark()
-    assert driver.lit() is None
+    assert driver.channel_on() is None
     assert driver.identity() == (
         "Numato relay board, firmware 00000008, id 12345678, LEDs 450 nm on relay 1, 525 nm on "
         "relay 2, far red on relay 10"
@@ -94,7 +94,7 @@ def test_one_that_is_stuck_does_not_keep_the_others_from_going_off() -> None:
 def test_two_that_are_lit_at_once_are_an_error() -> None:
     driver, _ = bank([*read("1", "on"), *read("2", "off"), *read("A", "on")])
     with pytest.raises(DeviceError, match="450 nm and far red are lit at once"):
-        driver.lit()
+        driver.channel_on()
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_two_that_are_lit_at_once_are_an_error() -> None:
 def test_anything_but_the_expected_answer_is_a_device_error(answer: bytes, said: str) -> None:
     driver, _ = bank([(b"relay read 1\r", answer)])
     with pytest.raises(DeviceError) as caught:
-        driver.lit()
+        driver.channel_on()
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -128,11 +128,11 @@ def test_two_are_never_lit_and_after_any_interruption_it_can_be_made_safe(
                 driver.dark()
             else:
                 driver.light(channel)
-            assert driver.lit() == channel
+            assert driver.channel_on() == channel
     assert max(lit_at_once, default=0) <= 1
     driver.make_safe()
     assert not any(board.states)
-    assert driver.lit() is None
+    assert driver.channel_on() is None
 
 
 def test_lamp_and_leds_share_a_line() -> None:

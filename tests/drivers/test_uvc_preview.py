@@ -37,7 +37,7 @@ def brightness(jpeg: bytes) -> float:
 def test_shows_one_picture_after_the_other(film: str) -> None:
     camera = eye(film)
     assert isinstance(camera, LiveView)
-    assert ROLES["viewfinder"].does is LiveView
+    assert ROLES["viewfinder"].protocol_class is LiveView
     assert brightness(camera.preview()) == pytest.approx(40, abs=1)
     assert brightness(camera.preview()) == pytest.approx(200, abs=1)
     camera.make_safe()
@@ -54,7 +54,7 @@ def test_nothing_is_opened_before_somebody_looks() -> None:
         camera.preview()
 
 
-def test_the_end_of_the_pictures_is_said(film: str) -> None:
+def test_the_end_of_the_pictures_is_reported(film: str) -> None:
     camera = eye(film)
     for _ in range(2):
         camera.preview()

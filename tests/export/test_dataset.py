@@ -52,7 +52,7 @@ def test_a_patch_without_a_fit_has_values_and_no_parameters(with_dark_patch: Fin
     assert np.isnan(dark.channel_weight).all()
 
 
-def test_what_cannot_be_read_is_said_in_one_line(
+def test_what_cannot_be_read_is_reported_in_one_line(
     finished: Finished, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(UsageError, match="expected a run with a result"):

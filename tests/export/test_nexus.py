@@ -147,7 +147,7 @@ def test_the_same_run_gives_the_same_bytes_whenever_it_is_written(
     assert written(finished, "again.nxs").read_bytes() == once
 
 
-def test_a_file_that_cannot_be_written_is_said_in_one_line(
+def test_a_file_that_cannot_be_written_is_reported_in_one_line(
     finished: Finished, tmp_path: Path
 ) -> None:
     path = tmp_path / "nowhere" / "run.nxs"

@@ -48,7 +48,7 @@ class Bench:
         Of the lamp, in multiples of the norm.
     flicker
         Of every photograph.
-    photons
+    photon
         Of a signal of 1.
     """
 
@@ -85,7 +85,7 @@ class Bench:
         self,
         name: str,
         windows: FloatArray,
-        charges_s: Sequence[float],
+        charge_durations_s: Sequence[float],
         wait_s: float = 300.0,
         shots: int = 12,
         every_s: float = 7.0,
@@ -93,7 +93,7 @@ class Bench:
     ) -> ChargingSeries:
         """Charges one after another, photographs after each, a wait in the dark before the next."""
         lamp, charges, at_s = Lamp.found(self.lamp, on=False), [], 10.0
-        for duration_s in charges_s:
+        for duration_s in charge_durations_s:
             off_s = at_s + duration_s
             start_s: FloatArray = off_s + DOOR_S + every_s * np.arange(float(shots))
             lamp = lamp.switched(True, at_s).switched(False, off_s)

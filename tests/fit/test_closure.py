@@ -52,7 +52,7 @@ def test_it_predicts_what_an_integrator_finds() -> None:
     assert closed.rms_percent < 1e-4
 
 
-def test_deviations_are_told_in_percent_and_sigma() -> None:
+def test_deviations_are_reported_in_percent_and_sigma() -> None:
     closed = closure(CHARGES_S, 1.05 * LEVELS, 0.05 * LEVELS, **LAMP)
     assert closed.rms_percent == pytest.approx(5.0, rel=1e-4)
     assert closed.rms_sigma == pytest.approx(1.0, rel=1e-4)

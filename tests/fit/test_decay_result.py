@@ -102,7 +102,7 @@ def test_prediction_and_residuals_add_up_to_the_values() -> None:
         fit.predict([1.0, 2.0], [1.0, 2.0, 3.0])
 
 
-def test_missing_sigma_is_estimated_and_said() -> None:
+def test_missing_sigma_is_estimated_and_reported() -> None:
     rng = np.random.default_rng(0)
     values = 50 * DOUBLE(T) + 0.2 * rng.normal(size=37)
     fit = fit_decay(T, values, None)
@@ -163,7 +163,7 @@ def test_offset_far_from_its_prior_is_named() -> None:
     assert "offset of G" in warning
 
 
-def test_flicker_from_too_few_bright_frames_is_said() -> None:
+def test_flicker_from_too_few_bright_frames_is_reported() -> None:
     for seed in range(10):
         seen = truths.observe(truths.exponentials((0.25, 1.0)), seed, weights=np.ones(1))
         fit = fit_decay(seen.t_s, seen.values, seen.sigma, exposure_s=1.5, flicker=None)

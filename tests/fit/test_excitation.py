@@ -100,7 +100,7 @@ def test_weak_light_leaves_the_level_unknown_and_says_so() -> None:
     ), "a is measured, Λ and r(0) are not"
 
 
-def test_a_sample_that_is_no_phosphor_of_these_states_is_told() -> None:
+def test_a_sample_that_is_no_phosphor_of_these_states_is_reported() -> None:
     bench = Bench(two_states())
     series = measured(bench)
     found = fit(series, [0.03], [1.0], RelativeSigmas(bench.flicker, LAMP))

@@ -132,7 +132,7 @@ def test_what_is_no_decay_is_refused_in_one_line(
 
 @pytest.mark.parametrize("flicker", ["auto", "0"])
 @pytest.mark.parametrize("case", WARNED, ids=lambda case: case.name)
-def test_what_the_data_do_not_hold_is_said(
+def test_what_the_data_do_not_hold_is_reported(
     labrig: Labrig, tmp_path: Path, case: Case, flicker: str
 ) -> None:
     ended = fitted(labrig, tmp_path, case, "--flicker", flicker)

@@ -53,7 +53,7 @@ def test_a_strip_that_is_turned_is_seen_and_refused_if_that_was_not_said() -> No
         locate_lines(PIXELS, turned, rising=True)
 
 
-def test_without_colours_it_has_to_be_told() -> None:
+def test_without_colours_it_has_to_be_reported() -> None:
     wavelengths, lvf = strip()
     grey = picture(lvf, GREY)
     with pytest.raises(FitError, match="say whether the wavelength rises"):

@@ -89,7 +89,7 @@ def test_a_camera_without_colours() -> None:
     assert inside.mean() > 0.9
 
 
-def test_curves_that_are_wrong_are_in_the_band_if_it_is_told_so() -> None:
+def test_curves_that_are_wrong_are_in_the_band_if_it_is_reported_so() -> None:
     ours = made.of_the_house()
     bend = 1 + 0.08 * np.sin(ours.wavelength_nm / 25.0)
     theirs = replace(ours, sensitivity=ours.sensitivity * bend[:, np.newaxis])

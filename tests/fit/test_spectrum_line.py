@@ -64,7 +64,7 @@ def test_values_that_are_missing() -> None:
     assert fit.wavelength_nm == pytest.approx(537.0, abs=4 * fit.sigma_nm)
 
 
-def test_light_that_is_no_such_line_is_told_by_the_misfit() -> None:
+def test_light_that_is_no_such_line_is_reported_by_the_misfit() -> None:
     two = Spectrum("two", FINE_NM, line(480.0).at(FINE_NM) + line(600.0).at(FINE_NM))
     picture = photographed(two, 3)
     assert fit_line(picture.value, picture.sigma, SYSTEM, FWHM_NM).misfit > 5

@@ -73,7 +73,7 @@ def test_deviations_stand_in_percent_and_sigma() -> None:
     assert all(len(row) == len(table.head) for row in table.rows)
 
 
-def test_what_was_not_measured_is_said() -> None:
+def test_what_was_not_measured_is_reported() -> None:
     decay_only = Material(
         name="test", kind="phosphor", states=(State(k_r_per_s=0.03), State(k_r_per_s=0.3))
     )

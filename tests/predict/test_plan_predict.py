@@ -156,11 +156,11 @@ def test_the_tables_fit_the_terminal(
     ended = labrig("plan", "decay", "--rig", "sim", "--predict", close)
     assert ended.code == 0, ended.err
     assert max(map(len, ended.out.splitlines())) <= columns
-    for text in ("σ of amplitude", "flicker", "repeats: 4", "will not tell these 2 states apart"):
+    for text in ("σ of amplitude", "flicker", "repeats: 4", "may not resolve these 2 states"):
         assert text in " ".join(ended.out.split())
 
 
-def test_frames_that_clip_are_left_out_and_said(labrig: Labrig, measured: Path) -> None:
+def test_frames_that_clip_are_left_out_and_reported(labrig: Labrig, measured: Path) -> None:
     said = predicted(labrig, measured, exposure="2 s")
     clipped = said["patches"]["sample"]["clipped_frames"]
     assert 0 < clipped < 25

@@ -11,12 +11,12 @@ from labrig.errors import DeviceError
 from labrig.protocols.steps.afterglow import (
     Afterglow,
     Glow,
+    classify_decay,
+    classify_ladder,
+    classify_repeats,
     dark_level,
-    decayed,
     glow,
-    looked_at,
-    metered,
-    went_out,
+    has_gone_out,
 )
 from tests.protocols.metering import measure_frame
 
@@ -40,7 +40,7 @@ def decay(
 ) -> Afterglow:
     times_s = [0.5, 5.5, for_s / 2, for_s - 5.0, for_s]
     five = seen(rate_dn_per_s, times_s, [exposure_s] * 5)
-    return decayed(five[:2], five[2], five[3:], [])
+    return classify_decay(five[:2], five[2], five[3:], [])
 
 
 def exponential(rate: float, k_per_s: float) -> Callable[[float], float]:
@@ -64,7 +64,7 @@ def test_what_does_not_fade_is_refused(rate: float) -> None:
         found.require(pytest.fail)
 
 
-def test_nothing_is_said_of_a_short_decay_or_of_noise() -> None:
+def test_nothing_is_reported_of_a_short_decay_or_of_noise() -> None:
     assert decay(lambda _: 3000.0, for_s=8.0) is Afterglow.FADING
     assert decay(lambda _: 3.0) is Afterglow.FADING
 
@@ -77,7 +77,7 @@ def test_no_glow_is_refused(rate: float) -> None:
         found.require(pytest.fail)
 
 
-def test_a_light_that_came_on_during_the_decay_is_told() -> None:
+def test_a_light_that_came_on_during_the_decay_is_reported() -> None:
     said: list[str] = []
     found = decay(lambda t: 1000 * math.exp(-0.2 * t) + 500, for_s=180.0)
     assert found is Afterglow.LINGERING
@@ -89,17 +89,17 @@ def test_a_light_that_came_on_during_the_decay_is_told() -> None:
 @given(rate=st.floats(300, 2e5), k_per_s=st.floats(0.002, 0.5))
 def test_metering_accepts_every_glow(rate: float, k_per_s: float) -> None:
     times_s = [0.5, 2.2, 3.9, 5.6, 7.7]
-    assert metered(seen(exponential(rate, k_per_s), times_s, LADDER_S)) is Afterglow.FADING
+    assert classify_ladder(seen(exponential(rate, k_per_s), times_s, LADDER_S)) is Afterglow.FADING
 
 
 def test_metering_doubts_a_lamp_and_a_closer_look_tells() -> None:
     times_s = [0.5, 2.2, 3.9, 5.6, 7.7]
-    assert metered(seen(lambda _: LAMP_DN_PER_S, times_s, LADDER_S)) is Afterglow.CLIPPED
-    assert metered(seen(lambda _: 0.0, times_s, LADDER_S)) is Afterglow.ABSENT
+    assert classify_ladder(seen(lambda _: LAMP_DN_PER_S, times_s, LADDER_S)) is Afterglow.CLIPPED
+    assert classify_ladder(seen(lambda _: 0.0, times_s, LADDER_S)) is Afterglow.ABSENT
 
     def metering(rate: Callable[[float], float]) -> Afterglow:
         first, again = (seen(rate, [at_s] * 3, LADDER_S[:3]) for at_s in (12.0, 75.0))
-        return looked_at(first, again)
+        return classify_repeats(first, again)
 
     assert metering(lambda _: LAMP_DN_PER_S) is Afterglow.STEADY
     assert metering(lambda _: 100 * LAMP_DN_PER_S) is Afterglow.STEADY
@@ -110,7 +110,7 @@ def test_metering_doubts_a_lamp_and_a_closer_look_tells() -> None:
 def test_a_glow_is_held_against_the_metering(fraction: float, found: Afterglow) -> None:
     before = seen(exponential(5000, 0.03), [0.5, 2.2, 3.9, 5.6, 7.7], LADDER_S)
     now = seen(exponential(fraction * 5000, 0.03), [0.5, 5.5, 30, 55, 60], [0.8] * 5)
-    assert decayed(now[:2], now[2], now[3:], before) is found
+    assert classify_decay(now[:2], now[2], now[3:], before) is found
 
 
 def test_a_lamp_that_has_gone_out_is_darker() -> None:
@@ -118,9 +118,9 @@ def test_a_lamp_that_has_gone_out_is_darker() -> None:
         seen(lambda _, rate=rate: rate, [0.0], [1 / 512])[0]  # type: ignore[misc]
         for rate in (LAMP_DN_PER_S, 1e5, 0.0)
     )
-    assert went_out(lit, glowing)
-    assert went_out(lit, none)
-    assert not went_out(lit, lit)
+    assert has_gone_out(lit, glowing)
+    assert has_gone_out(lit, none)
+    assert not has_gone_out(lit, lit)
 
 
 def test_dark_levels_lie_straight_between_those_taken() -> None:

@@ -44,13 +44,15 @@ def test_the_next_charge_is_the_one_that_tells_most(rate_per_s: float, spread: f
     assert chosen_s == pytest.approx(best_s, rel=0.5)
 
 
-def _log_determinants(charges_s: FloatArray, rates: FloatArray) -> float:
+def _log_determinants(charge_durations_s: FloatArray, rates: FloatArray) -> float:
     """Of the information about ln a and ln s at every place, derivatives by differences."""
     total = 0.0
     for rate in rates:
         h = 1e-5
-        up, down = (np.log(glow(charges_s, np.full(1, rate * np.exp(d))))[:, 0] for d in (h, -h))
-        slopes = np.hstack([np.ones((len(charges_s), 1)), (up - down) / (2 * h)])
+        up, down = (
+            np.log(glow(charge_durations_s, np.full(1, rate * np.exp(d))))[:, 0] for d in (h, -h)
+        )
+        slopes = np.hstack([np.ones((len(charge_durations_s), 1)), (up - down) / (2 * h)])
         total += float(np.linalg.slogdet(slopes.T @ slopes)[1])
     return total
 

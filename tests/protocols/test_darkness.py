@@ -89,7 +89,7 @@ def test_a_glow_is_never_called_a_lamp_without_a_closer_look(rate: float, k_per_
 @pytest.mark.parametrize(
     ("k_per_s", "said"), [(0.02, "still glows from earlier"), (0.0, "some light is left")]
 )
-def test_a_little_light_is_told_and_subtracted(k_per_s: float, said: str) -> None:
+def test_a_little_light_is_reported_and_subtracted(k_per_s: float, said: str) -> None:
     (warning,) = told(taken(lambda t: 300 * math.exp(-k_per_s * t)))
     assert said in warning
     assert "% of the range in 3.2 s" in warning

@@ -81,7 +81,7 @@ def test_a_plan_for_a_driver_of_another_kind_is_refused(
 def test_a_plan_without_end_is_refused(
     make_protocol: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("labrig.acquire.planner.MOST_STEPS", 300)
+    monkeypatch.setattr("labrig.acquire.planner.MAX_STEPS", 300)
     with pytest.raises(ProtocolError, match="at most 300 steps"):
         planned(make_protocol(repeats=1000))
 

@@ -235,7 +235,7 @@ def test_a_fault_is_one_clear_line_before_the_filters(
 
 
 @pytest.mark.campaign
-def test_a_filter_that_was_skipped_is_told_at_once_and_left_out(
+def test_a_filter_that_was_skipped_is_reported_at_once_and_left_out(
     write: Make, make_rig: Make, labrig: Labrig, tmp_path: Path
 ) -> None:
     rig = make_rig(base="sim-phosphor", faults=[{"filter_skipped": {"name": FEW[3]}}])

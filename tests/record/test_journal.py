@@ -58,6 +58,6 @@ def test_damage_before_the_last_line_is_refused(tmp_path: Path) -> None:
         read_journal(path)
 
 
-def test_no_journal_is_said(tmp_path: Path) -> None:
+def test_no_journal_is_reported(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no journal"):
         read_journal(tmp_path / "journal.jsonl")

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from .runs import RUNS
 
-MOST_LINES = 20
+MAX_LINES = 20
 
 
 def main() -> int:
@@ -35,7 +35,7 @@ def main() -> int:
             found = run.differences(result)
             matter = [one for one in found if one.matters]
             print(f"{run.name}: {len(found)} numbers differ, {len(matter)} of them matter")
-            for one in found[:MOST_LINES]:
+            for one in found[:MAX_LINES]:
                 print(f"    {one}")
             changed = changed or bool(matter)
             if asked.keep or asked.record:

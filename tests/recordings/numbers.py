@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 #: What changes of labrig that do not say otherwise may move a number by: in σ, or relative to it.
-MOST_SIGMAS, MOST_RELATIVE = 1e-6, 1e-9
+MAX_SIGMAS, MAX_RELATIVE = 1e-6, 1e-9
 #: Which program made a result is no number of it; `result.json` repeats what other files say.
 _LEFT_OUT = frozenset({"provenance.yaml", "result.json"})
 
@@ -54,8 +54,8 @@ class Difference:
     def matters(self) -> bool:
         """Whether it is more than a change that keeps the numbers may make."""
         if math.isfinite(self.sigmas):
-            return abs(self.sigmas) > MOST_SIGMAS
-        return not abs(self.relative) <= MOST_RELATIVE
+            return abs(self.sigmas) > MAX_SIGMAS
+        return not abs(self.relative) <= MAX_RELATIVE
 
     def __str__(self) -> str:
         """A line for people."""

@@ -85,8 +85,8 @@ def photographed(rng: np.random.Generator, light_dn: float) -> RawFrame:
     lens = 1000 / LinearFrame(even, flat=FLAT).value_dn()
     dark = np.tile(DARK_DN[[[0, 1], [1, 2]]], (HEIGHT // 2, WIDTH // 2))
     electrons = rng.poisson(GAIN * (light_dn * lens + dark))
-    counted = (electrons + READ_E * rng.standard_normal(electrons.shape)) / GAIN
-    return RawFrame(np.rint(counted + black).astype(np.uint16), "RGGB", BLACK["RGGB"], WHITE)
+    count_levels = (electrons + READ_E * rng.standard_normal(electrons.shape)) / GAIN
+    return RawFrame(np.rint(count_levels + black).astype(np.uint16), "RGGB", BLACK["RGGB"], WHITE)
 
 
 @pytest.mark.parametrize("light_dn", [0.0, 40.0, 4000.0])
@@ -94,7 +94,7 @@ def test_the_variance_is_what_frames_scatter_by(light_dn: float) -> None:
     """400 frames, three channels: the scatter's own σ is 2 %, so 20 % too much or little fails."""
     rng = np.random.default_rng(1)
     sums = [
-        LinearFrame(photographed(rng, light_dn), DARK_DN, FLAT, NOISE).of_region(
+        LinearFrame(photographed(rng, light_dn), DARK_DN, FLAT, NOISE).region_sums(
             (0.1, 0.2, 0.6, 0.5)
         )
         for _ in range(400)
@@ -110,7 +110,7 @@ def test_the_variance_is_what_frames_scatter_by(light_dn: float) -> None:
 def test_a_region_with_full_pixels_is_clipped_channel_by_channel() -> None:
     mosaic = np.full((HEIGHT, WIDTH), 2000, np.uint16)
     mosaic[0, 0:8:2] = 15_000  # red ones
-    sums = LinearFrame(RawFrame(mosaic, "RGGB", BLACK["RGGB"], WHITE)).of_region(
+    sums = LinearFrame(RawFrame(mosaic, "RGGB", BLACK["RGGB"], WHITE)).region_sums(
         (0.0, 0.0, 1.0, 1.0)
     )
     assert sums.is_clipped.tolist() == [True, False, False]
@@ -135,7 +135,7 @@ def test_light_that_rises_across_the_frame_is_measured_at_the_middle_of_a_channe
     region = (x / WIDTH, y / HEIGHT, width / WIDTH, height / HEIGHT)
     frame = LinearFrame(raw)
     np.testing.assert_allclose(
-        frame.of_region(region).mean_dn, 100 * (frame.middle_columns(region) - 0.5), rtol=1e-9
+        frame.region_sums(region).mean_dn, 100 * (frame.middle_columns(region) - 0.5), rtol=1e-9
     )
 
 

@@ -63,10 +63,10 @@ class Sensor:
         """Light of `LEVEL` with photon noise, each pixel on its own black level, 500 outside."""
         level = np.vectorize(LEVEL.get)(self.colours).astype(float)
         black = _tiled(self.black, _square(self.black), self.corner)
-        counted = np.rint(np.random.default_rng(5).poisson(level) + black)
+        count_levels = np.rint(np.random.default_rng(5).poisson(level) + black)
         top, left, bottom, right = self.area
-        seen = np.full(counted.shape, 500.0)
-        seen[top:bottom, left:right] = counted[top:bottom, left:right]
+        seen = np.full(count_levels.shape, 500.0)
+        seen[top:bottom, left:right] = count_levels[top:bottom, left:right]
         return seen.astype(np.uint16)
 
     def dng(self, write: WriteDng) -> bytes:

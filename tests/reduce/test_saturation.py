@@ -30,9 +30,9 @@ def _scene(shape: str, highest: float) -> Levels:
 def _frame(mean: Levels, electrons_per_dn: float, step: int, seed: int) -> npt.NDArray[np.uint16]:
     """With photon noise; `step`: levels that are left out by a lossy or multiplied file."""
     rng = np.random.default_rng(seed)
-    counted = BLACK + rng.poisson((mean - BLACK) * electrons_per_dn) / electrons_per_dn
-    counted = counted + rng.normal(0, 2, mean.shape)
-    return np.asarray(np.clip(np.rint(counted / step) * step, 0, 65535), dtype=np.uint16)
+    count_levels = BLACK + rng.poisson((mean - BLACK) * electrons_per_dn) / electrons_per_dn
+    count_levels = count_levels + rng.normal(0, 2, mean.shape)
+    return np.asarray(np.clip(np.rint(count_levels / step) * step, 0, 65535), dtype=np.uint16)
 
 
 scenes = st.sampled_from(["flat", "gradient", "bump", "disc", "colours"])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from labrig.optics import CameraResponse, read_camera
 from labrig.report.colours import (
     HALOGEN_K,
-    MOST_SWATCHES,
+    MAX_SWATCHES,
     camera_to_xyz,
     colour_matching,
     encoded,
@@ -71,7 +71,7 @@ def test_the_transfer_curve() -> None:
 
 def test_swatches_fade_and_keep_their_hue() -> None:
     shown = swatches(decay_series(40), SCREEN)
-    assert len(shown) == MOST_SWATCHES
+    assert len(shown) == MAX_SWATCHES
     brightness = [int(swatch.glow[3:5], 16) for swatch in shown]
     assert brightness == sorted(brightness, reverse=True)
     assert all("ff" in swatch.hue for swatch in shown if swatch.hue)
@@ -124,9 +124,9 @@ def test_glow_is_on_one_exposure_and_brightened(tmp_path: Path) -> None:
 
 
 def test_saturated_glow_is_white(tmp_path: Path) -> None:
-    blown = frame(write_dng(tmp_path / "1.dng", np.array([900.0, 16000.0, 2000.0])))
-    (picture,) = glow_pictures([GlowPhotograph(blown, 1.0)], SCREEN)
-    assert picture.blown
+    has_saturation = frame(write_dng(tmp_path / "1.dng", np.array([900.0, 16000.0, 2000.0])))
+    (picture,) = glow_pictures([GlowPhotograph(has_saturation, 1.0)], SCREEN)
+    assert picture.has_saturation
     assert decoded(picture.source)[12, 16].min() > 250
 
 

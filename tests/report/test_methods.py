@@ -9,13 +9,13 @@ import pytest
 from labrig.report.methods import Methods, methods
 from labrig.report.photographs import Sensor
 from labrig.report.report_model import DecayReport
-from labrig.report.timing import Lateness
+from labrig.report.timing import LatenessStatistics
 from labrig.results import FittedDecay
 
 from .made import decay_report, decay_series, fitted, frame, patch
 
 SENSOR = Sensor("Canon EOS 5D Mark II", 1404, 936)
-LATE = Lateness(30, 0.0021, 0.004, 0.0093, "000007.dng")
+LATE = LatenessStatistics(30, 0.0021, 0.004, 0.0093, "000007.dng")
 DECAY = [replace(frame(Path(f"{n:06d}.dng"), n), late_s=0.002) for n in range(1, 31)]
 DARK = [
     replace(frame(Path(f"d{n}.dng"), n, "dark", exposure_s), start_time=1.8e9 - 100 + n)
@@ -31,7 +31,7 @@ def report(tmp_path: Path) -> DecayReport:
         made,
         about=replace(made.about, libraries=libraries),
         frames=(*DARK, *DECAY),
-        charges_s=(5400.2,),
+        charge_durations_s=(5400.2,),
     )
 
 
@@ -77,7 +77,7 @@ def test_repeats_and_varied_exposures(report: DecayReport) -> None:
         replace(one, unit=f"decay-{1 + n // 15}", exposure_s=0.5 * 2 ** (n % 3))
         for n, one in enumerate(DECAY)
     ]
-    said = of(replace(report, frames=tuple(frames), charges_s=(1200.0, 1260.0))).recording
+    said = of(replace(report, frames=tuple(frames), charge_durations_s=(1200.0, 1260.0))).recording
     assert "Before each of 2 decays the sample was charged" in said
     assert "for 20 min to 21 min" in said
     assert "took 15 RAW frames a decay, each exposed for 0.5 s to 2 s" in said
@@ -129,7 +129,7 @@ def test_one_channel_needs_no_weights(report: DecayReport) -> None:
 
 def test_what_is_not_known_is_not_said(report: DecayReport) -> None:
     about = replace(report.about, libraries=())
-    bare = replace(report, about=about, charges_s=(), frames=())
+    bare = replace(report, about=about, charge_durations_s=(), frames=())
     said = methods(bare, None, None)
     for absent in ("charged", "pixels", "RAW frames", "planned", "dark frames", "NumPy"):
         assert absent not in said.recording + said.analysis

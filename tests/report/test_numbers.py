@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from labrig.written_numbers import exposure_text, plus_minus, rounded
+from labrig.number_format import exposure_text, plus_minus, rounded
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_rounding(value: float, digits: int, text: str) -> None:
     assert rounded(value, digits) == text
 
 
-def test_exposures_are_said_as_photographers_do() -> None:
+def test_exposures_are_reported_as_photographers_do() -> None:
     assert exposure_text(1 / 64) == "1/64 s"
     assert exposure_text(0.5) == "0.5 s"
     assert exposure_text(30.0) == "30 s"

@@ -11,11 +11,11 @@ import pytest
 
 from labrig.errors import DiskError
 from labrig.fit import DecayFit
+from labrig.number_format import plus_minus
 from labrig.record.history import Interruption
 from labrig.report import write_report
 from labrig.report.parameters import quality_rows
 from labrig.report.report_model import DecayReport, PatchReport
-from labrig.written_numbers import plus_minus
 
 from .made import decay_report, decay_series, page_of, patch
 
@@ -198,7 +198,7 @@ def test_what_a_run_has_besides_is_shown(plain: Made, tmp_path: Path) -> None:
                     ),
                 ),
                 patches=(patch(replace(series, unit=unit)),),
-                charges_s=(5400.0,),
+                charge_durations_s=(5400.0,),
             ),
         )
     )
@@ -263,7 +263,7 @@ def test_a_missing_fit_is_warned_of_once(tmp_path: Path) -> None:
     assert "1 warning" in page.text
 
 
-def test_a_steady_source_is_told_with_its_drift(tmp_path: Path) -> None:
+def test_a_steady_source_is_reported_with_its_drift(tmp_path: Path) -> None:
     series = decay_series(name="my diode")
     flicker = 1 + 0.007 * np.random.default_rng(1).standard_normal((30, 1))
     lit = PatchReport("my diode", None, replace(series, values=400 * flicker * [0.3, 1, 0.5]), "no")

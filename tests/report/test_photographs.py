@@ -145,14 +145,16 @@ def test_pictures_of_the_glow_are_on_one_scale_and_brightened(
         found = brightened[y - 2 : y + 2, x - 2 : x + 2].mean(axis=(0, 1))
         assert found == pytest.approx(encoded(colours).astype(float), abs=ROUNDED)
         assert float(picture.brightened) == pytest.approx(1 / light, rel=0.05)
-        assert not picture.blown
+        assert not picture.has_saturation
 
 
 @every_sensor
-def test_where_a_colour_is_saturated_it_is_white_and_said(sensor: Sensor, tmp_path: Path) -> None:
+def test_a_saturated_colour_is_white_and_reported(
+    sensor: Sensor, tmp_path: Path
+) -> None:
     clipped = frame(sensor.write(tmp_path / "1.dng", clipped=True), 1)
     (picture,) = glow_pictures([GlowPhotograph(clipped, 0.5)], screen_for(None))
-    assert picture.blown
+    assert picture.has_saturation
     assert middle(shown(picture.source)) == pytest.approx([255.0] * 3, abs=2)
 
 

@@ -8,7 +8,7 @@ import pytest
 from labrig.fit import DecayFit
 from labrig.report.decay import repeats, steady
 from labrig.report.decay_figures import fitted_curve
-from labrig.report.timing import FrameTiming, lateness
+from labrig.report.timing import FrameTiming, frame_lateness
 from labrig.results import Series
 
 from .made import decay_series, fitted
@@ -55,12 +55,12 @@ def test_a_repeat_without_usable_frames_is_left_out() -> None:
 
 def test_lateness_in_numbers() -> None:
     timings = [FrameTiming(f"{n}", "decay-1", 5.0 * n, 0.001 * n) for n in range(101)]
-    late = lateness(timings)
+    late = frame_lateness(timings)
     assert late is not None
     assert late.median_s == pytest.approx(0.050)
     assert late.p95_s == pytest.approx(0.095)
     assert (late.worst_s, late.worst_frame) == (0.1, "100")
-    assert lateness([]) is None
+    assert frame_lateness([]) is None
 
 
 def test_the_band_is_what_the_covariance_scatters_curves_by() -> None:

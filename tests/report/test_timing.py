@@ -15,7 +15,7 @@ IN_TIME = [move("lamp", "off", 0.0), move("shield", "cover", 0.0052), move("door
 AT_ONCE = [move("lamp", "on", 0.0), move("door", "close", 0.0), move("person", "sample", 0.0)]
 
 
-def test_every_kind_of_move_is_told_with_its_worst() -> None:
+def test_every_kind_of_move_is_reported_with_its_worst() -> None:
     moves = [*AT_ONCE, *IN_TIME, move("shield", "cover", 0.0011, "decay-2")]
     assert moves_text(moves) == (
         "Begun after its planned time: lamp off at most 0 ms, shield cover at most 5.2 ms "

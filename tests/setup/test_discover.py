@@ -84,7 +84,7 @@ def test_without_libusb_serial_ports_are_still_listed() -> None:
     ],
     ids=lambda value: value.device if isinstance(value, Plugged) else None,
 )
-def test_serial_ports_are_told_by_their_usb_numbers(
+def test_serial_ports_are_reported_by_their_usb_numbers(
     port: Plugged, name: str, has_driver: bool
 ) -> None:
     (found,) = discover(pc([port]), DRIVERS).ports
@@ -159,7 +159,7 @@ def test_a_makers_own_commands_are_left_to_libgphoto2(
     assert any("labrig[gphoto2]" in hint for hint in found.hints) == (driver != "ptp_camera")
 
 
-def test_twins_without_serial_numbers_cannot_be_told_apart() -> None:
+def test_twins_without_serial_numbers_cannot_be_distinguished() -> None:
     found = discover(pc(usb_devices=cameras(2)), DRIVERS)
     assert all("append /SERIAL" in camera.hints[0] for camera in found.cameras)
 

@@ -68,7 +68,7 @@ def exercised(data: bytes) -> Exercised:
 
 
 @every_sensor
-def test_noise_of_every_channel_is_told(cfa: str) -> None:
+def test_noise_of_every_channel_is_reported(cfa: str) -> None:
     report = exercised(dark_frame(cfa))
     told = {entry.what: entry.value for entry in report.measured if "dark frame" in entry.what}
     assert list(told) == [f"dark frame 2 s ISO 400, {name}" for name in CHANNELS[cfa]]
@@ -81,7 +81,7 @@ def test_noise_of_every_channel_is_told(cfa: str) -> None:
 
 
 @every_sensor
-def test_a_frame_that_is_not_dark_is_said(cfa: str) -> None:
+def test_a_frame_that_is_not_dark_is_reported(cfa: str) -> None:
     (warned,) = [f for f in exercised(dark_frame(cfa, 200.0)).findings if f.severity == "warn"]
     assert "not dark (200 DN above black)" in warned.what
 

@@ -242,7 +242,7 @@ def test_a_port_that_is_taken_is_named() -> None:
         ViewServer(LivePictures(), None, "rig", first.server_port)
 
 
-def test_regions_in_pixels_are_told_apart(make_protocol: Callable[..., Path]) -> None:
+def test_regions_in_pixels_are_distinguished(make_protocol: Callable[..., Path]) -> None:
     patches = {"a": [0, 0, 0.5, 1], "b": [700, 400, 64, 64]}
     protocol = EditableProtocol(make_protocol(patches=patches))
     assert [region["name"] for region in protocol.in_fractions()] == ["a"]

@@ -26,7 +26,7 @@ def half_maxima(u: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("u", "fwhm_nm"), [(0.0, 23.0), (0.5, 25.0), (1.0, 27.0)])
-def test_a_band_is_where_and_as_wide_as_it_is_said(u: float, fwhm_nm: float) -> None:
+def test_a_band_is_where_and_as_wide_as_it_is_reported(u: float, fwhm_nm: float) -> None:
     centre_nm, width_nm = half_maxima(u)
     assert centre_nm == pytest.approx(float(Lvf(BENT).centre_nm(np.array([u]))[0]), abs=0.5)
     assert width_nm == pytest.approx(fwhm_nm, rel=0.02)

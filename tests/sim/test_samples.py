@@ -7,7 +7,7 @@ from labrig.sim.bench_settings import TemperatureSettings
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.phosphor import Phosphor
 from labrig.sim.simulation import LampSettings, Simulation
-from labrig.sim.temperature import quickening
+from labrig.sim.temperature import rate_factor
 from tests.sim.darkroom import SMALL, Darkroom
 
 STEADY = LampSettings(warm_up_deficit=0.0, drift_per_hour=0.0)
@@ -16,12 +16,12 @@ GLOWING = {"initial": {"concentration": 0.5}}
 
 def test_re_radiation_more_than_doubles_in_ten_kelvin() -> None:
     """0.65 eV: 2.3 times from 21 to 31 °C."""
-    faster = quickening(TemperatureSettings(start=31.0))
+    faster = rate_factor(TemperatureSettings(start=31.0))
     assert faster(0.0) == pytest.approx(2.32, abs=0.01)
-    drifting = quickening(TemperatureSettings(start=21.0, drift_per_hour=5.0))
+    drifting = rate_factor(TemperatureSettings(start=21.0, drift_per_hour=5.0))
     assert drifting(0.0) == pytest.approx(1.0, abs=1e-9)
     assert drifting(7200.0) == pytest.approx(faster(0.0))
-    assert quickening(None)(1e6) == 1.0
+    assert rate_factor(None)(1e6) == 1.0
 
 
 def decay(**changed: object) -> tuple[float, float]:
@@ -35,7 +35,7 @@ def decay(**changed: object) -> tuple[float, float]:
 
 def test_a_warm_sample_glows_brighter_and_fades_faster() -> None:
     (cool, cool_rate), (warm, warm_rate) = decay(), decay(temperature={"start": 25.0})
-    faster = quickening(TemperatureSettings(start=25.0))(0.0)
+    faster = rate_factor(TemperatureSettings(start=25.0))(0.0)
     assert cool_rate == pytest.approx(0.032, rel=0.02)
     assert warm_rate / cool_rate == pytest.approx(faster, rel=0.02)
     assert warm / cool == pytest.approx(faster * np.exp(-(warm_rate - cool_rate) / 2), rel=0.02)
@@ -55,7 +55,7 @@ def test_the_truth_is_that_of_a_warm_room() -> None:
     assert blue == pytest.approx(expected, rel=0.02)
 
 
-def test_emission_is_isotropic_unless_it_is_said_not_to_be() -> None:
+def test_emission_is_isotropic_unless_it_is_reported_not_to_be() -> None:
     def tilted(degrees: int, **changed: object) -> float:
         bench = Darkroom(**{**GLOWING, **changed})
         bench.do(f"tilt {degrees}")

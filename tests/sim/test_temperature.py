@@ -24,7 +24,7 @@ def make(
     return NumatoBoard(8, lambda relay, on: None, {0: sensor.volts})
 
 
-def test_a_room_of_which_nothing_is_said_has_21_degrees() -> None:
+def test_a_room_of_which_nothing_is_reported_has_21_degrees() -> None:
     clock = VirtualClock()
     boards = [make(clock, None, seed) for seed in range(12)]
     errors = np.array([shown(board) - 21 for board in boards])

@@ -158,7 +158,7 @@ def test_a_frame_that_cannot_be_read_is_passed_over(growing: Growing) -> None:
     assert settled(RunFollower(growing.path))["frame"]["name"] == before.name
 
 
-def test_a_chain_is_told_by_its_parts(tmp_path: Path) -> None:
+def test_a_chain_is_reported_by_its_parts(tmp_path: Path) -> None:
     growing = Growing(CHAIN_RUN, tmp_path)
     growing.finish()
     state = settled(RunFollower(growing.path))
@@ -296,7 +296,7 @@ def watching(growing: Growing) -> Iterator[Watching]:
         yield made
 
 
-def test_the_run_is_there_as_soon_as_the_address_is_told(growing: Growing) -> None:
+def test_the_run_is_there_as_soon_as_the_address_is_reported(growing: Growing) -> None:
     growing.finish()
     clock, seen = SystemClock(), []
 

@@ -10,7 +10,7 @@ from ..device_info import DeviceInfo
 from ..failures import RefusedError
 from ..session import Reply, Session, Timeouts
 from .protocol import Eos
-from .release import FOCUS_S, LATE_PRESS_S, Held, Release, TwoStageRelease
+from .release import FOCUS_S, LATE_PRESS_S, Release, StageCommands, TwoStageRelease
 
 #: Time for which a busy camera is asked again to close its shutter.
 CLOSING_S = 30.0
@@ -30,7 +30,7 @@ class EosBulb:
         Whether the button's first stage goes first; BulbStart goes alone.
     """
 
-    def __init__(self, release: Held, *, needs_half_press: bool) -> None:
+    def __init__(self, release: StageCommands, *, needs_half_press: bool) -> None:
         self._release = release
         self.needs_half_press = needs_half_press
 
@@ -90,7 +90,7 @@ class EosBulb:
 def bulb_of(info: DeviceInfo, session: Session, release: Release) -> EosBulb | None:
     """Return the camera's way of bulb exposures; None if it has none."""
     if {Eos.BulbStart, Eos.BulbEnd} <= info.operations:
-        commands = Held(session, (Eos.BulbStart,), (Eos.BulbEnd,))
+        commands = StageCommands(session, (Eos.BulbStart,), (Eos.BulbEnd,))
         return EosBulb(commands, needs_half_press=False)
     if isinstance(release, TwoStageRelease):
         return EosBulb(release.full, needs_half_press=True)

@@ -12,7 +12,7 @@ import struct
 from enum import IntEnum
 
 #: Longest block, more than any camera has sent (364 bytes, a 5DS).
-MOST_BYTES = 4096
+MAX_BYTES = 4096
 
 
 class CustomFunction(IntEnum):
@@ -51,7 +51,7 @@ class CustomFunctions:
 
 def parse_custom_functions(block: bytes) -> dict[int, tuple[int, ...]] | None:
     """Return the values by function id; None where any number does not fit the known layout."""
-    if not 8 <= len(block) <= MOST_BYTES or len(block) % 4:
+    if not 8 <= len(block) <= MAX_BYTES or len(block) % 4:
         return None
     numbers = struct.unpack(f"<{len(block) // 4}I", block)
     size, groups = numbers[:2]

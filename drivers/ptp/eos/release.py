@@ -34,7 +34,7 @@ class Stage(Enum):
     DOWN = auto()
 
 
-class Held:
+class StageCommands:
     """A pair of commands that press and release a stage, in any state before.
 
     Parameters
@@ -152,7 +152,7 @@ class TwoStageRelease(Release):
 
     def __init__(self, session: Session) -> None:
         self._half, self.full = (
-            Held(session, (Eos.RemoteReleaseOn, stage, 0), (Eos.RemoteReleaseOff, stage))
+            StageCommands(session, (Eos.RemoteReleaseOn, stage, 0), (Eos.RemoteReleaseOff, stage))
             for stage in (HALF, FULL)
         )
 

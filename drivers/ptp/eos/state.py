@@ -14,9 +14,9 @@ from .protocol import Eos, Property, property_dataset, value_text
 
 POLL_PERIOD_S = 0.03
 #: Largest number of answers in a row; a camera lists its state in a few.
-MOST_ANSWERS = 64
+MAX_ANSWERS = 64
 #: Largest number of frames, many times what fits into a camera's memory for the PC.
-MOST_OFFERED = 1000
+MAX_OFFERED = 1000
 _KNOWN = frozenset(Property)
 
 
@@ -73,11 +73,11 @@ class EosState:
         DeviceError
             The camera does not answer, violates the protocol, or never comes to an end.
         """
-        for _ in range(MOST_ANSWERS):
+        for _ in range(MAX_ANSWERS):
             if not self.listen(busy_s):
                 return
         raise DeviceError(
-            f"expected the camera to come to an end, it has reported events {MOST_ANSWERS} times "
+            f"expected the camera to come to an end, it has reported events {MAX_ANSWERS} times "
             "in a row: switch it off and on"
         )
 
@@ -101,10 +101,10 @@ class EosState:
                     self._choices[prop] = codes
                 case ObjectOffered():
                     self._offered.setdefault(event.handle, event)
-        if (many := len(self._offered)) > MOST_OFFERED:
+        if (many := len(self._offered)) > MAX_OFFERED:
             self._offered.clear()
             raise DeviceError(
-                f"expected at most {MOST_OFFERED} frames in the camera, it offers {many}: switch "
+                f"expected at most {MAX_OFFERED} frames in the camera, it offers {many}: switch "
                 "it off and on"
             )
         return bool(events)

@@ -118,9 +118,9 @@ _AROUND_DATA_BYTES = 12
 #: Longer than any packet that carries no data: an introduction with its name.
 _SHORT_PACKET_BYTES = 1024
 #: Longest packet while cancelling, when data of any length may still be on its way.
-_MOST_PACKET_BYTES = 256 * 1024 * 1024
+_MAX_PACKET_BYTES = 256 * 1024 * 1024
 #: An EOS reports without end what nobody listens to, because it says it again when asked.
-_MOST_EVENTS_KEPT = 256
+_MAX_EVENTS_KEPT = 256
 _REFUSALS = {
     1: "it does not know this PC: allow 'labrig' in its network menu",
     2: "another program uses it: close that",
@@ -151,7 +151,7 @@ class IpLink:
         self._clock = clock
         self._operation = 0
         self._streams: list[PacketStream] = []
-        self._events: deque[Packet] = deque(maxlen=_MOST_EVENTS_KEPT)
+        self._events: deque[Packet] = deque(maxlen=_MAX_EVENTS_KEPT)
         self._introduce()
 
     def send(self, request: Container, data: bytes | None, doing: str) -> None:
@@ -230,7 +230,7 @@ class IpLink:
         is_over = False
         while not is_over:
             remaining_s = deadline_s - self._clock.now()
-            answer = self._next(doing, max(0.0, remaining_s), _MOST_PACKET_BYTES)
+            answer = self._next(doing, max(0.0, remaining_s), _MAX_PACKET_BYTES)
             if answer.kind == PacketKind.OPERATION_RESPONSE:
                 is_over = packets.response(answer).transaction_id == transaction_id
 

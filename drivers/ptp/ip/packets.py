@@ -7,7 +7,7 @@ import struct
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ..containers import MOST_PARAMETERS, Container, Kind
+from ..containers import MAX_PARAMETERS, Container, Kind
 from ..failures import MalformedError
 
 HEADER_BYTES = 8
@@ -149,9 +149,9 @@ def event(packet: Packet) -> Container:
 def _with_params(kind: Kind, packet: Packet) -> Container:
     code, transaction_id = packet.fields("HI")
     params = packet.payload[6:]
-    if len(params) % 4 or len(params) > 4 * MOST_PARAMETERS:
+    if len(params) % 4 or len(params) > 4 * MAX_PARAMETERS:
         raise MalformedError(
-            f"expected at most {MOST_PARAMETERS} parameters of 4 bytes in the camera's "
+            f"expected at most {MAX_PARAMETERS} parameters of 4 bytes in the camera's "
             f"{kind.name.lower()}",
             packet.payload,
         )

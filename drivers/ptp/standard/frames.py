@@ -19,7 +19,7 @@ SILENCE_S = 0.1
 #: Time from one file of a capture to its next, and to CaptureComplete.
 NEXT_FILE_S = 3.0
 #: Number of events, more than one capture reports.
-MOST_EVENTS = 64
+MAX_EVENTS = 64
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class StandardFrames:
         DeviceError
             The camera does not answer.
         """
-        for _ in range(MOST_EVENTS):
+        for _ in range(MAX_EVENTS):
             if self._listen(SILENCE_S) is None:
                 break
         while self._added:

@@ -138,7 +138,7 @@ def _endpoint(interface: Any, direction: int, transfer_type: int) -> Any:
 
 
 HOST_TO_INTERFACE, INTERFACE_TO_HOST = 0x21, 0xA1
-MOST_CONTROL_BYTES = 32
+MAX_CONTROL_BYTES = 32
 CONTROL_TIMEOUT_S = 2.0
 WRITE_TIMEOUT_S = 5.0
 
@@ -211,7 +211,7 @@ class UsbDevice:
                     request,
                     0,
                     self._endpoints.interface,
-                    MOST_CONTROL_BYTES,
+                    MAX_CONTROL_BYTES,
                     _ms(CONTROL_TIMEOUT_S),
                 )
             )

@@ -67,7 +67,7 @@ SILENCE_S = 0.05
 READY_TIMEOUT_S = 3.0
 READY_PERIOD_S = 0.05
 #: 256 MB of left-over data: more than any frame.
-MOST_DRAINED_BLOCKS = 1024
+MAX_DRAINED_BLOCKS = 1024
 
 
 class UsbLink:
@@ -237,13 +237,13 @@ class UsbLink:
             return self._events.feed(packet)
         except MalformedError:
             with suppress(NoAnswerError):
-                for _ in range(MOST_DRAINED_BLOCKS):
+                for _ in range(MAX_DRAINED_BLOCKS):
                     self._device.read_event_packet(SILENCE_S, "discarding left-over events")
             raise
 
     def _drain(self) -> None:
         block = b""
-        for _ in range(MOST_DRAINED_BLOCKS):
+        for _ in range(MAX_DRAINED_BLOCKS):
             try:
                 block = self._bulk_read(BLOCK_BYTES, SILENCE_S, "discarding left-over data")
             except NoAnswerError:

@@ -10,6 +10,18 @@ from typing import Any
 
 from labrig.acquire.roles.camera import CAMERA, Camera, Shoot
 from labrig.acquire.roles.changer import CHANGER, Changer
+from labrig.acquire.roles.door_and_shield import (
+    DOOR,
+    DOOR_CLOSE,
+    DOOR_OPEN,
+    SHIELD,
+    SHIELD_COVER,
+    SHIELD_UNCOVER,
+    Door,
+    LampShield,
+    Shield,
+    TrapDoor,
+)
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
 from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedSwitch
 from labrig.acquire.roles.role import (
@@ -29,18 +41,6 @@ from labrig.acquire.roles.role import (
     Suggestion,
 )
 from labrig.acquire.roles.spectrometer import SPECTROMETER, Spectrometer
-from labrig.acquire.roles.swings import (
-    DOOR,
-    DOOR_CLOSE,
-    DOOR_OPEN,
-    SHIELD,
-    SHIELD_COVER,
-    SHIELD_UNCOVER,
-    Door,
-    LampShield,
-    Shield,
-    TrapDoor,
-)
 from labrig.acquire.roles.thermometer import THERMOMETER, Thermometer
 from labrig.acquire.roles.viewfinder import VIEWFINDER, LiveView
 

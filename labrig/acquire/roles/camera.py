@@ -177,7 +177,7 @@ def _measured_offers(offers: CameraOffers) -> Measured:
 
 CAMERA: Role[Camera] = Role(
     key="camera",
-    does=Camera,
+    protocol_class=Camera,
     name="camera",
     planned=lambda driver, settings, clock: PlannedCamera(clock, driver.declared_offers(settings)),
     exercise=exercise_camera,

@@ -20,4 +20,4 @@ class Changer(Device, Protocol):
 
 
 #: Without a stand-in: in a plan, manual steps are done by a person.
-CHANGER: Role[Changer] = Role(key="changer", does=Changer, name="changer")
+CHANGER: Role[Changer] = Role(key="changer", protocol_class=Changer, name="changer")

@@ -109,7 +109,7 @@ def _require_state(lamp: Lamp, *, on: bool) -> None:
 
 LAMP: Role[Lamp] = Role(
     key="lamp",
-    does=Lamp,
+    protocol_class=Lamp,
     name="lamp",
     planned=lambda driver, settings, clock: PlannedLamp(),
     exercise=_exercise,

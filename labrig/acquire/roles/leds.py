@@ -32,7 +32,7 @@ class LedBank(Light, Protocol):
     def dark(self) -> None:
         """Switch all LEDs off, read back where the device can."""
 
-    def lit(self) -> str | None:
+    def channel_on(self) -> str | None:
         """Return the LED that is on, None if all are off: as read back where the device can.
 
         Raises
@@ -65,7 +65,7 @@ class PlannedLedBank(PlannedDevice):
         """Switch all LEDs off."""
         self._channel_on = None
 
-    def lit(self) -> str | None:
+    def channel_on(self) -> str | None:
         """Return the LED that is on, as commanded last."""
         return self._channel_on
 
@@ -125,7 +125,7 @@ def _exercise(leds: LedBank, context: ExerciseContext) -> Exercised:
 
 
 def _require_state(leds: LedBank, channel: str | None) -> None:
-    if (channel_on := leds.lit()) != channel:
+    if (channel_on := leds.channel_on()) != channel:
         raise DeviceError(
             f"the LEDs were switched to {channel or 'dark'}, they say {channel_on or 'dark'}; look "
             "at them, switch them off by hand and check the relays"
@@ -134,10 +134,10 @@ def _require_state(leds: LedBank, channel: str | None) -> None:
 
 LEDS: Role[LedBank] = Role(
     key="leds",
-    does=LedBank,
+    protocol_class=LedBank,
     name="bank of LEDs",
     planned=lambda driver, settings, clock: PlannedLedBank(driver.declared_channels(settings)),
     exercise=_exercise,
-    state=lambda leds: str(LedSwitch(leds.lit())),
+    state=lambda leds: str(LedSwitch(leds.channel_on())),
     safe_first=True,
 )

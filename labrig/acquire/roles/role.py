@@ -212,7 +212,7 @@ class Role(Generic[DeviceT]):
     ----------
     key
         Key of the role's device in a rig file and in the journal.
-    does
+    protocol_class
         Protocol class that its drivers satisfy.
     name
         Name of its device in messages.
@@ -230,7 +230,7 @@ class Role(Generic[DeviceT]):
     """
 
     key: str
-    does: type
+    protocol_class: type
     name: str
     planned: Callable[[Any, Any, VirtualClock], DeviceT] | None = None
     exercise: Callable[[DeviceT, ExerciseContext], Exercised] | None = None

@@ -16,4 +16,6 @@ class Spectrometer(Device, Protocol):
         """Return one reading in counts per pixel, without dark subtraction."""
 
 
-SPECTROMETER: Role[Spectrometer] = Role(key="spectrometer", does=Spectrometer, name="spectrometer")
+SPECTROMETER: Role[Spectrometer] = Role(
+    key="spectrometer", protocol_class=Spectrometer, name="spectrometer"
+)

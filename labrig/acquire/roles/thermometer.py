@@ -26,5 +26,5 @@ def _exercise(thermometer: Thermometer, context: ExerciseContext) -> Exercised:
 
 
 THERMOMETER: Role[Thermometer] = Role(
-    key="thermometer", does=Thermometer, name="thermometer", exercise=_exercise
+    key="thermometer", protocol_class=Thermometer, name="thermometer", exercise=_exercise
 )

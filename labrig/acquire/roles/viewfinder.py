@@ -35,5 +35,5 @@ def _exercise(viewfinder: LiveView, context: ExerciseContext) -> Exercised:
 
 
 VIEWFINDER: Role[LiveView] = Role(
-    key="viewfinder", does=LiveView, name="viewfinder", exercise=_exercise
+    key="viewfinder", protocol_class=LiveView, name="viewfinder", exercise=_exercise
 )

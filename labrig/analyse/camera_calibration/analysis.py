@@ -13,6 +13,7 @@ from labrig.analyse.frames import camera_identity, lens_of, part_frames, part_re
 from labrig.analyse.part import Part
 from labrig.calibration import CameraFile, Linearity
 from labrig.errors import DataError
+from labrig.number_format import exposure_text, plus_minus
 from labrig.protocols.camera_calibration import LINEARITY, CardFrames
 from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw, reduce_patches
@@ -25,11 +26,10 @@ from labrig.results import (
     PhotonTransfer,
     Series,
 )
-from labrig.written_numbers import exposure_text, plus_minus
 
 LIT = tuple(CardFrames)
 #: Deviation from linearity beyond which frames are not used for settings.
-MOST_BENT = 0.02
+MAX_BENT = 0.02
 #: χ² per degree of freedom beyond which the photon transfer is not linear.
 STRAIGHT_CHI2 = 6.0
 #: Deviations from linearity and of exposure times, and gradients of light, that cause a warning.
@@ -139,7 +139,7 @@ class CardLevels:
         """Return the light of the card in frames of the roles, corrected for non-linearity."""
         nonlinearity = deviation(linearity, self.level_dn)
         linear_level = self.level_dn * np.exp(-nonlinearity)
-        used = self.series.usable & (np.abs(nonlinearity).max(axis=1) < MOST_BENT)
+        used = self.series.usable & (np.abs(nonlinearity).max(axis=1) < MAX_BENT)
         light, noise = linear_level.sum(axis=1), np.sqrt(np.square(self.sigma_dn).sum(axis=1))
         return [
             CardFrame(

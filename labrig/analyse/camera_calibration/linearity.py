@@ -21,7 +21,7 @@ from labrig.results import FloatArray
 #: Knots of D, as fractions of the range up to saturation.
 KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)
 #: Fraction of the range below which read noise dominates.
-LEAST_FRACTION = 0.005
+MIN_FRACTION = 0.005
 
 
 def fit_linearity(
@@ -46,7 +46,7 @@ def fit_linearity(
     saturation_dn
         Saturation level in DN, which is passed on to the result.
     """
-    is_used = np.isfinite(level_dn) & (level_dn > LEAST_FRACTION * range_dn)
+    is_used = np.isfinite(level_dn) & (level_dn > MIN_FRACTION * range_dn)
     is_used &= (is_used.sum(axis=1) > 1)[:, np.newaxis]
     if not is_used.any():
         return None

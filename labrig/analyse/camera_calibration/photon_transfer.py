@@ -25,7 +25,7 @@ OUTLIER_SIGMAS = 6.0
 #: Brightness of a lit frame in standard deviations of its pixels.
 LIT_SIGMAS = 3.0
 #: Most pixels across and down; more take memory without more precision.
-MOST_PIXELS = 1024
+MAX_PIXELS = 1024
 #: Offsets of half of the eight neighbours; the others are symmetric.
 _NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
 
@@ -71,7 +71,7 @@ def scatter(
 def _central_area(area: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
     """Return the middle of an area x, y, width, height, large enough to measure noise to 0.2 %."""
     x, y, width, height = area
-    wide, high = min(width, MOST_PIXELS), min(height, MOST_PIXELS)
+    wide, high = min(width, MAX_PIXELS), min(height, MAX_PIXELS)
     return x + (width - wide) // 2, y + (height - high) // 2, wide, high
 
 

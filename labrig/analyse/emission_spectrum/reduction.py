@@ -271,7 +271,7 @@ def _measure(
     frame: SeriesFrame, raw: RawFrame, regions: Sequence[Region], hot: PixelMask | None
 ) -> MeasuredPlaces:
     linear = LinearFrame(raw, hot=hot)
-    sums = [linear.of_region(region) for region in regions]
+    sums = [linear.region_sums(region) for region in regions]
     deviations = np.full((len(regions), len(raw.channels), STRIPS), np.nan)
     for region_deviations, region_sums in zip(deviations, sums, strict=True):
         means = region_sums.strip_means_dn(min(STRIPS, len(region_sums.pixels) // raw.cfa_side))

@@ -31,7 +31,7 @@ LAMP = 0.01
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
 #: Least standard uncertainty of a dark level in DN/s.
-LEAST_DARK = 1e-3
+MIN_DARK = 1e-3
 
 
 def analyse(part: Part) -> ExcitationResult:
@@ -75,7 +75,7 @@ def _patch_excitation(
 ) -> tuple[PatchExcitation, Sequence[str]]:
     """Return the patch's excitation, and warnings."""
     decay = fit_series(charging.whole, _states(part, patch))
-    dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), LEAST_DARK).tolist())
+    dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), MIN_DARK).tolist())
     relative_sigmas = RelativeSigmas(
         flicker=_flicker(part, decay),
         lamp=LAMP,

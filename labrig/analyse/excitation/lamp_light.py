@@ -12,7 +12,7 @@ from labrig.results import FloatArray, Transient
 
 #: Least relative σ of the light on a single place: bands are calibrated place by place, and their
 #: flanks scatter by so much. Smooth errors alone cannot describe it.
-LEAST_SITE_SIGMA = 0.03
+MIN_SITE_SIGMA = 0.03
 #: Standard uncertainty of a filter's wavelengths in nm.
 WAVELENGTH_SIGMA_NM = 1.0
 #: Number of smooth modes along the filter: errors are uncorrelated over some 40 nm.
@@ -20,7 +20,7 @@ SMOOTH_MODES = 9
 #: Largest relative σ of the light, within which its logarithm is linear.
 WORST = 1.0
 #: Least light as a fraction of the most, for its logarithm.
-LEAST_LIGHT = 1e-6
+MIN_LIGHT = 1e-6
 #: Wavelengths in nm and times in seconds in which a halogen lamp falls to 1/e (from literature),
 #: and time after which it is dark (Nalbach et al., section 4.6).
 USUAL_NM = (419.0, 650.0)
@@ -53,7 +53,7 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
         np.clip((sigma / _positive_light(through)) ** 2 - light_sigma**2, 0.0, WORST**2)
     )
     bands = np.ones(through.shape[1])
-    independent = LEAST_SITE_SIGMA * np.eye(len(position))[..., None]
+    independent = MIN_SITE_SIGMA * np.eye(len(position))[..., None]
     return np.concatenate(
         [
             smooth * light_sigma * bands,
@@ -120,7 +120,7 @@ def _relative_sigma(irradiance: IrradianceFile) -> FloatArray:
 
 
 def _positive_light(light: FloatArray) -> FloatArray:
-    positive: FloatArray = np.maximum(light, LEAST_LIGHT * light.max())
+    positive: FloatArray = np.maximum(light, MIN_LIGHT * light.max())
     return positive
 
 

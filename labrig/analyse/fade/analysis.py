@@ -18,13 +18,13 @@ from labrig.analyse.part import Part
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
 from labrig.errors import DataError
+from labrig.number_format import plus_minus
 from labrig.optics import CameraResponse, Spectrum
 from labrig.protocols.fade import SWITCHED, LampFrames
 from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import read_raw
 from labrig.region import Region
 from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
-from labrig.written_numbers import plus_minus
 
 #: Relative flicker of a photograph without a camera file.
 TYPICAL_FLICKER = 0.007

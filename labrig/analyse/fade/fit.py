@@ -30,7 +30,7 @@ ANY_LAG = Measured(0.0, 6e-3, "s")
 JITTERS_S = np.geomspace(3e-4, 2e-2, 31)
 FIRST_JITTER_S = 3e-3
 #: Iterations of the covariances by the model; most steps of a fit, and its tolerance.
-ROUNDS, MOST_STEPS, TOLERANCE = 3, 100, 1e-6
+ROUNDS, MAX_STEPS, TOLERANCE = 3, 100, 1e-6
 #: Difference in −2 ln L from which another shape replaces the filament.
 CLEARLY = 10.0
 
@@ -101,7 +101,7 @@ def _fit(
     for _ in range(ROUNDS):
         problem.whiten(theta, jitter_s)
         result = least_squares(
-            problem.residuals, theta, max_iterations=MOST_STEPS, tolerance=TOLERANCE
+            problem.residuals, theta, max_iterations=MAX_STEPS, tolerance=TOLERANCE
         )
         theta = result.parameters
         jitter_s = problem.likeliest_jitter(theta)

@@ -75,7 +75,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
     filter_misfits = tuple(misfits(all_scenes, bench, fit.map))
     scenes = all_scenes.without({misfit.name for misfit in filter_misfits if misfit.left_out})
     lvf_fit = calibrated(scenes, bench, fit.map)
-    stripes, why_no_stripes = _stripes(part, frames, placed.strip, lvf_fit, fit.map)
+    stripes, no_stripes_reason = _stripes(part, frames, placed.strip, lvf_fit, fit.map)
     filters = tuple(transmittance.name for transmittance in scenes.filters[1:])
     assert lvf_fit.lvf.sigma is not None, "a calibration tells its σ"
     file = LvfFile(
@@ -99,7 +99,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
         map_order=fit.order,
         placed=placed,
         stripes=stripes,
-        why_no_stripes=why_no_stripes,
+        no_stripes_reason=no_stripes_reason,
         card=all_scenes.card,
         through_filters={
             transmittance.name: values

@@ -17,9 +17,9 @@ WHOLE = (0.0, 1.0)
 #: Mercury lines in nm that excite phosphors; those of longer wavelength seldom do.
 EXCITING_NM = (365.02, 404.6565, 407.7837, 435.8335, 546.0750)
 #: Largest shift of the sample by the door, as a fraction of the strip's length.
-MOST_SHIFT = 0.08
+MAX_SHIFT = 0.08
 #: Fraction of the variance along the strip that detected stripes explain at least.
-LEAST_EXPLAINED = 0.7
+MIN_EXPLAINED = 0.7
 
 
 def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLines:
@@ -121,17 +121,17 @@ def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: fl
         residual = glow - design @ nonnegative_least_squares(design, glow)
         return float(residual @ residual)
 
-    coarse = np.linspace(-MOST_SHIFT, MOST_SHIFT, 33)
+    coarse = np.linspace(-MAX_SHIFT, MAX_SHIFT, 33)
     best = coarse[np.argmin([residual_square(shift) for shift in coarse])]
     step = coarse[1] - coarse[0]
     # Least squares, but of curves with a kink at every position of the filter: without slopes.
     result = minimize_scalar(residual_square, bounds=(best - step, best + step), method="bounded")
-    if not variation or result.fun > (1 - LEAST_EXPLAINED) * variation:
+    if not variation or result.fun > (1 - MIN_EXPLAINED) * variation:
         raise FitError("no stripes of mercury lines are seen on the sample")
     shift = float(result.x)
     curvature = (
         residual_square(shift + step) + residual_square(shift - step) - 2 * result.fun
     ) / step**2
     noise = result.fun / max(len(glow) - len(EXCITING_NM) - 2, 1)
-    sigma = float(np.sqrt(2 * noise / curvature)) if curvature > 0 else MOST_SHIFT
+    sigma = float(np.sqrt(2 * noise / curvature)) if curvature > 0 else MAX_SHIFT
     return Stripes(_move_ends(strip, shift, 1 + shift), shift * nm_per_strip, sigma * nm_per_strip)

@@ -20,7 +20,7 @@ OFFSET_SIGMAS = 4.0
 OUTLIER_SIGMAS = 7.0
 #: Distance of an outlier in σ of its own noise, and the largest number of outliers reported.
 OUTLIER_OWN_SIGMAS = 3.0
-MOST_NAMED = 2
+MAX_NAMED = 2
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _outlier_warnings(misfit: Misfit) -> list[str]:
     return [
         f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(typical, 1e-3):.0f} times as "
         "far off the curve as the others do: look at it, leave it out if something disturbed it"
-        for row in outliers[np.argsort(-size[outliers])][:MOST_NAMED]
+        for row in outliers[np.argsort(-size[outliers])][:MAX_NAMED]
     ]
 
 

@@ -26,15 +26,15 @@ REFINEMENT = 4
 ROUNDS = 3
 #: Upper limit of the flicker of shutters, apertures and lamps: a larger scatter is due to a wrong
 #: dark level or model.
-MOST_FLICKER = 0.1
+MAX_FLICKER = 0.1
 #: Alternations of curve, channel weights and flicker; of curve and weights if flicker is given.
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
 #: Signal of all frames in σ below which it is noise.
-LEAST_BRIGHTNESS = 4.0
+MIN_BRIGHTNESS = 4.0
 #: Fraction of the bright frames' information that the curve must leave to the flicker.
-LEAST_SPARE = 1e-6
+MIN_SPARE = 1e-6
 #: Scale of the half-Cauchy prior of the flicker (A. Gelman, Bayesian Analysis 1, 2006): shutters,
 #: apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
 USUAL_FLICKER = 0.01
@@ -111,7 +111,7 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
             series = series.relevelled(_gains(data, curve, weights, offsets))
         signal = np.multiply.outer(curve, weights)
         brightness = float(np.linalg.norm(np.einsum("fcd,fd->fc", series.whiteners, signal)))
-        if brightness == 0 or (series.sigma_given and brightness < LEAST_BRIGHTNESS):
+        if brightness == 0 or (series.sigma_given and brightness < MIN_BRIGHTNESS):
             raise FitError(NO_DECAY)
         if flicker is None:
             rho, rho_sigma, dof, likely = _flicker(series, signal, offsets, leverage)
@@ -202,7 +202,7 @@ def _flicker(
     residual = np.einsum("fcd,fd->fc", series.whiteners, series.values - signal - offsets)
     along2 = np.einsum("fc,fc->f", u, residual) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
     free = np.maximum(1 - leverage, 0.0)
-    if float(brightness2**2 @ free) <= LEAST_SPARE * float(brightness2 @ brightness2):
+    if float(brightness2**2 @ free) <= MIN_SPARE * float(brightness2 @ brightness2):
         raise FitError(
             "expected frames to spare to estimate flicker, got a curve through all bright ones; "
             "give the flicker, or record more frames"
@@ -211,7 +211,7 @@ def _flicker(
     for _ in range(FLICKER_ITERATIONS):
         weight = brightness2 / (1 + variance * brightness2)
         scatter = float((weight**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - free))
-        variance = min(max(scatter / float(weight**2 @ free), 0.0), MOST_FLICKER**2)
+        variance = min(max(scatter / float(weight**2 @ free), 0.0), MAX_FLICKER**2)
 
     def error(variance: float) -> tuple[float, float]:
         """Return σ(ρ²), and ν: 2/ν is V's squared relative error, weighted by information."""
@@ -222,7 +222,7 @@ def _flicker(
     variance_sigma, dof = error(variance)
     if dof < FEWEST_NOISE_DOF:
         # So few frames tell that a low estimate is an accident: err on the noisy side.
-        variance = min(variance + variance_sigma, MOST_FLICKER**2)
+        variance = min(variance + variance_sigma, MAX_FLICKER**2)
         variance_sigma, dof = error(variance)
     flicker = float(np.sqrt(variance))
     # Near zero the square root is not linear: then √σ(ρ²) is the scale of what ρ could be.
@@ -236,7 +236,7 @@ def _likely_flickers(brightness2: FloatArray, along2: FloatArray, free: FloatArr
     The arguments are named as in `_flicker`.
     """
     # Dense near zero, where a small ρ already tells.
-    rho = MOST_FLICKER * np.linspace(0, 1, FLICKER_GRID) ** 2
+    rho = MAX_FLICKER * np.linspace(0, 1, FLICKER_GRID) ** 2
     variance = 1 + np.multiply.outer(rho**2, brightness2)
     log_likelihood = -0.5 * (np.log(variance) @ free + (along2 / variance).sum(axis=1))
     density = np.exp(log_likelihood - log_likelihood.max()) / (1 + (rho / USUAL_FLICKER) ** 2)

@@ -24,7 +24,7 @@ REWEIGHTED_ENOUGH = 1e-9
 #: Scatter below which data are exact up to rounding.
 EXACT = 1e-13
 FEWEST_FOR_FLICKER = 6
-MOST_STATES = 8
+MAX_STATES = 8
 
 
 def fit_decay(
@@ -169,9 +169,9 @@ def _numbers_of_states(
         raise FitError(
             f"expected n_states ≥ {max(1, n_fixed)}, got {fewest}; fixed rates count as states"
         )
-    if most > MOST_STATES:
+    if most > MAX_STATES:
         raise FitError(
-            f"expected at most {MOST_STATES} states, got {most}; "
+            f"expected at most {MAX_STATES} states, got {most}; "
             "no decay tells more apart: a power law may be what you see"
         )
     frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))

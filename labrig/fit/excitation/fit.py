@@ -163,7 +163,7 @@ def _at_off(
     """Return the brightest lamp-off level of every series, σ by linear propagation."""
     n, bands = problem.parameters.states, problem.parameters.bands
     levels_at_charge = []
-    for charging in problem.lit(rates):
+    for charging in problem.illuminated_series(rates):
         level = levels_at_off(charging, rates.k_r_per_s, rates.k_e_per_s)
         glow = level.value @ rates.amplitude
         charge, site = np.unravel_index(int(np.argmax(glow)), glow.shape)

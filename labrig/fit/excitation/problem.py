@@ -67,7 +67,7 @@ class ExcitationProblem:
             _signal(
                 levels(charging, rates.k_r_per_s, rates.k_e_per_s).value @ rates.amplitude, rates
             )
-            for charging in self.lit(rates)
+            for charging in self.illuminated_series(rates)
         ]
 
     def plain_residuals(self, theta: FloatArray) -> tuple[FloatArray, ...]:
@@ -94,7 +94,7 @@ class ExcitationProblem:
         rates = self.parameters.unpack(theta)
         parts = [
             self._series_residuals(number, charging, rates)
-            for number, charging in enumerate(self.lit(rates))
+            for number, charging in enumerate(self.illuminated_series(rates))
         ]
         sigma = self.parameters.prior_sigma
         if len(sigma):
@@ -104,7 +104,7 @@ class ExcitationProblem:
         residuals, jacobians = zip(*parts, strict=True)
         return np.concatenate(residuals), np.concatenate(jacobians)
 
-    def lit(self, rates: Rates) -> list[ChargingSeries]:
+    def illuminated_series(self, rates: Rates) -> list[ChargingSeries]:
         """Return the series with the irradiance and the brightness of θ."""
         illuminated = []
         for number, (charging, log_scale) in enumerate(

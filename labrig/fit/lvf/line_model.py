@@ -11,7 +11,7 @@ from labrig.results import LocatedLines
 
 FEWEST_LINES = 3
 #: Smallest fraction of the profile's variance that lines and background must explain.
-LEAST_EXPLAINED = 0.9
+MIN_EXPLAINED = 0.9
 #: Largest deviation, in σ, of a blend's fraction from its prior: an imperfect shape would bias it
 #: otherwise.
 FRACTION_SIGMAS = 2.0
@@ -110,10 +110,10 @@ class LineModel:
             ]
         residual = self.values - self._fit_values(x)
         explained = 1 - float(residual.var() / (self.values - self.values.mean(axis=0)).var())
-        if explained < LEAST_EXPLAINED:
+        if explained < MIN_EXPLAINED:
             raise FitError(
                 f"no lines of mercury: lines explain {explained:.0%} of the profile, expected "
-                f"{LEAST_EXPLAINED:.0%} or more; check that no other lamp is lit"
+                f"{MIN_EXPLAINED:.0%} or more; check that no other lamp is lit"
             )
         wavelength_nm = np.array([line.wavelength_nm[0] for line in self.lines])
         return LocatedLines(

@@ -21,11 +21,11 @@ from labrig.optics import NOMINAL_FWHM_NM
 from labrig.results import LocatedLines
 
 #: Smallest prominence in units of the noise.
-LEAST_PROMINENCE = 10.0
+MIN_PROMINENCE = 10.0
 #: Smallest prominence as a fraction of the channel's range, and of the largest range.
-LEAST_FRACTION, LEAST_OF_ALL = 0.03, 0.003
-MOST_PEAKS = 8
-MOST_SAMPLES = 20_000
+MIN_FRACTION, MIN_OF_ALL = 0.03, 0.003
+MAX_PEAKS = 8
+MAX_SAMPLES = 20_000
 #: Distance, in widths, below which peaks of two channels are one.
 SAME = 0.5
 #: Width of the smoothing as a fraction of the profile.
@@ -60,7 +60,7 @@ def find_line_peaks(position: FloatArray, values: FloatArray) -> list[Peak]:
 
     They are searched channel by channel: in the sum neighbouring lines merge.
     """
-    finest = max(float(np.diff(position).min()), float(np.ptp(position)) / MOST_SAMPLES)
+    finest = max(float(np.diff(position).min()), float(np.ptp(position)) / MAX_SAMPLES)
     grid = np.arange(position[0], position[-1], finest)
     channels = np.stack([np.interp(grid, position, column) for column in values.T], axis=1)
     smooth = gaussian_filter1d(channels, len(grid) * SMOOTHING, axis=0)
@@ -71,7 +71,7 @@ def find_line_peaks(position: FloatArray, values: FloatArray) -> list[Peak]:
     for channel, channel_noise in zip(smooth.T, noise, strict=True):
         unit = max(float(channel_noise), 1e-6 * height)
         extent = float(np.ptp(channel))
-        least = max(LEAST_PROMINENCE * unit, LEAST_FRACTION * extent, LEAST_OF_ALL * height)
+        least = max(MIN_PROMINENCE * unit, MIN_FRACTION * extent, MIN_OF_ALL * height)
         if not height:
             continue
         indices, properties = find_peaks(channel, prominence=least)
@@ -95,16 +95,16 @@ def _distinct(peaks: list[Peak]) -> list[Peak]:
     for peak in sorted(peaks, key=lambda peak: -peak.prominence):
         if all(abs(peak.position - other.position) > SAME * other.fwhm for other in kept):
             kept.append(peak)
-    return sorted(kept[:MOST_PEAKS], key=lambda peak: peak.position)
+    return sorted(kept[:MAX_PEAKS], key=lambda peak: peak.position)
 
 
 #: Largest deviation of peaks from an assignment, in widths.
 TOLERANCE = 0.4
 #: Difference of scores below which assignments are ambiguous, and the number of them fitted.
 AMBIGUOUS = 1.0
-MOST_CANDIDATES = 4
+MAX_CANDIDATES = 4
 #: Largest bend of a strip in nm, in its middle against its ends.
-MOST_BEND_NM = 20.0
+MAX_BEND_NM = 20.0
 #: Ratio of the unexplained variances at which the better orientation is accepted.
 CLEARLY = 1.3
 
@@ -158,7 +158,7 @@ def locate_lines(
     assignments.sort(key=lambda trial: -trial.score)
     candidates = [
         trial
-        for trial in assignments[:MOST_CANDIDATES]
+        for trial in assignments[:MAX_CANDIDATES]
         if assignments[0].score - trial.score < AMBIGUOUS
     ]
     located = _best_by_orientation([LineModel(u, values, lines, trial) for trial in candidates])
@@ -191,7 +191,7 @@ def _best_by_orientation(models: list[LineModel]) -> list[LocatedLines]:
         except FitError as error:
             refusal = refusal or error
             continue
-        if _bend_nm(located, model.middle, model.reach) > MOST_BEND_NM:
+        if _bend_nm(located, model.middle, model.reach) > MAX_BEND_NM:
             refusal = refusal or FitError(
                 "no lines of mercury: the peaks could only be lines of a strip bent as none is; "
                 "check that no other lamp is lit"

@@ -28,7 +28,7 @@ FIGURES = 5
 REMAINDER_STEP_NM = 20.0
 #: Step of the grid on which T_p is linear: a band of 25 nm loses 0.1 % of its height.
 GRID_NM = 1.0
-MOST_SKEW = 1.0
+MAX_SKEW = 1.0
 _STEP = 1e-4
 #: Initial damping, its factor of change, and the value at which the search stops.
 _DAMPING, _FACTOR, _HOPELESS = 1e-3, 8.0, 1e6
@@ -180,7 +180,7 @@ class StripProblem:
     ) -> tuple[StripSolution, float]:
         step = self._step(solution, expected, damping)
         figures = solution.figures + step.figures
-        figures[:, SKEW] = np.clip(figures[:, SKEW], -MOST_SKEW, MOST_SKEW)
+        figures[:, SKEW] = np.clip(figures[:, SKEW], -MAX_SKEW, MAX_SKEW)
         figures[:, LEAKAGE] = np.maximum(figures[:, LEAKAGE], 0.0)
         trial = StripSolution(figures, solution.curves + step.curves)
         if not np.isfinite(figures).all():

@@ -54,7 +54,7 @@ def measured(
 
 
 #: Number of exchanges after which block pivoting counts as cycling.
-MOST_EXCHANGES = 25
+MAX_EXCHANGES = 25
 #: Rounding errors of slopes, and of coordinates relative to the largest.
 ROUNDING = 100 * EPSILON
 SMALLEST = 1e-9
@@ -84,7 +84,7 @@ def nonnegative_minimum(
     """
     free = free.copy()
     size = np.abs(curvature)
-    for _ in range(MOST_EXCHANGES):
+    for _ in range(MAX_EXCHANGES):
         x = np.zeros_like(linear)
         if free.any():
             x[free] = _solved(curvature[np.ix_(free, free)], linear[free])
@@ -113,7 +113,7 @@ ROUNDS = 3
 #: Grid of weights of the prior, for a spectrum of about 1.
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
 #: Added to the curvature of the fit, for a spectrum of about 1.
-LEAST_CURVATURE = 1e-6
+MIN_CURVATURE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,4 +287,4 @@ def _draw(
 
 def _ridge(prior: FloatArray) -> FloatArray:
     """Return a ridge that fixes what neither the values nor the prior constrain."""
-    return LEAST_CURVATURE * np.eye(len(prior))
+    return MIN_CURVATURE * np.eye(len(prior))

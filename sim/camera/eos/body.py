@@ -21,7 +21,7 @@ from .viewfinder import Viewfinder
 #: Time from a new value of a property to its event.
 PROPERTY_DELAY_S = 0.03
 #: More free photographs than the camera can show.
-_MOST_SHOTS = 9999
+_MAX_SHOTS = 9999
 _IN_MEMORY = 0
 _FOCUS_OFF = 1
 
@@ -137,7 +137,7 @@ class EosBody:
 
     def announce_host_capacity(self, clusters: int, bytes_each: int, _reset: int) -> ResponseCode:
         """Do PCHDDCapacity: room on the host's disk, without which it gets no photograph."""
-        self._host_shots = min(clusters * bytes_each // SHOT_BYTES, _MOST_SHOTS)
+        self._host_shots = min(clusters * bytes_each // SHOT_BYTES, _MAX_SHOTS)
         self._count_shots(0.0)
         return ResponseCode.OK
 

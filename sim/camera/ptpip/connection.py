@@ -5,7 +5,7 @@ from collections import deque
 
 from .packets import Packet, PacketReader
 
-_MOST_AT_ONCE = 65536
+_MAX_AT_ONCE = 65536
 
 
 class Connection:
@@ -38,7 +38,7 @@ class Connection:
     def receive(self) -> bool:
         """Take in the bytes that have come; return False if the other side is gone."""
         try:
-            received = self._socket.recv(_MOST_AT_ONCE)
+            received = self._socket.recv(_MAX_AT_ONCE)
         except BlockingIOError:
             return True
         except OSError:

@@ -22,11 +22,11 @@ from .transactions import Transactions
 #: Address of the server, which no other PC can reach.
 LOOPBACK = "127.0.0.1"
 #: Largest number of unidentified connections; the oldest is closed for a new one.
-_MOST_UNIDENTIFIED = 8
+_MAX_UNIDENTIFIED = 8
 _GUID = b"labrig simulated"
 _GUID_BYTES = 16
 #: Longer than the 39 letters of the standard, because libgphoto2 sends the PC's name as it is.
-_MOST_NAME_BYTES = 512
+_MAX_NAME_BYTES = 512
 
 
 @dataclass
@@ -133,7 +133,7 @@ class PtpIpServer:
         except OSError:
             return  # it has hung up already
         self._strangers.append(Connection(accepted))
-        if len(self._strangers) > _MOST_UNIDENTIFIED:
+        if len(self._strangers) > _MAX_UNIDENTIFIED:
             self._hang_up(self._strangers[0])
 
     def _report_events(self, now_s: float) -> None:
@@ -226,5 +226,5 @@ class PtpIpServer:
 def _check_introduction(packet: Packet) -> None:
     """Check GUID, name with its closing zero, version; any version is accepted."""
     name_bytes = len(packet.payload) - _GUID_BYTES - 4
-    if not 2 <= name_bytes <= _MOST_NAME_BYTES or name_bytes % 2:
+    if not 2 <= name_bytes <= _MAX_NAME_BYTES or name_bytes % 2:
         raise MalformedPacketError

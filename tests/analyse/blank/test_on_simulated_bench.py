@@ -63,7 +63,7 @@ def test_a_hot_pixel_is_no_light_that_leaks_in(tmp_path: Path) -> None:
     assert process_run(record(tmp_path, PROTOCOL, with_light(seed=4))).warnings == ()
 
 
-def test_a_leak_is_found_and_told_and_a_decay_is_warned(tmp_path: Path) -> None:
+def test_a_leak_is_found_and_reported_and_a_decay_is_warned(tmp_path: Path) -> None:
     leaking = record(tmp_path / "leak", PROTOCOL, with_light(ambient=1e-6))
     result = process_run(leaking)
     blank = read_blank_file(leaking / "result" / "blank.yaml")

@@ -65,7 +65,7 @@ def test_the_result_and_its_file_are_read_back(run: Path, result: CameraCalibrat
     assert_read_back(result)
 
 
-def test_a_person_is_told(processed: Processed) -> None:
+def test_a_person_is_reported(processed: Processed) -> None:
     told = ("ISO 100: gain", "ISO 400: gain", "flicker", "shutter", "aperture", "vignetting")
     for line, begin in zip(processed.lines, told, strict=True):
         assert line.startswith(begin)

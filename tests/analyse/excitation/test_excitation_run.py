@@ -187,7 +187,7 @@ def test_a_frame_that_was_changed_is_refused(run: Path) -> None:
         frame.write_bytes(kept)
 
 
-def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: Path) -> None:
+def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_reported(run: Path) -> None:
     blank = BlankFile(
         iso=400, f_number=4.0, channels=("G",), t_s=(0.5,), rate_dn_per_s=((0.0,),),
         sigma_dn_per_s=((1.0,),), constant_dn_per_s=(0.0,), constant_sigma_dn_per_s=(1.0,),

@@ -20,7 +20,7 @@ def test_across_a_place_the_light_runs_as_along_the_filter() -> None:
     assert np.median(np.abs(found[np.abs(change) > 0.1])) > 0.1
 
 
-def test_what_is_told_of_a_place_is_what_its_modes_add_up_to() -> None:
+def test_what_is_reported_of_a_place_is_what_its_modes_add_up_to() -> None:
     irradiance = true_irradiance()
     through = np.array(irradiance.through)
     leaks = np.where(through < 0.01 * through.max(axis=0), 0.5, 0.02)

@@ -95,7 +95,7 @@ def test_it_is_a_glowing_bodys(result: FadeResult) -> None:
         assert change.best.reduced_chi2 < 2
 
 
-def test_a_person_is_told(processed: Processed) -> None:
+def test_a_person_is_reported(processed: Processed) -> None:
     told = ("the turn-off transient is", "the turn-on transient lacks", "a cold lamp has")
     for line, begin in zip(processed.lines, told, strict=True):
         assert line.startswith(begin)

@@ -72,7 +72,7 @@ def test_what_spoils_photometry_is_refused(
     assert refused.remedy
 
 
-def test_what_cannot_be_told_is_warned_of(toy: ToyBench) -> None:
+def test_what_cannot_be_reported_is_warned_of(toy: ToyBench) -> None:
     names = ("expprogram", "focusmode", "isoauto", "longexpnr", "imagequality")
     untold: dict[str, list[str]] = {name: [] for name in names}
     with toy.connected(untold | {"autopoweroff": ["60"]}) as camera:

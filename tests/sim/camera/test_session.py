@@ -59,7 +59,7 @@ def test_descriptors_are_those_of_a_5d_mark_ii() -> None:
     assert "04a9" in str(device).lower()
 
 
-def test_device_info_is_told_without_a_session() -> None:
+def test_device_info_is_reported_without_a_session() -> None:
     info = Bench().host().do(0x1001).data
     assert info is not None
     assert struct.unpack_from("<HIHBH", info) == (100, 0xB, 200, 0, 0)

@@ -167,7 +167,9 @@ def test_descriptions_are_read_as_the_standard_writes_them() -> None:
         ({"autofocus": True}, 0x500A, 2),
     ],
 )
-def test_what_is_set_by_hand_is_told(set_by_hand: dict[str, Any], prop: int, expected: int) -> None:
+def test_manual_settings_are_reported(
+    set_by_hand: dict[str, Any], prop: int, expected: int
+) -> None:
     assert value(ready(bench(**set_by_hand)), prop) == expected
 
 
@@ -178,7 +180,7 @@ def test_faults_of_the_body() -> None:
     assert host.do(0x100E).code == OK
 
 
-def test_after_the_session_nobody_is_told() -> None:
+def test_after_the_session_nobody_is_reported() -> None:
     b = bench()
     host = ready(b)
     assert host.do(0x100E).code == OK

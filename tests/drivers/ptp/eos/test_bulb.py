@@ -54,7 +54,7 @@ def test_a_frame_says_how_long_it_was_really_exposed(
     assert b.toy.is_idle
 
 
-def test_nothing_is_said_while_the_shutter_is_open() -> None:
+def test_nothing_is_reported_while_the_shutter_is_open() -> None:
     b, camera = long_bench()
     camera.configure(LONG)
     camera.arm()
@@ -206,7 +206,7 @@ def test_a_refusal_says_what_to_do() -> None:
         photograph(camera, LONG)
 
 
-def test_an_exposure_that_somebody_ended_at_the_camera_is_said() -> None:
+def test_an_exposure_that_somebody_ended_at_the_camera_is_reported() -> None:
     b, camera = long_bench()
     b.toy.faults[BULB_END] = [Fault.REFUSED]
     with pytest.raises(DeviceError, match="it was ended at the camera"):

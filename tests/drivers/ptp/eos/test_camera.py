@@ -122,7 +122,7 @@ def test_configure_refuses_what_is_not_offered(asked: ExposureSettings, message:
         (0xD103, r"iso \(0xD103\) = 0x50 \(ISO 200\), it says 0x48 \(ISO 100\)"),
     ],
 )
-def test_what_is_set_is_read_back_and_both_are_said(prop: int, said: str) -> None:
+def test_what_is_set_is_read_back_and_both_are_reported(prop: int, said: str) -> None:
     b = bench()
     b.toy.stubborn.add(prop)
     with pytest.raises(DeviceError, match=f"asked the camera for {said}"):
@@ -144,7 +144,7 @@ def test_manual_lens() -> None:
     ("prop", "value", "message"),
     [(0xD105, 0, "exposure mode"), (0xD102, 0x0C, "bulb"), (0xD103, 0, "automatic ISO")],
 )
-def test_wrong_mode_is_told(prop: int, value: int, message: str) -> None:
+def test_wrong_mode_is_reported(prop: int, value: int, message: str) -> None:
     b = bench()
     b.toy.values[prop] = u32(value)
     camera = b.connect()
@@ -160,7 +160,7 @@ def test_wrong_dial_offers_nothing() -> None:
         camera.offers()
 
 
-def test_a_dial_without_lists_is_told() -> None:
+def test_a_dial_without_lists_is_reported() -> None:
     b = bench()
     b.toy.lists[0xD102] = ()
     with pytest.raises(DeviceError, match="turn its dial to M"):
@@ -306,7 +306,7 @@ def test_no_frame_in_time() -> None:
     assert b.toy.is_idle
 
 
-def test_room_on_the_pc_is_told_again_when_it_runs_out() -> None:
+def test_room_on_the_pc_is_reported_again_when_it_runs_out() -> None:
     b = bench()
     b.toy.values[0xD11B] = u32(3)
     camera = b.connect()

@@ -168,7 +168,7 @@ def test_make_safe_resets_a_camera_that_cannot_be_cancelled() -> None:
     assert_usable(b, camera)
 
 
-def test_hopeless_camera_is_told_by_make_safe() -> None:
+def test_hopeless_camera_is_reported_by_make_safe() -> None:
     b = bench()
     camera = b.connect()
     b.toy.faults[(0x9116,)] = [Fault.SILENT]

@@ -135,7 +135,7 @@ def test_a_camera_that_never_gets_ready_is_given_up() -> None:
     assert toy.values[0xD1B0] == bytes(4)
 
 
-def test_a_refusal_is_said_at_once() -> None:
+def test_a_refusal_is_reported_at_once() -> None:
     toy = LiveToy(LIVE)
     toy.answer = (0x2005, None)
     with pytest.raises(DeviceError, match="0x2005"):
@@ -168,7 +168,7 @@ class TestRecords:
         "data",
         [b"", b"\x08", PICTURE, bytes(64), record(4, PICTURE), record(1, b"GIF"), record(2, b"")],
     )
-    def test_no_jpeg_is_said(self, data: bytes) -> None:
+    def test_no_jpeg_is_reported(self, data: bytes) -> None:
         with pytest.raises(DeviceError, match="expected a JPEG"):
             jpeg_in(data)
 

@@ -30,7 +30,7 @@ from ..usb.wire import (
 from .mutations import Mutator
 
 #: A session that needs more steps hangs; real ones need some hundreds.
-MOST_STEPS = 20_000
+MAX_STEPS = 20_000
 _ALL = 1 << 30
 
 
@@ -245,7 +245,7 @@ class _Network:
         self._pass_on()
         while has_passed:
             self._steps += 1
-            assert self._steps < MOST_STEPS, "the driver hangs"
+            assert self._steps < MAX_STEPS, "the driver hangs"
             self._server.serve_once(0.0)
             has_passed = self._pass_on()
         for relay in [relay for relay in self._relays if relay.is_over]:

@@ -9,7 +9,7 @@ EDGES = (0, 1, 7, 8, 11, 12, 13, 255, 256, 511, 512, 0x7FFF, 0xFFFF, 0x10000, 0x
 EDGES_32 = (*EDGES, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF)
 #: Bytes of the longest header of either transport: what a mutation is most telling in.
 HEADER_BYTES = 18
-MOST_GARBAGE_BYTES = 2000
+MAX_GARBAGE_BYTES = 2000
 KEPT = 8
 
 Mutation = Callable[[random.Random, bytes], list[bytes]]
@@ -41,7 +41,7 @@ def _cut_off(rng: random.Random, whole: bytes) -> list[bytes]:
 
 
 def _made_longer(rng: random.Random, whole: bytes) -> list[bytes]:
-    return [whole + rng.randbytes(rng.choice((1, 4, 12, 512, MOST_GARBAGE_BYTES)))]
+    return [whole + rng.randbytes(rng.choice((1, 4, 12, 512, MAX_GARBAGE_BYTES)))]
 
 
 def _told_longer_and_made_so(rng: random.Random, whole: bytes) -> list[bytes]:
@@ -50,7 +50,7 @@ def _told_longer_and_made_so(rng: random.Random, whole: bytes) -> list[bytes]:
 
 
 def _garbage(rng: random.Random, whole: bytes) -> list[bytes]:
-    return [rng.randbytes(rng.randint(1, MOST_GARBAGE_BYTES))]
+    return [rng.randbytes(rng.randint(1, MAX_GARBAGE_BYTES))]
 
 
 def _garbage_before(rng: random.Random, whole: bytes) -> list[bytes]:

@@ -32,10 +32,10 @@ from .lines import LiveFilm, Transport, over_network, over_usb
 from .mutations import Mutator
 
 #: Lab time in which a session must be over, whatever came: some tens of time-outs.
-MOST_SESSION_S = 1200.0
+MAX_SESSION_S = 1200.0
 #: Between the last harm and what must work again: a long exposure by mistake is over.
 PAUSE_S = 120.0
-MOST_ATTEMPTS = 3
+MAX_ATTEMPTS = 3
 #: Of the containers of a session that come to harm.
 FRACTIONS = (0.03, 0.1, 0.3)
 #: With which act harm begins; 0 is connecting, 6 a photograph, 9 one at bulb.
@@ -153,7 +153,7 @@ def session(name: str, seed: int, number: int, tally: Tally) -> None:
         with way.transport(clock, responder, *mutators) as (address, line):
             camera = _use(rng, address, line, harming, tally)
             tally.longest_s = max(tally.longest_s, clock.now())
-            assert clock.now() < MOST_SESSION_S, f"it takes {clock.now():.0f} s of lab time"
+            assert clock.now() < MAX_SESSION_S, f"it takes {clock.now():.0f} s of lab time"
             harming.stop()
             clock.spend(PAUSE_S)
             if camera is not None:
@@ -179,7 +179,7 @@ def _mended(camera: PtpCamera, tally: Tally) -> bytes | None:
     None if the driver gave up, as it must where damage could not be noticed: a list of choices
     that came under the name of another property, say.
     """
-    for attempt in range(1, MOST_ATTEMPTS + 1):
+    for attempt in range(1, MAX_ATTEMPTS + 1):
         try:
             camera.make_safe()
             frame = _photograph(camera)

@@ -56,7 +56,7 @@ def rig(tmp_path: Path) -> Callable[[str], Path]:
     return write
 
 
-def test_what_is_said_first() -> None:
+def test_what_is_reported_first() -> None:
     with saying() as camera:
         camera.link()
         on_command, on_event = camera.heard()

@@ -130,7 +130,7 @@ def test_a_camera_that_delivers_jpeg_is_refused_in_one_line_each_time() -> None:
     assert on_card(camera) == []
 
 
-def test_times_of_a_dial_are_used_as_told_and_said_to_be_such() -> None:
+def test_times_of_a_dial_are_used_as_told_and_reported_to_be_such() -> None:
     dial = {300_000: 32.0, 10_000: 1.0, 333: 1 / 32, 166: 1 / 64}
     *_, driver = bench(habits=StandardHabits(shutter_times=dial))
     assert driver.configure(ExposureSettings(1 / 64, 400, 4.0)).exposure_s == pytest.approx(0.0166)
@@ -157,7 +157,7 @@ def test_what_is_set_by_hand_and_spoils_photometry_is_refused(
     assert said in str(found)
 
 
-def test_a_well_set_camera_is_refused_nothing_but_warned_of_what_cannot_be_told() -> None:
+def test_a_well_set_camera_is_refused_nothing_but_warned_of_what_cannot_be_reported() -> None:
     *_, driver = bench(rig={"isos": [400]})
     warned = [finding.what for finding in driver.findings() if finding.severity == "warn"]
     assert len(warned) == 3
@@ -252,7 +252,7 @@ def test_unplugged_is_one_clear_line(after_bytes: int) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_full_card_is_said() -> None:
+def test_a_full_card_is_reported() -> None:
     *_, driver = bench(faults=CameraFaults(full_spans_s=((0.0, 1e9),)))
     with pytest.raises(DeviceError, match=r"0x200C StoreFull.*no room"):
         photograph(driver)

@@ -118,7 +118,7 @@ def test_the_one_that_is_meant_photographs(
     assert twins.films["0111"].taken == []
 
 
-def test_a_serial_number_that_is_not_there_is_said_with_those_that_are(
+def test_a_serial_number_that_is_not_there_is_reported_with_those_that_are(
     plug_in: Callable[[BodySettings], Twins], rig: Callable[..., Path]
 ) -> None:
     plug_in(EOS)

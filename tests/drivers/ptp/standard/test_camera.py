@@ -115,7 +115,7 @@ def test_the_end_is_waited_for_once_by_a_camera_that_never_tells_it() -> None:
         ([(1.1, File("DSC_0001.NEF", b"12345", announced_bytes=9))], "expected 9 bytes .* sent 5"),
     ],
 )
-def test_what_is_no_frame_is_said_and_the_next_one_is_good(
+def test_what_is_no_frame_is_reported_and_the_next_one_is_good(
     capture: list[tuple[float, File | int]], said: str
 ) -> None:
     t = toy(capture, usual(2))
@@ -263,7 +263,7 @@ def test_what_a_pc_can_set_is_set_when_it_connects() -> None:
     assert "burst" in refused[1]
 
 
-def test_a_setting_that_the_camera_does_not_take_is_said() -> None:
+def test_a_setting_that_the_camera_does_not_take_is_reported() -> None:
     t = toy()
     t.choices = {0x500D: (10_000, 20_000), 0x500F: (200, 400)}
     camera = connect(t)

@@ -81,7 +81,7 @@ def test_an_event_that_comes_in_two_waits_is_one(wire: Wire) -> None:
 @pytest.mark.parametrize(
     "junk", [bytes(16), event(0x4002, 7)[:4] + bytes(12), struct.pack("<IHHI", 12, 3, 0x2001, 7)]
 )
-def test_what_is_no_event_is_said_and_forgotten(wire: Wire, junk: bytes) -> None:
+def test_what_is_no_event_is_reported_and_forgotten(wire: Wire, junk: bytes) -> None:
     link = link_on(wire)
     wire.interrupts.extend(packets(junk))
     with pytest.raises(MalformedError, match=" ".join(f"{byte:02x}" for byte in junk[:8])):

@@ -16,7 +16,7 @@ from .wire import PACKET, Wire
 
 OK, BUSY, CANCELLED = 0x2001, 0x2019, 0x201F
 CANCEL, RESET, STATUS = 0x64, 0x66, 0x67
-TIMEOUT_S, MOST_BYTES = 0.5, 4096
+TIMEOUT_S, MAX_BYTES = 0.5, 4096
 
 
 class Scripted:
@@ -79,8 +79,8 @@ def test_data_then_the_response_of_whatever_size(
     wire.sends_empty_packets = ends_with_empty
     wire.send(container(Kind.DATA, 0x9107, 7, b"d" * size))
     wire.send(container(Kind.RESPONSE, OK, 7))
-    assert link.receive("x", TIMEOUT_S, MOST_BYTES).payload == b"d" * size
-    assert link.receive("x", TIMEOUT_S, MOST_BYTES) == Container(Kind.RESPONSE, OK, 7)
+    assert link.receive("x", TIMEOUT_S, MAX_BYTES).payload == b"d" * size
+    assert link.receive("x", TIMEOUT_S, MAX_BYTES) == Container(Kind.RESPONSE, OK, 7)
 
 
 def test_cancelling_names_the_transaction_and_waits_until_the_device_is_ready(
@@ -132,7 +132,7 @@ def test_what_is_no_container_is_shown(
 ) -> None:
     wire.send(transfer)
     with pytest.raises(MalformedError) as caught:
-        link.receive("x", TIMEOUT_S, MOST_BYTES)
+        link.receive("x", TIMEOUT_S, MAX_BYTES)
     assert shown in str(caught.value)
     assert str(caught.value).isprintable()
 
@@ -141,7 +141,7 @@ def test_what_came_before_the_silence_is_shown(link: UsbLink, wire: Wire) -> Non
     wire.sends_empty_packets = False
     wire.send(container(Kind.DATA, 0x9107, 7, b"\xee" * 2000)[:PACKET])
     with pytest.raises(NoAnswerError, match="of 2012 bytes it sent 512 bytes 'dc 07 00 00"):
-        link.receive("x", TIMEOUT_S, MOST_BYTES)
+        link.receive("x", TIMEOUT_S, MAX_BYTES)
 
 
 def test_a_device_that_does_not_stop_sending_is_given_up_with_what_it_sends(

@@ -16,7 +16,7 @@ PACKET, INTERRUPT_PACKET = 512, 8
 BULK_IN, BULK_OUT, INTERRUPT_IN = 0x81, 0x02, 0x83
 TRANSACTION_S = 0.0005
 #: Far more than any test needs: a driver that gets here hangs.
-MOST_TRANSFERS = 200_000
+MAX_TRANSFERS = 200_000
 
 
 class Peer(Protocol):
@@ -177,7 +177,7 @@ class Wire(StillImageDevice):
         assert ep == expected
         assert self.claimed
         self.transfers += 1
-        assert self.transfers < MOST_TRANSFERS, "the driver hangs"
+        assert self.transfers < MAX_TRANSFERS, "the driver hangs"
         self.clock.spend(TRANSACTION_S)
         if self.unplugged:
             raise usb.core.USBError("No such device", -4, errno.ENODEV)

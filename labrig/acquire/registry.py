@@ -39,7 +39,7 @@ def load_driver(key: str, name: str, source: str) -> Any:
     'NumatoRelay'
     """
     driver, role = load(DRIVERS, name, source), ROLES[key]
-    if not issubclass(driver, role.does):
+    if not issubclass(driver, role.protocol_class):
         raise UsageError(
             f"{source}: the driver '{name}' is no {role.name}; choose another driver for "
             f"'devices.{key}'"

@@ -138,7 +138,7 @@ def _exercise_shield(shield: LampShield, context: ExerciseContext) -> Exercised:
 
 DOOR: Role[TrapDoor] = Role(
     key="door",
-    does=TrapDoor,
+    protocol_class=TrapDoor,
     name="door",
     planned=lambda driver, settings, clock: PlannedSwing(driver.declared_travel_s(settings)),
     exercise=_exercise_door,
@@ -147,7 +147,7 @@ DOOR: Role[TrapDoor] = Role(
 
 SHIELD: Role[LampShield] = Role(
     key="shield",
-    does=LampShield,
+    protocol_class=LampShield,
     name="shield",
     planned=lambda driver, settings, clock: PlannedSwing(driver.declared_travel_s(settings)),
     exercise=_exercise_shield,
