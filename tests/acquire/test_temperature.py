@@ -139,9 +139,7 @@ def test_no_action_begins_later_for_it(
 @pytest.mark.parametrize(
     "fail", [DeviceError("its wire is off"), ValueError("oops")], ids=["device", "driver"]
 )
-def test_one_that_fails_is_reported_once_and_tried_again(
-    tmp_path: Path, fail: Exception
-) -> None:
+def test_one_that_fails_is_reported_once_and_tried_again(tmp_path: Path, fail: Exception) -> None:
     clock = VirtualClock(STARTED)
     thermometer = NotingThermometer(clock)
     thermometer.fail = fail

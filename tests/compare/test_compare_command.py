@@ -92,9 +92,7 @@ def test_two_states_are_nearer_to_the_photographs_than_one(labrig: Labrig, run: 
         assert stated in said["description"]
 
 
-def test_white_and_normalisation_are_used_and_reported(
-    labrig: Labrig, run: Path
-) -> None:
+def test_white_and_normalisation_are_used_and_reported(labrig: Labrig, run: Path) -> None:
     said = compared(labrig, run, "--white", "D50", "--normalise", "each")
     assert "white D50" in said["description"]
     assert "a factor of its own" in said["description"]

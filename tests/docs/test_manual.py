@@ -47,3 +47,18 @@ def test_the_worked_example_is_the_package_that_ci_runs() -> None:
     assert len(blocks) > 8
     for block in blocks:
         assert any(block in text for text in texts), block
+
+
+def test_files_that_the_manual_names_are_there() -> None:
+    root = DOCS.parent
+    pages = [*DOCS.rglob("*.md"), root / "README.md", root / "CONTRIBUTING.md"]
+    named = {
+        path
+        for page in pages
+        for path in re.findall(
+            r"`((?:labrig|drivers|protocols|sim|config|tests)/[\w./-]+)`", page.read_text("utf-8")
+        )
+    }
+    assert len(named) > 40
+    missing = [path for path in named if not (root / path).exists()]
+    assert not missing

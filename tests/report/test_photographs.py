@@ -149,9 +149,7 @@ def test_pictures_of_the_glow_are_on_one_scale_and_brightened(
 
 
 @every_sensor
-def test_a_saturated_colour_is_white_and_reported(
-    sensor: Sensor, tmp_path: Path
-) -> None:
+def test_a_saturated_colour_is_white_and_reported(sensor: Sensor, tmp_path: Path) -> None:
     clipped = frame(sensor.write(tmp_path / "1.dng", clipped=True), 1)
     (picture,) = glow_pictures([GlowPhotograph(clipped, 0.5)], screen_for(None))
     assert picture.has_saturation
