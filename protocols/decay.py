@@ -33,8 +33,8 @@ from .steps.camera_settings import (
     dark_exposures_s,
     frame_times_s,
 )
+from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, glow, measure_frame
 from .steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
-from .steps.metering import DecayMeter, MeteringFrame, Schedule, glow, measure_frame
 from .steps.patch_names import Patches
 from .steps.sample_pose import charge, check_visible, face_lamp, has_door, lights_out
 from .steps.sanity_checks import SanityChecks
@@ -292,7 +292,9 @@ class DecayUnit:
             session.run_sequence([*lights_out(session), at(self.protocol.first, shoot)])
             face_lamp(session)
             session.perform(LAMP_ON)
-            if session.choose("plateau reached", lambda: self._level(session), worst=False):
+            if session.choose(
+                "plateau reached", lambda: self._reached_plateau(session), worst=False
+            ):
                 session.wait(LAMP_SETTLES_S, "lamp settles, charge topped up")
                 return
             session.wait(rule.check_every, "charging")
@@ -302,7 +304,7 @@ class DecayUnit:
             "below saturation (raise plateau.at_most)"
         )
 
-    def _level(self, session: Session) -> bool:
+    def _reached_plateau(self, session: Session) -> bool:
         """Return whether every patch grew by less than the criterion since the last check."""
         metering = [
             frame for frame in session.frames(DecayFrames.PLATEAU) if frame.unit == self.name

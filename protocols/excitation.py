@@ -32,8 +32,8 @@ from .steps.afterglow import dark_level
 from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 from .steps.charge_times import FloatArray, most_informative_s, still_grows
 from .steps.darkness import levels
+from .steps.exposure_metering import DecayMeter, FrameCache, MeteringFrame, Schedule
 from .steps.glow import dark_frames
-from .steps.metering import DecayMeter, FrameCache, MeteringFrame, Schedule
 from .steps.patch_names import FilterPatches
 from .steps.sample_pose import charge, check_visible, face_camera, face_lamp, lights_out
 from .steps.sanity_checks import SanityChecks

@@ -13,7 +13,7 @@ from labrig.acquire import Plan, RunObserver
 from labrig.clock import Clock, Interrupted
 from labrig.errors import DeviceError
 from labrig.record import read_run
-from labrig.run import Recording
+from labrig.recording import Recording
 from labrig.sim.camera.usb.backend import CameraBackend
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended

@@ -66,7 +66,7 @@ def stands(monkeypatch: pytest.MonkeyPatch) -> list[Bench]:
             opened.append(stand)
             yield stand
 
-    monkeypatch.setattr("labrig.run.open_bench", remembered)
+    monkeypatch.setattr("labrig.recording.open_bench", remembered)
     return opened
 
 

@@ -21,7 +21,7 @@ from labrig.errors import DeviceError
 from labrig.execution import execute
 from labrig.record import RunFolder, read_run
 from labrig.record.journal import read_journal
-from labrig.run import Recording
+from labrig.recording import Recording
 from tests.acquire.fakes import Watching
 
 UNITS = ["dark", "decay-1", "decay-2"]

@@ -3,10 +3,10 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.connections import Connections, SerialPort
+from labrig.acquire.loading import load_driver, read_protocol
 from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
-from labrig.acquire.registry import load_driver, read_protocol
 from labrig.acquire.rig import Rig, in_safe_order
 from labrig.acquire.rig_file import DeviceEntry, Optics, RigFile, read_rig_file
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there

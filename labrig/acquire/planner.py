@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
+from labrig.acquire.loading import load_driver
 from labrig.acquire.protocol import ProtocolModel
-from labrig.acquire.registry import load_driver
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import CAMERA, ROLES, Device

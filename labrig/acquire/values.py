@@ -114,7 +114,8 @@ class Frame:
     suffix
         File extension in lower case with its dot, such as `.cr2`.
     start_s, end_s
-        Measured begin and end of the exposure on the rig's clock in seconds.
+        Begin and end of the exposure on the rig's clock in seconds; the driver has corrected them
+        for the shutter lag.
     settings
         Settings read back from the camera.
     """

@@ -1,7 +1,7 @@
 """From the frames of a run to its typed result: one module or package for each protocol."""
 
+from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.overrides import Overrides, read_run_protocol
-from labrig.analyse.part import Inputs, Part
 from labrig.analyse.series_fit import fit_series, fit_table
 from labrig.analyse.temperature import temperature_warnings
 

@@ -13,7 +13,7 @@ from labrig.analyse.frames import (
     require_calibrated_camera,
     timing_warnings,
 )
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
 from labrig.protocols.blank import BLANK_FRAMES

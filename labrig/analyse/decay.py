@@ -11,7 +11,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import FitError
 from labrig.fit import DecayFit

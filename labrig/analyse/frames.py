@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from labrig.analyse.inputs import Part
 from labrig.analyse.overrides import Overrides
-from labrig.analyse.part import Part
 from labrig.calibration import BlankFile, CameraFile
 from labrig.errors import DataError, UsageError
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import IrradianceFile

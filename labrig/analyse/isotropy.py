@@ -10,7 +10,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.errors import DataError
 from labrig.number_format import plus_minus

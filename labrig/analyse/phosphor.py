@@ -1,7 +1,7 @@
 """Analysis of a chain of protocols, to the results of its parts and the materials from them."""
 
 from labrig import plugins
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.errors import DataError, FitError
 from labrig.results import PhosphorResult, RunResult
 

@@ -22,7 +22,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import DataError, FitError
 from labrig.fit import EPSILON, least_squares

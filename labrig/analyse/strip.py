@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.analyse.frames import hot_pixels_of, require_calibrated_camera, steady_frames
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.errors import DataError
 from labrig.optics import SLICES, Strip
 from labrig.record import FrameRole

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from labrig.predict import PatchPrediction, Prediction, Remedy
-    from labrig.run import Recording
+    from labrig.recording import Recording
 
 PredictOption = Annotated[
     list[str] | None,

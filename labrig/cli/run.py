@@ -11,7 +11,7 @@ from labrig.clock import Interrupted
 from labrig.errors import UsageError
 
 if TYPE_CHECKING:
-    from labrig.run import Recording
+    from labrig.recording import Recording
 
 Protocol = Annotated[
     str, typer.Argument(help="A shipped protocol, such as 'decay', or a path to a YAML file.")
@@ -95,7 +95,7 @@ def resume(
     from labrig.catalogue import find_run
     from labrig.cli.on_finish import notify_at_end
     from labrig.cli.progress import progress
-    from labrig.run import resume_run
+    from labrig.recording import resume_run
 
     folder = find_run(run, runs)
     path = folder / "rig.yaml"
@@ -116,7 +116,7 @@ def resume(
 
 def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":
     from labrig import resources
-    from labrig.run import Recording
+    from labrig.recording import Recording
 
     recording = Recording.prepare(
         resources.find("protocols", "protocol", protocol),

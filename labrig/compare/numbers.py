@@ -32,7 +32,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
     """
     plain: dict[str, Any] = _plain(
         {
-            "words": comparison.description,
+            "description": comparison.description,
             "camera": comparison.camera.name if comparison.camera else None,
             "white": comparison.white,
             "left_out": list(comparison.left_out),
@@ -55,7 +55,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
                 }
                 for residuals in comparison.residuals
             ],
-            "beside": [
+            "material_comparisons": [
                 {
                     "measured": materials.names[0],
                     "reference": materials.names[1],

@@ -14,7 +14,7 @@ from labrig.predict.information import Information, information
 from labrig.predict.series import ExpectedSeries, expected_series, repeated
 from labrig.protocols.decay import Decay
 from labrig.protocols.steps.camera_settings import CameraSettings
-from labrig.protocols.steps.metering import Schedule
+from labrig.protocols.steps.exposure_metering import Schedule
 from labrig.reduce import FrameMeasurement, is_clipped
 
 

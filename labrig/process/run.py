@@ -12,8 +12,8 @@ from labrig.calibration import LvfFile
 from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
 from labrig.optics import CameraResponse
-from labrig.process.changes import changes
 from labrig.process.provenance import Provenance, describe_run, provenance
+from labrig.process.result_changes import changes
 from labrig.record import read_run
 from labrig.report import (
     Report,

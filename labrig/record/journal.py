@@ -252,7 +252,7 @@ def _refuse_constant(constant: str) -> None:
 _NAME = "notes.md"
 
 
-def add_note(run: Path, text: str, time_text: float) -> Path:
+def add_note(run: Path, text: str, time_s: float) -> Path:
     """Add a note to a run.
 
     Parameters
@@ -261,7 +261,7 @@ def add_note(run: Path, text: str, time_text: float) -> Path:
         Run folder.
     text
         Note in Markdown; its lines are kept as they are.
-    time_text
+    time_s
         Time of the note in seconds since 1970.
 
     Returns
@@ -287,7 +287,7 @@ def add_note(run: Path, text: str, time_text: float) -> Path:
     if not text.strip():
         raise UsageError("expected a text to note, got nothing; write: labrig note RUN 'the text'")
     path = run / _NAME
-    written = datetime.fromtimestamp(time_text, UTC)
+    written = datetime.fromtimestamp(time_s, UTC)
     entry = f"## {written:%Y-%m-%d %H:%M} UTC\n\n{text.strip()}\n\n"
     try:
         with path.open("ab", buffering=0) as notes:

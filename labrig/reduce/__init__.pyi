@@ -25,11 +25,6 @@ from .measured_frames import (
 from .pair_noise import (
     STRIPS as STRIPS,
 )
-from .patches import (
-    TWO_DEGREES as TWO_DEGREES,
-    reduce_patches as reduce_patches,
-    reduce_series as reduce_series,
-)
 from .photon_transfer import (
     ROUNDING_VARIANCE as ROUNDING_VARIANCE,
     NoiseModel as NoiseModel,
@@ -49,6 +44,11 @@ from .raw import (
 )
 from .saturation import (
     is_clipped as is_clipped,
+)
+from .series import (
+    TWO_DEGREES as TWO_DEGREES,
+    reduce_patches as reduce_patches,
+    reduce_series as reduce_series,
 )
 from .strip import (
     FLICKER as FLICKER,

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import DataError, FrameError
-from labrig.reduce.noise import TILE, Floats, Mosaic, PlaneNoise, plane_noise
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
+from labrig.reduce.plane_noise import TILE, Floats, Mosaic, PlaneNoise, plane_noise
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.saturation import count_levels, is_clipped
 from labrig.region import Region, region_pixels

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from labrig.errors import DataError
 from labrig.reduce.channels import OUTLIER_SIGMAS, PixelMask
-from labrig.reduce.noise import Floats
+from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.saturation import histogram
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import FrameError
-from labrig.reduce.noise import Floats
+from labrig.reduce.plane_noise import Floats
 
 Letters: TypeAlias = npt.NDArray[np.str_]
 Scalar = TypeVar("Scalar", np.str_, np.float64)

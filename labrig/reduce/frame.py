@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from labrig.optics import Flat, rho_squared
 from labrig.reduce.channels import PixelMask
-from labrig.reduce.noise import Floats
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel
+from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.saturation import is_clipped
 from labrig.region import Region, region_pixels
@@ -134,11 +134,11 @@ class LinearFrame:
             (4, len(value), len(self.raw.channels))
         )
         for plane in self._planes(area):
-            rows, count_levels = (plane.slices[0], plane.channel), kept[plane.slices]
-            value_sum[rows] += value[plane.slices].sum(axis=1, where=count_levels)
-            variance_sum[rows] += variance[plane.slices].sum(axis=1, where=count_levels)
-            pixels[rows] += count_levels.sum(axis=1)
-            saturated_pixels[rows] += (saturated[plane.slices] & count_levels).sum(axis=1)
+            rows, counted = (plane.slices[0], plane.channel), kept[plane.slices]
+            value_sum[rows] += value[plane.slices].sum(axis=1, where=counted)
+            variance_sum[rows] += variance[plane.slices].sum(axis=1, where=counted)
+            pixels[rows] += counted.sum(axis=1)
+            saturated_pixels[rows] += (saturated[plane.slices] & counted).sum(axis=1)
         return RegionSums(value_sum, variance_sum, pixels, saturated_pixels)
 
     def region_sums(self, region: Region) -> RegionSums:

@@ -9,8 +9,8 @@ import numpy as np
 
 from labrig.errors import DataError
 from labrig.reduce.channels import FrameMeasurement, PixelMask, measure_regions
-from labrig.reduce.noise import Floats
 from labrig.reduce.pair_noise import strip_deviations
+from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.region import Region
 

@@ -2,12 +2,11 @@
 
 Two frames of the same patch differ by their noise, apart from their brightness: everything static
 cancels (the sample's structure, its edges, each pixel's own response). A pair therefore resolves
-what a single frame (`labrig.reduce.noise`) cannot: noise that the pixels of a row share, and the
-noise of a patch too small to be estimated from its surroundings. It is the photon transfer from
-pairs of Janesick (2007) and EMVA 1288, on strips as wide as the patch instead of single pixels:
-the scatter of a strip contains the correlation of all pixels in it. Dark frames of similar
-exposure are pairs, too: they determine the read noise, which of a decay only the faintest frames
-do.
+what a single frame (`labrig.reduce.plane_noise`) cannot: noise that the pixels of a row share, and
+the noise of a patch too small to be estimated from its surroundings. It is the photon transfer from
+pairs of Janesick (2007) and EMVA 1288, on strips as wide as the patch instead of single pixels: the
+scatter of a strip contains the correlation of all pixels in it. Dark frames of similar exposure are
+pairs, too: they determine the read noise, which of a decay only the faintest frames do.
 
 Deviations of the strips may be correlated between channels: rows that are read together, charge
 that strays into the neighbour of another colour. The same differences determine that correlation.
@@ -22,8 +21,8 @@ import numpy.typing as npt
 
 from labrig.reduce.channels import PixelMask
 from labrig.reduce.dark import same_exposure
-from labrig.reduce.noise import Floats
 from labrig.reduce.photon_transfer import NoiseModel, variance_terms
+from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.region import Region, region_pixels
 

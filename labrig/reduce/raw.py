@@ -25,7 +25,7 @@ from labrig.reduce.dng import (
     side_of,
     smallest_square,
 )
-from labrig.reduce.noise import Floats, Mosaic
+from labrig.reduce.plane_noise import Floats, Mosaic
 from labrig.reduce.saturation import clip_level
 
 _STDERR = 2

@@ -9,7 +9,7 @@ therefore determined from the frame where the file's white level is not reached.
 import numpy as np
 import numpy.typing as npt
 
-from labrig.reduce.noise import Mosaic
+from labrig.reduce.plane_noise import Mosaic
 
 #: Pixels below which sorting them is faster than going through all levels.
 _FEW_PIXELS = 50_000

@@ -12,7 +12,7 @@ from labrig.errors import DataError
 from labrig.optics import SLICES, CameraModel, Strip
 from labrig.reduce.hdr import HdrFrame, Image
 from labrig.reduce.measured_frames import SeriesFrame
-from labrig.reduce.patches import reduce_patches
+from labrig.reduce.series import reduce_patches
 from labrig.results import FloatArray, SliceValues, StripProfile
 
 #: Least brightness of a lit pixel in units of the noise of the dark surroundings,

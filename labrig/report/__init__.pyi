@@ -31,7 +31,7 @@ from .page import (
     Report as Report,
     write_report as write_report,
 )
-from .registry import (
+from .renderers import (
     render as render,
 )
 from .run_sections import (

@@ -67,7 +67,7 @@ def _section(result: BlankResult) -> Section:
                 "Light of the blank over time; bars are ± 1 σ.",
             ),
         ),
-        (Table(("channel", "background / (DN/s)", "stray light / (DN/s)"), rows),),
+        (Table(("Channel", "Background / (DN/s)", "Stray light / (DN/s)"), rows),),
     )
 
 

@@ -69,7 +69,7 @@ def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
                 "noise of the fitted gain.",
             ),
         ),
-        (Table(("ISO", "gain / e/DN", "read noise / e", "row noise / e"), rows),),
+        (Table(("ISO", "Gain / (e/DN)", "Read noise / e", "Row noise / e"), rows),),
     )
 
 
@@ -193,7 +193,7 @@ def _table(name: str, factors: Sequence[Factor], form: str, caption: str) -> Tab
         )
         for factor in factors
     )
-    return Table((name, "factor"), rows, caption)
+    return Table((name, "Factor"), rows, caption)
 
 
 def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
@@ -207,7 +207,7 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
         )
         for flat in (fitted.flat for fitted in flats)
     )
-    head = ("aperture", *(f"{name} in the corner / %" for name in file.channels), "gradient / %")
+    head = ("Aperture", *(f"{name} in the corners / %" for name in file.channels), "Gradient / %")
     stop = first.flat.f_number
     return Section(
         "Flat field and vignetting",

@@ -62,7 +62,7 @@ def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> S
         )
         for name, _, change in changes
     )
-    head = ("", "exponent", "lag / ms", "jitter / ms", "χ² per dof", "photographs")
+    head = ("", "Exponent", "Lag / ms", "Jitter / ms", "χ² per dof", "Frames")
     return Section(
         "Turn-off and turn-on transients of the lamp",
         (

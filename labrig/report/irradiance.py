@@ -35,7 +35,7 @@ def _section(result: IrradianceResult) -> Section:
     file = result.calibration
     head = ("Band / nm", *(f"{low:g}" for low in file.bands_nm[:-1]))
     rows = (
-        ("direct", *(rounded(value, 3) for value in file.direct)),
+        ("Direct", *(rounded(value, 3) for value in file.direct)),
         *(
             (f"p{k:02d}", *(rounded(value, 2) for value in file.through[k]))
             for k in range(0, len(file.position), 5)

@@ -85,7 +85,7 @@ def _section(result: IsotropyResult) -> Section:
             *(_statement(name, glow) for name, glow in patches.items()),
         ),
         (Picture("isotropy", partial(_figure, patches), caption),),
-        (Table(("angle", *patches), tuple(rows)),),
+        (Table(("Angle", *patches), tuple(rows)),),
     )
 
 

@@ -14,7 +14,7 @@ UNKNOWN = "–"
 def measured_table(material: Material) -> Table:
     """Return the table of all values of a material with their σ, in one column a state."""
     states = sorted(material.states, key=lambda state: -state.k_r_per_s)
-    head = ("",) if len(states) == 1 else ("", *(f"state {n + 1}" for n in range(len(states))))
+    head = ("",) if len(states) == 1 else ("", *(f"State {n + 1}" for n in range(len(states))))
     rows = tuple(_rows(states, material.bands_nm or ()))
     caption = "Value ± standard uncertainty (1 σ)."
     if material.irradiance_norm is not None:

@@ -14,7 +14,7 @@ from labrig.report.decay_figures import logarithmic_decay
 from labrig.report.emission_spectrum import spectrum_figure
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
-from labrig.report.registry import render as render_result
+from labrig.report.renderers import render as render_result
 from labrig.report.report_model import GlowPhotograph
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.results import DecayPatch, DecayResult, FloatArray, PhosphorResult

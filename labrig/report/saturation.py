@@ -138,7 +138,7 @@ def _rates_table(test: RatesTest, units: tuple[str, ...]) -> Table:
         for row, unit in enumerate(units)
     )
     shared = ("shared", *(rounded(float(k)) for k in test.shared_per_s))
-    head = ("decay", *(f"k{number + 1} / s⁻¹" for number in states))
+    head = ("Decay", *(f"k_r {number + 1} / s⁻¹" for number in states))
     return Table(head, (*rows, shared))
 
 

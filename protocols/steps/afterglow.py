@@ -14,7 +14,7 @@ import numpy.typing as npt
 from labrig.errors import DeviceError
 
 from .darkness import clips, levels
-from .metering import MeteringFrame
+from .exposure_metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 

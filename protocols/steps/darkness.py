@@ -10,7 +10,7 @@ from labrig.errors import DataError, DeviceError
 from labrig.quantity import duration_text
 from labrig.reduce import is_clipped
 
-from .metering import MeteringFrame
+from .exposure_metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 

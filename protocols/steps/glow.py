@@ -17,7 +17,7 @@ from labrig.region import Region
 from .afterglow import glow
 from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 from .darkness import levels, range_dn
-from .metering import DecayMeter, MeteringFrame, Schedule, measure_frame
+from .exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
 from .sample_pose import charge, check_visible, face_camera, face_lamp, has_door, lights_out
 from .sanity_checks import SanityChecks
 

@@ -19,7 +19,7 @@ from labrig.record import FrameRole
 from labrig.region import Region
 
 from .darkness import range_dn
-from .metering import SEEN_SIGMA, MeteringFrame, measure_frame
+from .exposure_metering import SEEN_SIGMA, MeteringFrame, measure_frame
 from .sample_pose import face_lamp
 
 GREY_CARD = ManualStep(

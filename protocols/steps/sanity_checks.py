@@ -24,7 +24,7 @@ from .afterglow import (
     has_gone_out,
 )
 from .darkness import DARK, Darkness, darkness, levels
-from .metering import FrameCache, MeteringFrame
+from .exposure_metering import FrameCache, MeteringFrame
 
 #: Time by which a lamp has gone dark; a halogen lamp takes a third of it.
 LAMP_GONE_S = 1.0

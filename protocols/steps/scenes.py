@@ -25,7 +25,7 @@ from labrig.reduce import measure, read_raw
 from labrig.region import CENTRE
 
 from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
-from .metering import SEEN_DN, SEEN_SIGMA, TARGET
+from .exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET
 from .sample_pose import face_lamp
 from .sanity_checks import SanityChecks
 

@@ -10,8 +10,8 @@ from .body_settings import BodySettings
 from .camera import SimulatedCamera
 from .faults import CameraFaults
 from .pace import Pace
+from .photograph import Sensor
 from .ptpip.server import PtpIpServer
-from .sensor import Sensor
 from .standard.body import StandardHabits
 
 __all__ = [

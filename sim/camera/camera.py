@@ -8,9 +8,9 @@ from .eos.operations import EosOperations
 from .faults import CameraFaults
 from .objects import StoredObject
 from .operations import Operations
+from .photograph import Sensor
 from .power import AutoPowerOff
 from .responder import Responder
-from .sensor import Sensor
 from .shutter import Shutter
 from .standard.body import StandardBody, StandardHabits
 from .standard.operations import StandardOperations

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from labrig.clock import Clock
 
 from .datasets import ObjectInfo, ptp_time, storage_info
-from .sensor import Photograph
+from .photograph import Photograph
 from .vocabulary import ObjectFormat
 
 #: The first card, and one more in another slot.

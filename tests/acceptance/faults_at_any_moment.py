@@ -25,7 +25,7 @@ from typing import Any
 import event_model
 import yaml
 
-from labrig import resources, run as labrig_run
+from labrig import recording, resources
 from labrig.bench import Bench, open_bench
 from labrig.cli import app as _preloaded  # noqa: F401
 from labrig.cli.exit_codes import guarded
@@ -33,7 +33,7 @@ from labrig.cli.progress import progress
 from labrig.clock import VirtualClock
 from labrig.record import read_run
 from labrig.record.journal import read_journal
-from labrig.run import Recording
+from labrig.recording import Recording
 
 #: How a run may end with each fault, apart from well.
 CODES: dict[str, set[int]] = {
@@ -317,7 +317,7 @@ def _run(arguments: list[str], report: Path, stop: Stop | None) -> int:
             stands.append(stand)
             yield stand
 
-    labrig_run.open_bench = remembered  # type: ignore[attr-defined]
+    recording.open_bench = remembered  # type: ignore[attr-defined]
     VirtualClock.now = counted  # type: ignore[method-assign, assignment]
     code = guarded(arguments)
     tell()

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from labrig import run as labrig_run
+from labrig import recording
 from labrig.bench import Bench, open_bench
 from labrig.cli.exit_codes import guarded
 
@@ -78,7 +78,7 @@ def _child(told: str, arguments: list[str]) -> int:
             finally:
                 bench.write_text(json.dumps(_left(stand)))
 
-    labrig_run.open_bench = looked_at  # type: ignore[attr-defined]
+    recording.open_bench = looked_at  # type: ignore[attr-defined]
     return guarded(arguments)
 
 

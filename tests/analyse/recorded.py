@@ -17,8 +17,8 @@ from labrig.clock import Clock
 from labrig.execution import Watch
 from labrig.process.provenance import describe_run
 from labrig.record import RunRecord, read_run
+from labrig.recording import Recording, resume_run
 from labrig.report import Source
-from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
 from tests.quick_yaml import read_quickly, write_quickly
 

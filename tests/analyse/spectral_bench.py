@@ -18,9 +18,9 @@ from labrig.clock import Clock
 from labrig.material import read_material
 from labrig.optics import Bands, Strip
 from labrig.optics.piecewise import band_means, edges_from_centres
+from labrig.recording import Recording
 from labrig.region import region_pixels
 from labrig.results.emission_spectrum import WAVELENGTH_NM
-from labrig.run import Recording
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from labrig.sim.lvf import PIECES, Lvf, pieces

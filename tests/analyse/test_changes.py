@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import yaml
 
-from labrig.process.changes import changes
+from labrig.process.result_changes import changes
 from labrig.process.run import new_result, put_in_place
 from labrig.results import FittedDecay, write_fitted_decay
 from tests.results.made import decay_result as fit

@@ -24,7 +24,7 @@ from labrig.analyse.emission_spectrum.comparison import (
 )
 from labrig.analyse.emission_spectrum.forward_model import forward_models
 from labrig.analyse.emission_spectrum.reduction import reduce_places
-from labrig.analyse.part import Inputs
+from labrig.analyse.inputs import Inputs
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import SpectrumFit, fit_spectrum, system_through_lvf
 from labrig.optics import Spectrum

@@ -12,7 +12,7 @@ from hypothesis import given, strategies as st
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse as analyse_spectra
-from labrig.analyse.part import Inputs, Part
+from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.strip import StripPatch, for_each_patch, slice_strip, tilt_offset
 from labrig.calibration import write_irradiance_file, write_lvf_file
 from labrig.compare.run import read_patches

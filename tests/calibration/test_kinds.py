@@ -8,7 +8,7 @@ import pytest
 
 from labrig import plugins
 from labrig.acquire import read_rig_file
-from labrig.analyse.part import Inputs
+from labrig.analyse.inputs import Inputs
 from labrig.calibration import CalibrationKind, kinds
 from labrig.errors import UsageError
 

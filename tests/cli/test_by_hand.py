@@ -26,7 +26,7 @@ from labrig.cli.prompt import Terminal
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
 from labrig.record import read_run
-from labrig.run import Recording
+from labrig.recording import Recording
 from tests.test_doors import middle
 
 STEP = ManualStep("put filter 37 in", "its transmission is measured", "filter 37")

@@ -84,7 +84,7 @@ def test_two_states_are_nearer_to_the_photographs_than_one(labrig: Labrig, run: 
     assert 0.3 < glow["mean"]["material"] < 10
     for ratios in said["residuals"]:
         assert 0 < ratios["rms"]["2"] < 0.2
-    (table,) = said["beside"]
+    (table,) = said["material_comparisons"]
     assert [row["quantity"] for row in table["rows"]] == ["k_r 1", "k_r 2"]
     assert all(abs(row["in_sigma"]) < 5 for row in table["rows"])
     assert len(said["spectra"]) == 12

@@ -16,9 +16,9 @@ from labrig.process import process_run
 from labrig.process.provenance import describe_run
 from labrig.record import read_run
 from labrig.record.history import RunDescription
+from labrig.recording import Recording
 from labrig.results import read_result
 from labrig.results.decay import DecayResult
-from labrig.run import Recording
 from tests.acquire.fakes import Watching
 
 #: The rest of the frame stays dark.

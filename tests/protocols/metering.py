@@ -1,6 +1,6 @@
 """Looks at a scene that is written down instead of photographed."""
 
-from labrig.protocols.steps.metering import MeteringFrame
+from labrig.protocols.steps.exposure_metering import MeteringFrame
 from labrig.reduce import ChannelStats, FrameMeasurement
 
 BLACK, WHITE = 1024.0, 15_600.0

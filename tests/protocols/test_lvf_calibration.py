@@ -16,9 +16,9 @@ from labrig.clock import Clock, Interrupted
 from labrig.errors import UsageError
 from labrig.process import process_run
 from labrig.record import read_run
+from labrig.recording import Recording, resume_run
 from labrig.results import read_result
 from labrig.results.lvf_calibration import LvfCalibrationResult
-from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
 from tests.analyse.lvf_calibration.room_truth import (
     FINE_NM,

@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 from labrig.errors import DataError, FrameError, UsageError
 from labrig.reduce import RawFrame, measure, read_raw
 from labrig.reduce.channels import isolated_outliers
-from labrig.reduce.noise import plane_noise
+from labrig.reduce.plane_noise import plane_noise
 
 MakeRaw = Callable[..., RawFrame]
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.ndimage import gaussian_filter, uniform_filter
 
 from labrig.reduce import RawFrame, measure
-from labrig.reduce.noise import plane_noise
+from labrig.reduce.plane_noise import plane_noise
 
 MakeRaw = Callable[..., RawFrame]
 Array = npt.NDArray[Any]

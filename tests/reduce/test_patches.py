@@ -10,7 +10,7 @@ import pytest
 
 from labrig.errors import DataError, FrameError
 from labrig.reduce import SeriesFrame, reduce_patches, reduce_series
-from labrig.reduce.patches import TWO_DEGREES
+from labrig.reduce.series import TWO_DEGREES
 from labrig.results import Series
 
 WriteDng = Callable[..., bytes]

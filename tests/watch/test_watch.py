@@ -26,7 +26,7 @@ from labrig.cli.progress import thumbnail
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import UsageError
 from labrig.record import UNDONE, ActionRecord, RunFolder, read_run
-from labrig.run import resume_run
+from labrig.recording import resume_run
 from labrig.watch.previews import Previews
 from labrig.watch.run_follower import RunFollower, State
 from labrig.watch.server import UpdateFeed, WatchServer, watch_run

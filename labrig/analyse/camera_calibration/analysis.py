@@ -10,7 +10,7 @@ from labrig.analyse.camera_calibration.flat_field import fit_flat
 from labrig.analyse.camera_calibration.linearity import deviation, fit_linearity
 from labrig.analyse.camera_calibration.photon_transfer import pairs_of, photon_transfer, scatter
 from labrig.analyse.frames import camera_identity, lens_of, part_frames, part_region, timed, untimed
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.calibration import CameraFile, Linearity
 from labrig.errors import DataError
 from labrig.number_format import exposure_text, plus_minus

@@ -27,7 +27,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum

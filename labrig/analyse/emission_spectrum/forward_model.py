@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from labrig.analyse.emission_spectrum.comparison import combined
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_patches, tilt_offset
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.errors import DataError, UsageError

@@ -10,7 +10,7 @@ from labrig.analyse.excitation.closure import predicted_charging
 from labrig.analyse.excitation.lamp_light import band_sigma, scale_sigma
 from labrig.analyse.excitation.material import excited_material
 from labrig.analyse.frames import require_intact
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.temperature import at_temperature

@@ -7,7 +7,7 @@ import numpy as np
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
 from labrig.analyse.excitation.lamp_light import across_sites, lamp_transients, site_modes
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_patches, tilt_offset
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError

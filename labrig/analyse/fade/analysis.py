@@ -14,7 +14,7 @@ from labrig.analyse.fade.frames import (
     warming,
 )
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
-from labrig.analyse.part import Part
+from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
 from labrig.errors import DataError

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from labrig.analyse.inputs import Part
 from labrig.analyse.lvf_calibration.filters import (
     NO_FILTER,
     Bench,
@@ -20,7 +21,6 @@ from labrig.analyse.lvf_calibration.lines import (
     strip_lines,
     wavelengths_along,
 )
-from labrig.analyse.part import Part
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import (
     camera_curves,

@@ -11,7 +11,7 @@ from .. import codes
 from ..body_settings import BodySettings
 from ..faults import CameraFaults
 from ..objects import CARD_ID, SHOT_BYTES, ObjectStore
-from ..sensor import Photograph, Sensor
+from ..photograph import Photograph, Sensor
 from ..shutter import FOCUS_S, METERING_S, READOUT_S, Exposure, Shutter, Stage
 from ..vocabulary import EosEvent, EosProperty, ResponseCode
 from .events import EventQueue, object_added, record, transfer_request

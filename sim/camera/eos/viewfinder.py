@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labrig.clock import Clock
 
-from ..sensor import Sensor
+from ..photograph import Sensor
 
 #: Time from the command to the first picture: mirror up, shutter open, sensor running.
 START_S = 0.4

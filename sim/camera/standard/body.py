@@ -12,7 +12,7 @@ from ..body_settings import BodySettings
 from ..faults import CameraFaults
 from ..objects import CARD_ID, SECOND_CARD_ID, ObjectStore
 from ..operations import Event
-from ..sensor import Photograph, Sensor
+from ..photograph import Photograph, Sensor
 from ..shutter import FOCUS_S, METERING_S, READOUT_S, Exposure, Shutter, Stage
 from ..vocabulary import ObjectFormat, ResponseCode, StandardEvent
 from .properties import SHUTTER_TIMES, StandardProperties

@@ -10,7 +10,7 @@ import pytest
 
 from labrig.analyse import Overrides, decay as decay_analysis
 from labrig.analyse.frames import intact_frames
-from labrig.analyse.part import Inputs
+from labrig.analyse.inputs import Inputs
 from labrig.calibration import read_blank_file
 from labrig.errors import DataError
 from labrig.process import process_run

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from labrig.analyse import decay as decay_analysis
-from labrig.analyse.part import Inputs
+from labrig.analyse.inputs import Inputs
 from labrig.calibration import CameraFile, read_camera_file
 from labrig.errors import DataError
 from labrig.process import Processed, process_and_report, process_run

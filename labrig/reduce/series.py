@@ -19,8 +19,8 @@ from labrig.reduce.measured_frames import (
     measure_frames,
     strips,
 )
-from labrig.reduce.noise import Floats
 from labrig.reduce.pair_noise import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
+from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.region import Region
 from labrig.results import Series, add_flag, is_usable

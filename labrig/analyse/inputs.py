@@ -66,7 +66,7 @@ class Inputs:
         return cls()._with(named)
 
     def calibration(self, kind: CalibrationKind[FileT]) -> FileT | None:
-        """What is known of a kind of calibration; None if nothing is."""
+        """Return the calibration of a kind; None if none is named or measured."""
         found: FileT | None = getattr(self, kind.name, None) or self.others.get(kind.name)
         return found
 
@@ -79,7 +79,7 @@ class Inputs:
         return self._with(provided)
 
     def _with(self, values: Mapping[str, Any]) -> Self:
-        """These, with values by the names of fields, or of further kinds of calibration."""
+        """Return these inputs with values by the names of fields or of further kinds."""
         own = {item.name for item in fields(self)}
         others = {name: value for name, value in values.items() if name not in own}
         return replace(
