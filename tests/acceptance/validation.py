@@ -103,17 +103,27 @@ class Figure:
     extract: Extract
 
 
-def _module(name: str, *arguments: str) -> Campaign:
-    return Campaign(name, (f"tests.acceptance.{name}", *arguments))
+def _module(name: str, *arguments: str, called: str = "") -> Campaign:
+    return Campaign(called or name, (f"tests.acceptance.{name}", *arguments))
 
 
 CAMPAIGNS = {
     campaign.name: campaign
     for campaign in (
-        _module("coverage_pipeline", "--seeds", "150"),
+        _module("coverage_pipeline", "--seeds", "100", "--scenario", "baseline", "all of it"),
+        _module(
+            "coverage_pipeline",
+            *("--seeds", "60", "--scenario", "another", "lamp", "flicker", "steady", "power"),
+            called="coverage_pipeline_other_scenarios",
+        ),
         _module("coverage_decay_fit", "--seeds", "100"),
         _module("reference_data"),
-        _module("predicted_sigmas", "--days", "32"),
+        _module("predicted_sigmas", "--days", "32", "--only", "double"),
+        _module(
+            "predicted_sigmas",
+            *("--days", "32", "--only", "blue"),
+            called="predicted_sigmas_one_state",
+        ),
         _module("excitation_rates", "--seeds", "40"),
         _module("whole_phosphor", "blue-paint", "green-paint"),
         _module("lvf_in_the_room", "--width", "402", "--seeds", "3"),
@@ -368,7 +378,7 @@ def _times(what: str, *peers: str) -> Extract:
 FIGURES = (
     Figure(
         "Simulated dark room, from lamp to fit: samples of one and of two states, sensor of "
-        "96 × 64 pixels, flicker of 0.7 %, 150 seeds. Share of the rates k_r within 1 σ and 2 σ "
+        "96 × 64 pixels, flicker of 0.7 %, 100 seeds. Share of the rates k_r within 1 σ and 2 σ "
         "of the truth (68 % and 95 % if σ is right), and mean error",
         "coverage_pipeline",
         _coverage("baseline"),
@@ -385,27 +395,33 @@ FIGURES = (
     ),
     Figure(
         "The same with lamp drift of 3 %/h, crosstalk of 3 % and row noise of 0.3 read noise in "
-        "addition, two decays, 150 seeds",
+        "addition, two decays, 100 seeds",
         "coverage_pipeline",
         _coverage("all of it"),
     ),
     Figure(
-        "The same, reduced with another laboratory's camera curves, 150 seeds",
-        "coverage_pipeline",
+        "The same, reduced with another laboratory's camera curves, 60 seeds",
+        "coverage_pipeline_other_scenarios",
         _coverage("another laboratory's curves"),
     ),
     Figure(
-        "The same with lamp drift of 3 %/h, two decays, 150 seeds",
-        "coverage_pipeline",
+        "The same with lamp drift of 3 %/h, two decays, 60 seeds",
+        "coverage_pipeline_other_scenarios",
         _coverage("lamp drifts"),
     ),
     Figure(
-        "The same with flicker of 2 %, 150 seeds", "coverage_pipeline", _coverage("flicker 2 %")
+        "The same with flicker of 2 %, 60 seeds",
+        "coverage_pipeline_other_scenarios",
+        _coverage("flicker 2 %"),
     ),
-    Figure("The same without flicker, 150 seeds", "coverage_pipeline", _coverage("steady light")),
     Figure(
-        "A sample whose glow falls by a power law, 150 seeds: fits that say so",
-        "coverage_pipeline",
+        "The same without flicker, 60 seeds",
+        "coverage_pipeline_other_scenarios",
+        _coverage("steady light"),
+    ),
+    Figure(
+        "A sample whose glow falls by a power law, 60 seeds: fits that say so",
+        "coverage_pipeline_other_scenarios",
         lambda printed: _match(r"flagged as such (\d+ of \d+)", printed),
     ),
     Figure(
@@ -431,9 +447,14 @@ FIGURES = (
         lambda printed: _match(r"^visible +\d+ +([\d.]+)$", printed) + " nm",
     ),
     Figure(
-        "Scatter of fitted rates over the σ that `labrig plan --predict` states, 16 protocols, "
-        "32 runs each, of which chance alone makes ± 0.13",
+        "Scatter of fitted rates over the σ that `labrig plan --predict` states, materials of two "
+        "states, 8 protocols, 32 runs each (chance alone makes ± 0.13)",
         "predicted_sigmas",
+        _predicted,
+    ),
+    Figure(
+        "The same for a material of one state, 6 protocols, 32 runs each",
+        "predicted_sigmas_one_state",
         _predicted,
     ),
     Figure(
@@ -512,6 +533,11 @@ FIGURES = (
         _narrow_lights,
     ),
     Figure("The same, every second held out", "lightlogger", _narrow_lights_halved),
+    Figure(
+        "Every third held out: rms of error over σ (1 if σ is right)",
+        "lightlogger",
+        lambda printed: _match(r"rms of error over σ ([\d.]+)$", printed),
+    ),
     Figure(
         "Charge and decay of a real SrAl2O4:Eu,Dy, two states: rms of misfit over glow in the "
         "charge until 60 s, in the charge until 300 s, in the decay until 60 s, later",
