@@ -4,13 +4,24 @@ import re
 
 import pytest
 
-from tests.acceptance.validation import CAMPAIGNS, FIGURES, OUTPUTS, PAGE, Figure, page
+from tests.acceptance.validation import CAMPAIGNS, FIGURES, OUTPUTS, PAGE, ROOT, Figure, page
 
 KEPT = {name: output for name, one in CAMPAIGNS.items() if (output := one.kept) is not None}
 
 
 def test_the_page_is_made_of_what_is_kept() -> None:
     assert PAGE.read_text(encoding="utf-8") == page()
+
+
+def test_the_readme_tells_figures_of_the_page() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    section = readme.split("## How good is it")[1].split("\n## ")[0]
+    told = [
+        row.split(" | ")[1].removesuffix(" |") for row in re.findall(r"^\|.* \|$", section, re.M)
+    ]
+    found = {one.extract(KEPT[one.campaign].printed) for one in FIGURES if one.campaign in KEPT}
+    assert len(told) > 5
+    assert set(told[1:]) <= found
 
 
 def test_what_is_kept_belongs_to_a_campaign_and_says_how_it_was_made() -> None:
