@@ -269,7 +269,15 @@ def _phosphor(printed: str) -> str:
 def _variable_filter(printed: str) -> str:
     (centre,) = _columns(r"^ +centre / nm +[\d.]+ +([\d.]+)", printed)
     (width,) = _columns(r"^ +width / 1 +[\d.]+ +([\d.]+)", printed)
-    return f"centres within {max(centre):.2f} nm, widths within {100 * max(width):.1f} %"
+    return f"centres within {max(centre):.3f} nm, widths within {100 * max(width):.1f} %"
+
+
+def _variable_filter_sigma(printed: str) -> str:
+    said = []
+    for name in ("centre / nm", "width / 1"):
+        (rms,) = _columns(rf"^ +{name} +[\d.]+ +[\d.]+ +[\d.]+ +([\d.]+)", printed)
+        said.append(f"{name.split()[0]} {_span(rms, 2)}")
+    return ", ".join(said)
 
 
 def _irradiance(printed: str) -> str:
@@ -499,6 +507,11 @@ FIGURES = (
         "cameras: central wavelengths and widths of the pass bands from 420 nm to 680 nm",
         "lvf_in_the_room",
         _variable_filter,
+    ),
+    Figure(
+        "Same runs: rms of error over σ at all positions (1 if σ is right)",
+        "lvf_in_the_room",
+        _variable_filter_sigma,
     ),
     Figure(
         "Same runs: relative irradiance behind the filter, summed over all bands, from 420 nm to "
