@@ -266,6 +266,12 @@ def _phosphor(printed: str) -> str:
     )
 
 
+def _phosphor_sigma(printed: str) -> str:
+    names = {"k_r": "k_r", "r0_off": "r(0)", "k_e": "k_e", "radiated": "Λ"}
+    rms = {name: _match(rf" {name} ([\d.]+) σ", printed) for name in names}
+    return ", ".join(f"{names[name]} {value}" for name, value in rms.items())
+
+
 def _variable_filter(printed: str) -> str:
     (centre,) = _columns(r"^ +centre / nm +[\d.]+ +([\d.]+)", printed)
     (width,) = _columns(r"^ +width / 1 +[\d.]+ +([\d.]+)", printed)
@@ -501,6 +507,11 @@ FIGURES = (
         "one seed each",
         "whole_phosphor",
         _phosphor,
+    ),
+    Figure(
+        "Same runs: rms of error over σ (1 if σ is right)",
+        "whole_phosphor",
+        _phosphor_sigma,
     ),
     Figure(
         "Linear variable filter calibrated in the simulated room with real colour filters, three "
