@@ -356,7 +356,10 @@ def _kills(printed: str) -> str:
 
 def _disk(printed: str) -> str:
     failures, frames, wrong = _columns(r"^(?:run|result), \w+ +(\d+) +(\d+) +\d+ +(\d+) ", printed)
-    return f"{sum(wrong):.0f} of {sum(failures):.0f} failures wrong; {sum(frames):.0f} frames kept"
+    return (
+        f"{sum(wrong):.0f} of {sum(failures):.0f} wrong (run not usable, an acknowledged frame of "
+        f"{sum(frames):.0f} lost, more than one unit done again)"
+    )
 
 
 def _refused(printed: str) -> str:
