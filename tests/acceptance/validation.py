@@ -457,8 +457,8 @@ FIGURES = (
         lambda printed: _match(r"flagged as such (\d+ of \d+)", printed),
     ),
     Figure(
-        "Decay fit by itself, one to three states, flicker and dark level known or not, 100 seeds "
-        "in each of the cases: share of the rates",
+        "Decay fit by itself, one to three states, flicker and dark level known or not, flicker "
+        "that the fit is not told of among them, 100 seeds in each case: share of the rates",
         "coverage_decay_fit",
         _decay_fit,
     ),
