@@ -26,7 +26,7 @@ from labrig.quantity import Count, DurationS
 from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
-from .steps.camera_settings import CameraSettings
+from .steps.camera_settings import CameraSettings, FNumber, Iso
 from .steps.grey_card import GREY_CARD, CardLight, CardMeterUnit, card_light, light_card
 from .steps.sanity_checks import SanityChecks
 from .steps.scenes import Arrangement, PutBackUnit
@@ -288,8 +288,8 @@ class CameraCalibration(ProtocolModel):
 
     protocol: Literal["camera_calibration"] = "camera_calibration"
     camera: CameraSettings = CameraSettings(iso=100, f_number=4.0)
-    isos: tuple[int, ...] = Field((100, 200, 400, 800, 1600), min_length=1)
-    f_numbers: tuple[float, ...] = (2.8, 4.0, 5.6, 8.0, 11.0)
+    isos: tuple[Iso, ...] = Field((100, 200, 400, 800, 1600), min_length=1)
+    f_numbers: tuple[FNumber, ...] = (2.8, 4.0, 5.6, 8.0, 11.0)
     card: Region = CENTRE
     levels: int = Field(6, ge=3, le=30)
     repeats: Count = Field(24, ge=6)

@@ -1,5 +1,7 @@
 """Settings of the camera, and times that follow from them."""
 
+from typing import Annotated
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire import MAX_STEPS, CameraOffers
@@ -30,6 +32,11 @@ DARKS_PER_EXPOSURE = 4
 MARGIN_S = 0.5
 
 
+#: Sensitivities and apertures beyond those of any camera and lens are slips of the pen.
+Iso = Annotated[int, Field(ge=1, le=10_000_000)]
+FNumber = Annotated[float, Field(ge=0.1, le=1000)]
+
+
 class CameraSettings(BaseModel):
     """Sensitivity and aperture of the camera; the shutter time has a key of its own.
 
@@ -43,8 +50,8 @@ class CameraSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    iso: int = Field(400, gt=0)
-    f_number: float | None = Field(4.0, gt=0)
+    iso: Iso = 400
+    f_number: FNumber | None = 4.0
 
 
 def dark_exposures_s(longest_s: float, offers: CameraOffers) -> list[float]:
