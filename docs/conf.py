@@ -30,6 +30,7 @@ myst_enable_extensions = ["amsmath", "attrs_block", "colon_fence", "deflist", "d
 myst_heading_anchors = 3
 
 autodoc_typehints = "none"
+autodoc_default_options = {"exclude-members": "model_config"}
 default_role = "code"
 autosummary_generate = True
 numpydoc_show_class_members = False

@@ -60,6 +60,7 @@ def _block(name: str, block: dict[str, Any], blocks: dict[str, Any]) -> Iterator
     yield f"({_anchor(name)})="
     yield f"## {_kind(block) or name}\n"
     yield f"{block.get('description', '')}\n"
+    yield "{.keys}"
     yield "| key | value | default | meaning |"
     yield "|---|---|---|---|"
     required = block.get("required", ())

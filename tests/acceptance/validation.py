@@ -696,14 +696,15 @@ def page() -> str:
 
 
 def _rows(kept: dict[str, Output]) -> Iterator[str]:
-    yield "| what | figure | command | measured on |"
-    yield "|---|---|---|---|"
+    yield "{.figures}"
+    yield "| what | figure | measured |"
+    yield "|---|---|---|"
     for figure in FIGURES:
         if figure.campaign in kept:
             output = kept[figure.campaign]
-            command = f"[`{output.header['command']}`](#{_anchor(figure.campaign)})"
+            link = f"[{figure.campaign}](#{_anchor(figure.campaign)})"
             found = figure.extract(output.printed)
-            yield f"| {figure.what} | {found} | {command} | {output.header['date']} |"
+            yield f"| {figure.what} | {found} | {link} {output.header['date']} |"
 
 
 def _missing(campaigns: Iterable[Campaign]) -> Iterator[str]:
@@ -717,7 +718,8 @@ def _missing(campaigns: Iterable[Campaign]) -> Iterator[str]:
 
 def _blocks(kept: dict[str, Output]) -> Iterator[str]:
     for name, output in kept.items():
-        yield f"({_anchor(name)})=\n### {name}\n\n```text\n{output.text}```\n"
+        command = f"```sh\n{output.header['command']}\n```"
+        yield f"({_anchor(name)})=\n### {name}\n\n{command}\n\n```text\n{output.text}```\n"
 
 
 def _anchor(name: str) -> str:
