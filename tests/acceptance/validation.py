@@ -408,7 +408,7 @@ def _times(what: str, *peers: str) -> Extract:
 FIGURES = (
     Figure(
         "Simulated dark room, from lamp to fit: samples of one and of two states, sensor of "
-        "96 × 64 pixels, flicker of 0.7 %, 100 seeds. Share of the rates k_r within 1 σ and 2 σ "
+        "96 × 64 pixels, flicker of 0.7 %, 100 seeds. Fraction of the rates k_r within 1 σ and 2 σ "
         "of the truth (68 % and 95 % if σ is right; chance alone makes ± 5 % and ± 2 %), and mean "
         "error",
         "coverage_pipeline",
@@ -458,12 +458,12 @@ FIGURES = (
     ),
     Figure(
         "Decay fit by itself, one to three states, flicker and dark level known or not, flicker "
-        "that the fit is not told of among them, 100 seeds in each case: share of the rates",
+        "that the fit is not told of among them, 100 seeds in each case: fraction of the rates",
         "coverage_decay_fit",
         _decay_fit,
     ),
     Figure(
-        "The same, power laws of three shapes, 100 seeds each: share of the fits that say so",
+        "The same, power laws of three shapes, 100 seeds each: fraction of the fits that say so",
         "coverage_decay_fit",
         _power_laws,
     ),
@@ -550,7 +550,7 @@ FIGURES = (
         _colours("another laboratory's"),
     ),
     Figure(
-        "Emission of 40 fluorophores through a variable filter, camera curves known: share of the "
+        "Emission of 40 fluorophores through a variable filter, camera curves known: fraction of the "
         "bands above 2 % of the peak within their credible bands of 68 % and 95 %",
         "spectrum_through_lvf",
         _spectrum_bands("fluorophores"),
@@ -563,7 +563,7 @@ FIGURES = (
     Figure(
         "Emission spectra of five paints in the simulated room, camera curves as far off as "
         "laboratories disagree, with a picture of a grey card, three seeds each: largest error, "
-        "and share of the bands above 2 % of the peak",
+        "and fraction of the bands above 2 % of the peak",
         "emission_spectra",
         _emission,
     ),
@@ -702,7 +702,7 @@ def _rows(kept: dict[str, Output]) -> Iterator[str]:
     for figure in FIGURES:
         if figure.campaign in kept:
             output = kept[figure.campaign]
-            link = f"[{figure.campaign}](#{_anchor(figure.campaign)})"
+            link = f"[{figure.campaign.replace(chr(95), chr(32))}](#{_anchor(figure.campaign)})"
             found = figure.extract(output.printed)
             yield f"| {figure.what} | {found} | {link} {output.header['date']} |"
 
