@@ -550,8 +550,8 @@ FIGURES = (
         _colours("another laboratory's"),
     ),
     Figure(
-        "Emission of 40 fluorophores through a variable filter, camera curves known: fraction of the "
-        "bands above 2 % of the peak within their credible bands of 68 % and 95 %",
+        "Emission of 40 fluorophores through a variable filter, camera curves known: fraction of "
+        "the bands above 2 % of the peak within their credible bands of 68 % and 95 %",
         "spectrum_through_lvf",
         _spectrum_bands("fluorophores"),
     ),
@@ -702,7 +702,8 @@ def _rows(kept: dict[str, Output]) -> Iterator[str]:
     for figure in FIGURES:
         if figure.campaign in kept:
             output = kept[figure.campaign]
-            link = f"[{figure.campaign.replace(chr(95), chr(32))}](#{_anchor(figure.campaign)})"
+            title = figure.campaign.replace("_", " ")
+            link = f"[{title}](#{_anchor(figure.campaign)})"
             found = figure.extract(output.printed)
             yield f"| {figure.what} | {found} | {link} {output.header['date']} |"
 
