@@ -28,6 +28,7 @@ nitpicky = False
 
 myst_enable_extensions = ["amsmath", "attrs_block", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+smartquotes = False
 
 autodoc_typehints = "none"
 autodoc_default_options = {"exclude-members": "model_config"}

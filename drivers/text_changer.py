@@ -70,7 +70,7 @@ class TextChanger:
         if answer != "done":
             kind = DeviceError if answer.startswith("cannot") else UnclearAnswerError
             raise kind(
-                f"{self._name} were told '{task}': expected 'done', got '{answer}'; do it by hand, "
+                f"{self._name} was sent '{task}': expected 'done', got '{answer}'; do it by hand, "
                 "without 'changer:' in the rig file, or teach them"
             )
 

@@ -202,7 +202,7 @@ class Room:
         )
 
     def truth(self, iso: int = 400, f_number: float = 4.0) -> Truth:
-        """Return the result of a perfect fit of the decay after the last lamp-off."""
+        """Return the result of a perfect fit of the decay after the last lamp off."""
         lamps = self._lamps()
         off_s = lamps.last_switch_off(self._clock.now())
         level = effective = None

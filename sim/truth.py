@@ -29,17 +29,17 @@ class TrueState(_Part):
     Attributes
     ----------
     k_r_per_s
-        Re-radiation rate in 1/s, at the room's temperature at lamp-off.
+        Re-radiation rate in 1/s, at the room's temperature at lamp off.
     k_e_per_s, reradiation
         Excitation rate and Λ of every band, as in the material's file.
     emission
         Λ on the room's `wavelength_nm`.
     concentration
-        r at the moment of the last lamp-off; null if the lamp was never switched off. Where an LVF
+        r at the moment of the last lamp off; null if the lamp was never switched off. Where an LVF
         has lain on the patch, the mean over its pixels; so is the amplitude.
     amplitude_dn_per_s
         Signal of the state in R, G, B per second of exposure, extrapolated from the dark back to
-        lamp-off (the fade charges a little more), in the middle of the lens.
+        lamp off (the fade charges a little more), in the middle of the lens.
     """
 
     k_r_per_s: float
@@ -105,7 +105,7 @@ class Truth(_Part):
     Attributes
     ----------
     lamp_off_s
-        Time of the last lamp-off on the room's clock.
+        Time of the last lamp off on the room's clock.
     iso, f_number
         Sensitivity and aperture to which the amplitudes belong.
     sensitivity
@@ -144,7 +144,7 @@ def true_patches(
     Parameters
     ----------
     level, effective : ndarray, shape (states,)
-        Concentrations at lamp-off, and those extrapolated from the dark.
+        Concentrations at lamp off, and those extrapolated from the dark.
     dn_per_s : ndarray, shape (states, 3)
         Signal of the states at r = 1 in DN/s.
     faster

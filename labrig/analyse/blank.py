@@ -108,7 +108,7 @@ def _weighted_mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, F
 
 
 def analyse(part: Part) -> BlankResult:
-    """Measure the light after lamp-off where nothing glows.
+    """Measure the light after lamp off where nothing glows.
 
     Raises
     ------

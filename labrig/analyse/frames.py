@@ -165,7 +165,7 @@ def without_stray_light(
     Raises
     ------
     DataError
-        The blank never became clean, or no frame begins late enough.
+        The blank never became dark, or no frame begins late enough.
     """
     if blank is None:
         return frames, ()
@@ -183,14 +183,14 @@ def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
     Parameters
     ----------
     t_s
-        Begins of the frames in seconds after lamp-off.
+        Begins of the frames in seconds after lamp off.
     blank
         Stray light of the bench.
 
     Raises
     ------
     DataError
-        The blank never became clean, or no frame begins late enough.
+        The blank never became dark, or no frame begins late enough.
     """
     early = [start_s for start_s in t_s if not blank.is_clean(start_s)]
     if not early:
@@ -228,7 +228,7 @@ LATE_S = 0.05
 def intact_frames(
     run: RunRecord, overrides: Overrides, role: str = FrameRole.DECAY
 ) -> IntactFrames:
-    """Check every frame against its checksum, and time those after lamp-off from it.
+    """Check every frame against its checksum, and time those after lamp off from it.
 
     Parameters
     ----------
@@ -347,7 +347,7 @@ def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
 
 
 def _flag_frame(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:
-    """Return a frame timed from lamp-off, with its flags."""
+    """Return a frame timed from lamp off, with its flags."""
     flag = "late" if frame.late_s > LATE_S else ""
     flag = add_flag(flag, "excluded") if overrides.excludes(frame) else flag
     return replace(timed(frame, switched_time(attempt, frame, "off")), flag=flag)

@@ -122,7 +122,7 @@ def fit_table(
     weights
         Uncertainties of the values: `given` in the table, or those of `counts` (Poisson).
     origin_s
-        Time of lamp-off in the table's seconds.
+        Time of lamp off in the table's seconds.
     from_s
         Time in the table's seconds from which points are fitted; None takes all.
 

@@ -49,7 +49,7 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
     if not photographs or "thermometer" not in run.attempts[-1].start.get("devices", {}):
         return ()
     if not run.temperatures():
-        return (f"the thermometer told nothing: {CHECK_IT}",)
+        return (f"the thermometer gave no reading: {CHECK_IT}",)
     course, warnings = TemperatureHistory(run), []
     for part, group in groupby(photographs, key=lambda frame: frame.unit.rpartition("/")[0]):
         temperatures_c = course.during(list(group))
@@ -64,7 +64,7 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
             )
     if photographs[-1].end_time > course.time[-1] + KNOWN_FOR_S:
         warnings.append(
-            f"the thermometer told nothing after {time_text(course.time[-1])}: {CHECK_IT}"
+            f"the thermometer gave no reading after {time_text(course.time[-1])}: {CHECK_IT}"
         )
     return tuple(warnings)
 

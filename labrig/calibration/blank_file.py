@@ -83,12 +83,13 @@ class BlankFile(BaseModel):
         Raises
         ------
         DataError
-            The blank never became clean.
+            The blank never became free of the turn-off transient.
         """
         if self.first_clean_s is None:
             raise DataError(
-                "the blank never became clean: light other than the glow fades along with it (see "
-                "the blank's report, and measure one again with a shield or for longer)"
+                "the blank never became free of the turn-off transient: light other than the glow "
+                "fades along with it (see the blank's report, and measure one again with a shield "
+                "or for longer)"
             )
         return t_s >= self.first_clean_s - SAME_TIME_S
 
@@ -96,7 +97,7 @@ class BlankFile(BaseModel):
         """Return a message for each source of constant stray light."""
         messages = []
         for occasion, level, sigma in (
-            ("after lamp-off, but not in dark frames", self.constant_dn_per_s,
+            ("after lamp off, but not in dark frames", self.constant_dn_per_s,
              self.constant_sigma_dn_per_s),
             ("all the time", self.ambient_dn_per_s, self.ambient_sigma_dn_per_s),
         ):  # fmt: skip

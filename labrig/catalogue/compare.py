@@ -75,7 +75,7 @@ class PatchComparison:
         if self.states[0] != self.states[1]:
             return f"{self.states[0]} and {self.states[1]} states: fit both with the same --states"
         if math.isnan(self.p_value):
-            return "cannot be told: the uncertainties are not known"
+            return "not decided: the uncertainties are not known"
         agree = "differ" if self.p_value < DIFFERENT_P else "agree"
         p = f"p = {self.p_value:.2g}" if self.p_value >= MIN_P else f"p < {MIN_P:g}"
         return f"the rates {agree} ({p})"

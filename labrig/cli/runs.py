@@ -188,7 +188,7 @@ def _print_comparison(comparison: "Comparison") -> None:
             Console().print(table)
         if patch.gain.sigma:
             gain = plus_minus(patch.gain.value, patch.gain.sigma)
-            typer.echo(f"a of run B is multiplied by {gain}, as the reference tells")
+            typer.echo(f"a of run B is multiplied by {gain}, by the reference")
     if not any(patch.gain.sigma for patch in comparison.patches):
         typer.echo("a is in each day's own DN/s; a source that stays, as --reference, ties them")
 

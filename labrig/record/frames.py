@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 class FrameRole(StrEnum):
-    """Purpose of a frame in any protocol; a protocol may have further roles.
+    """Role of a frame in any protocol; a protocol may have further roles.
 
     `METER` frames set exposures, `LOOK` frames decide how a unit goes on, `REST` frames show the
     sample before it is charged, rates are fitted to `DECAY` frames.

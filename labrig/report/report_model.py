@@ -10,8 +10,8 @@ from labrig.results import FittedDecay, NoiseBudget, Series
 #: Assumptions of every decay measured with a camera.
 DECAY_ASSUMPTIONS = (
     "The amplitudes aᵢ are what the decay measures: the signal at lamp off in the brightest "
-    "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiance Λᵢ "
-    "and charge level rᵢ(0) are not determined separately by a decay alone.",
+    "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiation Λᵢ "
+    "and concentration rᵢ(0) are not determined separately by a decay alone.",
     "A frame measures the mean over its exposure, and is fitted as such.",
     "Rates and amplitudes are shared by the channels; each channel has one weight. So every state "
     "is taken to have the same colour.",

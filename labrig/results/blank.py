@@ -1,4 +1,4 @@
-"""Result of a blank: light after lamp-off that is not the sample's glow."""
+"""Result of a blank: light after lamp off that is not the sample's glow."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class StrayLight:
     Attributes
     ----------
     start_s, t_s
-        Begins and middles of the exposures in seconds after lamp-off, rising, shape (n,).
+        Begins and middles of the exposures in seconds after lamp off, rising, shape (n,).
     rate, sigma
         Stray light above the constant level and its standard uncertainty in DN/s, shape (n, C).
     constant, constant_sigma
@@ -27,7 +27,7 @@ class StrayLight:
     unclean
         Whether stray light above the constant level is detected, shape (n,).
     first_clean_s
-        Begin of the first frame from which all are clean, in seconds after lamp-off; None if there
+        Begin of the first frame from which all are clean, in seconds after lamp off; None if there
         is none.
     """
 

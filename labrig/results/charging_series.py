@@ -87,7 +87,7 @@ class Charge:
     fresh
         Whether the sample was exchanged for one that has never been exposed to light.
     saturated
-        Whether all states count as fully charged at lamp-off, r = 1, as Nalbach et al. assume after
+        Whether all states count as fully charged at lamp off, r = 1, as Nalbach et al. assume after
         90 minutes.
     """
 

@@ -22,7 +22,7 @@ class NoiseBudget:
     Attributes
     ----------
     t_s
-        Middles of the exposures of the first decay in seconds after lamp-off, rising, shape (n,).
+        Middles of the exposures of the first decay in seconds after lamp off, rising, shape (n,).
     photon, read, uneven
         Photon noise, read noise, and the part that is proportional to the light but uneven over the
         patch, shape (n,). Their sum in quadrature is the series' σ.

@@ -184,7 +184,7 @@ class FilterFrames:
     Attributes
     ----------
     t_s
-        Middles of the exposures in seconds after lamp-off, shape (f,).
+        Middles of the exposures in seconds after lamp off, shape (f,).
     value_dn_per_s
         Signal of every position and channel in DN/s, shape (f, m); NaN where it clips.
     sigma_dn_per_s

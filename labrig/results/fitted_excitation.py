@@ -46,7 +46,7 @@ class ExcitedState:
 
 @dataclass(frozen=True, eq=False)
 class LevelAtOff:
-    """Charge of the N states at a lamp-off, extrapolated back in the dark.
+    """Charge of the N states at a lamp off, extrapolated back in the dark.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class FittedExcitation:
     channel_weights, channel_weights_sigma
         Weights of the channels, 1 of the brightest, shape (C,).
     at_off
-        Charge at lamp-off of every series, at the charge and site of the brightest glow.
+        Charge at lamp off of every series, at the charge and site of the brightest glow.
     chi2, dof
         Sum of squared whitened residuals, and its degrees of freedom.
     covariance

@@ -241,7 +241,7 @@ def _checked(key: str, device: Device, context: ExerciseContext) -> DeviceReport
             report = replace(report, findings=tuple(device.findings()))
         if any(finding.severity == "refuse" for finding in report.findings):
             return replace(
-                report, measured=(Measured("not exercised", "first mend what is refused"),)
+                report, measured=(Measured("not exercised", "correct first what is refused"),)
             )
         if exercise := ROLES[key].exercise:
             outcome = exercise(device, context)

@@ -59,7 +59,10 @@ def test_a_steady_room_is_shown_without_a_warning(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("off", "readings", "told"),
-    [("0 s", 0, "told nothing: check it"), ("1 min", 3, "told nothing after 2026-01-01 00:0")],
+    [
+        ("0 s", 0, "gave no reading: check it"),
+        ("1 min", 3, "gave no reading after 2026-01-01 00:0"),
+    ],
 )
 def test_a_thermometer_that_fails_does_not_end_a_run(
     tmp_path: Path, off: str, readings: int, told: str

@@ -60,7 +60,7 @@ def test_when_a_blank_is_clean_and_what_leaks() -> None:
     leaking = BLANK.model_copy(update={"ambient_dn_per_s": (0.0, 3.0)})
     (said,) = leaking.leaks()
     assert "3 ± 0.1 DN/s in G" in said
-    with pytest.raises(DataError, match="never became clean"):
+    with pytest.raises(DataError, match="never became free"):
         BLANK.model_copy(update={"first_clean_s": None}).is_clean(9.0)
 
 

@@ -18,7 +18,7 @@ from labrig.sim.simulation import LampSettings
 
 FloatArray = NDArray[np.float64]
 
-#: From lamp-off until the door stands still.
+#: From lamp off until the door stands still.
 DOOR_S = 0.6
 RISE_S: FloatArray = np.linspace(0.0, 1.0, 33)
 FADE_S: FloatArray = np.linspace(0.0, 0.5, 33)
@@ -126,7 +126,7 @@ class Bench:
         return total
 
     def level_at_off(self, windows: FloatArray, charge_s: float) -> FloatArray:
-        """(N,) of the first place after one charge, traced back in the dark to lamp-off."""
+        """(N,) of the first place after one charge, traced back in the dark to lamp off."""
         lamp = Lamp.found(self.lamp, on=False).switched(True, 10.0)
         off_s = 10.0 + charge_s
         samples = self._samples(windows[:1])

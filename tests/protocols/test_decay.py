@@ -176,7 +176,7 @@ def test_a_charge_until_the_plateau_ends_when_the_glow_stops_growing(
         float(line.split(",")[0])
         for line in (ended.run_folder / "result" / "series.csv").read_text().splitlines()[1:]
     ]
-    assert min(times_s) == pytest.approx(0.56, abs=0.03), "time counts from the last lamp-off"
+    assert min(times_s) == pytest.approx(0.56, abs=0.03), "time counts from the last lamp off"
 
 
 def test_a_dark_region_takes_the_place_of_dark_frames(

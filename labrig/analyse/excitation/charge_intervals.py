@@ -88,7 +88,7 @@ def charge_frames(
     ------
     DataError
         There are no charges through the filter, or none without it, or no photographs; or the blank
-        never became clean.
+        never became dark.
     """
     units = (_interval(attempt) for attempt in run.completed().values())
     charges = sorted(

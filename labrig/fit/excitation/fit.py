@@ -160,7 +160,7 @@ def _result(
 def _at_off(
     problem: ExcitationProblem, rates: Rates, covariance: FloatArray, order: NDArray[np.intp]
 ) -> tuple[LevelAtOff, ...]:
-    """Return the brightest lamp-off level of every series, σ by linear propagation."""
+    """Return the brightest lamp off level of every series, σ by linear propagation."""
     n, bands = problem.parameters.states, problem.parameters.bands
     levels_at_charge = []
     for charging in problem.illuminated_series(rates):

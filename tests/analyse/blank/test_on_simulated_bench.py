@@ -90,7 +90,7 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "20 s",
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
     decayed = record(tmp_path / "decay", decay)
-    with pytest.raises(DataError, match="never became clean"):
+    with pytest.raises(DataError, match="never became free"):
         decay_analysis.analyse(part_of(decayed, Inputs(blank=blank)))
     # One that is clean from the third frame on: the earlier ones are left out, and it is said.
     third = sorted(frame.t_s for frame in intact_frames(read_run(decayed), Overrides()).decay)[2]
