@@ -110,7 +110,7 @@ class StripPatch:
         return entries.get(self.name)
 
 
-def strip_patches(part: Part) -> list[StripPatch]:
+def strip_regions(part: Part) -> list[StripPatch]:
     """Return the patches of a part's protocol, with the user's regions instead.
 
     Raises

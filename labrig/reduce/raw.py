@@ -36,7 +36,7 @@ _lock = threading.Lock()
 
 
 @contextmanager
-def quiet_stderr() -> Iterator[None]:
+def libraw_stderr() -> Iterator[None]:
     """Drop LibRaw's lines on the process's stderr.
 
     Lines that other threads write meanwhile are passed on at the end.
@@ -378,7 +378,7 @@ def _decode(content: bytes) -> RawFrame:
     import rawpy  # LibRaw takes a tenth of a second to load: only when a RAW file is read
 
     # LibRaw reports damage on the process's stderr besides raising.
-    with quiet_stderr():
+    with libraw_stderr():
         try:
             with rawpy.imread(io.BytesIO(content)) as raw:
                 return _frame(raw, rawpy.RawType.Flat, content, read_exif(content))

@@ -26,7 +26,7 @@ from labrig.region import Region
 from labrig.results import Series, add_flag, is_usable
 
 
-def calibrated(
+def apply_calibration(
     series: Series, camera: CameraModel, region: Region, width: int, height: int
 ) -> Series:
     """Correct the series of a region by the camera's calibration.
@@ -227,13 +227,13 @@ def reduce_patches(
     hot = hot_pixels(list(longest.values())) if longest else None
     dark = {} if background else _patch_darks(darks, patches, hot, longest)
     longest.clear()  # five frames of 42 MB that are not needed any more
-    shots = measure_frames(frames, patches, background, hot, {})
-    _check_settings(shots)
-    series = {name: _patch_series(name, shots, dark) for name in patches}
+    measured = measure_frames(frames, patches, background, hot, {})
+    _check_settings(measured)
+    series = {name: _patch_series(name, measured, dark) for name in patches}
     if camera is None:
         return series
     return {
-        name: calibrated(patch_series, camera, patches[name], *_frame_size(shots[0]))
+        name: apply_calibration(patch_series, camera, patches[name], *_frame_size(measured[0]))
         for name, patch_series in series.items()
     }
 
@@ -255,11 +255,13 @@ def _patch_darks(
 ) -> dict[tuple[str, float], _PatchDark]:
     """Return the dark level by patch and ISO."""
     by_iso: dict[float, list[MeasuredFrame]] = defaultdict(list)
-    for shot in measure_frames(darks, patches, None, hot, read):
-        by_iso[_setting_key(shot.iso)].append(shot)
+    for entry in measure_frames(darks, patches, None, hot, read):
+        by_iso[_setting_key(entry.iso)].append(entry)
     return {
-        (name, iso): _patch_dark([shot.frame.exposure_s for shot in shots], _views(name, shots))
-        for iso, shots in by_iso.items()
+        (name, iso): _patch_dark(
+            [entry.frame.exposure_s for entry in measured], _views(name, measured)
+        )
+        for iso, measured in by_iso.items()
         for name in patches
     }
 
@@ -274,12 +276,12 @@ def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]
 
 
 def _patch_series(
-    name: str, shots: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _PatchDark]
+    name: str, measured: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _PatchDark]
 ) -> Series:
-    exposure_s = np.array([shot.frame.exposure_s for shot in shots])
-    t_s = np.array([shot.frame.t_s for shot in shots])
-    unit = tuple(shot.frame.unit for shot in shots)
-    flags = tuple(_flag(shot, name) for shot in shots)
+    exposure_s = np.array([entry.frame.exposure_s for entry in measured])
+    t_s = np.array([entry.frame.t_s for entry in measured])
+    unit = tuple(entry.frame.unit for entry in measured)
+    flags = tuple(_flag(entry, name) for entry in measured)
     dark_of_unit: dict[str, PatchFrames] = {}
 
     def noise(views: Sequence[RegionMeasurement], light: Floats, sigma: Floats) -> PatchNoise:
@@ -287,29 +289,29 @@ def _patch_series(
         usable = np.array([is_usable(flag) for flag in flags])
         return paired_noise(frames, t_s, unit, usable, dark_of_unit)
 
-    views = _views(name, shots)
+    views = _views(name, measured)
     level, sigma = levels(views)
     dark, dark_sigma = np.zeros_like(level), np.full_like(level, np.nan)
     drift = np.zeros_like(level)
     unexposed = np.zeros_like(level)
-    backgrounds = [shot.background for shot in shots if shot.background is not None]
+    backgrounds = [entry.background for entry in measured if entry.background is not None]
     if backgrounds:
         dark, dark_noise = levels(backgrounds)
         dark_noise = noise(backgrounds, np.zeros_like(dark), dark_noise).sigma
         dark_sigma = np.zeros_like(level)
     elif darks:
-        for row, (shot, view) in enumerate(zip(shots, views, strict=True)):
-            patch_dark = darks.get((name, _setting_key(shot.iso)))
+        for row, (entry, view) in enumerate(zip(measured, views, strict=True)):
+            patch_dark = darks.get((name, _setting_key(entry.iso)))
             if patch_dark is None or patch_dark.kind != view.kind:
                 raise DataError(
-                    f"{shot.frame.path}: expected dark frames at ISO {shot.iso:g} as this frame, "
+                    f"{entry.frame.path}: expected dark frames at ISO {entry.iso:g} as this frame, "
                     "of the same sensor, got none; take some, or name a background region"
                 )
-            dark[row], model_sigma = patch_dark.model.dark_level(shot.frame.exposure_s)
+            dark[row], model_sigma = patch_dark.model.dark_level(entry.frame.exposure_s)
             unexposed[row] = patch_dark.model.base
-            drift[row] = TWO_DEGREES * np.abs(patch_dark.model.current(shot.frame.exposure_s))
+            drift[row] = TWO_DEGREES * np.abs(patch_dark.model.current(entry.frame.exposure_s))
             dark_sigma[row] = np.hypot(model_sigma, drift[row])
-            dark_of_unit[shot.frame.unit] = patch_dark.frames
+            dark_of_unit[entry.frame.unit] = patch_dark.frames
     patch_noise = noise(views, level - (dark if backgrounds else unexposed), sigma)
     sigma = np.hypot(patch_noise.sigma, dark_noise) if backgrounds else patch_noise.sigma
     per_second = exposure_s[:, np.newaxis]
@@ -325,9 +327,9 @@ def _patch_series(
         sigma=sigma,
         dark_sigma=dark_sigma,
         channels=tuple(views[0].measured.channels),
-        iso=np.array([shot.iso for shot in shots], dtype=np.float64),
-        f_number=np.array([shot.f_number for shot in shots], dtype=np.float64),
-        frame=tuple(shot.frame.path.name for shot in shots),
+        iso=np.array([entry.iso for entry in measured], dtype=np.float64),
+        f_number=np.array([entry.f_number for entry in measured], dtype=np.float64),
+        frame=tuple(entry.frame.path.name for entry in measured),
         unit=unit,
         flag=flags,
         region=name,
@@ -353,30 +355,30 @@ def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | N
     return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MAX_COMMON * correlation)
 
 
-def _frame_size(shot: MeasuredFrame) -> tuple[int, int]:
+def _frame_size(entry: MeasuredFrame) -> tuple[int, int]:
     """Return width and height of a frame in pixels."""
-    width, height, _ = next(iter(shot.patches.values())).kind
+    width, height, _ = next(iter(entry.patches.values())).kind
     return width, height
 
 
-def _views(name: str, shots: Sequence[MeasuredFrame]) -> list[RegionMeasurement]:
-    return [shot.patches[name] for shot in shots]
+def _views(name: str, measured: Sequence[MeasuredFrame]) -> list[RegionMeasurement]:
+    return [entry.patches[name] for entry in measured]
 
 
-def _flag(shot: MeasuredFrame, name: str) -> str:
-    views = [shot.patches[name], *([shot.background] if shot.background else [])]
+def _flag(entry: MeasuredFrame, name: str) -> str:
+    views = [entry.patches[name], *([entry.background] if entry.background else [])]
     clipped = any(view.measured.clipped for view in views)
-    return add_flag(shot.frame.flag, "clipped") if clipped else shot.frame.flag
+    return add_flag(entry.frame.flag, "clipped") if clipped else entry.frame.flag
 
 
-def _check_settings(shots: Sequence[MeasuredFrame]) -> None:
+def _check_settings(measured: Sequence[MeasuredFrame]) -> None:
     """Refuse frames of several gains or apertures in one unit: their DN/s are not comparable."""
-    for unit in {shot.frame.unit for shot in shots}:
+    for unit in {entry.frame.unit for entry in measured}:
         for setting, values in (
-            ("ISO", {_setting_key(shot.iso) for shot in shots if shot.frame.unit == unit}),
+            ("ISO", {_setting_key(entry.iso) for entry in measured if entry.frame.unit == unit}),
             (
                 "f-number",
-                {_setting_key(shot.f_number) for shot in shots if shot.frame.unit == unit},
+                {_setting_key(entry.f_number) for entry in measured if entry.frame.unit == unit},
             ),
         ):
             if len(values) > 1:

@@ -9,7 +9,7 @@ import usb.core
 import usb.util
 
 from labrig.setup.host import Host, Port
-from labrig.setup.port_users import holders, unreachable
+from labrig.setup.port_users import port_users, unreachable
 
 NO_LIBUSB = (
     "libusb is not installed, so USB cameras cannot be seen: install libusb-1.0 (Linux: "
@@ -193,7 +193,7 @@ def _camera(device: Any, host: Host, drivers: Collection[str], has_twin: bool) -
     address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
     obstacle = unreachable(device, host.platform)
     hints = [obstacle] if obstacle else []
-    hints += [f"may be held by {holder}" for holder in holders(device, host)]
+    hints += [f"may be held by {holder}" for holder in port_users(device, host)]
     serial = None if obstacle else _text(device, device.iSerialNumber)
     if has_twin and serial:
         address += f"/{serial}"

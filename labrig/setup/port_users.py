@@ -34,7 +34,7 @@ _REMEDIES = {
 _ZADIG = "give this camera the WinUSB driver with Zadig (https://zadig.akeo.ie)"
 
 
-def holders(device: Any, host: Host) -> list[str]:
+def port_users(device: Any, host: Host) -> list[str]:
     """Return the programs that may hold a `usb.core.Device`, each with a remedy."""
     return [
         f"{process.name} (process {process.pid}): {remedy}"

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from labrig.errors import FrameError, UsageError
 from labrig.reduce import RawFrame, read_raw
-from labrig.reduce.raw import quiet_stderr
+from labrig.reduce.raw import libraw_stderr
 
 WriteDng = Callable[..., bytes]
 MOSAIC = np.random.default_rng(1).integers(0, 65536, (40, 60)).astype(np.uint16)
@@ -136,7 +136,7 @@ def _read_or_refused(content: bytes) -> None:
 
 
 def test_only_libraw_is_kept_quiet(capfd: pytest.CaptureFixture[str]) -> None:
-    with quiet_stderr():
+    with libraw_stderr():
         os.write(2, b"unknown file: Unexpected end of file\nlamp off\nCorrupt JPEG data: x\n")
     os.write(2, b"door closed\n")
     assert capfd.readouterr().err == "lamp off\ndoor closed\n"

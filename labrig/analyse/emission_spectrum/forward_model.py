@@ -12,7 +12,7 @@ import numpy as np
 
 from labrig.analyse.emission_spectrum.comparison import combined
 from labrig.analyse.inputs import Part
-from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_patches, tilt_offset
+from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
@@ -108,7 +108,7 @@ def forward_models(
         )
     raw, strip, lvf = read_raw(frame.path), calibration.before_camera, calibration.lvf
     camera, holder = _camera_curves(part, raw.channels), _holder_regions(strip)
-    patches, refused = slice_strip(strip_patches(part), strip, raw)
+    patches, refused = slice_strip(strip_regions(part), strip, raw)
     models = {}
     for patch, slices in patches.items():
         # At either end pixels reach a little beyond the places that were calibrated.

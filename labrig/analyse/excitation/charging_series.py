@@ -8,7 +8,7 @@ from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInter
 from labrig.analyse.excitation.lamp_light import across_sites, lamp_transients, site_modes
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
-from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_patches, tilt_offset
+from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
 from labrig.optics import Strip
@@ -48,7 +48,7 @@ def patch_chargings(
     require_calibrated_camera(inputs.camera, part.run, list(frames.charge_of))
     raw = read_raw(next(iter(frames.charge_of)).path)
     sites, reasons = slice_strip(
-        strip_patches(part), irradiance.strip, raw, len(irradiance.position)
+        strip_regions(part), irradiance.strip, raw, len(irradiance.position)
     )
     series = reduce_patches(
         [

@@ -10,7 +10,7 @@ from labrig.analyse.lvf_calibration.filters import (
     NO_FILTER,
     Bench,
     FilterScenes,
-    calibrated,
+    fit_bands,
     left_out_text,
     misfits,
     residuals,
@@ -74,7 +74,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
     all_scenes = _scenes(part, frames, before_camera.strip)
     filter_misfits = tuple(misfits(all_scenes, bench, fit.map))
     scenes = all_scenes.without({misfit.name for misfit in filter_misfits if misfit.left_out})
-    lvf_fit = calibrated(scenes, bench, fit.map)
+    lvf_fit = fit_bands(scenes, bench, fit.map)
     stripes, no_stripes_reason = _stripes(part, frames, placed.strip, lvf_fit, fit.map)
     filters = tuple(transmittance.name for transmittance in scenes.filters[1:])
     assert lvf_fit.lvf.sigma is not None, "a calibration tells its σ"

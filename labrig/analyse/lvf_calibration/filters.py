@@ -165,7 +165,7 @@ def left_out_text(misfit: FilterMisfit) -> str:
     )
 
 
-def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> LvfCalibration:
+def fit_bands(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> LvfCalibration:
     """Fit T_p(λ) at every position, in units of the card seen without the strip.
 
     The effect of lens, lamp and card on a place is divided out by the frame of the card itself, and

@@ -9,7 +9,7 @@ from labrig.analyse.lvf_calibration.filters import (
     NO_FILTER,
     Bench,
     FilterScenes,
-    calibrated,
+    fit_bands,
     left_out_text,
     misfits,
     residuals,
@@ -65,7 +65,7 @@ def scenes(**in_their_place: Transmittance) -> FilterScenes:
 def test_filters_in_their_place_calibrate_the_strip() -> None:
     all_of_them = scenes()
     assert not [one for one in misfits(all_of_them, BENCH, TRUE_MAP) if one.left_out]
-    found = calibrated(all_of_them, BENCH, TRUE_MAP)
+    found = fit_bands(all_of_them, BENCH, TRUE_MAP)
     truth = strip().bands
     np.testing.assert_allclose(found.lvf.bands.centre_nm, truth.centre_nm, atol=1.0)
     np.testing.assert_allclose(found.lvf.bands.fwhm_nm, truth.fwhm_nm, rtol=0.1)
@@ -100,5 +100,5 @@ def test_what_clips_everywhere_is_left_out() -> None:
     holes = replace(dark, value=np.where(dark.value > np.median(dark.value), np.nan, dark.value))
     with_holes = replace(one, values=[*one.values[:3], holes, *one.values[4:]])
     assert not [m for m in misfits(with_holes, BENCH, TRUE_MAP) if m.left_out]
-    bands = calibrated(with_holes, BENCH, TRUE_MAP).lvf.bands
+    bands = fit_bands(with_holes, BENCH, TRUE_MAP).lvf.bands
     np.testing.assert_allclose(bands.centre_nm, strip().bands.centre_nm, atol=1.0)
