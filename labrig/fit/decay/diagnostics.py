@@ -159,7 +159,7 @@ def state_warnings(
         if state.k_r_per_s < 1.001 * slowest:
             warnings.append(
                 f"{rate} is the slowest rate {span_s:.4g} s can tell from a constant: subtract the "
-                "dark level, fit an offset (offset_sigma) or record longer"
+                "dark level, fit an offset (labrig fit decay --offset) or record longer"
             )
         elif state.k_r_per_s > 0.999 * fastest:
             warnings.append(
@@ -193,7 +193,7 @@ def offset_warnings(
     """Return warnings about fitted offsets (C,) far from their priors, both in the same unit."""
     return [
         f"the offset of {name} is {abs(offset) / sigma:.0f} times its prior σ from zero: "
-        "a light may have come on, or the dark level is wrong; else widen offset_sigma"
+        "a light may have come on, or the dark level is wrong; else its σ is too small"
         for name, offset, sigma in zip(channels, offsets, prior_sigma, strict=True)
         if 0 < sigma < np.inf and abs(offset) >= OFFSET_SIGMAS * sigma
     ]
@@ -224,7 +224,7 @@ def below_zero_warnings(signal: FloatArray, information: FloatArray) -> list[str
         return []
     return [
         f"the signal falls below zero, by {-last / np.sqrt(variance):.0f} σ in the last quarter of "
-        "the frames: too much was subtracted, check the dark level or fit an offset (offset_sigma)"
+        "the frames: too much was subtracted, check the dark level or fit an offset (--offset)"
     ]
 
 

@@ -167,7 +167,7 @@ def _numbers_of_states(
     most = max(max_states, fewest) if n_states is None else n_states
     if fewest < max(1, n_fixed):
         raise FitError(
-            f"expected n_states ≥ {max(1, n_fixed)}, got {fewest}; fixed rates count as states"
+            f"expected {max(1, n_fixed)} states or more, got {fewest}; fixed rates count as states"
         )
     if most > MAX_STATES:
         raise FitError(

@@ -267,10 +267,10 @@ def _prior_sigma(offset_sigma: ArrayLike, n_channels: int) -> FloatArray:
     s = np.asarray(offset_sigma, dtype=np.float64)
     if s.shape not in {(), (n_channels,)}:
         raise FitError(
-            f"expected one offset_sigma or {n_channels}, got shape {s.shape}; give one per channel"
+            f"expected 1 or {n_channels} σ of the offset, got shape {s.shape}; give one per channel"
         )
     if not np.all(s >= 0):
-        raise FitError(f"expected offset_sigma ≥ 0, got {s.min():g}; 0 holds the offset at 0")
+        raise FitError(f"expected σ of the offset ≥ 0, got {s.min():g}; 0 holds the offset at 0")
     return np.broadcast_to(s, n_channels)
 
 
