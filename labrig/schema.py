@@ -35,7 +35,18 @@ def schema(kind: str) -> dict[str, Any]:
     makers: dict[str, Callable[[], Any]] = {"protocol": _protocol, "rig": _rig}
     model = makers[kind]() if kind in makers else Material
     json_schema = TypeAdapter(model).json_schema(by_alias=True, schema_generator=_Described)
+    _describe_in_markdown(json_schema)
     return {"$schema": _Described.schema_dialect, **json_schema, "title": f"labrig {kind}"}
+
+
+def _describe_in_markdown(node: Any) -> None:
+    """Repeat descriptions under the key by which editors show Markdown, such as `code`."""
+    children = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
+    for child in list(children):
+        _describe_in_markdown(child)
+    text = node.get("description") if isinstance(node, dict) else None
+    if isinstance(text, str) and "`" in text:
+        node["markdownDescription"] = text
 
 
 def _protocol() -> Any:

@@ -113,6 +113,7 @@ def test_keys_are_described_by_the_models_and_their_base_classes(
         "Time between the begins of two photographs, for example `5 s`."
     )
     assert every["default"] == "5 s"
+    assert every["markdownDescription"] == every["description"]
     assert "saturated" in protocols["Isotropy"]["properties"]["charge"]["description"]
     rig = validators["rig"].schema["$defs"]
     assert "rig check" in rig["ptp_camera"]["properties"]["shutter_lag"]["description"]
