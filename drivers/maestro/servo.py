@@ -208,7 +208,7 @@ class Servo:
     def _refused(self, pulse_s: float) -> UnclearAnswerError:
         channel, sent_s = self._settings.channel, self.pulse_s
         return UnclearAnswerError(
-            f"channel {channel} of {self.name} was told to send {pulse_s * 1e6:.2f} µs and sends "
+            f"channel {channel} of {self.name} was set to send {pulse_s * 1e6:.2f} µs and sends "
             f"{sent_s * 1e6:.2f} µs; in the Maestro Control Center look whether it is a servo "
             "channel and its range (Min, Max) wide enough"
         )

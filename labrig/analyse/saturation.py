@@ -33,7 +33,7 @@ from labrig.protocols.saturation import Light, WeakerLight
 from labrig.record import FrameRole, RunRecord, charge_durations_s
 from labrig.reduce import reduce_patches
 from labrig.results import (
-    ChargeLevel,
+    Concentration,
     Curve,
     FittedDecay,
     FloatArray,
@@ -63,7 +63,7 @@ def charge_level(
     fraction_sigma: float,
     k_per_s: float,
     charge_durations_s: tuple[float, float],
-) -> ChargeLevel:
+) -> Concentration:
     """Return the level of a state under the full light.
 
     Parameters
@@ -83,7 +83,7 @@ def charge_level(
     sigma = np.hypot(by_ratio * ratio_sigma / ratio, by_fraction * fraction_sigma)
     # At an end of the range, where nothing changes any more, the σ is that just inside.
     least = ratio_sigma / ratio * fraction / (1 - fraction)
-    return ChargeLevel(r, float(max(sigma, least)))
+    return Concentration(r, float(max(sigma, least)))
 
 
 def _level(
@@ -290,7 +290,7 @@ def _patch_saturation(
     start_per_s = [state.k_r_per_s for state in fit.states]
     rates = compare_rates(list(curves.values()), start_per_s, flicker_dof(fit))
     charge_s = np.array([unit_charge_s[unit] for unit in units])
-    levels: Iterable[ChargeLevel] = ()
+    levels: Iterable[Concentration] = ()
     if part.protocol.weaker is not None and weaker:
         levels = _levels(rates, charge_s, weaker[-1], full[-1], part.protocol.weaker)
     begin, end = _growths(*(curves[units[row]] for row in full[-2:]))
@@ -299,13 +299,13 @@ def _patch_saturation(
 
 def _levels(
     rates: RatesTest, charge_s: FloatArray, dim: int, bright: int, weaker: WeakerLight
-) -> Iterator[ChargeLevel]:
+) -> Iterator[Concentration]:
     """Iterate over the level of every state, after the longest charges under both lights."""
     for state, k_per_s in enumerate(rates.shared_per_s):
         a, b = rates.amplitude[[dim, bright], state]
         a_sigma, b_sigma = rates.amplitude_sigma[[dim, bright], state]
         if b <= 0:
-            yield ChargeLevel(0.0, 1.0)
+            yield Concentration(0.0, 1.0)
             continue
         ratio = max(a / b, 1e-6)
         sigma = float(np.hypot(a_sigma / b, a / b * b_sigma / b))

@@ -51,9 +51,9 @@ from .fitted_decay import (
     write_fitted_decay as write_fitted_decay,
 )
 from .fitted_excitation import (
+    ConcentrationAtOff as ConcentrationAtOff,
     ExcitedState as ExcitedState,
     FittedExcitation as FittedExcitation,
-    LevelAtOff as LevelAtOff,
 )
 from .irradiance import (
     CardRatio as CardRatio,
@@ -98,7 +98,7 @@ from .run_result import (
 from .saturation import (
     FULL_LIGHT as FULL_LIGHT,
     LIGHTS as LIGHTS,
-    ChargeLevel as ChargeLevel,
+    Concentration as Concentration,
     Curve as Curve,
     PatchSaturation as PatchSaturation,
     RatesTest as RatesTest,

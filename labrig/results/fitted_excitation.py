@@ -45,7 +45,7 @@ class ExcitedState:
 
 
 @dataclass(frozen=True, eq=False)
-class LevelAtOff:
+class ConcentrationAtOff:
     """Charge of the N states at a lamp off, extrapolated back in the dark.
 
     Attributes
@@ -93,7 +93,7 @@ class FittedExcitation:
     states: tuple[ExcitedState, ...]
     channel_weights: FloatArray
     channel_weights_sigma: FloatArray
-    at_off: tuple[LevelAtOff, ...]
+    at_off: tuple[ConcentrationAtOff, ...]
     chi2: float
     dof: int
     covariance: FloatArray

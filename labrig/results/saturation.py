@@ -27,7 +27,7 @@ MISFIT_LEVEL = 5e-4
 
 
 @dataclass(frozen=True)
-class ChargeLevel:
+class Concentration:
     """Level of a state at lamp off after the longest charge under the full light.
 
     Attributes
@@ -151,7 +151,7 @@ class PatchSaturation:
     rates: RatesTest
     growth_at_begin: Measured
     growth_at_end: Measured
-    levels: tuple[ChargeLevel, ...]
+    levels: tuple[Concentration, ...]
 
     @property
     def time_saturation(self) -> Literal["saturated in time", "not saturated", "not decided"]:

@@ -121,7 +121,7 @@ def test_the_watchdog_is_called_so() -> None:
         (
             [(GO_OPEN, b""), FINE, *[(WHERE, CLOSED)] * 30],
             DeviceError,
-            "told to send 1500.00 µs and sends 1000.00 µs; in the Maestro Control Center",
+            "set to send 1500.00 µs and sends 1000.00 µs; in the Maestro Control Center",
         ),
         ([(GO_OPEN, b""), FINE, *[(WHERE, b"\0\0")] * 30], DeviceError, "sends 0.00 µs"),
     ],
@@ -216,7 +216,7 @@ def test_the_time_out_closes_the_door_and_is_reported() -> None:
 
 def test_a_pulse_outside_the_channels_range_is_reported() -> None:
     bench = Bench(VirtualClock(), open="2600 us")
-    with pytest.raises(DeviceError, match=r"told to send 2600\.00 µs and sends 2500\.00 µs"):
+    with pytest.raises(DeviceError, match=r"set to send 2600\.00 µs and sends 2500\.00 µs"):
         bench.door.open()
 
 

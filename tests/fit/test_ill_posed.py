@@ -62,7 +62,7 @@ WARNED = [
         "two rates as good as one",
         100 * np.exp(-0.022 * T) + 100 * np.exp(-0.018 * T) + 0.3 * NOISE,
         0.3,
-        "k1 and k2 cannot be told apart: ask for one state fewer",
+        "k1 and k2 cannot be distinguished: ask for one state fewer",
         ("--states", "2"),
     ),
     Case(
@@ -89,7 +89,7 @@ WARNED = [
         "three states of one",
         DECAY + 0.3 * NOISE,
         0.3,
-        "k1 and k2 cannot be told apart: ask for one state fewer",
+        "k1 and k2 cannot be distinguished: ask for one state fewer",
         ("--states", "3"),
     ),
     Case(

@@ -89,7 +89,7 @@ class EosShutter:
         """
         if self._bulb is None:
             raise DeviceError(
-                "expected a camera that can be told to end an exposure, this one has neither "
+                "expected a camera with a command to end an exposure, this one has neither "
                 "BulbEnd 0x9126 nor RemoteReleaseOff 0x9129: set longest_exposure to 32 s"
             )
         self._frames.expect(self._clock.now() + LATE_PRESS_S + exposure_s)

@@ -176,7 +176,7 @@ def state_warnings(
     for number, apart in enumerate(sigmas_apart(log_rates, log_rate_covariance), start=1):
         if apart < APART_SIGMAS:
             warnings.append(
-                f"k{number} and k{number + 1} cannot be told apart: ask for one state fewer"
+                f"k{number} and k{number + 1} cannot be distinguished: ask for one state fewer"
             )
     is_fixed = states[-1].k_r_sigma_per_s == 0
     if lifetime_s > span_s and not is_fixed and sigma[-1] <= ILL_DETERMINED:

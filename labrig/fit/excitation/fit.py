@@ -16,7 +16,7 @@ from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.start import starts
 from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
-from labrig.results import ChargingSeries, ExcitedState, FittedExcitation, LevelAtOff
+from labrig.results import ChargingSeries, ConcentrationAtOff, ExcitedState, FittedExcitation
 
 #: Number of updates of the flicker's covariance; the second one has hardly any effect.
 WHITENINGS = 2
@@ -159,7 +159,7 @@ def _result(
 
 def _at_off(
     problem: ExcitationProblem, rates: Rates, covariance: FloatArray, order: NDArray[np.intp]
-) -> tuple[LevelAtOff, ...]:
+) -> tuple[ConcentrationAtOff, ...]:
     """Return the brightest lamp off level of every series, σ by linear propagation."""
     n, bands = problem.parameters.states, problem.parameters.bands
     levels_at_charge = []
@@ -179,7 +179,7 @@ def _at_off(
             for jacobian in (gradient, amplitude_gradient)
         ]
         levels_at_charge.append(
-            LevelAtOff(
+            ConcentrationAtOff(
                 charging.name,
                 int(charge),
                 int(site),
