@@ -208,7 +208,7 @@ def _shutter(described: PropertyDescription | None) -> Iterator[Finding]:
         )
     yield Finding(
         "fine",
-        f"shutter times below {FEWEST_UNITS / UNITS_PER_S * 1e3:g} ms stay unused (steps of 0.1 ms)",
+        f"shutter times below {FEWEST_UNITS / UNITS_PER_S * 1e3:g} ms stay unused (0.1 ms steps)",
     )
 
 
