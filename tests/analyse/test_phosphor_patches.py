@@ -14,7 +14,7 @@ from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.strip import StripPatch, for_each_patch, slice_strip, tilt_offset
-from labrig.calibration import write_irradiance_file, write_lvf_file
+from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.compare.run import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
@@ -60,8 +60,8 @@ def chain(**keys: Any) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("phosphor")
-    write_irradiance_file(folder / "irradiance.yaml", true_irradiance(WIDTH, HEIGHT))
-    write_lvf_file(folder / "lvf.yaml", true_lvf_file(WIDTH, HEIGHT))
+    IRRADIANCE_KIND.write(folder, true_irradiance(WIDTH, HEIGHT))
+    LVF_KIND.write(folder, true_lvf_file(WIDTH, HEIGHT))
 
     def change(rig: dict[str, dict[str, Any]]) -> None:
         rig["optics"] |= {name: str(folder / f"{name}.yaml") for name in ("irradiance", "lvf")}
