@@ -126,7 +126,10 @@ def record_phosphor(labrig: Labrig) -> None:
 
 def record_many_patches(labrig: Labrig) -> None:
     """Record a decay of 50 patches."""
-    patches = {f"patch {n}": [0.05 + 0.09 * (n % 10), 0.1 + 0.15 * (n // 10), 0.06, 0.1] for n in range(PATCHES)}
+    patches = {
+        f"patch {n}": [0.05 + 0.09 * (n % 10), 0.1 + 0.15 * (n // 10), 0.06, 0.1]
+        for n in range(PATCHES)
+    }
     record(labrig, "decay", "sim", {"patches": patches}, {})
 
 
@@ -138,7 +141,13 @@ def record_large_frames(labrig: Labrig) -> None:
 
 def make_many_runs(labrig: Labrig) -> None:
     """Make 5000 processed runs, without frames and pages, of one."""
-    record(labrig, "decay", "sim", {"charge": "5 min", "for": "30 s"}, {"sensor": {"width": 96, "height": 64}})
+    record(
+        labrig,
+        "decay",
+        "sim",
+        {"charge": "5 min", "for": "30 s"},
+        {"sensor": {"width": 96, "height": 64}},
+    )
     labrig.timed("process", "last")
     (made,) = (labrig.folder / "runs").iterdir()
     left_out = shutil.ignore_patterns("frames", "figures", "*.html", "*.nxs", "*.pdf")
@@ -149,6 +158,16 @@ def make_many_runs(labrig: Labrig) -> None:
 def process_last(labrig: Labrig) -> Times:
     """Process the run."""
     return labrig.timed("process", "last")
+
+
+def processed(record_run: Callable[[Labrig], None]) -> Callable[[Labrig], None]:
+    """Return a function that records a run and processes it."""
+
+    def prepare(labrig: Labrig) -> None:
+        record_run(labrig)
+        process_last(labrig)
+
+    return prepare
 
 
 def make_series(labrig: Labrig) -> None:
@@ -173,13 +192,12 @@ ROWS = (
     Row(f"process a decay of {PATCHES} patches", process_last, record_many_patches, rounds=1),
     Row(f"process again a decay of {PATCHES} patches",
         lambda labrig: labrig.timed("process", "last", "--states", 2),
-        lambda labrig: (record_many_patches(labrig), process_last(labrig)), rounds=3),
+        processed(record_many_patches)),
     Row("process 21 megapixels, each of 40 frames", process_last, record_large_frames,
         one_core=False, rounds=1),
     Row("process again 21 megapixels, each of 40 frames",
         lambda labrig: labrig.timed("process", "last", "--states", 1),
-        lambda labrig: (record_large_frames(labrig), process_last(labrig)),
-        one_core=False, rounds=1),
+        processed(record_large_frames), one_core=False),
     Row("process a phosphor", process_last, record_phosphor, rounds=1),
 )  # fmt: skip
 
