@@ -5,6 +5,7 @@ from typer.core import TyperGroup
 
 from labrig.cli import (
     compare,
+    driver,
     fit,
     frame,
     optics,
@@ -34,6 +35,7 @@ app.command("compare")(compare.compare)
 app.command("note")(runs.note)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)
+app.add_typer(driver.app, name="driver")
 app.add_typer(fit.app, name="fit")
 app.add_typer(optics.app, name="optics")
 app.add_typer(protocol.app, name="protocol")

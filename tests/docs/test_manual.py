@@ -3,6 +3,7 @@
 import os
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,16 @@ def test_the_worked_example_is_the_package_that_ci_runs() -> None:
     assert len(blocks) > 8
     for block in blocks:
         assert any(block in text for text in texts), block
+
+
+def test_extras_that_the_manual_names_are_declared() -> None:
+    root = DOCS.parent
+    pages = [*DOCS.rglob("*.md"), root / "README.md", root / "CONTRIBUTING.md"]
+    named = {
+        extra for page in pages for extra in re.findall(r"labrig\[(\w+)\]", page.read_text("utf-8"))
+    }
+    project = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
+    assert named == set(project["optional-dependencies"])
 
 
 def test_files_that_the_manual_names_are_there() -> None:
