@@ -5,6 +5,7 @@ from typer.core import TyperGroup
 
 from labrig.cli import (
     compare,
+    figures,
     fit,
     frame,
     optics,
@@ -29,6 +30,7 @@ app.command("run")(run.run)
 app.command("plan")(run.plan)
 app.command("resume")(run.resume)
 app.command("process")(process.process)
+app.command("figures")(figures.figures)
 app.command("frame")(frame.frame)
 app.command("compare")(compare.compare)
 app.command("note")(runs.note)
