@@ -6,6 +6,7 @@ from typer.core import TyperGroup
 from labrig.cli import (
     compare,
     driver,
+    figures,
     fit,
     frame,
     optics,
@@ -30,6 +31,7 @@ app.command("run")(run.run)
 app.command("plan")(run.plan)
 app.command("resume")(run.resume)
 app.command("process")(process.process)
+app.command("figures")(figures.figures)
 app.command("frame")(frame.frame)
 app.command("compare")(compare.compare)
 app.command("note")(runs.note)
