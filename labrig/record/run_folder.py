@@ -13,9 +13,11 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
+from labrig.clock import SystemClock
 from labrig.errors import DiskError, UsageError
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, REAL_DISK, Disk, Journal, sync_folder, write_durably
+from labrig.record.made import MADE, made_text
 from labrig.record.run_record import RunRecord, run_record
 
 #: File by which a run folder is recognised.
@@ -101,6 +103,8 @@ class RunFolder:
             ) from None
         try:
             (path / "frames").mkdir()
+            # By the PC's clock, since the time of a simulated room is the same in every run.
+            texts = {MADE: made_text(SystemClock().wall()), **texts}
             for file_name in sorted(texts, key=lambda name: name == PROTOCOL):
                 write_durably(path / file_name, texts[file_name].encode(), disk)
             sync_folder(runs)
