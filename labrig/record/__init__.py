@@ -36,6 +36,7 @@ from labrig.record.journal import (
 )
 from labrig.record.run_folder import RunFolder
 from labrig.record.run_record import Attempt, RunRecord, read_run
+from labrig.record.run_size import RunSize, size_text
 
 __all__ = [
     "KNOWN_FOR_S",
@@ -54,6 +55,7 @@ __all__ = [
     "RunDescription",
     "RunFolder",
     "RunRecord",
+    "RunSize",
     "TemperatureHistory",
     "TemperatureRecord",
     "add_note",
@@ -66,6 +68,7 @@ __all__ = [
     "read_notes",
     "read_run",
     "relative_rate_change",
+    "size_text",
     "time_text",
     "unit_in",
     "unit_within",
