@@ -11,7 +11,16 @@ from urllib.parse import urlsplit
 import serial
 import usb.core
 
-from labrig.acquire import Device, DeviceEntry, Rig, RigFile, SerialPort, in_safe_order, load_driver
+from labrig.acquire import (
+    CAMERA,
+    Device,
+    DeviceEntry,
+    Rig,
+    RigFile,
+    SerialPort,
+    in_safe_order,
+    load_driver,
+)
 from labrig.awake import kept_awake
 from labrig.clock import Clock, SystemClock
 from labrig.device_lock import held, network_devices, serial_devices, usb_device
@@ -51,6 +60,11 @@ class Bench:
     def seed(self) -> int | None:
         """Seed of everything random in a simulated rig; `None` on a real bench."""
         return None if self.room is None else self.room.seed
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the devices are in a simulated room, which the rig file describes completely."""
+        return self.room is not None
 
     @property
     def disk(self) -> Disk:
@@ -142,6 +156,58 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
 
     with sim.open_room(file.simulation, source, not_before_s) as room:
         yield Bench(file, source, room.clock, room)
+
+
+def with_frame_size(file: RigFile, source: str) -> RigFile:
+    """Return a rig file that says how large its camera's frames are, if they are simulated.
+
+    A real camera's are said by the keys `frame_pixels` and `frame_size`, or seen in its first
+    frame. The description of the simulated room is checked.
+
+    Parameters
+    ----------
+    file
+        The validated rig file.
+    source
+        Path of the rig file, for messages.
+
+    Returns
+    -------
+    RigFile
+        The file, with these keys of a simulated camera filled in.
+
+    Raises
+    ------
+    UsageError
+        The description of the room is malformed, names an unknown material, or contradicts the
+        keys of the camera.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.bench import with_frame_size
+    >>> rig = labrig.read_rig_file("runs/decay/rig.yaml")
+    >>> with_frame_size(rig, "rig.yaml").devices["camera"].settings()["frame_pixels"]
+    [384, 64]
+    """
+    if file.simulation is None:
+        return file
+    from labrig import sim
+
+    room = sim.describe_room(file.simulation, source)
+    entry = file.devices.get(CAMERA.key)
+    if entry is None:
+        return file
+    given, driver = entry.settings(), load_driver(CAMERA.key, entry.driver, source)
+    sizes = {"frame_pixels": list(room.frame_pixels), "frame_size": f"{room.frame_bytes} B"}
+    if given.get("frame_pixels", sizes["frame_pixels"]) != sizes["frame_pixels"]:
+        raise UsageError(
+            f"{source}, devices.camera: expected frame_pixels {sizes['frame_pixels']}, as "
+            f"'simulation.sensor' says, got {given['frame_pixels']}; leave it out"
+        )
+    known = {key: size for key, size in sizes.items() if key in driver.Settings.model_fields}
+    completed = DeviceEntry.model_validate(entry.model_dump() | known | given)
+    return file.model_copy(update={"devices": {**file.devices, CAMERA.key: completed}})
 
 
 def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], None]) -> None:

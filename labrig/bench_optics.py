@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from labrig import resources
 from labrig.acquire import RigFile
-from labrig.calibration import CalibrationKind, LvfFile
+from labrig.calibration import CalibrationKind, LvfFile, kinds
 from labrig.errors import UsageError
 from labrig.optics import (
     CameraResponse,
@@ -85,6 +85,26 @@ def filter_transmittances(rig: RigFile, names: Sequence[str]) -> list[Transmitta
             f"{did_you_mean(unknown[0], list(files))}"
         )
     return [read_transmittance(files[name]) for name in names]
+
+
+def require_optics(rig: RigFile) -> None:
+    """Read all that a rig file names under `optics:`, since a run needs it hours later only.
+
+    Raises
+    ------
+    UsageError
+        A file is missing or malformed, or there is none of that name.
+    """
+    if rig.optics.camera is not None:
+        read_camera(rig.optics.camera)
+    if rig.optics.lamp is not None:
+        lamp_spectrum(rig)
+    if rig.optics.grey_card is not None:
+        card_reflectance(rig)
+    if rig.optics.filters is not None:
+        rig.optics.filter_files()
+    for kind in kinds():
+        calibration(rig, kind)
 
 
 def _named(value: str | None, key: str) -> str:

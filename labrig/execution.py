@@ -32,6 +32,7 @@ from labrig.errors import (
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder, RunRecord
 from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
+from labrig.trial_frame import check_regions
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 
@@ -97,6 +98,7 @@ def execute(
 
         def use(rig: Rig) -> None:
             _refuse_what_spoils(rig)
+            _refuse_regions_outside(rig, protocol, folder, bench)
             devices = rig.identities()
             _arrange_again(manual_actions, rig, observer)
             _report_exchanged_camera(folder, devices, observer)
@@ -224,6 +226,19 @@ def _refuse_what_spoils(rig: Rig) -> None:
     ]
     if spoilers:
         raise ProtocolError("this would spoil the measurement: " + "; ".join(spoilers))
+
+
+def _refuse_regions_outside(
+    rig: Rig, protocol: ProtocolModel, folder: RunFolder, bench: Bench
+) -> None:
+    """Raise `ProtocolError` if a region is outside the frame; a resumed run has its own file."""
+    try:
+        check_regions(protocol, rig, trust_offers=bench.is_simulated)
+    except ProtocolError as error:
+        if folder.read().attempts:
+            files = " and ".join(str(folder.path / name) for name in ("protocol.yaml", "rig.yaml"))
+            error.args = (f"{error} (this run's own files are {files})",)
+        raise
 
 
 def _arrange_again(manual_actions: Sequence[ActionRecord], rig: Rig, observer: RunObserver) -> None:

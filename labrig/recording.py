@@ -5,17 +5,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from labrig.acquire import Plan, ProtocolModel, RigFile, plan, read_protocol, read_rig_file
-from labrig.bench import open_bench
+from labrig.acquire import (
+    Plan,
+    ProtocolModel,
+    RigFile,
+    plan,
+    planned_rig,
+    read_protocol,
+    read_rig_file,
+)
+from labrig.bench import open_bench, with_frame_size
+from labrig.bench_optics import require_optics
 from labrig.errors import DiskError, UsageError
 from labrig.execution import Watch, execute
-from labrig.optics import read_camera
-from labrig.quantity import duration_text
-from labrig.record import RunFolder, read_run
+from labrig.record import RunFolder, RunSize, read_run, size_text
 from labrig.yaml_file import yaml_text
-
-#: Free disk space required besides the frames: journal, results, report.
-SPARE_BYTES = 200e6
 
 
 @dataclass(frozen=True)
@@ -37,28 +41,16 @@ class Recording:
         UsageError
             A file is malformed, or the plan cannot work on this rig.
         DiskError
-            The disk has no room for the frames.
+            The disk has no room for frames and results.
         """
         requested = read_protocol(protocol_path)
-        rig = read_rig_file(rig_path)
+        rig = with_frame_size(read_rig_file(rig_path), str(rig_path))
+        planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
         protocol = requested.suited_to(rig)
-        if rig.optics.camera is not None:
-            read_camera(rig.optics.camera)  # a misspelt name is found now, not after the run
+        require_optics(rig)
         run_plan = plan(protocol, rig, str(rig_path))
-        free_bytes = shutil.disk_usage(_existing_parent(runs)).free
-        if run_plan.size_bytes + SPARE_BYTES > free_bytes:
-            raise DiskError(
-                f"{runs}: {run_plan.frames} frames need {run_plan.size_bytes / 1e9:.2f} GB, "
-                f"{free_bytes / 1e9:.2f} GB are free; free some space or give another --runs"
-            )
+        _require_free_disk(runs, run_plan.size())
         return cls(protocol, rig, rig_path, runs, run_plan)
-
-    def summary(self) -> str:
-        """Return the number of units, the duration, the frames and the bytes in one line."""
-        return (
-            f"{len(self.plan.units)} units, at most {duration_text(self.plan.duration_s)} of lab "
-            f"time, {self.plan.frames} frames, {self.plan.size_bytes / 1e6:.0f} MB"
-        )
 
     def notes(self) -> tuple[str, ...]:
         """Return notes for the user before the run, one line each."""
@@ -113,14 +105,40 @@ def resume_run(path: Path, watch: Watch) -> Path:
         raise UsageError(f"{path}: expected a run folder with protocol.yaml in it; see --runs")
     protocol = read_protocol(path / "protocol.yaml")
     rig = read_rig_file(path / "rig.yaml")
-    last_time = read_run(path).last_time if (path / "journal.jsonl").exists() else 0.0
+    last_time, done = 0.0, frozenset[str]()
+    if (path / "journal.jsonl").exists():
+        record = read_run(path)
+        last_time, done = record.last_time, frozenset(record.completed())
     run_plan = plan(protocol, rig, str(path / "rig.yaml"))
+    _require_free_disk(path, run_plan.size(done))
     with (
         open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as bench,
         RunFolder(path, bench.seed, bench.disk) as folder,
     ):
         execute(folder, protocol, bench, run_plan, watch)
     return path
+
+
+def _require_free_disk(folder: Path, size: RunSize) -> None:
+    """Refuse a run for which the disk is too small.
+
+    Raises
+    ------
+    DiskError
+        The disk has no room for frames and results.
+    """
+    free_bytes = free_disk_bytes(folder)
+    if size.total_bytes > free_bytes:
+        raise DiskError(
+            f"{folder}: {size.frames} frames and their results need about "
+            f"{size_text(size.total_bytes)}, {size_text(free_bytes)} are free; free some space or "
+            "give another --runs"
+        )
+
+
+def free_disk_bytes(folder: Path) -> int:
+    """Return the free space in bytes of the disk on which a folder is or will be."""
+    return shutil.disk_usage(_existing_parent(folder)).free
 
 
 def _existing_parent(path: Path) -> Path:

@@ -27,7 +27,12 @@ from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
-from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, frame_times_s
+from .steps.camera_settings import (
+    DARKS_PER_EXPOSURE,
+    CameraSettings,
+    frame_times_s,
+    longest_exposure_s,
+)
 from .steps.sample_pose import charge, face_camera, lights_out, visible_after_s
 from .steps.sanity_checks import SanityChecks
 from .steps.scenes import Arrangement, PutBackUnit
@@ -123,7 +128,7 @@ class Blank(ProtocolModel):
 
     def exposures_s(self, offers: CameraOffers) -> tuple[float, float]:
         """Return the shutter times of a sequence's first frame and of all others, in seconds."""
-        longest_s = offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
+        longest_s = longest_exposure_s(self.every, offers)
         return min(offers.exposure_at_most(self.exposure), longest_s), longest_s
 
     def times_s(self, earliest_s: float, later_s: float) -> list[float]:
@@ -170,8 +175,9 @@ class SequenceUnit:
         protocol = self.protocol
         session.wait_until_warm("camera")
         first_s, others_s = protocol.exposures_s(session.rig[CAMERA].offers())
-        earliest_s = visible_after_s(session) or EARLIEST_S
-        if protocol.first != "auto" and protocol.first < visible_after_s(session):
+        visible_s = visible_after_s(session.rig)
+        earliest_s = visible_s or EARLIEST_S
+        if protocol.first != "auto" and protocol.first < visible_s:
             raise ProtocolError(
                 f"first: {duration_text(protocol.first)} after lamp off the door still moves; "
                 f"write first: auto, which is {duration_text(earliest_s)} on this rig"

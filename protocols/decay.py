@@ -3,6 +3,7 @@
 After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.4.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,14 +13,18 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
+    DOOR,
     LAMP_ON,
+    SHIELD,
     CameraOffers,
     ExposureSettings,
     ProtocolModel,
+    RigFile,
     Session,
     Shoot,
     Unit,
     at,
+    planned_rig,
 )
 from labrig.quantity import Count, DurationS, Fraction, WordOrDuration, duration_text
 from labrig.record import FrameRole
@@ -32,12 +37,23 @@ from .steps.camera_settings import (
     CameraSettings,
     dark_exposures_s,
     frame_times_s,
+    longest_exposure_s,
 )
 from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, glow, measure_frame
 from .steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
 from .steps.patch_names import Patches
-from .steps.sample_pose import charge, check_visible, face_lamp, has_door, lights_out
+from .steps.sample_pose import (
+    charge,
+    check_visible,
+    face_lamp,
+    has_door,
+    lights_out,
+    visible_after_s,
+)
 from .steps.sanity_checks import SanityChecks
+
+#: Earliest first photograph after lamp off: a halogen lamp has gone dark by then.
+EARLIEST_S = 0.5
 
 
 class Plateau(BaseModel):
@@ -77,8 +93,8 @@ class DecaySettings(ProtocolModel):
     duration
         Time after lamp off until which photographs begin, for example `180 s`.
     first
-        Time from lamp off to the first photograph, for example `500 ms`. A halogen lamp needs about
-        320 ms to go dark, and a trap door must be open.
+        Time from lamp off to the first photograph, for example `500 ms`. `auto` is 500 ms, since a
+        halogen lamp needs about 320 ms to go dark, or as soon after that as the trap door is open.
     repeats
         Number of charges, each with a decay after it.
     camera
@@ -108,7 +124,7 @@ class DecaySettings(ProtocolModel):
     plateau: Plateau = Plateau()
     every: DurationS = Field(5.0, gt=0)
     duration: DurationS = Field(180.0, gt=0, alias="for")
-    first: DurationS = Field(0.5, ge=0)
+    first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
     repeats: Count = Field(1, ge=1)
     camera: CameraSettings = CameraSettings()
     exposure: Annotated[float | Literal["auto", "grow"], WordOrDuration("auto", "grow")] = "auto"
@@ -126,21 +142,30 @@ class DecaySettings(ProtocolModel):
                 "dark: background needs the key 'background: [x, y, width, height]', a region of "
                 "the frame that never glows"
             )
-        if self.first + self.every > self.duration:
+        if self.first_s + self.every > self.duration:
             raise ValueError(
                 f"for: {duration_text(self.duration)} leaves no two frames "
                 f"{duration_text(self.every)} apart; make it longer"
             )
-        if isinstance(self.exposure, float) and self.exposure >= self.every:
-            raise ValueError(
-                f"an exposure of {duration_text(self.exposure)} does not fit between frames every "
-                f"{duration_text(self.every)}; expose for less or leave more time"
-            )
         return self
+
+    @property
+    def first_s(self) -> float:
+        """Time from lamp off to the first photograph in seconds; `suited_to` knows the door."""
+        return EARLIEST_S if self.first == "auto" else self.first
+
+    def suited_to(self, rig: RigFile) -> Self:
+        """Return the protocol with the first photograph after the rig's trap door is open."""
+        if self.first != "auto":
+            return self
+        doors = planned_rig(rig, f"rig '{rig.name}'", (DOOR.key, SHIELD.key))
+        visible_s = visible_after_s(doors)
+        first_s = max(EARLIEST_S, math.ceil(visible_s * 100) / 100)
+        return self.model_copy(update={"first": first_s})
 
     def frame_times_s(self) -> list[float]:
         """Return the planned begin of each frame in seconds after lamp off."""
-        return frame_times_s(self.first, self.every, self.duration)
+        return frame_times_s(self.first_s, self.every, self.duration)
 
     def settings(self, exposure_s: float) -> ExposureSettings:
         """Return the camera settings with that shutter time."""
@@ -148,7 +173,9 @@ class DecaySettings(ProtocolModel):
 
     def longest_exposure_s(self, offers: CameraOffers) -> float:
         """Return the longest offered shutter time that fits between two frames, in seconds."""
-        return offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
+        if isinstance(self.exposure, str):
+            return longest_exposure_s(self.every, offers)
+        return longest_exposure_s(self.every, offers, offers.exposure_near(self.exposure))
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
@@ -160,7 +187,7 @@ class DecaySettings(ProtocolModel):
         """Return begin and shutter time of each metering frame; for `grow`, along the decay."""
         longest_s = self.longest_exposure_s(offers)
         pause_s = offers.overhead_s + MARGIN_S
-        ladder, at_s = [], self.first
+        ladder, at_s = [], self.first_s
         for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
             exposure_s = offers.exposure_at_most(longest_s * fraction)
             ladder.append((at_s, exposure_s))
@@ -187,6 +214,20 @@ class DecaySettings(ProtocolModel):
         growth = self.grow_at_most if self.exposure == "grow" else 1.0
         longest_s = self.longest_exposure_s(offers)
         return DecayMeter(metering).schedule(times_s, offers, longest_s, growth, warn)
+
+    def assumed_schedule(self, offers: CameraOffers) -> Schedule:
+        """Return the schedule of a plan, which has metered nothing: the longest exposures.
+
+        With `exposure: grow` they are those of a glow that fades evenly, by `grow_at_most`.
+        """
+        times_s, longest_s = self.frame_times_s(), self.longest_exposure_s(offers)
+        growth = self.grow_at_most if self.exposure == "grow" else 1.0
+        fading_s = times_s[-1] - times_s[0]
+        exposures_s = (
+            offers.exposure_at_most(longest_s * growth ** ((time_s - times_s[-1]) / fading_s))
+            for time_s in times_s
+        )
+        return Schedule(tuple(times_s), tuple(exposures_s))
 
     def expected_schedule(
         self,
@@ -248,7 +289,7 @@ class DecayUnit:
         """Charge, switch the lamp off, take one frame every `every` seconds."""
         session.wait_until_warm("camera")
         schedule = self._schedule(session)
-        check_visible(session, self.protocol.first)
+        check_visible(session, self.protocol.first_s)
         self._charge(session, schedule.exposures_s[0])
         session.run_sequence(
             [
@@ -276,9 +317,7 @@ class DecayUnit:
 
         if isinstance(protocol.exposure, float):
             return protocol.schedule(offers, [], session.warn)
-        longest_s = protocol.longest_exposure_s(offers)
-        worst = Schedule.constant(protocol.frame_times_s(), longest_s)
-        return session.choose("exposure", decide, worst)
+        return session.choose("exposure", decide, protocol.assumed_schedule(offers))
 
     def _charge(self, session: Session, exposure_s: float) -> None:
         if isinstance(self.protocol.charge, float):
@@ -289,7 +328,7 @@ class DecayUnit:
         charged_s = rule.check_every
         while charged_s < rule.at_most:
             shoot = Shoot(DecayFrames.PLATEAU, self.protocol.settings(exposure_s))
-            session.run_sequence([*lights_out(session), at(self.protocol.first, shoot)])
+            session.run_sequence([*lights_out(session), at(self.protocol.first_s, shoot)])
             face_lamp(session)
             session.perform(LAMP_ON)
             if session.choose(

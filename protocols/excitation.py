@@ -29,7 +29,12 @@ from labrig.record import FrameRecord, FrameRole
 from labrig.region import Region
 
 from .steps.afterglow import dark_level
-from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
+from .steps.camera_settings import (
+    MARGIN_S,
+    CameraSettings,
+    dark_exposures_s,
+    longest_exposure_s,
+)
 from .steps.charge_times import FloatArray, most_informative_s, still_grows
 from .steps.darkness import levels
 from .steps.exposure_metering import DecayMeter, FrameCache, MeteringFrame, Schedule
@@ -201,8 +206,7 @@ class ExcitationSettings(ProtocolModel):
         """
         times_s = self.frame_times_s(lasting_s)
         pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
-        spare_s = offers.overhead_s + MARGIN_S
-        return [offers.exposure_at_most(pause_s - spare_s) for pause_s in (*pauses_s, pauses_s[-1])]
+        return [longest_exposure_s(pause_s, offers) for pause_s in (*pauses_s, pauses_s[-1])]
 
     def settings(self, exposure_s: float) -> ExposureSettings:
         """Return the camera settings with that shutter time."""

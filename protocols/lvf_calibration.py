@@ -145,7 +145,7 @@ class StripesUnit(SceneUnit):
         light(session, self.warm_up_s(session))
         charge(session, self.charge_s)
         offers, scene = session.rig[CAMERA].offers(), self.bracketing
-        at_s, steps = visible_after_s(session) + MARGIN_S, list[TimedAction]()
+        at_s, steps = visible_after_s(session.rig) + MARGIN_S, list[TimedAction]()
         for fraction in STRIPES_LADDER:
             exposure_s = offers.exposure_at_most(scene.longest_s * fraction)
             steps.append(at(at_s, Shoot(self.role, scene.settings(exposure_s))))

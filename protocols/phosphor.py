@@ -68,6 +68,15 @@ class Phosphor(ProtocolModel):
                 return part.protocol.patches_of(part_unit)
         return self.patches
 
+    def named_regions(self) -> Mapping[str, Region]:
+        """Return the regions of all parts; those that a part shares with the chain stand once."""
+        regions = dict(super().named_regions())
+        for part in self.chain():
+            for key, region in part.protocol.named_regions().items():
+                if regions.get(key) != region:
+                    regions[f"{part.name}: {key}"] = region
+        return regions
+
     def suited_to(self, rig: RigFile) -> Self:
         """Return the chain with the keys filled in that its parts leave to the rig file."""
         parts = [

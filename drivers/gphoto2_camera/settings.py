@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire import CameraOffers
+from labrig.acquire import CameraOffers, FramePixels, frame_bytes
 from labrig.quantity import DurationS, SizeBytes
 
 #: In thirds of a stop, from 32 s down to 1/8192 s.
@@ -37,8 +37,13 @@ class Gphoto2CameraSettings(BaseModel):
     frame_time
         Time from the end of an exposure until its frame is on the PC and the next can begin, for
         example `2 s`.
+    frame_pixels
+        Width and height of a frame in pixels, as `labrig rig check` measures them, for example
+        `[5634, 3752]`. A plan refuses regions outside of it. Default: unknown before the first
+        frame.
     frame_size
-        Size of one RAW file, for planning disk space, for example `27 MB`.
+        Size of one RAW file, for planning disk space, for example `27 MB`. Default: 1.5 bytes for
+        each pixel, or 30 MB where these are unknown.
     transfer_timeout
         Time from the end of an exposure within which its frame must be on the PC, for example
         `30 s`.
@@ -56,7 +61,8 @@ class Gphoto2CameraSettings(BaseModel):
     f_numbers: tuple[Annotated[float, Field(gt=0)], ...] = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
     longest_exposure: Positive = 32.0
     frame_time: Annotated[DurationS, Field(ge=0)] = 2.0
-    frame_size: Annotated[SizeBytes, Field(gt=0)] = 30e6
+    frame_pixels: FramePixels | None = None
+    frame_size: Annotated[SizeBytes, Field(gt=0)] | None = None
     transfer_timeout: Positive = 30.0
     answer_timeout: Positive = 5.0
 
@@ -78,5 +84,6 @@ class Gphoto2CameraSettings(BaseModel):
             isos=tuple(sorted(set(isos))),
             f_numbers=tuple(sorted(set(f_numbers))),
             overhead_s=self.frame_time,
-            frame_bytes=round(self.frame_size),
+            frame_bytes=frame_bytes(self.frame_size, self.frame_pixels),
+            frame_pixels=self.frame_pixels,
         )

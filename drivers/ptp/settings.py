@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from labrig.acquire import CameraOffers
+from labrig.acquire import CameraOffers, FramePixels, frame_bytes
 from labrig.quantity import DurationS, SizeBytes
 
 from .eos.codes import F_NUMBERS, ISOS, bulb_times_s, shutter_time_s, third_stop_codes
@@ -31,8 +31,13 @@ class PtpCameraSettings(BaseModel):
     frame_time
         Time from the end of an exposure until its frame is on the PC and the next can begin, for
         example `2 s`.
+    frame_pixels
+        Width and height of a frame in pixels, as `labrig rig check` measures them, for example
+        `[5634, 3752]`. A plan refuses regions outside of it. Default: unknown before the first
+        frame.
     frame_size
-        Size of one RAW file, for planning disk space, for example `27 MB`.
+        Size of one RAW file, for planning disk space, for example `27 MB`. Default: 1.5 bytes for
+        each pixel, or 30 MB where these are unknown.
     transfer_timeout
         Time from the end of an exposure within which the camera must have offered its frame, for
         example `30 s`.
@@ -47,7 +52,8 @@ class PtpCameraSettings(BaseModel):
     f_numbers: tuple[float, ...] = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
     longest_exposure: Annotated[DurationS, Field(gt=0)] = 32.0
     frame_time: Annotated[DurationS, Field(ge=0)] = 2.0
-    frame_size: Annotated[SizeBytes, Field(gt=0)] = 30e6
+    frame_pixels: FramePixels | None = None
+    frame_size: Annotated[SizeBytes, Field(gt=0)] | None = None
     transfer_timeout: Annotated[DurationS, Field(gt=0)] = 30.0
     answer_timeout: Annotated[DurationS, Field(gt=0)] = 5.0
 
@@ -91,5 +97,6 @@ class PtpCameraSettings(BaseModel):
             isos=self.isos,
             f_numbers=self.f_numbers,
             overhead_s=self.frame_time,
-            frame_bytes=round(self.frame_size),
+            frame_bytes=frame_bytes(self.frame_size, self.frame_pixels),
+            frame_pixels=self.frame_pixels,
         )

@@ -3,8 +3,10 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.connections import Connections, SerialPort
+from labrig.acquire.frame_regions import require_inside
 from labrig.acquire.loading import load_driver, read_protocol
-from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan
+from labrig.acquire.plan import Plan, Step
+from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.rig import Rig, in_safe_order
@@ -12,17 +14,28 @@ from labrig.acquire.rig_file import DeviceEntry, Optics, RigFile, read_rig_file
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
 from labrig.acquire.roles.role import Finding, Severity
 from labrig.acquire.runner import RunObserver, run_units
-from labrig.acquire.session import Session
-from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.acquire.session import TOLERANCE_S, Session
+from labrig.acquire.values import (
+    TYPICAL_BYTES_PER_PIXEL,
+    CameraOffers,
+    ExposureSettings,
+    Frame,
+    FramePixels,
+    frame_bytes,
+    shutter_text,
+)
 
 __all__ = [
     "MAX_STEPS",
+    "TOLERANCE_S",
+    "TYPICAL_BYTES_PER_PIXEL",
     "CameraOffers",
     "Connections",
     "DeviceEntry",
     "ExposureSettings",
     "Finding",
     "Frame",
+    "FramePixels",
     "LateAction",
     "ManualStep",
     "Optics",
@@ -41,12 +54,16 @@ __all__ = [
     "UndoManualStep",
     "Unit",
     "at",
+    "frame_bytes",
     "in_safe_order",
     "lights_that_read_back",
     "load_driver",
     "plan",
+    "planned_rig",
     "read_protocol",
     "read_rig_file",
+    "require_inside",
     "run_units",
+    "shutter_text",
 ]
 __all__ += roles.__all__

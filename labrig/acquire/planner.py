@@ -1,12 +1,14 @@
 """The plan: the protocol's own code run on stand-ins that take the time of the devices."""
 
-import json
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
+from labrig.acquire.frame_regions import require_inside
 from labrig.acquire.loading import load_driver
+from labrig.acquire.plan import Plan, Step
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
@@ -16,100 +18,13 @@ from labrig.acquire.values import CameraOffers, Frame
 from labrig.clock import VirtualClock
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
-from labrig.record import PERSON, ActionRecord, FrameRecord
+from labrig.record import ActionRecord, FrameRecord
 from labrig.yaml_file import validate
 
 #: Largest number of steps: more than any run has, and laid out in about a second.
 MAX_STEPS = 50_000
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Step:
-    """One line of the timeline.
-
-    Attributes
-    ----------
-    at_s
-        Begin of the step in seconds after the start of the run.
-    unit
-        Name of the unit.
-    device
-        Key of the device, `PERSON` for a step by hand, `-` for a wait or a warning.
-    action
-        Action as text.
-    """
-
-    at_s: float
-    unit: str
-    device: str
-    action: str
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Timeline of a run, with the longest durations and the largest number of frames.
-
-    Attributes
-    ----------
-    steps
-        Steps in order of time.
-    units
-        Names of the units in order.
-    unit_ends_s
-        End of each unit in seconds after the start of the run.
-    frames
-        Number of frames.
-    offers
-        Settings that the camera offers.
-    """
-
-    steps: tuple[Step, ...]
-    units: tuple[str, ...]
-    unit_ends_s: tuple[float, ...]
-    frames: int
-    offers: CameraOffers
-
-    @property
-    def duration_s(self) -> float:
-        """Lab time of the whole run in seconds."""
-        return self.unit_ends_s[-1] if self.unit_ends_s else 0.0
-
-    @property
-    def size_bytes(self) -> int:
-        """Size of all frames in bytes."""
-        return self.frames * self.offers.frame_bytes
-
-    @property
-    def manual_steps(self) -> tuple[str, ...]:
-        """Steps to be done by hand."""
-        return tuple(step.action for step in self.steps if step.device == PERSON)
-
-    def lines(self) -> list[str]:
-        """Return the timeline as lines `@t (+dt) device action`, with a heading for each unit."""
-        lines, unit, before_s = [], "", 0.0
-        for step in self.steps:
-            if step.unit != unit:
-                unit = step.unit
-                lines.append(f"unit {unit}")
-            lines.append(
-                f"  @{step.at_s:10.3f} s (+{step.at_s - before_s:9.3f} s)  "
-                f"{step.device:8} {step.action}"
-            )
-            before_s = step.at_s
-        return lines
-
-    def to_json(self) -> str:
-        """Return the timeline as JSON."""
-        content = {
-            "units": self.units,
-            "duration_s": self.duration_s,
-            "frames": self.frames,
-            "size_bytes": self.size_bytes,
-            "steps": [asdict(step) for step in self.steps],
-        }
-        return json.dumps(content, ensure_ascii=False)
 
 
 def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
@@ -150,28 +65,70 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
     >>> print(plan.lines()[1])
       @     0.000 s (+    0.000 s)  -        warming up the camera, 1 min
     """
-    clock = VirtualClock()
-    recorder = _PlanRecorder(clock)
-    devices: dict[str, Device] = {}
-    for key, entry in rig.devices.items():
-        driver = load_driver(key, entry.driver, source)
-        settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
-        if stand_in := ROLES[key].planned:
-            devices[key] = stand_in(driver, settings, clock)
-    warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
-    planned_rig = Rig(rig.name, clock, devices, warm_up_s)
+    bench = planned_rig(rig, source)
+    clock = bench.clock
+    assert isinstance(clock, VirtualClock)
+    protocol = protocol.suited_to(rig)
+    offers = bench[CAMERA].offers() if CAMERA in bench else CameraOffers((), ())
+    if offers.frame_pixels is not None:
+        require_inside(protocol.named_regions(), offers.frame_pixels)
+    recorder = _PlanRecorder(clock, offers.overhead_s)
     units, unit_ends_s = protocol.units(), []
     for unit in units:
         recorder.unit = unit.name
-        unit.run(Session(planned_rig, recorder, recorder))
+        unit.run(Session(bench, recorder, recorder))
         unit_ends_s.append(clock.now())
     return Plan(
         tuple(recorder.steps),
         tuple(unit.name for unit in units),
         tuple(unit_ends_s),
-        recorder.frame_count,
-        planned_rig[CAMERA].offers() if CAMERA in planned_rig else CameraOffers((), ()),
+        offers,
+        max((len(protocol.patches_of(unit.name)) for unit in units), default=1) or 1,
     )
+
+
+def planned_rig(rig: RigFile, source: str, keys: Collection[str] | None = None) -> Rig:
+    """Return a rig of stand-ins, which take the time that the drivers declare and do nothing else.
+
+    Parameters
+    ----------
+    rig
+        Rig file with the devices.
+    source
+        Name or path of the rig file, for messages.
+    keys
+        Keys of the devices; None for all.
+
+    Returns
+    -------
+    Rig
+        Stand-ins on a virtual clock, for the roles that have one.
+
+    Raises
+    ------
+    UsageError
+        If there is no such driver, or a key of a device is unknown or invalid.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.acquire import DOOR, planned_rig
+    >>> rig = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> planned_rig(rig, "rig.yaml")[DOOR].travel_s()
+    0.3
+    """
+    clock = VirtualClock()
+    devices: dict[str, Device] = {}
+    for key, entry in rig.devices.items():
+        if keys is not None and key not in keys:
+            continue
+        driver = load_driver(key, entry.driver, source)
+        settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
+        if stand_in := ROLES[key].planned:
+            devices[key] = stand_in(driver, settings, clock)
+    warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
+    return Rig(rig.name, clock, devices, warm_up_s)
 
 
 @dataclass
@@ -179,9 +136,9 @@ class _PlanRecorder:
     """Recorder and observer of a plan, which lists the steps and refuses late ones."""
 
     clock: VirtualClock
+    overhead_s: float
     unit: str = ""
     steps: list[Step] = field(default_factory=list)
-    frame_count: int = 0
 
     def acted(
         self,
@@ -192,11 +149,11 @@ class _PlanRecorder:
         late_s: float,
         task: str = "",
     ) -> None:
-        self._add_step(start_s, device, action, late_s)
+        self._add(Step(start_s, self.unit, device, action), late_s)
 
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:
-        self.frame_count += 1
-        self._add_step(frame.start_s, CAMERA.key, f"{role} frame, {frame.settings}", late_s)
+        action, exposure_s = f"{role} frame, {frame.settings}", frame.settings.exposure_s
+        self._add(Step(frame.start_s, self.unit, CAMERA.key, action, exposure_s), late_s)
 
     def temperature(self, celsius: float, at_s: float) -> None:
         pass
@@ -219,22 +176,34 @@ class _PlanRecorder:
 
     def doing(self, what: str, until_s: float | None = None) -> None:
         if until_s is not None:
-            self._add_step(self.clock.now(), "-", what, 0.0)
+            now_s = self.clock.now()
+            self._add(Step(now_s, self.unit, "-", what, lasts_s=until_s - now_s))
 
     def warn(self, text: str) -> None:
-        self._add_step(self.clock.now(), "-", f"warning: {text}", 0.0)
+        self._add(Step(self.clock.now(), self.unit, "-", f"warning: {text}"))
 
-    def _add_step(self, at_s: float, device: str, action: str, late_s: float) -> None:
+    def _add(self, step: Step, late_s: float = 0.0) -> None:
         if late_s > TOLERANCE_S:
-            previous = next(step for step in reversed(self.steps) if step.device != "-")
-            raise ProtocolError(
-                f"{self.unit}: '{action}' would begin {duration_text(late_s)} late, because "
-                f"'{previous.action}' is not over; leave more time between frames (every:) or "
-                "expose for less"
-            )
+            raise ProtocolError(self._lateness(step.action, late_s))
         if len(self.steps) == MAX_STEPS:
             raise ProtocolError(
                 f"expected at most {MAX_STEPS} steps, got more in {self.unit}; ask for fewer "
                 "repeats or frames"
             )
-        self.steps.append(Step(at_s, self.unit, device, action))
+        self.steps.append(step)
+
+    def _lateness(self, action: str, late_s: float) -> str:
+        previous = next(step for step in reversed(self.steps) if step.device != "-")
+        message = (
+            f"{self.unit}: '{action}' would begin {duration_text(late_s)} late, because "
+            f"'{previous.action}' is not over; "
+        )
+        if previous.exposure_s is None:
+            return f"{message}leave more time before it"
+        shortest_s = math.ceil(10 * (previous.exposure_s + self.overhead_s) - 1e-6) / 10
+        return (
+            f"{message}it takes {duration_text(previous.exposure_s)} and the camera "
+            f"{duration_text(self.overhead_s)} until the next (frame_time): let frames begin at "
+            f"least {duration_text(shortest_s)} apart (every: {duration_text(shortest_s)}), or "
+            "expose for less"
+        )

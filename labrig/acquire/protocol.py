@@ -5,8 +5,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from labrig.acquire.frame_regions import regions_in
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.calibration import CalibrationKind
@@ -43,7 +44,7 @@ class Sample(BaseModel):
         Anything else worth keeping about the sample, as free text.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", coerce_numbers_to_str=True)
 
     name: str = Field("sample", min_length=1)
     thickness: str | None = None
@@ -73,6 +74,13 @@ class ProtocolModel(BaseModel):
     protocol: str
     sample: Sample = Sample()
 
+    @field_validator("sample", mode="before")
+    @classmethod
+    def _sample_with_keys(cls, sample: Any) -> Any:
+        if not isinstance(sample, (dict, Sample)):
+            raise ValueError("expected keys, such as 'sample: {name: blue-paint}'")
+        return sample
+
     @abstractmethod
     def units(self) -> Sequence[Unit]:
         """Return all units in order; they are determined before any device moves."""
@@ -81,6 +89,10 @@ class ProtocolModel(BaseModel):
         """Return the regions of interest of a unit's frames by name; empty for most protocols."""
         patches: Mapping[str, Region] = getattr(self, "patches", {})
         return patches
+
+    def named_regions(self) -> Mapping[str, Region]:
+        """Return all regions of the frame that the protocol names, by their keys."""
+        return regions_in(self)
 
     def suited_to(self, rig: RigFile) -> Self:
         """Return the protocol with the values that it takes from the rig file; the base takes none.

@@ -2,9 +2,47 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
 
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
+
+#: Width and height of a frame in pixels, in a rig file.
+FramePixels = tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]
+#: Size of a RAW file per pixel: 14 bits, losslessly compressed.
+TYPICAL_BYTES_PER_PIXEL = 1.5
+#: Size of a frame of which nothing is known, as that of 20 megapixels.
+TYPICAL_FRAME_BYTES = 30_000_000
+
+
+def frame_bytes(size_bytes: float | None, pixels: tuple[int, int] | None) -> int:
+    """Return the size of a frame: as given, else estimated from the number of its pixels.
+
+    Parameters
+    ----------
+    size_bytes
+        Size of a RAW file in bytes in the rig file; None if it gives none.
+    pixels
+        Width and height of a frame in pixels; None if they are unknown.
+
+    Returns
+    -------
+    int
+        Size in bytes.
+
+    Examples
+    --------
+    >>> from labrig.acquire import frame_bytes
+    >>> frame_bytes(None, (5634, 3752))
+    31708152
+    """
+    if size_bytes is not None:
+        return round(size_bytes)
+    if pixels is None:
+        return TYPICAL_FRAME_BYTES
+    return round(TYPICAL_BYTES_PER_PIXEL * pixels[0] * pixels[1])
 
 
 @dataclass(frozen=True)
@@ -26,13 +64,30 @@ class ExposureSettings:
     f_number: float | None = None
 
     def __str__(self) -> str:
-        shutter = (
-            f"1/{1 / self.exposure_s:.0f} s"
-            if self.exposure_s < 0.3
-            else f"{self.exposure_s:.3g} s"
-        )
         aperture = "" if self.f_number is None else f" f/{self.f_number:g}"
-        return f"{shutter} ISO {self.iso}{aperture}"
+        return f"{shutter_text(self.exposure_s)} ISO {self.iso}{aperture}"
+
+
+def shutter_text(exposure_s: float) -> str:
+    """Format a shutter time as photographers do.
+
+    Parameters
+    ----------
+    exposure_s
+        Shutter time in seconds.
+
+    Returns
+    -------
+    str
+        Text such as `1/64 s` or `3.17 s`.
+
+    Examples
+    --------
+    >>> from labrig.acquire import shutter_text
+    >>> shutter_text(0.125)
+    '1/8 s'
+    """
+    return f"1/{1 / exposure_s:.0f} s" if exposure_s < 0.3 else f"{exposure_s:.3g} s"
 
 
 @dataclass(frozen=True)
@@ -51,6 +106,8 @@ class CameraOffers:
         Time in seconds from the end of an exposure until the next can begin: readout and transfer.
     frame_bytes
         Typical size of a frame in bytes.
+    frame_pixels
+        Width and height of a frame in pixels; None if they are not known before the first one.
     """
 
     exposures_s: tuple[float, ...]
@@ -58,6 +115,7 @@ class CameraOffers:
     f_numbers: tuple[float, ...] = ()
     overhead_s: float = 0.0
     frame_bytes: int = 0
+    frame_pixels: tuple[int, int] | None = None
 
     def exposure_near(self, exposure_s: float) -> float:
         """Return the offered exposure time nearest to `exposure_s`, such as 1/64 s for 1/60 s.

@@ -57,13 +57,21 @@ def plan(
     predict: PredictOption = None,
     like: LikeOption = None,
     metered: MeteredOption = None,
+    every_step: Annotated[
+        bool, typer.Option("--all", help="Print every step, instead of units with repeats folded.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Print what a protocol will do, how long it takes and what it needs; touch nothing.
 
     With --predict: how well it will know the rates of a material, and what would halve their σ.
     """
+    from labrig.cli.plan_text import folded_units, summary
+    from labrig.recording import free_disk_bytes
+
     recording = _prepared(protocol, rig, runs)
+    if not json:
+        typer.echo("\n".join([*summary(recording, free_disk_bytes(runs)), ""]))
     if predict:
         predict_and_print(recording, predict, like, metered, json=json)
     elif like or metered:
@@ -71,10 +79,8 @@ def plan(
     elif json:
         typer.echo(recording.plan.to_json())
     else:
-        for line in recording.plan.lines():
-            typer.echo(line)
-    if not json:
-        typer.echo(recording.summary())
+        lines = recording.plan.lines() if every_step else folded_units(recording.plan)
+        typer.echo("\n".join(lines))
 
 
 def resume(
@@ -138,4 +144,8 @@ def _finish(folder: Path, no_process: bool, json: bool) -> None:
             raise Interrupted(
                 stop.signum, f"stopped; the run is recorded, go on with: labrig process {folder}"
             ) from None
+    if not json:
+        from labrig.record import RunSize
+
+        typer.echo(f"this run takes {RunSize.measured(folder)}")
     typer.echo(folder)

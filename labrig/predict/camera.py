@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from labrig.acquire import CameraOffers
+from labrig.acquire import TYPICAL_BYTES_PER_PIXEL, CameraOffers
 from labrig.region import Region, region_pixels
 
 #: Conversion gain in electrons per DN at ISO 100 of a typical full-frame DSLR with 14 bits.
@@ -16,8 +16,7 @@ TYPICAL_NOISE_AFTER_GAIN = 27.0
 TYPICAL_RANGE_DN = 14_500.0
 #: Dark current of a pixel near room temperature in electrons per second.
 TYPICAL_DARK_ELECTRONS_PER_S = 0.1
-#: File size in bytes per pixel with lossless compression, and number of pixels.
-TYPICAL_BYTES_PER_PIXEL = 1.5
+#: Number of pixels.
 TYPICAL_PIXELS = 20e6
 #: Brightest over mean signal in a patch: vignetting, shading of the lamp, structure of the sample.
 TYPICAL_UNEVENNESS = 1.1
@@ -92,11 +91,15 @@ def typical_read_noise_electrons(iso: float) -> float:
 
 
 def typical_camera(offers: CameraOffers, iso: float) -> CameraFigures:
-    """Return typical figures for a camera of which only the file size is known; aspect 3:2."""
+    """Return typical figures for a camera of which at most the size of a frame is known.
+
+    If only its file's size is known, the aspect ratio is taken for 3:2.
+    """
     pixels = offers.frame_bytes / TYPICAL_BYTES_PER_PIXEL or TYPICAL_PIXELS
-    height = 2 * round(math.sqrt(pixels / 6))
+    rows = 2 * round(math.sqrt(pixels / 6))
+    width, height = offers.frame_pixels or (rows * 3 // 2, rows)
     return CameraFigures(
-        width=height * 3 // 2,
+        width=width,
         height=height,
         iso=iso,
         electrons_per_dn=TYPICAL_ELECTRONS_PER_DN * 100 / iso,

@@ -45,3 +45,7 @@ from .run_record import (
     RunRecord as RunRecord,
     read_run as read_run,
 )
+from .run_size import (
+    RunSize as RunSize,
+    size_text as size_text,
+)

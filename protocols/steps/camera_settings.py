@@ -1,10 +1,11 @@
 """Settings of the camera, and times that follow from them."""
 
+import math
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire import MAX_STEPS, CameraOffers
+from labrig.acquire import MAX_STEPS, TOLERANCE_S, CameraOffers
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
 
@@ -24,6 +25,38 @@ def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]
             f"{count:.3g} frames, expected at most {MAX_STEPS}; take fewer"
         )
     return [first_s + number * every_s for number in range(int(count) + 1)]
+
+
+def longest_exposure_s(every_s: float, offers: CameraOffers, wanted_s: float = 0.0) -> float:
+    """Return the longest offered shutter time that fits between frames `every_s` seconds apart.
+
+    Parameters
+    ----------
+    every_s
+        Time in seconds between the begins of two frames.
+    offers
+        Exposure settings that the camera offers.
+    wanted_s
+        Shutter time in seconds that has to fit in any case.
+
+    Raises
+    ------
+    ProtocolError
+        If `wanted_s`, or even the shortest shutter time, does not fit; the message has the shortest
+        time between frames that works.
+    """
+    spent_s = offers.overhead_s + MARGIN_S
+    shortest_s = max(wanted_s + offers.overhead_s, offers.exposures_s[0] + spent_s)
+    if every_s + TOLERANCE_S < shortest_s:
+        shortest_text = duration_text(math.ceil(10 * (shortest_s - TOLERANCE_S)) / 10)
+        exposing = f"an exposure of {duration_text(wanted_s)}" if wanted_s else "any exposure"
+        raise ProtocolError(
+            f"frames every {duration_text(every_s)} leave no time for {exposing}: from its end to "
+            f"the next one this camera takes {duration_text(offers.overhead_s)} (frame_time), and "
+            f"{duration_text(spent_s)} where settings change; let frames begin at least "
+            f"{shortest_text} apart (every: {shortest_text})"
+        )
+    return offers.exposure_at_most(max(every_s - spent_s, offers.exposures_s[0]))
 
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.

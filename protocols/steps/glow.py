@@ -15,7 +15,7 @@ from labrig.record import FrameRole
 from labrig.region import Region
 
 from .afterglow import glow
-from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
+from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s, longest_exposure_s
 from .darkness import levels, range_dn
 from .exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
 from .sample_pose import charge, check_visible, face_camera, face_lamp, has_door, lights_out
@@ -64,11 +64,12 @@ class GlowSettings(ProtocolModel):
 
     def longest_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Return the longest shutter time of each frame, which ends before the next begins."""
-        free_s = [
-            min(later - earlier - offers.overhead_s - MARGIN_S, self.longest)
+        longest_s = offers.exposure_at_most(self.longest)
+        between_s = [
+            longest_exposure_s(later - earlier, offers)
             for earlier, later in pairwise(self.times_s())
         ]
-        return [offers.exposure_at_most(limit_s) for limit_s in (*free_s, self.longest)]
+        return [min(limit_s, longest_s) for limit_s in (*between_s, longest_s)]
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""

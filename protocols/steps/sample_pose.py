@@ -14,6 +14,7 @@ from labrig.acquire import (
     SHIELD,
     SHIELD_COVER,
     SHIELD_UNCOVER,
+    Rig,
     Session,
     TimedAction,
     at,
@@ -62,20 +63,25 @@ def charge(session: Session, duration_s: float) -> None:
 def lights_out(session: Session) -> Sequence[TimedAction]:
     """Return the begin of a timed sequence: lamp off, shield before it, then the door opens."""
     steps = [at(0.0, LAMP_OFF)]
-    dark_s = LAMP_DARK_S
     if SHIELD in session.rig:
         steps.append(at(0.0, SHIELD_COVER))
-        dark_s = min(dark_s, session.rig[SHIELD].travel_s() + SETTLES_S)
     if has_door(session):
-        steps.append(at(dark_s, DOOR_OPEN))
+        steps.append(at(_door_opens_s(session.rig), DOOR_OPEN))
     return steps
 
 
-def visible_after_s(session: Session) -> float:
+def _door_opens_s(rig: Rig) -> float:
+    """Return the time from lamp off until no light of the lamp reaches the sample, in seconds."""
+    if SHIELD not in rig:
+        return LAMP_DARK_S
+    return min(LAMP_DARK_S, rig[SHIELD].travel_s() + SETTLES_S)
+
+
+def visible_after_s(rig: Rig) -> float:
     """Return the time from `lights_out` until the camera sees the whole sample, in seconds."""
-    if not has_door(session):
+    if DOOR not in rig:
         return 0.0
-    return lights_out(session)[-1].at_s + session.rig[DOOR].travel_s() + SETTLES_S
+    return _door_opens_s(rig) + rig[DOOR].travel_s() + SETTLES_S
 
 
 def check_visible(session: Session, first_s: float) -> None:
@@ -86,9 +92,10 @@ def check_visible(session: Session, first_s: float) -> None:
     ProtocolError
         The first photograph is too early; the message has the earliest time.
     """
-    if first_s < visible_after_s(session):
+    visible_s = visible_after_s(session.rig)
+    if first_s < visible_s:
         raise ProtocolError(
             f"the first frame {duration_text(first_s)} after lamp off would show a door that still "
-            f"moves; it is open {duration_text(visible_after_s(session))} after lamp off, so write "
-            f"first: {duration_text(round(visible_after_s(session) + 0.05, 1))}"
+            f"moves; it is open {duration_text(visible_s)} after lamp off, so write "
+            f"first: {duration_text(round(visible_s + 0.05, 1))}"
         )

@@ -4,22 +4,10 @@ It is a Canon EOS 5D Mark II, or one that implements nothing but the PTP standar
 
 `SimulatedCamera(...).backend` is given to pyusb, which then exchanges packets with it;
 `PtpIpServer` serves `SimulatedCamera(...).responder` to any program on this PC.
+
+Names are listed in `__init__.pyi`, and loaded when first used.
 """
 
-from .body_settings import BodySettings
-from .camera import SimulatedCamera
-from .faults import CameraFaults
-from .pace import Pace
-from .photograph import Sensor
-from .ptpip.server import PtpIpServer
-from .standard.body import StandardHabits
+import lazy_loader
 
-__all__ = [
-    "BodySettings",
-    "CameraFaults",
-    "Pace",
-    "PtpIpServer",
-    "Sensor",
-    "SimulatedCamera",
-    "StandardHabits",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -126,7 +126,9 @@ def test_an_earlier_run_lends_its_camera_to_other_materials(labrig: Labrig, meas
     assert not like["patches"]["sample"]["brightness_known"]
     assert len(like["patches"]["sample"]["states"]) == 2
     few, many = (said["patches"]["sample"]["states"][0]["noise"] for said in (like, alone))
-    assert few["photons"] > many["photons"], "a small sensor has less light to count"
+    assert few["photons"] == pytest.approx(many["photons"], rel=0.5), (
+        "the rig tells the sensor, too"
+    )
 
 
 def test_a_glow_too_dim_for_the_time_between_frames_is_known_less_well(labrig: Labrig) -> None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection
 
-from labrig.acquire import CameraOffers, ExposureSettings
+from labrig.acquire import CameraOffers, ExposureSettings, frame_bytes
 from labrig.errors import DeviceError
 
 from ..settings import PtpCameraSettings
@@ -81,7 +81,8 @@ class EosExposure:
             isos=tuple(isos),
             f_numbers=tuple(sorted(f_numbers)),
             overhead_s=self._settings.frame_time,
-            frame_bytes=round(self._settings.frame_size),
+            frame_bytes=frame_bytes(self._settings.frame_size, self._settings.frame_pixels),
+            frame_pixels=self._settings.frame_pixels,
         )
 
     def apply(self, requested: ExposureSettings) -> None:

@@ -7,7 +7,7 @@ nominal time (1/60 s is 16.6 ms), whatever the actual one. The number is used as
 import math
 from collections.abc import Iterable, Sequence
 
-from labrig.acquire import CameraOffers, ExposureSettings
+from labrig.acquire import CameraOffers, ExposureSettings, frame_bytes
 from labrig.errors import DeviceError
 
 from ..codes import StandardProperty
@@ -74,7 +74,8 @@ class StandardExposure:
             isos=tuple(sorted(isos)),
             f_numbers=tuple(sorted(self._f_number_choices(self._aperture()))),
             overhead_s=self._settings.frame_time,
-            frame_bytes=round(self._settings.frame_size),
+            frame_bytes=frame_bytes(self._settings.frame_size, self._settings.frame_pixels),
+            frame_pixels=self._settings.frame_pixels,
         )
 
     def apply(self, requested: ExposureSettings) -> None:

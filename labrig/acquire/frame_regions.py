@@ -1,0 +1,56 @@
+"""Regions of interest of a protocol, and whether they lie inside the frames of a camera."""
+
+from collections.abc import Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+from labrig.errors import ProtocolError, UsageError
+from labrig.region import Region, region_pixels
+
+_REGION_METADATA = get_args(Region)[1:]
+
+
+def regions_in(model: BaseModel) -> dict[str, Region]:
+    """Return the regions among the values of a model by their keys, such as `patches.sample`."""
+    regions: dict[str, Region] = {}
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if value is None or not _names_regions((field.annotation, *field.metadata)):
+            continue
+        if isinstance(value, Mapping):
+            regions |= {f"{name}.{patch}": region for patch, region in value.items()}
+        else:
+            regions[name] = value
+    return regions
+
+
+def _names_regions(annotation: tuple[Any, ...]) -> bool:
+    """Return whether a type is a region or holds some; an annotated one has its metadata behind."""
+    return any(
+        part in _REGION_METADATA or _names_regions(get_args(part))
+        for part in annotation
+        if part is not None
+    )
+
+
+def require_inside(regions: Mapping[str, Region], frame_pixels: tuple[int, int]) -> None:
+    """Refuse regions that extend beyond a frame.
+
+    Parameters
+    ----------
+    regions
+        Regions by their keys in the protocol.
+    frame_pixels
+        Width and height of the camera's frames in pixels.
+
+    Raises
+    ------
+    ProtocolError
+        A region is not inside; the message names its key and the size of the frame.
+    """
+    for key, region in regions.items():
+        try:
+            region_pixels(region, *frame_pixels)
+        except UsageError as error:
+            raise ProtocolError(f"{key}: {error}") from None
