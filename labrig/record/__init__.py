@@ -1,6 +1,7 @@
 """Run folders: written during a run, read afterwards."""
 
 from labrig.record.attempt import AttemptWriter
+from labrig.record.checksums import CACHE, FRAMES, damaged_frames
 from labrig.record.frames import (
     PERSON,
     UNDONE,
@@ -35,9 +36,12 @@ from labrig.record.journal import (
     write_durably,
 )
 from labrig.record.run_folder import RunFolder
+from labrig.record.run_lock import RunLock
 from labrig.record.run_record import Attempt, RunRecord, read_run
 
 __all__ = [
+    "CACHE",
+    "FRAMES",
     "KNOWN_FOR_S",
     "PERSON",
     "REAL_DISK",
@@ -53,11 +57,13 @@ __all__ = [
     "FrameRole",
     "RunDescription",
     "RunFolder",
+    "RunLock",
     "RunRecord",
     "TemperatureHistory",
     "TemperatureRecord",
     "add_note",
     "charge_durations_s",
+    "damaged_frames",
     "degrees_text",
     "frames_in_roles",
     "glow_temperature_c",
