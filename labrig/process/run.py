@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from labrig import plugins
-from labrig.acquire import RigFile
+from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, temperature_warnings
 from labrig.bench_optics import camera_curves
 from labrig.calibration import LvfFile
@@ -14,7 +14,7 @@ from labrig.export import write_nexus
 from labrig.optics import CameraResponse
 from labrig.process.provenance import Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
-from labrig.record import read_run
+from labrig.record import RunLock, read_run
 from labrig.report import (
     Rendered,
     Report,
@@ -29,6 +29,8 @@ from labrig.results import RunResult, read_result, write_result
 from labrig.yaml_file import write_yaml
 
 _EARLIER = "result-"
+#: Lock of the process that makes the result; acquisition has another one.
+_LOCK = ".process.lock"
 
 
 def new_result(run: Path) -> Path:
@@ -113,7 +115,8 @@ def process_run(folder: Path | str, overrides: Overrides | None = None) -> RunRe
     Raises
     ------
     UsageError
-        If this is not a run folder, or an override does not fit the run.
+        If this is not a run folder, another labrig is processing it, or an override does not fit
+        the run.
     DataError
         If frames are too few, missing, or were changed after the run.
     FitError
@@ -147,7 +150,8 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     Raises
     ------
     UsageError
-        If this is not a run folder, or an override does not fit the run.
+        If this is not a run folder, another labrig is processing it, or an override does not fit
+        the run.
     DataError
         If frames are too few, missing, or were changed after the run.
     FitError
@@ -164,6 +168,12 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     """
     folder, overrides = Path(folder), overrides or Overrides()
     protocol = read_run_protocol(folder)
+    with RunLock(folder / _LOCK, "processing this run"):
+        return _process(folder, overrides, protocol)
+
+
+def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Processed:
+    """Process a run that no other process processes meanwhile."""
     rig, run = overrides.bench(folder), read_run(folder)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check(frames)

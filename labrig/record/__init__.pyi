@@ -1,6 +1,11 @@
 from .attempt import (
     AttemptWriter as AttemptWriter,
 )
+from .checksums import (
+    CACHE as CACHE,
+    FRAMES as FRAMES,
+    damaged_frames as damaged_frames,
+)
 from .frames import (
     PERSON as PERSON,
     UNDONE as UNDONE,
@@ -39,6 +44,9 @@ from .made import (
 )
 from .run_folder import (
     RunFolder as RunFolder,
+)
+from .run_lock import (
+    RunLock as RunLock,
 )
 from .run_record import (
     Attempt as Attempt,

@@ -21,7 +21,7 @@ from labrig.material import read_material
 from labrig.optics import Strip
 from labrig.process import Processed, process_and_report
 from labrig.record import read_run
-from labrig.reduce import RawFrame
+from labrig.reduce import SensorLayout
 from labrig.region import Region
 from labrig.results import read_fitted_decays
 from labrig.results.emission_spectrum import read_emission_spectrum
@@ -160,11 +160,11 @@ def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
 
 
 STRIP = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.3, rising=True)
-RAW = RawFrame(np.zeros((HEIGHT, WIDTH), np.uint16), "RGGB", (0.0,) * 4, 1000.0)
+LAYOUT = SensorLayout(WIDTH, HEIGHT, "RGGB")
 
 
 def cut_of(region: Region) -> dict[str, Region]:
-    (slices,) = slice_strip([StripPatch("a", "a", region, alone=False)], STRIP, RAW)[0].values()
+    (slices,) = slice_strip([StripPatch("a", "a", region, alone=False)], STRIP, LAYOUT)[0].values()
     return slices
 
 
@@ -199,7 +199,7 @@ def test_rows_of_a_tilted_strip_lie_further_along(down: float, below: float) -> 
     }
     left, right = (np.array(end) * [WIDTH, HEIGHT] for end in (strip.left, strip.right))
     for (x, y, width, height), further in zip(
-        slices.values(), tilt_offset(strip, slices, RAW), strict=True
+        slices.values(), tilt_offset(strip, slices, LAYOUT), strict=True
     ):
         middle = np.array([(x + width / 2) * WIDTH, (y + height / 2) * HEIGHT])
         along = (middle - left) @ (right - left) / np.sum((right - left) ** 2)
