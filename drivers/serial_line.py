@@ -79,6 +79,11 @@ class SerialLine:
         """
         return self._read(lambda received: len(received) == count, f"{count} bytes", timeout_s)
 
+    def discard(self) -> None:
+        """Discard the bytes that have arrived, which belong to no command that is still to come."""
+        while self._waiting():
+            self._read_byte()
+
     def drain(self, quiet_s: float = LATEST_ANSWER_S, timeout_s: float = DRAIN_S) -> bytes:
         """Return all bytes that come until the line is quiet for `quiet_s`."""
         deadline_s = self._clock.now() + timeout_s

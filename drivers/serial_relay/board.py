@@ -116,6 +116,7 @@ class Board:
     def _send(self, text: WireText) -> int:
         """Send a command and return the number of its bytes."""
         content = text.content if text.is_hex else text.content + self._line_end
+        self._line.discard()
         self._line.write(content)
         return len(content)
 

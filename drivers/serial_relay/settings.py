@@ -24,7 +24,7 @@ def _bytes(text: str) -> str:
 
 def _some_bytes(text: str) -> str:
     if not wire_text(text).content:
-        raise ValueError("expected at least one character, got ''")
+        raise ValueError("expected at least one character")
     return text
 
 

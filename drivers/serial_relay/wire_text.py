@@ -41,7 +41,7 @@ def wire_text(text: str) -> WireText:
     """
     if text.startswith(HEX):
         return WireText(_hex_bytes(text), is_hex=True)
-    characters = _ESCAPE.sub(lambda match: _escaped(match[1], text), text)
+    characters = _ESCAPE.sub(lambda match: _escaped(match[1]), text)
     try:
         return WireText(characters.encode("latin-1"), is_hex=False)
     except UnicodeEncodeError as error:
@@ -57,17 +57,13 @@ def _hex_bytes(text: str) -> bytes:
     except ValueError:
         content = b""
     if not content:
-        raise ValueError(
-            f"expected pairs of hexadecimal digits, such as 'hex A0 01 01 A2', got {text!r}"
-        )
+        raise ValueError("expected pairs of hexadecimal digits, such as 'hex A0 01 01 A2'")
     return content
 
 
-def _escaped(code: str, text: str) -> str:
+def _escaped(code: str) -> str:
     if len(code) == 3:
         return chr(int(code[1:], 16))
     if code not in _ESCAPES:
-        raise ValueError(
-            rf"expected \r, \n, \t, \0, \\ or two hexadecimal digits as in \xA0, got {text!r}"
-        )
+        raise ValueError(r"expected \r, \n, \t, \0, \\ or two hexadecimal digits as in \xA0")
     return _ESCAPES[code]

@@ -82,11 +82,14 @@ def _print_discovery(discovery: "Discovery") -> None:
                 typer.echo(f"    ! {hint}")
     for note in discovery.notes:
         typer.echo(f"! {note}")
-    if snippets := [d.snippet for d in (*discovery.ports, *discovery.cameras) if d.snippet]:
-        typer.echo("\na rig file (a key may stand only once: keep what you use):\n")
-        typer.echo("name: my bench\n\ndevices:")
-        for snippet in snippets:
-            typer.echo(f"  {snippet}")
+    snippets = [d.snippet for d in (*discovery.ports, *discovery.cameras) if d.snippet]
+    if snippets:
+        typer.echo("\na rig file:\n\nname: my bench\n\ndevices:")
+    roles: set[str] = set()
+    for snippet in snippets:
+        role = snippet.partition(":")[0]
+        typer.echo(f"  {'# ' if role in roles else ''}{snippet}")  # a role has one device
+        roles.add(role)
 
 
 def _print_table(report: "RigReport") -> None:

@@ -9,12 +9,16 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from serial.tools.list_ports_common import ListPortInfo
 
 from labrig import resources
+from labrig.acquire import read_rig_file
 from labrig.drivers.numato import NumatoRelay
 from labrig.drivers.ptp.camera import PtpCamera
+from labrig.drivers.serial_relay import SerialRelay
 from labrig.errors import DeviceError
-from labrig.yaml_file import read_yaml, yaml_text
+from labrig.setup import Host
+from labrig.yaml_file import read_yaml, validate, yaml_text
 from tests.conftest import Ended
 
 Report = dict[str, Any]
@@ -201,6 +205,25 @@ def test_listing_needs_no_device(labrig: Labrig) -> None:
     assert "serial ports:" in ended.out
     found = json.loads(labrig("rig", "list", "--json").out)
     assert set(found) == {"ports", "cameras", "notes"}
+
+
+def test_what_is_listed_is_a_rig_file(
+    labrig: Labrig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ports = []
+    for device, ids in {"COM3": (0x2341, 0x43), "COM4": (0x2A19, 0xC05), "COM5": (1, 2)}.items():
+        port = ListPortInfo(device)
+        port.vid, port.pid = ids
+        ports.append(port)
+    around = Host("linux", lambda: ports, tuple, tuple)
+    monkeypatch.setattr(Host, "of_this_pc", lambda: around)
+    out = labrig("rig", "list").out
+    path = tmp_path / "rig.yaml"
+    path.write_text(out[out.index("name:") :])
+    rig = read_rig_file(path)
+    assert {key: entry.address for key, entry in rig.devices.items()} == {"lamp": "COM3"}
+    validate(rig.devices["lamp"].settings(), SerialRelay.Settings, "listed")
+    assert out.count("# lamp:") == 2
 
 
 def with_viewfinder(path: Path, address: str) -> Path:

@@ -9,13 +9,19 @@ from labrig.clock import VirtualClock
 from labrig.drivers.lcus import LcusRelay
 from labrig.drivers.maestro import MaestroDoor
 from labrig.drivers.numato import NumatoRelay
+from labrig.drivers.serial_relay import SerialRelay
 from labrig.drivers.text_changer import TextChanger
 from labrig.errors import UnclearAnswerError
-from labrig.sim.boards import ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard
+from labrig.sim.boards import ArduinoBoard, ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard
 from labrig.yaml_file import validate
 from tests.drivers.serial_wire import Board, BoardPort, InterruptingClock, Wired
 
 LATE_S = 0.06
+SKETCH = {
+    "on": {"send": "on 0", "answer": "ok"},
+    "off": {"send": "off 0", "answer": "ok"},
+    "state": {"send": "state 0", "on": "on", "off": "off"},
+}
 DOOR = {"channel": 0, "closed": "1000 us", "open": "1500 us", "travel": "20 ms"}
 
 
@@ -31,9 +37,18 @@ def lcus(clock: VirtualClock, late_s: float) -> tuple[LcusRelay, LcusBoard]:
     return LcusRelay("COM5", LcusRelay.Settings(relay=1), wired), board
 
 
-@pytest.mark.parametrize("make", [numato, lcus])
+def arduino(clock: VirtualClock, late_s: float) -> tuple[SerialRelay, ArduinoBoard]:
+    board = ArduinoBoard(2, lambda relay, on: None, clock)
+    settings = validate(SKETCH, SerialRelay.Settings, "rig.yaml")
+    return SerialRelay("COM7", settings, Wired(clock, BoardPort(clock, board, late_s))), board
+
+
+Make = Callable[[VirtualClock, float], tuple[NumatoRelay, NumatoBoard]]
+
+
+@pytest.mark.parametrize("make", [numato, lcus, arduino])
 def test_a_relay_board_that_answers_late_is_usable(
-    make: Callable[[VirtualClock, float], tuple[NumatoRelay, NumatoBoard]],
+    make: Make,
 ) -> None:
     driver, board = make(VirtualClock(), LATE_S)
     driver.make_safe()
@@ -56,11 +71,9 @@ def test_a_servo_board_that_answers_late_is_usable() -> None:
     assert [round(pulse.width_s * 1e6) for pulse in board.pulses(0)] == [1000, 1500, 1000]
 
 
-@pytest.mark.parametrize("make", [numato, lcus])
+@pytest.mark.parametrize("make", [numato, lcus, arduino])
 @given(waits=st.integers(0, 120))
-def test_interrupted_while_answers_are_on_their_way_it_is_made_safe(
-    make: Callable[[VirtualClock, float], tuple[NumatoRelay, NumatoBoard]], waits: int
-) -> None:
+def test_interrupted_while_answers_are_on_their_way_it_is_made_safe(make: Make, waits: int) -> None:
     clock = InterruptingClock()
     driver, board = make(clock, LATE_S)
     with clock.interrupted_after(waits):
@@ -85,19 +98,45 @@ class Straying:
         return stray + self._board.receive(data)
 
 
-@given(st.sampled_from([b"!", b">", b"\0", b"\xff", b"on\n\r>", b"CH1: ON \r\n"]))
+STRAY = [b"!", b">", b"\0", b"\xff", b"!on\n\r>", b"CH1: ON \r\n"]
+
+
+@given(st.sampled_from([*STRAY, b"on\n\r>"]))
 def test_stray_bytes_are_an_unclear_answer_and_the_next_one_is_clear(stray: bytes) -> None:
     clock = VirtualClock()
     board = Straying(NumatoBoard(8, lambda relay, on: None))
-    relay = NumatoRelay(
-        "COM3", NumatoRelay.Settings(relay=0), Wired(clock, BoardPort(clock, board))
-    )
+    wired = Wired(clock, BoardPort(clock, board))
+    require_clear_after(stray, board, NumatoRelay("COM3", NumatoRelay.Settings(relay=0), wired))
+
+
+@given(st.sampled_from(STRAY))
+def test_stray_bytes_before_the_answers_of_the_rig_file(stray: bytes) -> None:
+    clock = VirtualClock()
+    board = Straying(ArduinoBoard(2, lambda relay, on: None, clock))
+    settings = validate(SKETCH, SerialRelay.Settings, "rig.yaml")
+    relay = SerialRelay("COM3", settings, Wired(clock, BoardPort(clock, board)))
+    require_clear_after(stray, board, relay)
+
+
+def require_clear_after(stray: bytes, board: Straying, relay: NumatoRelay | SerialRelay) -> None:
     for act in (relay.on, relay.off, relay.is_on):
         board.stray = stray
         with pytest.raises(UnclearAnswerError):
             act()
         relay.make_safe()
         assert not relay.is_on()
+
+
+def test_lines_that_a_board_sends_of_its_own_accord_are_no_answers() -> None:
+    clock = VirtualClock()
+    board = ArduinoBoard(2, lambda relay, on: None, clock)
+    port = BoardPort(clock, board)
+    relay = SerialRelay("COM3", validate(SKETCH, SerialRelay.Settings, "x"), Wired(clock, port))
+    for act, on in ((relay.on, True), (relay.off, False)):
+        port.write(b"version\nalive\n")
+        clock.sleep(1.0)
+        act()
+        assert relay.is_on() == board.states[0] == on
 
 
 def test_hands_that_babble_are_asked_again_and_hands_that_cannot_are_not() -> None:

@@ -9,7 +9,7 @@ import pytest
 from labrig.acquire import DOOR, LAMP, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import VirtualClock
-from labrig.sim.boards import LcusBoard, MaestroBoard
+from labrig.sim.boards import ArduinoBoard, LcusBoard, MaestroBoard
 from tests.drivers.serial_wire import Board
 from tests.terminal import on_a_terminal
 
@@ -19,6 +19,13 @@ devices:
   lamp: {{driver: lcus_relay, address: "{lcus}", relay: 2}}
   door: {{driver: maestro_door, address: "{maestro}", channel: 3, closed: 1000 us, open: 1877.5 us,
           travel: 20 ms}}
+"""
+
+COMMANDS_RIG = """
+name: one board
+devices:
+  lamp: {{driver: serial_relay, address: "{address}", baud: 19200, framing: 8N2,
+          on: {{send: on 0, answer: ok}}, off: {{send: off 0, answer: ok}}}}
 """
 
 
@@ -46,3 +53,16 @@ def test_lamp_and_door(open_ports: Callable[[Board], str], tmp_path: Path) -> No
     assert [pulse.width_s * 1e6 for pulse in maestro.pulses(3)] == pytest.approx(
         [2000, 1000, 1877.5, 1000]
     )
+
+
+def test_line_settings_of_the_rig_file(open_ports: Callable[[Board], str], tmp_path: Path) -> None:
+    termios = pytest.importorskip("termios", reason="Windows sets its ports in another way")
+    address = open_ports(ArduinoBoard(1, lambda relay, on: None, VirtualClock()))
+    path = tmp_path / "rig.yaml"
+    path.write_text(COMMANDS_RIG.format(address=address))
+    with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as rig:
+        rig[LAMP].on()
+        with Path(address).open("rb") as terminal:
+            settings = termios.tcgetattr(terminal)
+    assert settings[2] & termios.CSTOPB
+    assert settings[5] == termios.B19200
