@@ -13,8 +13,6 @@ from labrig.report.decay_figures import (
     noise_figure,
     overview_figures,
     overview_tiles,
-    residual_figure,
-    residuals,
     timing_figure,
     values_below_axis,
     visible_parts,
@@ -27,6 +25,7 @@ from labrig.report.report_model import (
     GlowPhotograph,
     PatchReport,
 )
+from labrig.report.residual_figures import residual_figure, residuals
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.report.timing import (
     FrameTiming,

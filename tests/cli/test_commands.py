@@ -1,6 +1,7 @@
 """The commands as a person uses them: results, exit codes, one line when something is wrong."""
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -144,6 +145,23 @@ def test_a_run_ends_in_a_result_that_agrees_with_itself(labrig: Labrig, finished
     again = labrig("fit", "decay", result / "series.csv", "--json")
     refit = json.loads(again.out)
     assert refit["states"][0]["k_r_per_s"] == pytest.approx(state["k_r_per_s"], rel=1e-3)
+
+
+@pytest.mark.drawn
+def test_figures_are_drawn_into_a_pdf_on_demand(labrig: Labrig, finished: Path) -> None:
+    svg_files = list((finished / "result" / "figures").glob("*.svg"))
+    pdf = finished / "result" / "figures" / "figures.pdf"
+    assert not pdf.exists()
+    ended = labrig("figures", finished)
+    assert ended.code == 0, ended.err
+    assert pdf.read_bytes().count(b"/Type /Page ") == len(svg_files) >= 4
+    elsewhere = finished / "paper" / "a.pdf"
+    assert labrig("figures", finished, "--out", elsewhere).code == 0
+    assert elsewhere.read_bytes() == pdf.read_bytes()
+    one_line(labrig("figures", finished / "frames"), 2, "run")
+    one_line(labrig("figures", finished, "--out", finished / "journal.jsonl" / "a.pdf"), 5, "a.pdf")
+    shutil.rmtree(finished / "result")
+    one_line(labrig("figures", finished), 2, "expected a run with a result")
 
 
 def test_processing_otherwise(labrig: Labrig, finished: Path) -> None:

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from labrig import colour_science
 from labrig.optics import CameraResponse, read_camera
 from labrig.report.colours import (
     HALOGEN_K,
     MAX_SWATCHES,
+    XYZ_TO_SRGB,
     camera_to_xyz,
     colour_matching,
     encoded,
@@ -145,6 +147,16 @@ def test_an_observer_as_camera_gives_the_observer() -> None:
     np.testing.assert_allclose(
         matrix / matrix[1, 1], np.linalg.inv(mixing) / np.linalg.inv(mixing)[1, 1], atol=1e-9
     )
+
+
+def test_colours_are_those_of_colour_science() -> None:
+    colour = colour_science.load()
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    np.testing.assert_allclose(colour_matching(observer.wavelengths), observer.values, rtol=1e-9)
+    linear = np.linspace(0, 1, 999)
+    curve = colour.cctf_encoding(linear, function="sRGB")
+    np.testing.assert_array_equal(encoded(linear), np.rint(255 * curve))
+    np.testing.assert_allclose(XYZ_TO_SRGB, colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
 
 
 def test_the_misfit_is_what_the_docstring_says() -> None:

@@ -16,13 +16,12 @@ from labrig.report.decay_figures import (
     logarithmic_decay,
     overview_figures,
     overview_tiles,
-    residual_figure,
-    residuals,
     timing_figure,
     values_below_axis,
 )
 from labrig.report.figure_files import FigureFiles
 from labrig.report.figure_style import CARET_DOWN, figure_style
+from labrig.report.residual_figures import residual_figure, residuals
 from labrig.report.sections import Picture
 from labrig.report.timing import FrameTiming
 from labrig.results import Series

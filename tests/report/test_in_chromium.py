@@ -81,6 +81,31 @@ def test_nothing_overflows_and_no_printed_page_is_blank(chromium: "Chrome", tmp_
     assert 5 <= len(pages) <= 7
 
 
+def test_a_link_opens_the_patch_that_it_names(chromium: "Chrome", tmp_path: Path) -> None:
+    fitted = patch(decay_series(12))
+    patches = [replace(fitted, name=f"paint {number}") for number in range(1, 6)]
+    page = tmp_path / "report.html"
+    write_report(page, page_of(decay_report(tmp_path, patches)))
+
+    def opened() -> list[str]:
+        return [
+            summary.text.split()[-1]
+            for summary in chromium.find_elements("css selector", ".folded > details[open] summary")
+            if summary.text.startswith(tuple("12345"))
+        ]
+
+    chromium.get(page.as_uri())
+    assert opened() == []
+    chromium.find_element("css selector", ".tiles a[href='#patch-2']").click()
+    assert opened() == ["2"]
+    chromium.find_element("css selector", ".summary a[href='#patch-4']").click()
+    assert opened() == ["2", "4"]
+    (figure, *_) = chromium.find_elements("css selector", "#patch-4 .plot > svg")
+    assert figure.rect["width"] > 300
+    chromium.find_element("css selector", ".open-all").click()
+    assert opened() == ["1", "2", "3", "4", "5"]
+
+
 def shown_texts(pdf: bytes) -> list[int]:
     """How many pieces of text each page of a PDF by Chromium shows."""
     found = re.findall(rb"^(\d+) 0 obj\s(.*?)\sendobj", pdf, re.DOTALL | re.MULTILINE)

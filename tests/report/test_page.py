@@ -273,15 +273,34 @@ def test_a_steady_source_is_reported_with_its_drift(tmp_path: Path) -> None:
     assert "do not decay" not in Page(written(tmp_path, decay_report(tmp_path))).text
 
 
-@pytest.mark.campaign
-@pytest.mark.drawn
-def test_many_patches(tmp_path: Path) -> None:
-    patches = [patch(decay_series(seed=n, name=f"paint {n}")) for n in range(5)]
-    page = Page(written(tmp_path, decay_report(tmp_path, patches)))
-    for number in range(1, 6):
+@pytest.mark.parametrize(("count", "folded"), [(4, 0), (5, 5)])
+def test_many_patches_are_folded_up_behind_an_overview(
+    tmp_path: Path, count: int, folded: int
+) -> None:
+    fitted = patch(decay_series(12))
+    patches = [replace(fitted, name=f"paint {number}") for number in range(1, count + 1)]
+    text = written(tmp_path, decay_report(tmp_path, patches))
+    page = Page(text)
+    for number in range(1, count + 1):
+        assert page.references.count(f"#patch-{number}") >= 2
         assert f"patch-{number}" in page.ids
-        assert any(f"overview-{number}-" in one for one in page.ids)
-        assert page.text.count(f"paint {number - 1}") >= 3
+        assert page.text.count(f"paint {number}") >= 3
+    assert text.count('class="patch folded"') == folded
+    # A figure of every patch in the overview, four in its own section, and the timing.
+    assert text.count('role="img"') == 5 * count + 1
+    files = len(list((tmp_path / "figures").iterdir()))
+    assert files == 4 * count + 1 + (0 if folded else count)
+
+
+def test_a_warning_about_a_patch_of_several_stands_at_its_row(tmp_path: Path) -> None:
+    fit = patch(decay_series()).fit
+    assert isinstance(fit, DecayFit)
+    clean = replace(patch(decay_series()), fit=replace(fit, warnings=()), name="a")
+    warned = replace(clean, fit=replace(fit, warnings=("too hot",)), name="b")
+    report = decay_report(tmp_path, [clean, warned])
+    page = Page(written(tmp_path, report, ["b: too hot"]))
+    assert page.text.count("1 warning") == 2
+    assert page.text.count("too hot") == 2
 
 
 def test_without_camera_curves_or_photographs(tmp_path: Path) -> None:
