@@ -23,7 +23,7 @@ def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[floa
     x, y, width, height = region
     if max(region) <= 1 and max(x + width, y + height) > 1 + SLACK:
         raise ValueError(
-            f"expected a region inside of the frame, got {list(region)}: fractions of it that end at "
+            f"expected a region inside of the frame, got {list(region)}: fractions that end at "
             f"{x + width:g} of its width and {y + height:g} of its height"
         )
     return region
