@@ -1,4 +1,4 @@
-"""How Sphinx builds the manual: `sphinx-build -W docs OUT`, as `.ci/run` does."""
+"""Settings with which Sphinx builds the manual: `sphinx-build -W docs OUT`, as `.ci/run` does."""
 
 import sys
 from importlib.metadata import version as version_of

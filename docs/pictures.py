@@ -21,11 +21,12 @@ from selenium.webdriver import Chrome
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.chromium import browser
 
+LABRIG = (sys.executable, "-m", "labrig")
 PICTURES = Path(__file__).parent / "pictures"
 WIDTH = 1280
 #: Frames of the decay that the watched run has when its picture is taken.
 FRAMES_WATCHED = 22
-#: Until a live page has drawn what it is sent.
+#: Time after which a live page has drawn what it is sent.
 SETTLE_S = 4.0
 
 
@@ -49,11 +50,8 @@ def main() -> None:
             page(chrome, address, "view", 900, SETTLE_S)
 
 
-LABRIG = (sys.executable, "-m", "labrig")
-
-
 def page(chrome: Chrome, address: str, name: str, height: int, settle_s: float = 0.5) -> None:
-    """The top of a page, `height` pixels high."""
+    """Take a picture of the top of a page, `height` pixels high."""
     chrome.set_window_size(WIDTH, height)
     chrome.get(address)
     time.sleep(settle_s)
@@ -62,7 +60,7 @@ def page(chrome: Chrome, address: str, name: str, height: int, settle_s: float =
 
 
 def half_done(run: Path, runs: Path) -> Path:
-    """A copy of a run as it was in the middle of its decay."""
+    """Return a copy of a run as it was in the middle of its decay."""
     copy = runs / run.name
     shutil.copytree(run, copy, ignore=shutil.ignore_patterns("result*", "comparison"))
     lines = (run / "journal.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
@@ -74,7 +72,7 @@ def half_done(run: Path, runs: Path) -> Path:
 
 @contextmanager
 def served(*arguments: str) -> Iterator[str]:
-    """The address of a page that a command of labrig serves."""
+    """Yield the address of a page that a command of labrig serves."""
     with subprocess.Popen([*LABRIG, *arguments], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:

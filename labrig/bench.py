@@ -259,14 +259,18 @@ class _Connections:
         self._stack = stack
         self._names = names
         self._ports: dict[tuple[str, ...], SerialPort] = {}
+        self._settings: dict[tuple[str, ...], tuple[int, str]] = {}
         self._locked: set[str] = set()
 
-    def serial(self, address: str, baudrate: int) -> SerialPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
         try:
             port = serial.serial_for_url(
                 self._names.look_up(address),
                 do_not_open=True,
                 baudrate=baudrate,
+                bytesize=int(framing[0]),
+                parity=framing[1],
+                stopbits=int(framing[2]),
                 timeout=0,
                 write_timeout=SERIAL_WRITE_TIMEOUT_S,
                 exclusive=True,
@@ -277,11 +281,19 @@ class _Connections:
                 port.open()
                 self._stack.callback(port.close)
                 self._ports[devices] = port
+                self._settings[devices] = baudrate, framing
         except (serial.SerialException, OSError, ValueError) as error:
             raise DeviceError(
                 f"cannot open the serial port {address} ({' '.join(str(error).split())}); "
                 "check that it is plugged in and that no other program uses it"
             ) from None
+        if self._settings[devices] != (baudrate, framing):
+            other_baudrate, other_framing = self._settings[devices]
+            raise UsageError(
+                f"two devices of the rig use the serial port {address}, one at {other_baudrate} "
+                f"baud, {other_framing}, the other at {baudrate} baud, {framing}; give both the "
+                "same"
+            )
         return self._ports[devices]
 
     def usb(self, address: str, serial_of: Callable[[Any], str] | None = None) -> Any:

@@ -5,6 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
+from pydantic import BaseModel
+
 from labrig import resources
 from labrig.acquire import RigFile
 from labrig.calibration import CalibrationKind, LvfFile, kinds
@@ -19,7 +21,7 @@ from labrig.optics import (
 )
 from labrig.yaml_file import did_you_mean
 
-FileT = TypeVar("FileT")
+FileT = TypeVar("FileT", bound=BaseModel)
 
 _SUFFIX = ".csv"
 
@@ -55,7 +57,7 @@ def calibration(rig: RigFile, kind: CalibrationKind[FileT]) -> FileT | None:
         The file is missing or malformed.
     """
     named = rig.optics.named(kind)
-    return None if named is None else kind.read_named(Path(named))
+    return None if named is None else kind.read(Path(named))
 
 
 def lamp_spectrum(rig: RigFile) -> Spectrum:

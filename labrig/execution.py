@@ -33,7 +33,7 @@ from labrig.errors import (
     ProtocolError,
 )
 from labrig.quantity import duration_text
-from labrig.record import ActionRecord, RunFolder, RunRecord
+from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
 from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 from labrig.trial_frame import offers_with_frame_size
 
@@ -291,9 +291,10 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
             "crash or a failing disk left; they are kept, and nothing is made of them"
         )
     frames = [frame for attempt in record.completed().values() for frame in attempt.frames]
-    if damaged := [f"{frame.path.name} {damage}" for frame in frames if (damage := frame.damage())]:
+    damaged = damaged_frames(folder.path, frames)
+    if texts := [f"{frame.path.name} {damage}" for frame, damage in damaged.items()]:
         yield (
-            f"{folder.path / 'frames'}: {_listed(damaged)}; restore from a copy, or begin a new "
+            f"{folder.path / 'frames'}: {_listed(texts)}; restore from a copy, or begin a new "
             "run: labrig process refuses them"
         )
 

@@ -11,7 +11,6 @@ C. L. Lawson, R. J. Hanson, *Solving least squares problems* (1974), chapter 23.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 FloatArray = NDArray[np.float64]
 
@@ -45,6 +44,9 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
 
 def _by_scipy(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray | None:
     """Return SciPy's solution if it is the minimum, else None."""
+    # Not above: it takes as long to load as a plan takes to be printed.
+    from scipy.optimize import nnls
+
     if not columns.size:
         return None
     try:

@@ -54,12 +54,13 @@ class DoorSettings(Part):
 
 
 class LedSettings(Part):
-    """An LED behind a relay of the Numato board, beside the lamp; no filter is before it.
+    """An LED behind a relay, beside the lamp; no filter is before it.
 
     Attributes
     ----------
     relay
-        Relay of the Numato board that switches the LED; relay 0 is the lamp's.
+        Relay that switches the LED, of the Numato board, or of the Arduino if that switches the
+        lamp; relay 0 is the lamp's.
     centre
         Centre wavelength of the LED's band, in nm.
     fwhm

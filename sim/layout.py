@@ -73,10 +73,11 @@ class Layout:
             numbers += np.where(patch > 0, self._strips["on sample"], 0)
         # The cloth and every patch have a cell, even one that others hide.
         every = np.arange(len(simulation.patches) + 1) * (PIECES + 1)
-        cells, counts = np.unique(np.concatenate([every, numbers.ravel()]), return_counts=True)
+        pixels = np.bincount(numbers.ravel(), minlength=int(every[-1]) + 1)
+        cells = np.union1d(np.flatnonzero(pixels), every)
         self._cells = np.searchsorted(cells, numbers)
         self.patch, self.piece = np.divmod(cells, PIECES + 1)
-        self.pixels = counts - np.isin(cells, every)
+        self.pixels = pixels[cells]
         self._places_by_arrangement: dict[tuple[Card, LvfPlace], Places] = {}
 
     def places(self, arrangement: Arrangement) -> Places:
@@ -101,9 +102,10 @@ class Layout:
         surface = surfaces(card, self._simulation.chart, width, height)
         piece = self._strips.get(through, np.zeros_like(surface))
         numbers = (self._cells * (surface.max() + 1) + surface) * (PIECES + 1) + piece
-        distinct, place = np.unique(numbers, return_inverse=True)
+        distinct = np.flatnonzero(np.bincount(numbers.ravel()))
+        place = np.searchsorted(distinct, numbers)
         remainder, pieces_found = np.divmod(distinct, PIECES + 1)
         cells_found, surfaces_found = np.divmod(remainder, surface.max() + 1)
         bayer = np.tile(np.arange(len(BAYER_RGGB)).reshape(2, 2), (height // 2, width // 2))
-        painted = place.reshape(height, width) * len(BAYER_RGGB) + bayer
+        painted = place * len(BAYER_RGGB) + bayer
         return Places(cells_found, surfaces_found, pieces_found, painted)

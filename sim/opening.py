@@ -12,7 +12,7 @@ from labrig.clock import VirtualClock
 from labrig.yaml_file import validate
 
 from . import protocol_sim
-from .boards import ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
+from .boards import ArduinoBoard, ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
 from .clock import RoomClock
@@ -22,13 +22,14 @@ from .room import Room
 from .simulation import Simulation
 from .temperature import TemperatureSensor
 
-#: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/servo`,
-#: `sim://room/changer`, `sim://room/camera`.
+#: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
+#: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`.
 NAME = "room"
-#: Relay that carries the lamp, of either relay board; an LCUS board counts from 1.
+#: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
 RELAYS = 8
 LCUS_RELAYS = 4
+ARDUINO_RELAYS = 4
 #: Analogue input of the Numato board that has the thermometer.
 TEMPERATURE_INPUT = 0
 #: Stream of random numbers of the thermometer alone.
@@ -58,9 +59,17 @@ class OpenRoom:
         lcus = LcusBoard(
             LCUS_RELAYS, lambda relay, on: self._relay_moved("lcus", relay - 1, on), simulation.lcus
         )
+        arduino = ArduinoBoard(
+            ARDUINO_RELAYS, lambda relay, on: self._relay_moved("arduino", relay, on), clock
+        )
         self._lamp_board = simulation.lamp.board
-        carrier = relays if self._lamp_board == "relays" else lcus
-        carrier.states[LAMP_RELAY] = simulation.initial.lamp == "on"
+        self._led_board = "arduino" if self._lamp_board == "arduino" else "relays"
+        relay_boards: dict[str, NumatoBoard | LcusBoard | ArduinoBoard] = {
+            "relays": relays,
+            "lcus": lcus,
+            "arduino": arduino,
+        }
+        relay_boards[self._lamp_board].states[LAMP_RELAY] = simulation.initial.lamp == "on"
         changer = ChangerBoard(self.room.tasks)
         for task in simulation.initial.manual_steps:
             changer.do(task)
@@ -75,7 +84,7 @@ class OpenRoom:
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
-            for name, board in (("relays", relays), ("lcus", lcus))
+            for name, board in relay_boards.items()
         }
         self.camera = SimulatedCamera(
             clock,
@@ -98,7 +107,7 @@ class OpenRoom:
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
         if (board, relay) == (self._lamp_board, LAMP_RELAY):
             self.room.switch_lamp(on)
-        elif board == "relays":
+        elif board == self._led_board:
             self.room.switch_led(relay, on)
 
 
@@ -138,7 +147,7 @@ def open_room(
     >>> with open_room(description, "my-rig.yaml") as room:
     ...     room.clock.sleep(60.0)
     ...     print(sorted(room.boards), room.clock.now())
-    ['changer', 'lcus', 'relays', 'servo'] 60.0
+    ['arduino', 'changer', 'lcus', 'relays', 'servo'] 60.0
     """
     simulation = validate(content, Simulation, f"{source}, simulation").opened_at(not_before_s)
     naps = given(fault.pc_asleep for fault in simulation.faults)

@@ -113,8 +113,8 @@ class LampSettings(Part):
         Fraction of the light that is lost by ageing and dust in an hour of the room's clock, for
         example `0.2 %`.
     board
-        Board that switches the lamp: `relays`, relay 0 of the Numato board, or `lcus`, relay 1 of
-        the LCUS board.
+        Board that switches the lamp: `relays`, relay 0 of the Numato board, `lcus`, relay 1 of the
+        LCUS board, or `arduino`, relay 0 of the Arduino, which then has the LEDs, too.
     afterglow
         Light of the lamp just after it is switched off, as a fraction of the burning lamp's, beside
         the cooling filament's.
@@ -126,7 +126,7 @@ class LampSettings(Part):
     warm_up: Annotated[DurationS, Field(gt=0)] = 150.0
     warm_up_deficit: Annotated[Fraction, Field(ge=0, lt=1)] = 0.03
     drift_per_hour: Annotated[Fraction, Field(ge=0, lt=1)] = 0.002
-    board: Literal["relays", "lcus"] = "relays"
+    board: Literal["relays", "lcus", "arduino"] = "relays"
     afterglow: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     afterglow_fades: Annotated[DurationS, Field(gt=0)] = 60.0
 

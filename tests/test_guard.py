@@ -28,6 +28,23 @@ RIG = (
     "name: lamp\ndevices:\n  lamp: {{driver: numato_relay, address: '{address}', relay: {relay}}}\n"
 )
 
+#: The Numato board by the driver that knows no board.
+COMMANDS_RIG = r"""
+name: lamp
+devices:
+  lamp:
+    driver: serial_relay
+    address: '{address}'
+    line_end: '\r'
+    answer_end: '>'
+    on: {{send: relay on {relay}, answer: relay on {relay}}}
+    off: {{send: relay off {relay}, answer: relay off {relay}}}
+    state:
+      send: relay read {relay}
+      on: relay read {relay} on
+      off: relay read {relay} off
+"""
+
 
 @pytest.fixture
 def board() -> Iterator[BoardProcess]:
@@ -62,6 +79,16 @@ def test_ctrl_z_stops_it_safely_and_after_kill_9_the_guard_switches_off(tmp_path
     assert [attempt.exit_status for attempt in record.attempts] == ["abort", None]
     assert "Ctrl-Z" in record.attempts[0].reason
     assert "a process of its own" in record.attempts[0].start["guard"]
+
+
+def test_after_kill_9_the_guard_sends_the_commands_of_the_rig_file(tmp_path: Path) -> None:
+    with lit_bench(tmp_path, BoardProcess()) as bench:
+        path = tmp_path / "rig.yaml"
+        path.write_text(COMMANDS_RIG.format(address=bench.board.address, relay=RELAY))
+        process = bench.start()
+        process.kill()
+        assert bench.board.wait_for(False, OFF_WITHIN_S)
+        process.communicate()
 
 
 def heard(tmp_path: Path, said: bytes) -> bool:

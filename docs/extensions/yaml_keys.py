@@ -84,7 +84,7 @@ def _default(value: dict[str, Any]) -> str:
 
 
 def _value(value: dict[str, Any], blocks: dict[str, Any]) -> str:
-    """What may stand behind a key, in a few words."""
+    """Return a short description of the values that a key takes."""
     if "$ref" in value:
         name = value["$ref"].rpartition("/")[2]
         has_table = any("properties" in x for x in (blocks[name], *blocks[name].get("anyOf", [])))

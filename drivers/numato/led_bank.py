@@ -1,24 +1,33 @@
 """LEDs behind relays of a Numato board, one lit at a time; every relay is read back."""
 
-from contextlib import suppress
+from dataclasses import dataclass
 from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import Connections
-from labrig.errors import DeviceError
 
+from ..led_switches import LedSwitches
 from .board import CHANNELS, Board
 
 Name = Annotated[str, Field(min_length=1)]
 Relay = Annotated[int, Field(ge=0, lt=len(CHANNELS))]
 
 
+@dataclass(frozen=True)
+class _Relay:
+    board: Board
+    number: int
+
+    def switch(self, *, on: bool) -> None:
+        self.board.switch(self.number, on=on)
+
+    def is_on(self) -> bool:
+        return self.board.is_on(self.number)
+
+
 class NumatoLedBank:
     """Several relays of one Numato board, each switching an LED.
-
-    Two LEDs are never lit together: all that may be lit are switched off and read back before
-    another one is switched on.
 
     Parameters
     ----------
@@ -53,8 +62,8 @@ class NumatoLedBank:
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._relays = settings.relays
         self._board = Board(address, connections)
-        #: LEDs not read back as off since they were last lit; after connecting, all.
-        self._may_be_lit = set(self._relays)
+        relays = {name: _Relay(self._board, relay) for name, relay in self._relays.items()}
+        self._leds = LedSwitches(self._board.name, relays, self._board.resynchronise)
 
     @classmethod
     def declared_channels(cls, settings: Settings) -> tuple[str, ...]:
@@ -76,23 +85,11 @@ class NumatoLedBank:
 
     def light(self, channel: str) -> None:
         """Switch off all LEDs that may be lit, then switch on one; all are read back."""
-        self.dark()
-        self._may_be_lit.add(channel)
-        self._board.switch(self._relays[channel], on=True)
+        self._leds.light(channel)
 
     def dark(self) -> None:
         """Switch off all LEDs that may be lit, each even if another one fails; read all back."""
-        failure: DeviceError | None = None
-        for channel in [name for name in self._relays if name in self._may_be_lit]:
-            try:
-                self._board.switch(self._relays[channel], on=False)
-                self._may_be_lit.remove(channel)
-            except DeviceError as error:
-                failure = failure or error
-                with suppress(DeviceError):  # so that the next one is understood
-                    self._board.resynchronise()
-        if failure:
-            raise failure
+        self._leds.dark()
 
     def channel_on(self) -> str | None:
         """Return the name of the LED that the board reads as on.
@@ -102,19 +99,11 @@ class NumatoLedBank:
         DeviceError
             Several LEDs are on.
         """
-        names = [name for name, relay in self._relays.items() if self._board.is_on(relay)]
-        if len(names) > 1:
-            raise DeviceError(
-                f"{self._board.name}: {' and '.join(names)} are lit at once; something else has "
-                "switched them: leave the board to labrig while it measures"
-            )
-        return names[0] if names else None
+        return self._leds.channel_on()
 
     def make_safe(self) -> None:
         """Resynchronise the line, then switch all LEDs off, whatever their states before."""
-        self._board.resynchronise()
-        self._may_be_lit = set(self._relays)
-        self.dark()
+        self._leds.make_safe()
 
     def disconnect(self) -> None:
         """Do nothing: the port belongs to the connections, which close it."""

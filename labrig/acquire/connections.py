@@ -31,13 +31,24 @@ class Connections(Protocol):
     def clock(self) -> Clock:
         """Clock on which time-outs count."""
 
-    def serial(self, address: str, baudrate: int) -> SerialPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
         """Return the serial port at `COM3`, `/dev/…` or `sim://room/device`, shared by its users.
+
+        Parameters
+        ----------
+        address
+            Address in the rig file.
+        baudrate
+            Bits per second of the line.
+        framing
+            Data bits, parity (none, even, odd) and stop bits, such as `8N1`.
 
         Raises
         ------
         DeviceError
             If there is no such port, or another program holds it.
+        UsageError
+            If another device of the rig uses the port with other line settings.
         """
 
     def usb(self, address: str, serial_of: Callable[[Any], str] | None = None) -> Any:

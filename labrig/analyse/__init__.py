@@ -1,5 +1,6 @@
 """From the frames of a run to its typed result: one module or package for each protocol."""
 
+from labrig.analyse.frames import verify_frames
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.series_fit import fit_series, fit_table
@@ -13,4 +14,5 @@ __all__ = [
     "fit_table",
     "read_run_protocol",
     "temperature_warnings",
+    "verify_frames",
 ]

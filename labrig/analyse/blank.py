@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.analyse.frames import (
-    hot_pixels_of,
     intact_frames,
     part_frames,
     part_region,
@@ -17,7 +16,13 @@ from labrig.analyse.inputs import Part
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
 from labrig.protocols.blank import BLANK_FRAMES
-from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw, reduce_patches
+from labrig.reduce import (
+    FrameMeasurement,
+    fit_dark,
+    hot_pixels_of,
+    measure_region,
+    reduce_patches,
+)
 from labrig.results import BlankResult, FloatArray, Series, StrayLight
 
 #: Fraction of the frames, the latest ones, that determine the constant level.
@@ -123,8 +128,10 @@ def analyse(part: Part) -> BlankResult:
     # Hot pixels are of one colour: left in, they look like light.
     hot = hot_pixels_of(frames.dark)
     darks = [
-        replace(measure(read_raw(frame.path), region, hot), exposure_s=frame.exposure_s)
-        for frame in frames.dark
+        replace(measured, exposure_s=frame.exposure_s)
+        for frame, measured in zip(
+            frames.dark, measure_region(frames.dark, region, hot), strict=True
+        )
     ]
     least_dn = protocol.clean.fraction * darks[0].range_dn
     light = stray_light(series, protocol.clean.sigmas, least_dn)

@@ -7,8 +7,8 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile, CameraFile
 from labrig.errors import DataError, UsageError
-from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
-from labrig.reduce import PixelMask, SeriesFrame, hot_pixels, read_exif, read_raw
+from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, damaged_frames
+from labrig.reduce import SeriesFrame, read_exif
 from labrig.region import Region
 from labrig.results import add_flag
 
@@ -55,18 +55,16 @@ def require_intact(run: RunRecord, roles: Sequence[str], overrides: Overrides) -
     DataError
         Frames are damaged; the message names them and how to leave them out.
     """
-    require(run, damaged_frames(run, roles), overrides)
+    require(run, damaged_frames(run.folder, _frames_in_roles(run, roles)), overrides)
 
 
-def damaged_frames(run: RunRecord, roles: Sequence[str]) -> dict[FrameRecord, str]:
-    """Return frames of completed units that do not match their checksums, and their damage."""
-    frames = [
+def _frames_in_roles(run: RunRecord, roles: Sequence[str]) -> list[FrameRecord]:
+    return [
         frame
         for attempt in run.completed().values()
         for frame in attempt.frames
         if frame.role in roles
     ]
-    return {frame: damage for frame in frames if (damage := frame.damage())}
 
 
 def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overrides) -> None:
@@ -80,6 +78,45 @@ def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overr
     refused = {f: damage for f, damage in damaged.items() if not overrides.excludes(f)}
     if refused:
         raise DataError(f"{run.folder}: {_damage_text(refused)}")
+
+
+def verify_frames(run: RunRecord, overrides: Overrides) -> str:
+    """Read every frame of completed units anew and compare it with its checksum in the journal.
+
+    Parameters
+    ----------
+    run
+        A recorded run.
+    overrides
+        The user's settings, with the frames to leave out.
+
+    Returns
+    -------
+    str
+        Line for people that says how many frames are undamaged.
+
+    Raises
+    ------
+    DataError
+        Frames are damaged; the message names them and how to leave them out.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.analyse import Overrides, verify_frames
+    >>> verify_frames(labrig.read_run("runs/decay"), Overrides())
+    'all 37 frames have the checksums of the journal'
+    """
+    frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
+    damaged = damaged_frames(run.folder, frames, trust=False)
+    require(run, damaged, overrides)
+    if not damaged:
+        return f"all {len(frames)} frames have the checksums of the journal"
+    texts = ", ".join(f"{frame.path.name} {damage}" for frame, damage in damaged.items())
+    return (
+        f"{len(frames) - len(damaged)} of {len(frames)} frames have the checksums of the journal; "
+        f"left out: {texts}"
+    )
 
 
 def _damage_text(damaged: Mapping[FrameRecord, str]) -> str:
@@ -105,10 +142,7 @@ def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
     """
     require_intact(part.run, roles, part.overrides)
     return [
-        frame
-        for attempt in part.run.completed().values()
-        for frame in attempt.frames
-        if frame.role in roles and not part.overrides.excludes(frame)
+        frame for frame in _frames_in_roles(part.run, roles) if not part.overrides.excludes(frame)
     ]
 
 
@@ -208,19 +242,6 @@ def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
     )
 
 
-#: Most dark frames in which hot pixels are searched; reading more takes time.
-ENOUGH = 5
-
-
-def hot_pixels_of(darks: Sequence[SeriesFrame]) -> PixelMask | None:
-    """Find pixels that are bright in the dark; None if there are too few frames."""
-    longest_s = max((dark.exposure_s for dark in darks), default=0.0)
-    longest = [dark for dark in darks if dark.exposure_s == longest_s]
-    if len(longest) < 2:
-        return None
-    return hot_pixels([read_raw(dark.path) for dark in longest[:ENOUGH]])
-
-
 #: Delay in seconds after the planned time from which a warning is given; the measured time counts.
 LATE_S = 0.05
 
@@ -310,14 +331,18 @@ def _check_damage(
     run: RunRecord, overrides: Overrides, measured: tuple[str, ...]
 ) -> dict[FrameRecord, str]:
     """Return damaged frames and their damage; frames of `measured` roles must be excluded."""
-    damaged = damaged_frames(run, (*measured, FrameRole.DAYLIGHT))
+    shown = _frames_in_roles(run, (*measured, FrameRole.DAYLIGHT))
+    damaged = damaged_frames(run.folder, shown)
     require(run, {f: damage for f, damage in damaged.items() if f.role in measured}, overrides)
     return damaged
 
 
 def untimed(frame: FrameRecord) -> SeriesFrame:
     """Return a frame whose time is not used."""
-    return SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
+    return SeriesFrame(
+        frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit,
+        sha256=frame.sha256,
+    )  # fmt: skip
 
 
 def timed(frame: FrameRecord, zero_time: float) -> SeriesFrame:

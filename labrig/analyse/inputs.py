@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self, TypeVar
 
+from pydantic import BaseModel
+
 from labrig.acquire import RigFile
 from labrig.analyse.overrides import Overrides
 from labrig.bench_optics import calibration
@@ -20,7 +22,7 @@ from labrig.material import Material
 from labrig.record import RunRecord
 from labrig.results import EmissionSpectrum, FittedDecay, RunResult
 
-FileT = TypeVar("FileT")
+FileT = TypeVar("FileT", bound=BaseModel)
 
 
 @dataclass(frozen=True)

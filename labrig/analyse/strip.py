@@ -12,13 +12,23 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.frames import hot_pixels_of, require_calibrated_camera, steady_frames
+from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
 from labrig.errors import DataError
 from labrig.optics import SLICES, Strip
 from labrig.record import FrameRole
-from labrig.reduce import HdrFrame, PixelMask, RawFrame, SeriesFrame, read_hdr_frame, read_raw
+from labrig.reduce import (
+    FoundStrip,
+    HotPixels,
+    SensorLayout,
+    SeriesFrame,
+    find_strip_in,
+    hot_pixels_of,
+    sensor_layout,
+    strip_profile_in,
+)
 from labrig.region import Region, region_pixels
+from labrig.results import StripProfile
 
 
 class StripFrames:
@@ -50,18 +60,22 @@ class StripFrames:
             )
         return frames
 
-    def hdr(self, role: str, unit: str | None = None) -> HdrFrame:
-        """Return all frames of a role combined into one."""
-        return read_hdr_frame(self.of(role, unit), self.hot)
+    def find_strip(self, role: str, unit: str | None = None) -> FoundStrip:
+        """Find the lit strip in all frames of a role, combined into one."""
+        return find_strip_in(self.of(role, unit), self.hot)
+
+    def profile(self, role: str, strip: Strip) -> StripProfile:
+        """Average all frames of a role, combined into one, across a strip."""
+        return strip_profile_in(self.of(role), strip, self.hot)
 
     @cached_property
     def size(self) -> tuple[int, int]:
         """Width and height of the frames in pixels."""
-        raw = read_raw(self.dark[0].path)
-        return raw.width, raw.height
+        layout = sensor_layout(self.dark[0])
+        return layout.width, layout.height
 
     @cached_property
-    def hot(self) -> PixelMask | None:
+    def hot(self) -> HotPixels | None:
         """Pixels that are bright in the dark; None if there are too few frames."""
         return hot_pixels_of(self.dark)
 
@@ -130,7 +144,7 @@ def strip_regions(part: Part) -> list[StripPatch]:
 
 
 def slice_strip(
-    patches: Sequence[StripPatch], strip: Strip, raw: RawFrame, count: int = SLICES
+    patches: Sequence[StripPatch], strip: Strip, layout: SensorLayout, count: int = SLICES
 ) -> tuple[dict[StripPatch, Slices], tuple[str, ...]]:
     """Return the strip's slices in the rows of every patch, and the reason for patches without any.
 
@@ -140,8 +154,8 @@ def slice_strip(
         Patches on the strip.
     strip
         Place of the strip in the frames.
-    raw
-        Any frame, for its size and colours.
+    layout
+        Size and colours of the sensor.
     count
         Number of slices.
 
@@ -153,7 +167,7 @@ def slice_strip(
     slices, reasons = {}, []
     for patch in patches:
         try:
-            slices[patch] = _patch_slices(patch, strip, raw, count)
+            slices[patch] = _patch_slices(patch, strip, layout, count)
         except DataError as error:
             reasons.append(str(error))
     if not slices:
@@ -161,38 +175,40 @@ def slice_strip(
     return slices, tuple(reasons)
 
 
-def _patch_slices(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
+def _patch_slices(patch: StripPatch, strip: Strip, layout: SensorLayout, count: int) -> Slices:
     strip_slices = strip.slices(count)
     if patch.region is None:
         return strip_slices
-    x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
-    top, bottom = y / raw.height, (y + high) / raw.height
+    x, y, wide, high = region_pixels(patch.region, layout.width, layout.height)
+    top, bottom = y / layout.height, (y + high) / layout.height
     slices: Slices = {}
     for name, (left, upper, width, height) in strip_slices.items():
         first, last = max(upper, top), min(upper + height, bottom)
         slices[name] = (left, first, width, last - first)
-    rows = [round((y + h) * raw.height) - round(y * raw.height) for _, y, _, h in slices.values()]
-    ends = [round(end[0] * raw.width) for end in (strip.left, strip.right)]
-    if min(rows) >= MIN_CELLS * raw.cfa_side and x <= ends[0] and x + wide >= ends[1]:
+    rows = [
+        round((y + h) * layout.height) - round(y * layout.height) for _, y, _, h in slices.values()
+    ]
+    ends = [round(end[0] * layout.width) for end in (strip.left, strip.right)]
+    if min(rows) >= MIN_CELLS * layout.cfa_side and x <= ends[0] and x + wide >= ends[1]:
         return slices
-    upper = min(y for _, y, _, _ in strip_slices.values()) * raw.height
-    lower = max(y + h for _, y, _, h in strip_slices.values()) * raw.height
+    upper = min(y for _, y, _, _ in strip_slices.values()) * layout.height
+    lower = max(y + h for _, y, _, h in strip_slices.values()) * layout.height
     problem = (
         f"expected patch {patch.name} below the filter from end to end, in "
-        f"{MIN_CELLS * raw.cfa_side} rows or more of its own: the filter lies in columns "
+        f"{MIN_CELLS * layout.cfa_side} rows or more of its own: the filter lies in columns "
         f"{ends[0]} to {ends[1]} and rows {upper:.0f} to {lower:.0f}, the patch in columns {x} to "
         f"{x + wide} and rows {y} to {y + high} ({max(min(rows), 0)} in common)"
     )
     raise DataError(f"{problem}; move it: labrig process RUN --roi {patch.name}=x,y,width,height")
 
 
-def tilt_offset(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
+def tilt_offset(strip: Strip, slices: Slices, layout: SensorLayout) -> FloatArray:
     """Return the offset of slices along a tilted strip from the position of their columns, (P,).
 
     It is 0 in the strip's middle rows, and a fraction of its length, positive to the right, in the
     rows above and below, which belong to other places of the strip.
     """
-    size = np.array([raw.width, raw.height])
+    size = np.array([layout.width, layout.height])
     left, right = np.array(strip.left) * size, np.array(strip.right) * size
     across, down = right - left
     middles = np.array([(x + width / 2, y + height / 2) for x, y, width, height in slices.values()])

@@ -5,28 +5,22 @@ point in `labrig.calibrations`: rig files then have its key, and analyses find i
 `Inputs.calibration`.
 """
 
-from labrig.calibration.blank_file import BLANK_KIND, BlankFile, read_blank_file, write_blank_file
+from labrig.calibration.blank_file import BLANK_KIND, BlankFile
 from labrig.calibration.camera_file import (
     CAMERA_KIND,
     CameraFile,
     Linearity,
     Noise,
-    read_camera_file,
-    write_camera_file,
 )
 from labrig.calibration.fade_file import (
     FADE_KIND,
     Change,
     FadeFile,
     Warming,
-    read_fade_file,
-    write_fade_file,
 )
 from labrig.calibration.irradiance_file import (
     IRRADIANCE_KIND,
     IrradianceFile,
-    read_irradiance_file,
-    write_irradiance_file,
 )
 from labrig.calibration.kind import CalibrationKind, kinds
 from labrig.calibration.lvf_file import (
@@ -35,8 +29,6 @@ from labrig.calibration.lvf_file import (
     CurveColumns,
     LvfFile,
     WavelengthColumns,
-    read_lvf_file,
-    write_lvf_file,
 )
 
 __all__ = [
@@ -59,14 +51,4 @@ __all__ = [
     "Warming",
     "WavelengthColumns",
     "kinds",
-    "read_blank_file",
-    "read_camera_file",
-    "read_fade_file",
-    "read_irradiance_file",
-    "read_lvf_file",
-    "write_blank_file",
-    "write_camera_file",
-    "write_fade_file",
-    "write_irradiance_file",
-    "write_lvf_file",
 ]

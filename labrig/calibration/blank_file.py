@@ -1,7 +1,6 @@
 """The blank file: signal of a decay's frames without a glowing sample."""
 
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -10,7 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from labrig.calibration.kind import CalibrationKind
 from labrig.errors import DataError
 from labrig.finite import Finite, NotNegative, Positive
-from labrig.yaml_file import read_model, write_yaml
 
 Row = tuple[Finite, ...]
 
@@ -41,6 +39,14 @@ class BlankFile(BaseModel):
         a lower bound: the channel with the least signal is taken for dark.
     first_clean_s
         Time after lamp off in seconds from which only the constant level remains; null if never.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import BLANK_KIND
+    >>> blank = BLANK_KIND.read(Path("blank.yaml"))
+    >>> blank.channels, blank.is_clean(2.0)
+    (('R', 'G', 'B'), True)
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -111,63 +117,10 @@ class BlankFile(BaseModel):
         return tuple(messages)
 
 
-def read_blank_file(path: Path) -> BlankFile:
-    """Read a blank: the stray light that remains after lamp off.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-
-    Returns
-    -------
-    BlankFile
-        The validated blank.
-
-    Raises
-    ------
-    UsageError
-        There is no such file, or it is malformed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_blank_file
-    >>> blank = read_blank_file(Path("blank.yaml"))
-    >>> blank.channels, blank.is_clean(2.0)
-    (('R', 'G', 'B'), True)
-    """
-    return read_model(path, BlankFile)
-
-
-def write_blank_file(path: Path, file: BlankFile) -> None:
-    """Write a blank to a file that `read_blank_file` reads.
-
-    Parameters
-    ----------
-    path
-        Path of the file, which is overwritten.
-    file
-        The blank.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_blank_file, write_blank_file
-    >>> blank = read_blank_file(Path("blank.yaml"))
-    >>> noted = blank.model_copy(update={"source": "remeasured with the shield in place"})
-    >>> write_blank_file(Path("shielded.yaml"), noted)
-    >>> read_blank_file(Path("shielded.yaml")).source
-    'remeasured with the shield in place'
-    """
-    write_yaml(path, file)
-
-
 BLANK_KIND = CalibrationKind(
     name="blank",
     protocol="blank",
     optics_key="blank",
     file_name="blank.yaml",
-    read=read_blank_file,
-    write=write_blank_file,
+    model=BlankFile,
 )

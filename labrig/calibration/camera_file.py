@@ -1,6 +1,5 @@
 """The camera file: calibration of a camera body and lens."""
 
-from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
@@ -9,7 +8,6 @@ from labrig.calibration.kind import CalibrationKind
 from labrig.errors import DataError
 from labrig.finite import Finite, NotNegative, Positive
 from labrig.optics import CameraModel, f_number_text
-from labrig.yaml_file import read_model, write_yaml
 
 
 class _Part(BaseModel):
@@ -79,6 +77,15 @@ class CameraFile(CameraModel):
         Deviation from linearity, common to all channels.
     flicker, flicker_sigma
         Relative scatter of the light from frame to frame, common to all channels, and its σ.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import CAMERA_KIND
+    >>> camera = CAMERA_KIND.read(Path("camera.yaml"))
+    >>> exposure_s, relative_sigma = camera.exposure_s(1 / 64)
+    >>> f"{1e3 * exposure_s:.2f} ms ± {100 * relative_sigma:.1f} %"
+    '15.58 ms ± 0.5 %'
     """
 
     kind: Literal["camera"] = "camera"
@@ -127,65 +134,12 @@ class CameraFile(CameraModel):
             )
 
 
-def read_camera_file(path: Path) -> CameraFile:
-    """Read the calibration of a camera body and lens.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-
-    Returns
-    -------
-    CameraFile
-        The validated calibration.
-
-    Raises
-    ------
-    UsageError
-        There is no such file, or it is malformed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_camera_file
-    >>> camera = read_camera_file(Path("camera.yaml"))
-    >>> exposure_s, relative_sigma = camera.exposure_s(1 / 64)
-    >>> f"{1e3 * exposure_s:.2f} ms ± {100 * relative_sigma:.1f} %"
-    '15.58 ms ± 0.5 %'
-    """
-    return read_model(path, CameraFile)
-
-
-def write_camera_file(path: Path, file: CameraFile) -> None:
-    """Write the calibration of a camera to a file that `read_camera_file` reads.
-
-    Parameters
-    ----------
-    path
-        Path of the file, which is overwritten.
-    file
-        The calibration.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_camera_file, write_camera_file
-    >>> camera = read_camera_file(Path("camera.yaml"))
-    >>> write_camera_file(Path("no-lens.yaml"), camera.model_copy(update={"lens": None}))
-    >>> read_camera_file(Path("no-lens.yaml")).lens is None
-    True
-    """
-    write_yaml(path, file)
-
-
 CAMERA_KIND = CalibrationKind(
     name="camera",
     protocol="camera_calibration",
     optics_key="camera_file",
     file_name="camera.yaml",
-    read=read_camera_file,
-    write=write_camera_file,
+    model=CameraFile,
 )
 
 

@@ -1,7 +1,6 @@
 """The fade file: turn-off and turn-on transients of the lamp, band by band."""
 
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -10,7 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
 from labrig.finite import NotNegative, Positive
-from labrig.yaml_file import read_model, write_yaml
 
 FloatArray = NDArray[np.float64]
 Row = tuple[NotNegative, ...]
@@ -81,6 +79,17 @@ class FadeFile(_Part):
         Transients after switching off and on; null if not measured.
     warming
         Slow warm-up of the lamp's housing; null if not measured.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import FADE_KIND
+    >>> lamp = FADE_KIND.read(Path("fade.yaml"))
+    >>> t_s, fraction = lamp.in_bands(lamp.fade, [400, 500, 600, 700])
+    >>> fraction.shape == (len(t_s), 3)
+    True
+    >>> lamp.fade.equivalent_s()[:2].round(3).tolist()
+    [0.029, 0.031]
     """
 
     kind: Literal["fade"] = "fade"
@@ -113,65 +122,10 @@ class FadeFile(_Part):
         return np.array(change.t_s), np.array(fraction)
 
 
-def read_fade_file(path: Path) -> FadeFile:
-    """Read the turn-off and warm-up transients of a lamp.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-
-    Returns
-    -------
-    FadeFile
-        The validated transients.
-
-    Raises
-    ------
-    UsageError
-        There is no such file, or it is malformed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_fade_file
-    >>> lamp = read_fade_file(Path("fade.yaml"))
-    >>> t_s, fraction = lamp.in_bands(lamp.fade, [400, 500, 600, 700])
-    >>> fraction.shape == (len(t_s), 3)
-    True
-    >>> lamp.fade.equivalent_s()[:2].round(3).tolist()
-    [0.029, 0.031]
-    """
-    return read_model(path, FadeFile)
-
-
-def write_fade_file(path: Path, file: FadeFile) -> None:
-    """Write the transients of a lamp to a file that `read_fade_file` reads.
-
-    Parameters
-    ----------
-    path
-        Path of the file, which is overwritten.
-    file
-        The transients.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_fade_file, write_fade_file
-    >>> transients = read_fade_file(Path("fade.yaml"))
-    >>> write_fade_file(Path("lamp-2.yaml"), transients.model_copy(update={"lamp": "lamp 2"}))
-    >>> read_fade_file(Path("lamp-2.yaml")).lamp
-    'lamp 2'
-    """
-    write_yaml(path, file)
-
-
 FADE_KIND = CalibrationKind(
     name="fade",
     protocol="fade",
     optics_key="fade",
     file_name="fade.yaml",
-    read=read_fade_file,
-    write=write_fade_file,
+    model=FadeFile,
 )

@@ -1,7 +1,6 @@
 """The irradiance file: irradiance of the lamp on the sample, directly and through the LVF."""
 
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -9,7 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from labrig.calibration.kind import CalibrationKind
 from labrig.finite import NotNegative, Positive
 from labrig.optics import Strip
-from labrig.yaml_file import read_model, write_yaml
 
 Numbers = tuple[NotNegative, ...]
 
@@ -39,6 +37,17 @@ class IrradianceFile(BaseModel):
         Position of the LVF on the sample, as the camera sees the sample.
     source, run
         Origin of the numbers.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from labrig.calibration import IRRADIANCE_KIND
+    >>> lamp = IRRADIANCE_KIND.read(Path("irradiance.yaml"))
+    >>> f"|E| = {np.linalg.norm(lamp.direct):.3f} in {len(lamp.direct)} bands"
+    '|E| = 1.000 in 8 bands'
+    >>> len(lamp.through) == len(lamp.position)
+    True
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -75,67 +84,12 @@ class IrradianceFile(BaseModel):
         return self
 
 
-def read_irradiance_file(path: Path) -> IrradianceFile:
-    """Read the irradiance of a lamp on the sample, directly and through the LVF.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-
-    Returns
-    -------
-    IrradianceFile
-        The validated irradiance.
-
-    Raises
-    ------
-    UsageError
-        There is no such file, or it is malformed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import numpy as np
-    >>> from labrig.calibration import read_irradiance_file
-    >>> lamp = read_irradiance_file(Path("irradiance.yaml"))
-    >>> f"|E| = {np.linalg.norm(lamp.direct):.3f} in {len(lamp.direct)} bands"
-    '|E| = 1.000 in 8 bands'
-    >>> len(lamp.through) == len(lamp.position)
-    True
-    """
-    return read_model(path, IrradianceFile)
-
-
-def write_irradiance_file(path: Path, file: IrradianceFile) -> None:
-    """Write an irradiance to a file that `read_irradiance_file` reads.
-
-    Parameters
-    ----------
-    path
-        Path of the file, which is overwritten.
-    file
-        The irradiance.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_irradiance_file, write_irradiance_file
-    >>> lamp = read_irradiance_file(Path("irradiance.yaml"))
-    >>> write_irradiance_file(Path("copy.yaml"), lamp.model_copy(update={"source": "a copy"}))
-    >>> read_irradiance_file(Path("copy.yaml")).source
-    'a copy'
-    """
-    write_yaml(path, file)
-
-
 IRRADIANCE_KIND = CalibrationKind(
     name="irradiance",
     protocol="irradiance",
     optics_key="irradiance",
     file_name="irradiance.yaml",
-    read=read_irradiance_file,
-    write=write_irradiance_file,
+    model=IrradianceFile,
 )
 
 

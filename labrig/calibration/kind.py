@@ -1,15 +1,17 @@
 """A kind of calibration: its protocol, its file and its key in rig files."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from pydantic import BaseModel
+
 from labrig import plugins
 from labrig.errors import UsageError
+from labrig.yaml_file import read_model, write_yaml
 
-FileT = TypeVar("FileT")
+FileT = TypeVar("FileT", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -26,18 +28,26 @@ class CalibrationKind(Generic[FileT]):
         Key under `optics:` in a rig file that names its file or its run.
     file_name
         Name of its file in the result of a run.
-    read, write
-        Functions that read and write its file.
+    model
+        Content of its file.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import LVF_KIND
+    >>> lvf = LVF_KIND.read(Path("lvf.yaml"))
+    >>> wavelength_nm = lvf.wavelengths.map().wavelength_nm([0.0, 0.5, 1.0])
+    >>> [f"{nm:.0f} nm" for nm in wavelength_nm]
+    ['391 nm', '554 nm', '704 nm']
     """
 
     name: str
     protocol: str
     optics_key: str
     file_name: str
-    read: Callable[[Path], FileT]
-    write: Callable[[Path, FileT], None]
+    model: type[FileT]
 
-    def read_named(self, path: Path) -> FileT:
+    def read(self, path: Path) -> FileT:
         """Read the file at `path`, or the one in the result of a run or chained run at `path`.
 
         Raises
@@ -46,18 +56,18 @@ class CalibrationKind(Generic[FileT]):
             The file is missing or malformed, or the run has none or several.
         """
         if not path.is_dir():
-            return self.read(path)
+            return read_model(path, self.model)
         paths = [*path.glob(f"result/{self.file_name}"), *path.glob(f"result/*/{self.file_name}")]
         if len(paths) != 1:
             raise UsageError(
                 f"{path}: expected a run with one {self.file_name} in its result, got "
                 f"{len(paths)}; process it first, or name the file itself"
             )
-        return self.read(paths[0])
+        return read_model(paths[0], self.model)
 
-    def write_into(self, folder: Path, file: FileT) -> None:
-        """Write `file` into a result's folder under the kind's file name."""
-        self.write(folder / self.file_name, file)
+    def write(self, folder: Path, file: FileT) -> None:
+        """Write `file` into a folder, such as a run's result, under the kind's file name."""
+        write_yaml(folder / self.file_name, file)
 
 
 @cache

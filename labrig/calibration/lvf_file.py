@@ -1,6 +1,5 @@
 """The LVF file: transmission of a linear variable filter, and its position in the frame."""
 
-from pathlib import Path
 from typing import Literal, Self
 
 import numpy as np
@@ -9,7 +8,6 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from labrig.calibration.kind import CalibrationKind
 from labrig.finite import Finite, NotNegative
 from labrig.optics import Bands, CameraResponse, Lvf, Strip, WavelengthMap
-from labrig.yaml_file import read_model, write_yaml
 
 Numbers = tuple[Finite, ...]
 
@@ -159,66 +157,10 @@ class LvfFile(_Part):
 _FIGURES = tuple(BandColumns.model_fields)
 
 
-def read_lvf_file(path: Path) -> LvfFile:
-    """Read the calibration of a linear variable filter.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-
-    Returns
-    -------
-    LvfFile
-        The validated calibration.
-
-    Raises
-    ------
-    UsageError
-        There is no such file, or it is malformed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_lvf_file
-    >>> file = read_lvf_file(Path("lvf.yaml"))
-    >>> wavelength_nm = file.wavelengths.map().wavelength_nm([0.0, 0.5, 1.0])
-    >>> [f"{nm:.0f} nm" for nm in wavelength_nm]
-    ['391 nm', '554 nm', '704 nm']
-    >>> file.lvf.transmission(wavelength_nm).shape
-    (31, 3)
-    """
-    return read_model(path, LvfFile)
-
-
-def write_lvf_file(path: Path, file: LvfFile) -> None:
-    """Write the calibration of a filter to a file that `read_lvf_file` reads.
-
-    Parameters
-    ----------
-    path
-        Path of the file, which is overwritten.
-    file
-        The calibration.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.calibration import read_lvf_file, write_lvf_file
-    >>> filter_file = read_lvf_file(Path("lvf.yaml"))
-    >>> second = filter_file.model_copy(update={"source": "second filter"})
-    >>> write_lvf_file(Path("lvf-2.yaml"), second)
-    >>> read_lvf_file(Path("lvf-2.yaml")).source
-    'second filter'
-    """
-    write_yaml(path, file)
-
-
 LVF_KIND = CalibrationKind(
     name="lvf",
     protocol="lvf_calibration",
     optics_key="lvf",
     file_name="lvf.yaml",
-    read=read_lvf_file,
-    write=write_lvf_file,
+    model=LvfFile,
 )

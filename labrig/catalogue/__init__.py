@@ -1,26 +1,8 @@
-"""Catalogue of the runs in a folder: their states, their results, and changes between them."""
+"""Catalogue of the runs in a folder: their states, their results, and changes between them.
 
-from labrig.catalogue.compare import Comparison, Difference, PatchComparison, compare_runs
-from labrig.catalogue.listing import (
-    RunFilter,
-    RunStatus,
-    RunSummary,
-    find_run,
-    list_runs,
-    status_of,
-    summarise,
-)
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "Comparison",
-    "Difference",
-    "PatchComparison",
-    "RunFilter",
-    "RunStatus",
-    "RunSummary",
-    "compare_runs",
-    "find_run",
-    "list_runs",
-    "status_of",
-    "summarise",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,61 +1,15 @@
-"""Summaries of the runs in a folder."""
+"""The runs in a folder: listed through a filter, or one found by its name."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, date, datetime
+from datetime import date, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Literal, get_args
 
-from filelock import FileLock, Timeout
-
-from labrig.acquire import read_protocol
-from labrig.errors import DataError, DiskError, LabrigError, UsageError
-from labrig.record import read_run
-from labrig.results import FittedDecay, read_fitted_decays
-from labrig.yaml_file import did_you_mean, read_yaml
-
-#: `running`: a process writes to the run; `unfinished`: units are missing; `recorded`: all units
-#: are complete, without a result; `processed`: with a result; `damaged`: the journal is unreadable.
-RunStatus = Literal["running", "unfinished", "recorded", "processed", "damaged"]
-STATUSES: tuple[RunStatus, ...] = get_args(RunStatus)
-
-
-@dataclass(frozen=True)
-class RunSummary:
-    """Summary of a run folder.
-
-    Attributes
-    ----------
-    folder
-        Run folder.
-    sample
-        Name of the sample.
-    protocol
-        Name of the protocol.
-    began
-        Begin of the first attempt in UTC; None if there is none.
-    state
-        State of the run.
-    done
-        Number of completed units.
-    units
-        Number of all units; None if the protocol is not installed.
-    frames
-        Number of frames of completed units.
-    results
-        Fitted decays by patch; by "" if there is one patch only.
-    """
-
-    folder: Path
-    sample: str
-    protocol: str
-    began: datetime | None
-    status: RunStatus
-    done: int
-    units: int | None
-    frames: int
-    results: Mapping[str, FittedDecay]
+from labrig.catalogue.index import PROTOCOL, read_summaries
+from labrig.catalogue.run_summary import STATUSES, RunSummary
+from labrig.errors import UsageError
+from labrig.record import time_made
 
 
 @dataclass(frozen=True)
@@ -68,8 +22,8 @@ class RunFilter:
         Patterns of the names, such as `blue*`, without regard to case.
     since, until
         First and last day in UTC, both included.
-    state
-        State of the run; None for any state.
+    status
+        Status of the run; None for any.
     """
 
     sample: str = "*"
@@ -80,6 +34,8 @@ class RunFilter:
 
     def __post_init__(self) -> None:
         if self.status is not None and self.status not in STATUSES:
+            from labrig.yaml_file import did_you_mean
+
             raise UsageError(f"--status {self.status}: {did_you_mean(self.status, STATUSES)}")
 
     def admits(self, run: RunSummary) -> bool:
@@ -102,12 +58,12 @@ def list_runs(runs: Path, run_filter: RunFilter) -> list[RunSummary]:
     runs
         Folder with run folders.
     run_filter
-        Filter by sample, protocol, day and state.
+        Filter by sample, protocol, day and status.
 
     Returns
     -------
     list of RunSummary
-        Summaries of these runs, oldest first.
+        Summaries of these runs in the order in which they were made.
 
     Raises
     ------
@@ -124,8 +80,7 @@ def list_runs(runs: Path, run_filter: RunFilter) -> list[RunSummary]:
     """
     if not runs.is_dir():
         raise UsageError(f"{runs}: no such folder; give the one with the run folders as --runs")
-    summaries = [summarise(path) for path in _run_folders(runs)]
-    return [run for run in summaries if run_filter.admits(run)]
+    return [run for run in read_summaries(runs) if run_filter.admits(run)]
 
 
 def find_run(run: Path, runs: Path) -> Path:
@@ -134,7 +89,8 @@ def find_run(run: Path, runs: Path) -> Path:
     Parameters
     ----------
     run
-        Path of a run folder, name of a folder in `runs` or the beginning of one, or `last`.
+        Path of a run folder; name of a folder in `runs`, or the beginning of one; or `last` for the
+        run that was made last.
     runs
         Folder with run folders.
 
@@ -155,14 +111,14 @@ def find_run(run: Path, runs: Path) -> Path:
     >>> find_run(Path("last"), Path("runs")).name
     'decay'
     """
-    if (run / "protocol.yaml").is_file():
+    if (run / PROTOCOL).is_file():
         return run
-    folders = list(_run_folders(runs)) if runs.is_dir() else []
-    if str(run) == "last" and folders:
-        return folders[-1]
-    matches = [path for path in folders if path.name == str(run)] or [
-        path for path in folders if path.name.startswith(str(run))
-    ]
+    if str(run) == "last":
+        matches = sorted(_run_folders(runs, ""), key=_order)[-1:]
+    elif str(run) == run.name and (runs / run / PROTOCOL).is_file():
+        return runs / run
+    else:
+        matches = list(_run_folders(runs, str(run)))
     if len(matches) == 1:
         return matches[0]
     problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
@@ -172,109 +128,13 @@ def find_run(run: Path, runs: Path) -> Path:
     )
 
 
-def summarise(folder: Path) -> RunSummary:
-    """Summarise the run in a folder.
-
-    Parameters
-    ----------
-    folder
-        Run folder; its files may be incomplete or damaged.
-
-    Returns
-    -------
-    RunSummary
-        Sample, protocol, state, number of frames and fitted decays.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.catalogue import summarise
-    >>> summary = summarise(Path("runs/decay"))
-    >>> summary.sample, summary.status, summary.frames
-    ('sample', 'processed', 37)
-    """
-    sample, protocol, units = _protocol_summary(folder)
-    try:
-        record, results = read_run(folder), read_fitted_decays(folder / "result")
-    except (DataError, DiskError):
-        has_journal = (folder / "journal.jsonl").exists()
-        status: RunStatus = "damaged" if has_journal else "unfinished"
-        return RunSummary(folder, sample, protocol, None, status, 0, units, 0, {})
-    completed = record.completed()
-    return RunSummary(
-        folder=folder,
-        sample=sample,
-        protocol=protocol,
-        began=(
-            datetime.fromtimestamp(record.attempts[0].start["time"], UTC)
-            if record.attempts
-            else None
-        ),
-        status=status_of(folder, units is not None and len(completed) == units),
-        done=len(completed),
-        units=units,
-        frames=sum(len(attempt.frames) for attempt in completed.values()),
-        results=results,
-    )
+def _run_folders(runs: Path, beginning: str) -> Iterator[Path]:
+    """Yield the run folders whose names begin so."""
+    if runs.is_dir():
+        for path in runs.iterdir():
+            if path.name.startswith(beginning) and (path / PROTOCOL).is_file():
+                yield path
 
 
-def _run_folders(runs: Path) -> Iterator[Path]:
-    return (path.parent for path in sorted(runs.glob("*/protocol.yaml")))
-
-
-def _protocol_summary(folder: Path) -> tuple[str, str, int | None]:
-    """Return sample, protocol and number of units from the protocol file of a run."""
-    try:
-        content = read_yaml(folder / "protocol.yaml")
-    except UsageError:
-        return "?", "?", None
-    sample = content.get("sample")
-    name = sample.get("name", "?") if isinstance(sample, dict) else "?"
-    try:
-        units = len(read_protocol(folder / "protocol.yaml").units())
-    except LabrigError:
-        units = None
-    return str(name), str(content.get("protocol", "?")), units
-
-
-def status_of(folder: Path, is_complete: bool) -> RunStatus:
-    """Return the state of a run.
-
-    Parameters
-    ----------
-    folder
-        Run folder.
-    is_complete
-        Whether all units of the run are complete.
-
-    Returns
-    -------
-    RunState
-        One of `running`, `unfinished`, `recorded` and `processed`.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.catalogue import status_of
-    >>> status_of(Path("runs/decay"), is_complete=True)
-    'processed'
-    """
-    if _is_being_written(folder):
-        return "running"
-    if not is_complete:
-        return "unfinished"
-    return "processed" if (folder / "result").is_dir() else "recorded"
-
-
-def _is_being_written(folder: Path) -> bool:
-    """Whether a process has the run open for writing."""
-    lock = folder / ".lock"
-    if not lock.exists():
-        return False
-    try:
-        with FileLock(lock, timeout=0):
-            return False
-    except Timeout:
-        return True
-    except OSError:  # another user's folder: only its owner writes there
-        return False
+def _order(run: Path) -> tuple[datetime, str]:
+    return time_made(run), run.name

@@ -5,6 +5,8 @@ from typer.core import TyperGroup
 
 from labrig.cli import (
     compare,
+    driver,
+    figures,
     fit,
     frame,
     optics,
@@ -29,11 +31,13 @@ app.command("run")(run.run)
 app.command("plan")(run.plan)
 app.command("resume")(run.resume)
 app.command("process")(process.process)
+app.command("figures")(figures.figures)
 app.command("frame")(frame.frame)
 app.command("compare")(compare.compare)
 app.command("note")(runs.note)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)
+app.add_typer(driver.app, name="driver")
 app.add_typer(fit.app, name="fit")
 app.add_typer(optics.app, name="optics")
 app.add_typer(protocol.app, name="protocol")

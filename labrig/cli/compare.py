@@ -94,7 +94,7 @@ def _save_figures(section: "Section", folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     for picture in section.figures:
         with figure_style():
-            figure = picture.draw()
+            figure = picture.figure()
             figure.patch.set(visible=True, facecolor="white")
             for suffix in ("png", "pdf"):
                 figure.savefig(folder / f"{picture.name}.{suffix}", dpi=200)

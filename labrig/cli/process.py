@@ -41,17 +41,28 @@ def process(
         ),
     ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="Read every frame and compare its checksum, even if its file looks untouched.",
+        ),
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Reduce, fit and report a run again, and say what changed.
 
-    An earlier result that differs is kept as result-1, result-2, …
+    An earlier result that differs is kept as result-1, result-2, … What was reduced from the frames
+    before is used again, unless a region or a calibration that it depends on is another one.
     """
-    from labrig.analyse import Overrides
+    from labrig.analyse import Overrides, verify_frames
     from labrig.catalogue import find_run
+    from labrig.record import read_run
 
     overrides = Overrides.parse(roi or [], exclude or [], states, rate or [], camera, optics or [])
     folder = find_run(run, runs)
+    if verify:
+        typer.echo(verify_frames(read_run(folder), overrides), err=True)
     process_and_print(folder, overrides, json=json)
     typer.echo(folder)
 

@@ -36,17 +36,45 @@ def _summary(text: str) -> str:
 
 @app.command("new")
 def new_protocol(
-    name: Annotated[str, typer.Argument(help="A shipped protocol, see 'labrig protocol list'.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A shipped protocol, see 'labrig protocol list'; with --python the new one's name."
+        ),
+    ],
     file: Annotated[
-        Path | None, typer.Argument(help="Path of the new file.", show_default="./my-NAME.yaml")
+        Path | None,
+        typer.Argument(
+            help="Path of the new file; with --python of the new folder.",
+            show_default="./my-NAME.yaml, with --python ./NAME",
+        ),
     ] = None,
+    python: Annotated[
+        bool, typer.Option("--python", help="Create a package with a protocol of your own.")
+    ] = False,
 ) -> None:
-    """Create a commented protocol file to change; nothing is overwritten."""
+    """Create a commented protocol file to change; nothing is overwritten.
+
+    With --python: a package with a protocol, its analysis and its result, and their test.
+    """
+    if python:
+        _new_package(name, file or Path(name))
+    else:
+        _new_file(name, file or Path(f"my-{name}.yaml"))
+
+
+def _new_package(name: str, folder: Path) -> None:
+    from labrig.package_template import create_package
+
+    create_package("protocol", name, folder)
+    typer.echo(f'{folder} is yours to change; then: pip install -e "{folder.resolve()}[test]"')
+
+
+def _new_file(name: str, path: Path) -> None:
     from labrig import resources
     from labrig.errors import DiskError, UsageError
 
     text = resources.find("protocols", "protocol", name).read_text(encoding="utf-8")
-    path = file or Path(f"my-{name}.yaml")
     try:
         with path.open("x", encoding="utf-8", newline="\n") as new:
             new.write(text)

@@ -83,7 +83,8 @@ def _print_discovery(discovery: "Discovery") -> None:
     for note in discovery.notes:
         typer.echo(f"! {note}")
     if snippets := [d.snippet for d in (*discovery.ports, *discovery.cameras) if d.snippet]:
-        typer.echo("\nfor the rig file (a key may stand only once: keep what you use):\n\ndevices:")
+        typer.echo("\na rig file (a key may stand only once: keep what you use):\n")
+        typer.echo("name: my bench\n\ndevices:")
         for snippet in snippets:
             typer.echo(f"  {snippet}")
 

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +12,7 @@ from typer.core import TyperGroup
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
-    from labrig.results import FittedDecay
+    from labrig.results import Measured
 
 
 class _ListsByDefault(TyperGroup):
@@ -41,12 +42,19 @@ Until = Annotated[
 Status = Annotated[
     str | None,
     typer.Option(
-        help="Only runs with this status: running, unfinished, recorded, processed or damaged."
+        help="Only runs with this status: running, interrupted, failed, recorded, processed or "
+        "damaged."
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print as JSON.")]
 
-_STYLES = {"running": "bold", "unfinished": "yellow", "damaged": "red", "processed": "green"}
+_COLOURS = {
+    "running": "blue",
+    "interrupted": "yellow",
+    "failed": "red",
+    "damaged": "red",
+    "processed": "green",
+}
 
 
 @app.command("list")
@@ -59,7 +67,10 @@ def list_them(
     status: Status = None,
     json: Json = False,
 ) -> None:
-    """One line a run: when, which sample, how far it came, which rates."""
+    """One line a run: its name for other commands, which sample, how far it came, which rates.
+
+    The run that was made last is the last one; other commands also call it 'last'.
+    """
     from datetime import date
 
     from labrig.catalogue import RunFilter, list_runs
@@ -141,23 +152,32 @@ def note(
     typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
 
 
-def _print_runs(summaries: list["RunSummary"]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
+def _print_runs(summaries: Sequence["RunSummary"]) -> None:
+    """Print a table; never folded, so that every name can be copied."""
+    from rich.cells import cell_len
 
-    table = Table(box=None, pad_edge=False)
-    for title in ("began (UTC)", "sample", "protocol", "status", "k_r in 1/s"):
-        table.add_column(title, overflow="fold")
-    for run in summaries:
-        table.add_row(
-            _when(run),
-            run.sample,
-            run.protocol,
-            Text(_status(run), style=_STYLES.get(run.status, "")),
-            "\n".join(_short_rates(*patch) for patch in run.results.items()),
-        )
-    Console().print(table)
+    def padded(text: str, width: int) -> str:
+        return text + " " * (width - cell_len(text))
+
+    rows = [
+        (_printable(run.folder.name), _printable(run.sample), _status(run)) for run in summaries
+    ]
+    heading = ("run", "sample", "status")
+    widths = [max(map(cell_len, column)) for column in zip(heading, *rows, strict=True)]
+    lines = ["  ".join([*map(padded, heading, widths), "k_r in 1/s"])]
+    for run, (name, sample, status) in zip(summaries, rows, strict=True):
+        rates = [_printable(_short_rates(*patch)) for patch in run.rates.items()] or [""]
+        cells = [padded(name, widths[0]), padded(sample, widths[1]), padded(status, widths[2])]
+        if run.status in _COLOURS:
+            cells[2] = typer.style(cells[2], fg=_COLOURS[run.status])
+        lines.append("  ".join([*cells, rates[0]]).rstrip())
+        lines += [" " * (sum(widths) + 6) + rate for rate in rates[1:]]
+    typer.echo("\n".join(lines))
+
+
+def _printable(text: str) -> str:
+    """Return text without what a terminal would take for a command."""
+    return "".join(character if character.isprintable() else "\ufffd" for character in text)
 
 
 def _print_comparison(comparison: "Comparison") -> None:
@@ -201,7 +221,7 @@ def _print_results(folder: Path) -> None:
     results = _result_folders(folder)
     for result, before in itertools.zip_longest(results, results[1:]):
         for patch, fit in read_fitted_decays(folder / result).items():
-            typer.echo(f"  {result}: {_rates(patch, fit)} /s")
+            typer.echo(f"  {result}: {_rates(patch, fit.rates)} /s")
             for warning in fit.warnings:
                 typer.echo(f"    warning: {warning}")
         if before is not None:
@@ -218,19 +238,19 @@ def _result_folders(folder: Path) -> list[str]:
     return ["result", *earlier]
 
 
-def _rates(patch: str, result: "FittedDecay") -> str:
+def _rates(patch: str, rates: Sequence["Measured"]) -> str:
     from labrig.number_format import plus_minus
 
-    rates = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates)
-    return f"{patch}: {rates}" if patch else rates
+    text = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in rates)
+    return f"{patch}: {text}" if patch else text
 
 
-def _short_rates(patch: str, result: "FittedDecay") -> str:
+def _short_rates(patch: str, rates: Sequence["Measured"]) -> str:
     """Return the rates with σ in units of the last digits, so that they fit on a line."""
     from labrig.results import with_uncertainty
 
-    rates = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in result.rates)
-    return f"{patch}: {rates}" if patch else rates
+    text = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in rates)
+    return f"{patch}: {text}" if patch else text
 
 
 def _when(run: "RunSummary") -> str:
@@ -249,7 +269,12 @@ def _summary_json(run: "RunSummary") -> dict[str, object]:
     from dataclasses import asdict
 
     began = None if run.began is None else run.began.isoformat()
-    return {**asdict(run), "folder": str(run.folder), "began": began}
+    return {
+        **asdict(run),
+        "folder": str(run.folder),
+        "made": run.made.isoformat(),
+        "began": began,
+    }
 
 
 def _print_json(content: object) -> None:

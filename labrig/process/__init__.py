@@ -1,10 +1,11 @@
 """Processing of a run folder: analysis, report and exports."""
 
 from labrig.process.result_changes import other_settings
-from labrig.process.run import Processed, process_and_report, process_run
+from labrig.process.run import Processed, draw_figures, process_and_report, process_run
 
 __all__ = [
     "Processed",
+    "draw_figures",
     "other_settings",
     "process_and_report",
     "process_run",

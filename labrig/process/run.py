@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from labrig import plugins
-from labrig.acquire import RigFile
+from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, temperature_warnings
 from labrig.bench_optics import camera_curves
 from labrig.calibration import LvfFile
@@ -14,19 +14,23 @@ from labrig.export import write_nexus
 from labrig.optics import CameraResponse
 from labrig.process.provenance import Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
-from labrig.record import read_run
+from labrig.record import RunLock, read_run
 from labrig.report import (
+    Rendered,
     Report,
     Source,
     lamp_sections,
     render,
     temperature_sections,
+    write_figures_pdf,
     write_report,
 )
-from labrig.results import RunResult, write_result
+from labrig.results import RunResult, read_result, write_result
 from labrig.yaml_file import write_yaml
 
 _EARLIER = "result-"
+#: Lock of the process that makes the result; acquisition has another one.
+_LOCK = ".process.lock"
 
 
 def new_result(run: Path) -> Path:
@@ -111,7 +115,8 @@ def process_run(folder: Path | str, overrides: Overrides | None = None) -> RunRe
     Raises
     ------
     UsageError
-        If this is not a run folder, or an override does not fit the run.
+        If this is not a run folder, another labrig is processing it, or an override does not fit
+        the run.
     DataError
         If frames are too few, missing, or were changed after the run.
     FitError
@@ -145,7 +150,8 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     Raises
     ------
     UsageError
-        If this is not a run folder, or an override does not fit the run.
+        If this is not a run folder, another labrig is processing it, or an override does not fit
+        the run.
     DataError
         If frames are too few, missing, or were changed after the run.
     FitError
@@ -162,6 +168,12 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     """
     folder, overrides = Path(folder), overrides or Overrides()
     protocol = read_run_protocol(folder)
+    with RunLock(folder / _LOCK, "processing this run"):
+        return _process(folder, overrides, protocol)
+
+
+def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Processed:
+    """Process a run that no other process processes meanwhile."""
     rig, run = overrides.bench(folder), read_run(folder)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check(frames)
@@ -180,12 +192,8 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     )
     write_result(result_folder, result)
     write_nexus(result_folder / "run.nxs", run, about, result)
-    rendered = render(result, Source(run, protocol, rig, about, camera))
-    # After the parts of a chain, what is about all of them.
-    part = "the_run" if any(section.part for section in rendered.sections) else ""
-    about_run = (*lamp_sections(run), *temperature_sections(run, protocol.rate_frames))
-    sections = (*rendered.sections, *(replace(section, part=part) for section in about_run))
-    report = Report(about, warnings, sections, rendered.methods, frames, camera)
+    rendered = _render(result, Source(run, protocol, rig, about, camera))
+    report = Report(about, warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
     changes = put_in_place(result_folder)
 
@@ -193,6 +201,62 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
     return Processed(result, page, rendered.lines, changes)
+
+
+def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:
+    """Draw all figures of a run's report into one PDF, from the result of its latest analysis.
+
+    Parameters
+    ----------
+    folder
+        Run folder.
+    path
+        Path of the PDF; None for `result/figures/figures.pdf` in the run folder.
+
+    Returns
+    -------
+    path : Path
+        Path of the PDF.
+    n_pages : int
+        Number of figures, one a page.
+
+    Raises
+    ------
+    UsageError
+        If this is not a run folder, or there is no result, or there are no figures.
+    DataError
+        If the result was changed, or another version of labrig wrote it.
+    DiskError
+        If the PDF cannot be written.
+
+    Examples
+    --------
+    >>> from labrig.process import draw_figures
+    >>> path, n_pages = draw_figures("runs/decay")
+    >>> path.as_posix(), n_pages
+    ('runs/decay/result/figures/figures.pdf', 6)
+    """
+    folder = Path(folder)
+    run, protocol, result = read_run(folder), read_run_protocol(folder), read_result(folder)
+    rig = Overrides().bench(folder)
+    source = Source(run, protocol, rig, describe_run(run, protocol, rig))
+    path = path or folder / "result" / "figures" / "figures.pdf"
+    title = f"{source.about.title}, {source.about.run}"
+    n_pages = write_figures_pdf(path, title, _render(result, source).sections)
+    if not n_pages:
+        raise UsageError(f"{folder}: expected a report with figures, it has none")
+    return path, n_pages
+
+
+def _render(result: RunResult, source: Source) -> Rendered:
+    """Render a result, followed by the sections that do not depend on the protocol."""
+    rendered = render(result, source)
+    # After the parts of a chain, what is about all of them.
+    part = "the_run" if any(section.part for section in rendered.sections) else ""
+    rate_frames = source.protocol.rate_frames
+    about_run = (*lamp_sections(source.run), *temperature_sections(source.run, rate_frames))
+    more = tuple(replace(section, part=part) for section in about_run)
+    return replace(rendered, sections=(*rendered.sections, *more))
 
 
 def _camera_response(

@@ -6,8 +6,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-import event_model
-
 from labrig.record.frames import ActionRecord, FrameRecord, TemperatureRecord
 from labrig.record.journal import Disk, Journal, write_durably
 
@@ -75,6 +73,9 @@ class AttemptWriter:
         disk: Disk,
         executor: Executor,
     ) -> None:
+        # Not above: it takes long to load, and who plans or reads runs does not need it.
+        import event_model
+
         self.unit = unit
         self._journal = journal
         self._frames_folder = frames_folder

@@ -1,9 +1,7 @@
 """Records of frames, actions and temperatures."""
 
-import os
 from dataclasses import dataclass
 from enum import StrEnum
-from hashlib import file_digest
 from pathlib import Path
 
 
@@ -64,20 +62,6 @@ class FrameRecord:
     end_time: float
     late_s: float
     disk_s: float = 0.0
-
-    def damage(self) -> str:
-        """Return how the file differs from its record; empty if it does not."""
-        try:
-            with self.path.open("rb") as file:
-                # A file of another size need not be read; a forged one may have no end.
-                same_size = os.fstat(file.fileno()).st_size == self.size_bytes
-                if same_size and file_digest(file, "sha256").hexdigest() == self.sha256:
-                    return ""
-        except FileNotFoundError:
-            return "is missing"
-        except OSError as error:
-            return f"cannot be read ({error.strerror})"
-        return "was changed after the run (its checksum differs)"
 
 
 #: Devices of a person's actions: a step done by hand, and the undoing of a unit that was done

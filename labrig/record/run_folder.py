@@ -11,11 +11,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from filelock import FileLock, Timeout
-
-from labrig.errors import DiskError, UsageError
+from labrig.clock import SystemClock
+from labrig.errors import DiskError
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, REAL_DISK, Disk, Journal, sync_folder, write_durably
+from labrig.record.made import MADE, made_text
+from labrig.record.run_lock import RunLock
 from labrig.record.run_record import RunRecord, run_record
 
 #: File by which a run folder is recognised.
@@ -46,13 +47,7 @@ class RunFolder:
         self.path = path
         self._seed = seed
         self._disk = disk
-        self._lock = FileLock(path / ".lock")
-        try:
-            self._lock.acquire(timeout=0)
-        except Timeout:
-            raise UsageError(f"{path}: another labrig is writing to this run") from None
-        except OSError as error:
-            raise DiskError(f"{path}: the run cannot be written to ({error.strerror})") from None
+        self._lock = RunLock(path / ".lock", "writing to this run")
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)
         self._executor = ThreadPoolExecutor(1)
@@ -101,6 +96,8 @@ class RunFolder:
             ) from None
         try:
             (path / "frames").mkdir()
+            # By the PC's clock, since the time of a simulated room is the same in every run.
+            texts = {MADE: made_text(SystemClock().wall()), **texts}
             for file_name in sorted(texts, key=lambda name: name == PROTOCOL):
                 write_durably(path / file_name, texts[file_name].encode(), disk)
             sync_folder(runs)
@@ -190,8 +187,7 @@ class RunFolder:
         """Release the folder for other processes."""
         self._executor.shutdown()
         self._journal.close()
-        with suppress(OSError):  # the system lets go of it when labrig ends
-            self._lock.release()
+        self._lock.release()
 
     def __enter__(self) -> Self:
         return self

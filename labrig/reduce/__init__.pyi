@@ -7,20 +7,34 @@ from .channels import (
 from .dark import (
     DarkModel as DarkModel,
     fit_dark as fit_dark,
-    hot_pixels as hot_pixels,
+)
+from .decoding import (
+    Reduction as Reduction,
 )
 from .frame import (
     LinearFrame as LinearFrame,
     RegionSums as RegionSums,
     saturated_cells as saturated_cells,
 )
-from .hdr import (
+from .frame_reduction import (
     Exposure as Exposure,
+    StoredFrame as StoredFrame,
+    reduce_frames as reduce_frames,
+    reduce_groups as reduce_groups,
+)
+from .hdr import (
     HdrFrame as HdrFrame,
     read_hdr_frame as read_hdr_frame,
 )
+from .hot_pixels import (
+    BrightPixels as BrightPixels,
+    HotPixels as HotPixels,
+    hot_pixels as hot_pixels,
+    hot_pixels_of as hot_pixels_of,
+)
 from .measured_frames import (
     SeriesFrame as SeriesFrame,
+    measure_region as measure_region,
 )
 from .pair_noise import (
     STRIPS as STRIPS,
@@ -45,14 +59,28 @@ from .raw import (
 from .saturation import (
     is_clipped as is_clipped,
 )
+from .sensor_layout import (
+    SensorLayout as SensorLayout,
+    sensor_layout as sensor_layout,
+)
 from .series import (
     TWO_DEGREES as TWO_DEGREES,
     reduce_patches as reduce_patches,
     reduce_series as reduce_series,
 )
 from .strip import (
-    FLICKER as FLICKER,
+    FoundStrip as FoundStrip,
     find_strip as find_strip,
-    slice_values as slice_values,
     strip_profile as strip_profile,
+)
+from .strip_frames import (
+    FLICKER as FLICKER,
+    find_strip_in as find_strip_in,
+    slice_values as slice_values,
+    strip_profile_in as strip_profile_in,
+)
+from .thumbnails import (
+    MakeThumbnail as MakeThumbnail,
+    SaturatedFraction as SaturatedFraction,
+    Thumbnail as Thumbnail,
 )

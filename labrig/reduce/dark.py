@@ -1,21 +1,14 @@
-"""Signal of the sensor in the dark: its level over exposure time, and its hot pixels."""
+"""Level of the sensor in the dark over exposure time."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from labrig.errors import DataError
-from labrig.reduce.channels import OUTLIER_SIGMAS, PixelMask
 from labrig.reduce.plane_noise import Floats
-from labrig.reduce.raw import RawFrame
-from labrig.reduce.saturation import histogram
 
 #: Relative difference within which two exposure times are the same, by the rounding of cameras.
 SAME_EXPOSURE = 0.02
-#: Frames in which a hot pixel is bright: a cosmic ray does not hit the same pixel twice.
-HOT_FRAMES = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,75 +127,3 @@ def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
 def same_exposure(first_s: float, second_s: float) -> bool:
     """Return whether two exposure times agree within the rounding of cameras."""
     return abs(first_s - second_s) <= SAME_EXPOSURE * max(first_s, second_s)
-
-
-def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
-    """Find the pixels of the sensor that are bright in the dark.
-
-    A pixel is hot if it exceeds the median of the 24 nearest pixels of its CFA position by more
-    than 8 robust standard deviations in two frames.
-
-    Parameters
-    ----------
-    darks
-        Two or more dark frames, best those of the longest exposure.
-
-    Returns
-    -------
-    ndarray of bool
-        True where a pixel is hot, shape (height, width).
-
-    Raises
-    ------
-    DataError
-        There are fewer than two frames, or frames of different sizes or sensors.
-
-    Examples
-    --------
-    >>> import labrig
-    >>> from labrig.reduce import hot_pixels
-    >>> run = labrig.read_run("runs/decay")
-    >>> longest = run.frames("dark")[-4:]
-    >>> mask = hot_pixels([labrig.read_raw(frame.path) for frame in longest])
-    >>> mask.shape, int(mask.sum())
-    ((64, 96), 1)
-    """
-    if len(darks) < HOT_FRAMES:
-        raise DataError(
-            f"expected {HOT_FRAMES} or more dark frames to tell hot pixels from cosmic rays, got "
-            f"{len(darks)}; take more"
-        )
-    kinds = {(*dark.mosaic.shape, dark.cfa) for dark in darks}
-    if len(kinds) > 1:
-        raise DataError(
-            f"expected dark frames of one size and sensor, got {sorted(kinds)}; leave some out"
-        )
-    times_bright = np.zeros(darks[0].mosaic.shape, np.uint16)
-    for dark in darks:
-        times_bright += _bright(dark)
-    return np.asarray(times_bright >= HOT_FRAMES)
-
-
-def _bright(dark: RawFrame) -> PixelMask:
-    """Mark the pixels far above the median of their surroundings."""
-    import cv2  # its median filter is the fast one
-
-    side = dark.cfa_side
-    bright = np.zeros(dark.mosaic.shape, bool)
-    for row in range(side):
-        for column in range(side):
-            position = (slice(row, None, side), slice(column, None, side))
-            plane = np.ascontiguousarray(dark.mosaic[position])
-            median = cv2.medianBlur(plane, 5)
-            deviation = 1.4826 * _median(histogram(np.asarray(cv2.absdiff(plane, median))))
-            # Whole numbers: a quiet sensor's median deviation may be 0 though it is not silent.
-            limit = int(OUTLIER_SIGMAS * max(deviation, 1.0))
-            bright[position] = np.asarray(cv2.subtract(plane, median)) > limit
-    return bright
-
-
-def _median(counts: npt.NDArray[np.int64]) -> float:
-    """Return the median of the whole numbers 0, 1, … that occur `counts` times."""
-    up_to = np.cumsum(counts)
-    middle = np.searchsorted(up_to, [(up_to[-1] + 1) // 2, up_to[-1] // 2 + 1])
-    return float(middle.mean())

@@ -145,16 +145,6 @@ class LinearFrame:
         """Return the sums of each channel in a region, in fractions of the frame."""
         return self.sums(region_pixels(region, self.raw.width, self.raw.height))
 
-    def middle_columns(self, region: Region) -> Floats:
-        """Return the mean column of each channel's pixels, shape (C,); pixel centres are at .5."""
-        area = region_pixels(region, self.raw.width, self.raw.height)
-        x, _, width, height = area
-        pixels = np.zeros((len(self.raw.channels), width))
-        for plane in self._planes(area):
-            rows, columns = plane.slices
-            pixels[plane.channel, columns] += len(range(height)[rows])
-        return np.asarray(pixels @ (np.arange(x, x + width) + 0.5) / pixels.sum(axis=1))
-
     def _window(self, pixels: npt.NDArray[Pixel], area: Area | None) -> npt.NDArray[Pixel]:
         x, y, width, height = area or (0, 0, self.raw.width, self.raw.height)
         return pixels[y : y + height, x : x + width]

@@ -2,8 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 from labrig.errors import DataError
 from labrig.reduce.channels import PixelMask
 from labrig.reduce.frame import LinearFrame
+from labrig.reduce.frame_reduction import Exposure
 from labrig.reduce.raw import RawFrame, read_raw
 
 FloatArray = NDArray[np.float64]
@@ -20,18 +19,6 @@ Image = NDArray[np.float32]
 #: Fraction of the range above which single pixels are left out: noise carries some of those at the
 #: same light beyond the range, which `is_clipped` allows a mean over many.
 FULL = 0.95
-
-
-class Exposure(Protocol):
-    """A frame on disk."""
-
-    @property
-    def path(self) -> Path:
-        """Path of the file."""
-
-    @property
-    def exposure_s(self) -> float:
-        """Exposure time in seconds."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,21 +1,19 @@
 """The frames of a run, each read once and measured in every patch of the sample."""
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from labrig.errors import DataError
-from labrig.reduce.channels import FrameMeasurement, PixelMask, measure_regions
+from labrig.reduce.channels import FrameMeasurement, measure_regions
+from labrig.reduce.frame_reduction import StoredFrame, reduce_frames
+from labrig.reduce.hot_pixels import HotPixels
 from labrig.reduce.pair_noise import strip_deviations
 from labrig.reduce.plane_noise import Floats
-from labrig.reduce.raw import RawFrame, read_raw
+from labrig.reduce.raw import RawFrame
 from labrig.region import Region
-
-#: Frames in memory at once; only one is ever being decoded.
-_FRAMES_AT_ONCE = 2
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,9 @@ class SeriesFrame:
         Unit of the run.
     flag
         Flags that the frame already has.
+    sha256
+        Checksum of the file by its run's journal: what is reduced from the frame is then kept in
+        the run folder, and taken from there the next time. Empty keeps nothing.
     """
 
     path: Path
@@ -45,6 +46,7 @@ class SeriesFrame:
     f_number: float | None = None
     unit: str = ""
     flag: str = ""
+    sha256: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +101,77 @@ class MeasuredFrame:
         return _first(self.frame.f_number, *(view.measured.f_number for view in views))
 
 
+@dataclass(frozen=True, eq=False)
+class MeasureRegions:
+    """Measurement of one frame in several regions.
+
+    Attributes
+    ----------
+    regions
+        Regions in fractions of the frame.
+    hot
+        Hot pixels to leave out; None leaves out none.
+    """
+
+    regions: tuple[Region, ...]
+    hot: HotPixels | None
+
+    def __call__(self, frames: Iterator[RawFrame]) -> tuple[RegionMeasurement, ...]:
+        """Measure the frame in each region."""
+        raw, hot = next(frames), None if self.hot is None else self.hot.mask
+        return tuple(
+            RegionMeasurement(measured, strip_deviations(raw, region, hot))
+            for measured, region in zip(
+                measure_regions(raw, self.regions, hot), self.regions, strict=True
+            )
+        )
+
+
+def measure_region(
+    frames: Sequence[StoredFrame], region: Region, hot: HotPixels | None = None
+) -> list[FrameMeasurement]:
+    """Measure mean, noise and saturation of each colour channel in a region of each frame.
+
+    Parameters
+    ----------
+    frames
+        Frames on disk.
+    region
+        Region as (x, y, width, height) in fractions of the frame.
+    hot
+        Hot pixels to leave out; None leaves out none.
+
+    Returns
+    -------
+    list of FrameMeasurement
+        The statistics of each frame's channels in DN above black, and its settings.
+
+    Raises
+    ------
+    DataError
+        A frame is damaged, or the hot pixels are of another sensor.
+    UsageError, DiskError
+        A frame cannot be read, or the region leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import measure_region
+    >>> glow = labrig.read_run("runs/decay").frames("decay")[:3]
+    >>> measured = measure_region(glow, (0.25, 0.25, 0.5, 0.5))
+    >>> [f"{frame.channels['G'].mean:.0f} DN" for frame in measured]
+    ['4447 DN', '2403 DN', '1660 DN']
+    """
+    return [views[0].measured for views in reduce_frames(frames, MeasureRegions((region,), hot))]
+
+
 def measure_frames(
     frames: Sequence[SeriesFrame],
     patches: Mapping[str, Region],
     background: Region | None,
-    hot: PixelMask | None,
-    read: Mapping[Path, RawFrame],
+    hot: HotPixels | None,
 ) -> list[MeasuredFrame]:
-    """Measure all frames in their order; one is decoded while another is measured.
+    """Measure all frames in their order.
 
     Parameters
     ----------
@@ -117,41 +182,20 @@ def measure_frames(
     background
         Region of the background; None if there is none.
     hot
-        Hot pixels to leave out, shape (height, width).
-    read
-        Frames that are already decoded, by path.
+        Hot pixels to leave out.
     """
-
-    def decode_and_measure(frame: SeriesFrame) -> MeasuredFrame:
-        raw = read.get(frame.path) or read_raw(frame.path)
-        return _measure_frame(frame, raw, patches, background, hot)
-
-    with ThreadPoolExecutor(_FRAMES_AT_ONCE) as pool:
-        return list(pool.map(decode_and_measure, frames))
-
-
-def _measure_frame(
-    frame: SeriesFrame,
-    raw: RawFrame,
-    patches: Mapping[str, Region],
-    background: Region | None,
-    hot: PixelMask | None,
-) -> MeasuredFrame:
-    if not frame.exposure_s > 0:
-        raise DataError(f"{frame.path}: expected an exposure above 0 s, got {frame.exposure_s}")
-    regions = [*patches.values(), *([background] if background else [])]
-    try:
-        views = [
-            RegionMeasurement(measured, strip_deviations(raw, region, hot))
-            for measured, region in zip(measure_regions(raw, regions, hot), regions, strict=True)
-        ]
-    except DataError as error:
-        raise type(error)(f"{frame.path}: {error}") from None
-    return MeasuredFrame(
-        frame,
-        dict(zip(patches, views, strict=False)),
-        views[-1] if background else None,
-    )
+    for frame in frames:
+        if not frame.exposure_s > 0:
+            raise DataError(f"{frame.path}: expected an exposure above 0 s, got {frame.exposure_s}")
+    regions = (*patches.values(), *([background] if background else []))
+    return [
+        MeasuredFrame(
+            frame, dict(zip(patches, views, strict=False)), views[-1] if background else None
+        )
+        for frame, views in zip(
+            frames, reduce_frames(frames, MeasureRegions(regions, hot)), strict=True
+        )
+    ]
 
 
 def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:

@@ -3,14 +3,13 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from labrig.errors import DataError
 from labrig.optics import CameraModel
-from labrig.reduce.channels import PixelMask
-from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
+from labrig.reduce.dark import DarkModel, fit_dark
+from labrig.reduce.hot_pixels import HotPixels, hot_pixels_of
 from labrig.reduce.measured_frames import (
     MeasuredFrame,
     RegionMeasurement,
@@ -21,7 +20,6 @@ from labrig.reduce.measured_frames import (
 )
 from labrig.reduce.pair_noise import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
 from labrig.reduce.plane_noise import Floats
-from labrig.reduce.raw import RawFrame, read_raw
 from labrig.region import Region
 from labrig.results import Series, add_flag, is_usable
 
@@ -88,8 +86,6 @@ def apply_calibration(
 TWO_DEGREES = 2 ** (2 / 6) - 1
 #: Largest correlation of the errors of different channels.
 MAX_COMMON = 0.99
-#: Dark frames held in memory at once, to find hot pixels.
-_DARKS_FOR_HOT = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,11 +219,9 @@ def reduce_patches(
     """
     if not frames or not patches:
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
-    longest = _read_longest(darks)
-    hot = hot_pixels(list(longest.values())) if longest else None
-    dark = {} if background else _patch_darks(darks, patches, hot, longest)
-    longest.clear()  # five frames of 42 MB that are not needed any more
-    measured = measure_frames(frames, patches, background, hot, {})
+    hot = hot_pixels_of(darks)
+    dark = {} if background else _patch_darks(darks, patches, hot)
+    measured = measure_frames(frames, patches, background, hot)
     _check_settings(measured)
     series = {name: _patch_series(name, measured, dark) for name in patches}
     if camera is None:
@@ -238,24 +232,14 @@ def reduce_patches(
     }
 
 
-def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
-    """Read some of the longest dark frames; none if they are too few to find hot pixels."""
-    longest_s = max((dark.exposure_s for dark in darks), default=0.0)
-    longest = [dark for dark in darks if dark.exposure_s >= longest_s * (1 - SAME_EXPOSURE)]
-    if len(longest) < HOT_FRAMES:
-        return {}
-    return {dark.path: read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]}
-
-
 def _patch_darks(
     darks: Sequence[SeriesFrame],
     patches: Mapping[str, Region],
-    hot: PixelMask | None,
-    read: Mapping[Path, RawFrame],
+    hot: HotPixels | None,
 ) -> dict[tuple[str, float], _PatchDark]:
     """Return the dark level by patch and ISO."""
     by_iso: dict[float, list[MeasuredFrame]] = defaultdict(list)
-    for entry in measure_frames(darks, patches, None, hot, read):
+    for entry in measure_frames(darks, patches, None, hot):
         by_iso[_setting_key(entry.iso)].append(entry)
     return {
         (name, iso): _patch_dark(

@@ -1,7 +1,6 @@
-"""The strip of a linear variable filter in frames: finding it, and measuring the light along it."""
+"""The strip of a linear variable filter in a frame: its place, and the light along it."""
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -9,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DataError
-from labrig.optics import SLICES, CameraModel, Strip
+from labrig.optics import SLICES, Strip
 from labrig.reduce.hdr import HdrFrame, Image
-from labrig.reduce.measured_frames import SeriesFrame
-from labrig.reduce.series import reduce_patches
-from labrig.results import FloatArray, SliceValues, StripProfile
+from labrig.results import FloatArray, StripProfile
 
 #: Least brightness of a lit pixel in units of the noise of the dark surroundings,
 SEEN_SIGMA = 6.0
@@ -34,10 +31,6 @@ FULL = (0.9, 1.1)
 LONG_MARGIN, END_MARGIN = 0.12, 0.01
 #: Least width of a slice in pixels: a cell of the colour filter.
 _MIN_SLICE = 2
-#: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
-FLICKER = 0.005
-#: Relative independent error of a place: the sensor's pattern, dust.
-PATTERN = 0.002
 
 
 @dataclass(frozen=True)
@@ -199,70 +192,6 @@ def strip_profile(frame: HdrFrame, strip: Strip) -> StripProfile:
     return StripProfile(position, np.stack(columns_of_value, axis=1))
 
 
-def slice_values(
-    frames: Sequence[SeriesFrame],
-    strip: Strip,
-    darks: Sequence[SeriesFrame],
-    camera: CameraModel | None,
-) -> Mapping[str, SliceValues]:
-    """Measure the light in every slice of a strip, scene by scene.
-
-    Parameters
-    ----------
-    frames
-        Light frames; those of one unit show one scene at several exposures.
-    strip
-        Place of the strip, the same in all frames.
-    darks
-        Dark frames at their exposure times.
-    camera
-        Calibration of the camera; None uses the values as they are.
-
-    Returns
-    -------
-    dict of str to SliceValues
-        Signal in DN/s and its standard uncertainty by unit, shape (slices, channels).
-
-    Raises
-    ------
-    DataError
-        ISO or f-number differ within a unit, no dark frames match, or the calibration is of another
-        camera or aperture.
-    FrameError, UsageError
-        A frame cannot be read, or the strip leaves it.
-
-    Examples
-    --------
-    >>> import labrig
-    >>> from labrig.optics import Strip
-    >>> from labrig.reduce import SeriesFrame, slice_values
-    >>> run = labrig.read_run("runs/decay")
-    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
-    >>> first = run.frames("decay")[0]
-    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
-    >>> strip = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.2, rising=True)
-    >>> values = slice_values(frames, strip, darks, camera=None)
-    >>> values["lit"].value.shape
-    (31, 3)
-    """
-    series = reduce_patches(frames, strip.slices(), darks, camera=camera)
-    units = dict.fromkeys(frame.unit for frame in frames)
-    values_by_unit = {}
-    for unit in units:
-        pairs = []
-        for slice_series in series.values():
-            rows = np.array(slice_series.unit) == unit
-            usable = rows & slice_series.usable & np.isfinite(slice_series.sigma).all(axis=1)
-            pairs.append(
-                _weighted_mean(
-                    slice_series.values[usable], slice_series.sigma[usable], slice_series.dark_sigma
-                )
-            )
-        value, sigma = np.moveaxis(np.array(pairs), 1, 0)
-        values_by_unit[unit] = SliceValues(value, sigma)
-    return values_by_unit
-
-
 def _largest_lit_patch(light: Image) -> NDArray[np.uint8] | None:
     """Mark the largest lit patch by 1, shape (height, width); None without light."""
     ground = float(np.median(light))
@@ -328,15 +257,3 @@ def _interpolate_means(
     mean_place = np.histogram(place, edges, weights=place)[0] / pixels
     mean_value = np.histogram(place, edges, weights=value)[0] / pixels
     return np.asarray(np.interp(position, mean_place, mean_value), dtype=np.float64)
-
-
-def _weighted_mean(
-    value: FloatArray, sigma: FloatArray, dark_sigma: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the weighted mean of frames (n, channels) of one scene and its σ, (channels,) each."""
-    if not len(value):
-        return np.full_like(dark_sigma, np.nan), np.full_like(dark_sigma, np.nan)
-    weight = 1 / sigma**2
-    mean = (weight * value).sum(axis=0) / weight.sum(axis=0)
-    dark = np.nan_to_num(dark_sigma)
-    return mean, np.sqrt(1 / weight.sum(axis=0) + dark**2 + (PATTERN * mean) ** 2)

@@ -24,6 +24,9 @@ from .figure_style import (
     new_figure as new_figure,
     place as place,
 )
+from .figures_pdf import (
+    write_figures_pdf as write_figures_pdf,
+)
 from .material_tables import (
     comparison_table as comparison_table,
 )

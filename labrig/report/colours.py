@@ -1,11 +1,12 @@
 """Conversion of a camera's raw values to colours on a screen."""
 
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig import colour_science
 from labrig.number_format import rounded
 from labrig.optics import CameraResponse
 from labrig.results import Series
@@ -15,6 +16,15 @@ Bytes = NDArray[np.uint8]
 
 #: Colour temperature in K of a tungsten halogen lamp, the usual lamp for charging.
 HALOGEN_K = 3200.0
+#: Second radiation constant of Planck's law in nm K.
+SECOND_RADIATION_NM_K = 1.438777e7
+#: CIE XYZ to linear sRGB, IEC 61966-2-1.
+XYZ_TO_SRGB = np.array(
+    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
+)
+#: Table of wavelength in nm and x̄, ȳ, z̄. It is also in colour-science, which takes a second to
+#: load.
+_OBSERVER = Path(__file__).with_name("cie_1931_observer.csv")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +52,9 @@ def screen_for(camera: CameraResponse | None) -> Screen:
     """Return the matrices for a camera; unit matrices if its responses are not known."""
     if camera is None:
         return Screen(np.eye(3), np.eye(3), known=False)
-    colour = colour_science.load()
-    glow = colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ camera_to_xyz(camera)
-    halogen = np.asarray(colour.colorimetry.planck_law(camera.wavelength_nm * 1e-9, HALOGEN_K))
+    glow = XYZ_TO_SRGB @ camera_to_xyz(camera)
+    nm = camera.wavelength_nm
+    halogen = nm**-5 / np.expm1(SECOND_RADIATION_NM_K / (HALOGEN_K * nm))
     under_lamp = camera.response(halogen)
     equal_energy = camera.response(np.ones_like(camera.wavelength_nm))
     # Von Kries in the camera's own channels, then the colour matrix with its rows scaled to white.
@@ -103,20 +113,22 @@ def camera_to_xyz(camera: CameraResponse) -> FloatArray:
 
 def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
     """Return x̄, ȳ, z̄ of the CIE 1931 2° observer, shape (n, 3); 0 outside of its table."""
-    colour = colour_science.load()
-    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-    columns = [
-        np.interp(wavelength_nm, observer.wavelengths, column, left=0.0, right=0.0)
-        for column in observer.values.T
-    ]
-    return np.stack(columns, axis=1)
+    nm, *columns = _observer().T
+    return np.stack(
+        [np.interp(wavelength_nm, nm, column, left=0.0, right=0.0) for column in columns], axis=1
+    )
+
+
+@cache
+def _observer() -> FloatArray:
+    """Return the table of the observer, shape (n, 4)."""
+    return np.loadtxt(_OBSERVER, delimiter=",", skiprows=2, encoding="utf-8")
 
 
 def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:
     """Return the colour of a spectrum (n,) at full brightness, as `#rrggbb` clipped to sRGB."""
-    colour = colour_science.load()
     xyz = colour_matching(wavelength_nm).T @ (value * np.gradient(wavelength_nm))
-    linear = into_gamut(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ xyz)
+    linear = into_gamut(XYZ_TO_SRGB @ xyz)
     return css_colour(linear / max(float(linear.max()), 1e-12))
 
 
@@ -148,10 +160,10 @@ def into_gamut(linear: FloatArray) -> FloatArray:
 
 
 def encoded(linear: FloatArray) -> Bytes:
-    """Return linear sRGB as bytes with the transfer curve of sRGB; values above 1 are clipped."""
-    colour = colour_science.load()
-    curve = colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB")
-    return np.asarray(np.rint(255 * np.asarray(curve)), dtype=np.uint8)
+    """Return linear sRGB as bytes with the curve of IEC 61966-2-1; values above 1 are clipped."""
+    linear = np.clip(linear, 0.0, 1.0)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.asarray(np.rint(255 * curve), dtype=np.uint8)
 
 
 def css_colour(linear: FloatArray) -> str:

@@ -1,8 +1,7 @@
 """Report of a decay: results, sample, every patch, timing, and methods."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from labrig.report.decay_figures import (
     logarithmic_decay,
     noise_figure,
     overview_figures,
+    overview_tiles,
     residual_figure,
     residuals,
     timing_figure,
@@ -137,6 +137,9 @@ def steady(series: Series) -> SteadySource | None:
     )
 
 
+#: Largest number of patches that are shown in full; of more, the page shows an overview, and each
+#: is folded up until a reader opens it.
+MOST_UNFOLDED = 4
 #: Largest number of patches whose names are shown on photographs; of more, numbers are shown.
 NAMES_ON_PHOTOGRAPH = 3
 #: Positions of the shown photographs of the glow, as fractions of the first decay's frames; dense
@@ -217,6 +220,11 @@ class _Content:
     patch: _Patch | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
+    @property
+    def is_folded(self) -> bool:
+        """Whether patches are folded up until a reader opens them."""
+        return len(self.patches) > MOST_UNFOLDED
+
 
 def render(result: DecayResult, source: Source) -> Rendered:
     """Render a decay: results, sample, patches, timing, and methods."""
@@ -259,9 +267,10 @@ def decay_sections(
     late = frame_lateness(timings)
     content = _Content(report, patches, screen.known, late)
     sensor = sensor_of([photograph.frame for photograph in report.glow])
+    overview = _results(content, anchor), _sample(content, screen, anchor)
     results = (
-        _results(content, anchor),
-        _sample(content, screen, anchor),
+        # A long table would hide the photograph that says where the patches are.
+        *(reversed(overview) if content.is_folded else overview),
         *(
             Section(
                 f"Patch {patch.patch.name}",
@@ -304,10 +313,13 @@ def _glow(frames: Sequence[FrameRecord], series: Series) -> tuple[GlowPhotograph
 def _results(content: _Content, anchor: str) -> Section:
     """Return the section with the table of all patches, and a small figure each if several."""
     figures: tuple[Picture, ...] = ()
-    if len(content.patches) > 1:
+    if content.is_folded:
+        tiles, axes = overview_tiles(content.report.patches)
+        content = replace(content, extra={"tiles": tiles, "axes": axes})
+    elif len(content.patches) > 1:
         figures = tuple(
-            Picture(f"overview-{patch.number}-{patch.patch.name}", draw)
-            for patch, draw in zip(
+            Picture(f"overview-{patch.number}-{patch.patch.name}", chart)
+            for patch, chart in zip(
                 content.patches, overview_figures(content.report.patches), strict=True
             )
         )
@@ -345,7 +357,7 @@ def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> t
     steady_patches = [patch for patch in content.patches if patch.steady]
     if not (content.late or repeat_units or steady_patches):
         return ()
-    figures = (Picture("timing", partial(timing_figure, timings)),) if timings else ()
+    figures = (Picture("timing", timing_figure(timings)),) if timings else ()
     return (
         Section(
             "Timing and stability",
@@ -368,14 +380,14 @@ def _patch(number: int, patch: PatchReport, screen: Screen, anchor: str) -> _Pat
     fit = patch.fit if isinstance(patch.fit, FittedDecay) else None
     series = patch.series
     figures = [
-        Picture("linear", partial(linear_decay, series, fit)),
-        Picture("logarithmic", partial(logarithmic_decay, series, fit)),
+        Picture("linear", linear_decay(series, fit)),
+        Picture("logarithmic", logarithmic_decay(series, fit)),
     ]
     noise_parts: tuple[str, ...] = ()
     if fit is not None:
-        figures.append(Picture("residuals", partial(residual_figure, series, fit)))
+        figures.append(Picture("residuals", residual_figure(series, fit)))
     if patch.noise is not None:
-        figures.append(Picture("noise", partial(noise_figure, patch.noise)))
+        figures.append(Picture("noise", noise_figure(patch.noise)))
         noise_parts = tuple(visible_parts(patch.noise))
     return _Patch(
         number=number,

@@ -1,42 +1,43 @@
-"""Figures of a decay: signals, residuals, noise and timing."""
+"""Charts of a decay: signals, residuals, noise and timing."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from labrig.fit.decay import exponential_means_and_slopes
 from labrig.number_format import power_of_ten, rounded
+from labrig.report.chart import (
+    NO_VALUES,
+    Axis,
+    Band,
+    Chart,
+    ErrorBars,
+    Line,
+    Margins,
+    Mark,
+    Panel,
+    Points,
+    linear_axis,
+    logarithmic_axis,
+)
 from labrig.report.figure_style import (
     BAND_OPACITY,
+    CARET_DOWN,
     DASH_DOTTED,
     DASHED,
     DOTTED,
     INK,
-    LEFT_PT,
     LONG_DASHED,
     MARKERS,
     MUTED,
     OTHER_CHANNELS,
     PAPER,
     SHADE,
+    SOLID,
     LineStyle,
-    band_entry,
     channel_colour,
-    error_bars,
-    legend_above,
-    line_entry,
-    mark_decades,
-    marker_entry,
-    new_figure,
-    place,
-    points,
 )
 from labrig.report.report_model import PatchReport
 from labrig.report.timing import FrameTiming
@@ -138,47 +139,37 @@ MAX_DECADES = 6.0
 PLAIN_FROM, PLAIN_TO = 0.02, 1e5
 #: Values excluded from the fit are shown up to this many times the highest fitted value.
 LEFT_OUT_SHOWN = 3.0
+#: Entry of the legend for frames that are left out of the fit.
+LEFT_OUT: tuple[str, Mark] = ("left out", Points(MUTED, face=PAPER, size_pt=5.0))
 
 
-def linear_decay(series: Series, fit: FittedDecay | None) -> Figure:
-    """Draw the signal over time."""
-    figure, axes = _axes()
-    _draw(axes, series, fit)
+def linear_decay(series: Series, fit: FittedDecay | None) -> Chart:
+    """Return the signal over time."""
     highest, lowest = max(_highest(series), 0.0), min(float(_usable_values(series).min()), 0.0)
     room = 0.06 * (highest - lowest) or 1.0
-    axes.set_ylim(lowest - (room if lowest < 0 else 0.0), highest + room)
     exponent = _common_exponent(highest)
     unit = 10.0**exponent
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value / unit)))
-    if exponent:
-        axes.set_ylabel(f"Signal / ({power_of_ten(exponent)} DN/s)")
-    _legend(figure, series, fit)
-    return figure
+    axis = linear_axis(
+        f"Signal / ({power_of_ten(exponent)} DN/s)" if exponent else SIGNAL_LABEL,
+        lowest - (room if lowest < 0 else 0.0),
+        highest + room,
+        text=lambda value: rounded(value / unit),
+    )
+    return _decay(axis, series, fit)
 
 
-def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Figure:
-    """Draw the signal over time on a logarithmic axis; values below it are marked at its foot."""
-    figure, axes = _axes()
-    axes.set_yscale("log", nonpositive="clip")
-    _draw(axes, series, fit)
+def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Chart:
+    """Return the signal over time on a logarithmic axis; values below it are marked at its foot."""
     low, high = log_axis_ends(series)
-    axes.set_ylim(low, high)
-    mark_decades(axes)
+    axis = logarithmic_axis(SIGNAL_LABEL, low, high)
+    t_s = exposure_middles_s(series)
+    carets = []
     for number, name in enumerate(series.channels):
-        below = series.values[:, number] < low
-        if below.any():
-            axes.plot(
-                exposure_middles_s(series)[below],
-                np.full(np.count_nonzero(below), low),
-                linestyle="none",
-                marker=7,  # a caret that points down, its tip on the value
-                markersize=5,
-                color=channel_colour(name, number),
-                clip_on=False,
-                zorder=4,
-            )
-    _legend(figure, series, fit)
-    return figure
+        below_s = t_s[series.values[:, number] < low]
+        if len(below_s):
+            colour, foot = channel_colour(name, number), np.full(len(below_s), low)
+            carets.append(Points(colour, below_s, foot, CARET_DOWN, size_pt=5.0, is_clipped=False))
+    return _decay(axis, series, fit, carets)
 
 
 def values_below_axis(series: Series) -> int:
@@ -197,15 +188,6 @@ def log_axis_ends(series: Series) -> tuple[float, float]:
     floor = FRACTION_OF_NOISE * float(np.median(noise)) if noise.size else 0.0
     low = max(positive * 0.7, floor, highest * 10.0**-MAX_DECADES)
     return min(low, highest / 10), highest * 1.6
-
-
-def _axes() -> tuple[Figure, Axes]:
-    """Return a figure with axes of signal over time."""
-    figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
-    axes.set_xlabel(TIME_LABEL)
-    axes.set_ylabel(SIGNAL_LABEL)
-    return figure, axes
 
 
 def _common_exponent(highest: float) -> int:
@@ -230,57 +212,66 @@ def _highest(series: Series) -> float:
     )
 
 
-def _draw(axes: Axes, series: Series, fit: FittedDecay | None) -> None:
-    """Draw the signals with ± 1 σ, and the fit with its band and its states."""
+def _decay(axis: Axis, series: Series, fit: FittedDecay | None, more: Sequence[Mark] = ()) -> Chart:
+    """Return the signals with ± 1 σ over time, and the fit with its band and its states."""
+    channels = _channels(series)
     t_s, usable = exposure_middles_s(series), series.usable
-    for number, name in enumerate(series.channels):
-        marker = MARKERS[number % len(MARKERS)]
-        colour = channel_colour(name, number)
-        sigma = np.nan_to_num(series.sigma[:, number])
-        error_bars(axes, t_s, series.values[:, number], sigma, colour)
-        for rows, face in ((usable, colour), (~usable, PAPER)):
-            points(axes, t_s[rows], series.values[rows, number], marker, colour, face)
-    if fit is not None:
-        curve = fitted_curve(series, fit)
-        for number, name in enumerate(series.channels):
-            axes.plot(
-                curve.t_s, curve.total[:, number], color=channel_colour(name, number), linewidth=1.2
-            )
-        if np.isfinite(curve.sigma).all():
-            middle = curve.total[:, fit.brightest]
-            axes.fill_between(
-                curve.t_s,
-                middle - curve.sigma,
-                middle + curve.sigma,
-                color=_brightest_colour(fit),
-                alpha=BAND_OPACITY,
-                linewidth=0,
-            )
-        if fit.n_states > 1:
-            axes.plot(curve.t_s, curve.states, color=INK, linewidth=0.9, linestyle=DASHED)
-    last = float(t_s.max())
-    axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
-
-
-def _brightest_colour(fit: FittedDecay) -> str:
-    """Return the colour of the brightest channel of a fit."""
-    return channel_colour(fit.channels[fit.brightest], fit.brightest)
-
-
-def _legend(figure: Figure, series: Series, fit: FittedDecay | None) -> None:
-    """Add the legend of channels, fit and states."""
-    entries: list[Artist] = [
-        marker_entry(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
-        for number, name in enumerate(series.channels)
+    marks: list[Mark] = [
+        ErrorBars(colour, t_s, series.values[:, number], np.nan_to_num(series.sigma[:, number]))
+        for number, (_, _, colour) in enumerate(channels)
+    ]
+    legend: list[tuple[str, Mark]] = [
+        (name, Points(colour, marker=marker, size_pt=5.0)) for name, marker, colour in channels
     ]
     if fit is not None:
-        brightest = series.channels[fit.brightest]
-        entries += [line_entry("fit", MUTED), band_entry("± 1 σ", _brightest_colour(fit))]
+        curve = fitted_curve(series, fit)
+        marks += [
+            Line(colour, curve.t_s, curve.total[:, number])
+            for number, (_, _, colour) in enumerate(channels)
+        ]
+        brightest, _, colour = channels[fit.brightest]
+        if np.isfinite(curve.sigma).all():
+            middle = curve.total[:, fit.brightest]
+            marks.insert(0, Band(colour, curve.t_s, middle - curve.sigma, middle + curve.sigma))
+        legend += [("fit", Line(MUTED)), ("± 1 σ", Band(colour))]
         if fit.n_states > 1:
-            entries.append(line_entry(f"each state, {brightest}", INK, DASHED, width=0.9))
-    if not series.usable.all():
-        entries.append(marker_entry("left out", "o", MUTED, PAPER))
-    legend_above(figure, entries, columns=7)
+            marks += [
+                Line(INK, curve.t_s, state, width_pt=0.9, style=DASHED) for state in curve.states.T
+            ]
+            legend.append((f"each state, {brightest}", Line(INK, width_pt=0.9, style=DASHED)))
+    for number in range(len(channels)):
+        marks += _channel_points(series, number, series.values[:, number])
+    if not usable.all():
+        legend.append(LEFT_OUT)
+    panel = Panel(_time_axis(t_s), axis, (*marks, *more))
+    return Chart((panel,), HEIGHT_PT, legend=tuple(legend))
+
+
+def _channels(series: Series) -> list[tuple[str, str, str]]:
+    """Return name, marker and colour of every channel."""
+    return [
+        (name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
+        for number, name in enumerate(series.channels)
+    ]
+
+
+def _channel_points(
+    series: Series, number: int, values: FloatArray, size_pt: float = 3.8
+) -> list[Mark]:
+    """Return a value of each frame in a channel as points, hollow if the frame is left out."""
+    _, marker, colour = _channels(series)[number]
+    t_s, usable = exposure_middles_s(series), series.usable
+    return [
+        Points(colour, t_s[rows], values[rows], marker, face, size_pt)
+        for rows, face in ((usable, colour), (~usable, PAPER))
+        if rows.any()
+    ]
+
+
+def _time_axis(t_s: FloatArray) -> Axis:
+    """Return the axis of time after lamp off that shows all of some times."""
+    last = float(t_s.max())
+    return linear_axis(TIME_LABEL, -0.02 * last if last else -1.0, 1.03 * last or 1.0)
 
 
 RESIDUALS_HEIGHT_PT = 268.0
@@ -329,68 +320,70 @@ def residuals(series: Series, fit: FittedDecay) -> Residuals:
     )
 
 
-def residual_figure(series: Series, fit: FittedDecay) -> Figure:
-    """Draw the normalised residuals and, with several channels, the common-mode deviations."""
+def residual_figure(series: Series, fit: FittedDecay) -> Chart:
+    """Return the normalised residuals and, with several channels, the common-mode deviations."""
     deviations = residuals(series, fit)
-    several = len(series.channels) > 1
-    figure = new_figure(RESIDUALS_HEIGHT_PT if several else LOW_HEIGHT_PT)
-    upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=30)
-    t_s, usable = exposure_middles_s(series), series.usable
-    last = float(t_s.max())
-    upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
-    upper.axhline(0, color=MUTED, linewidth=0.8)
+    channels = _channels(series)
+    several = len(channels) > 1
+    time, usable = _time_axis(exposure_middles_s(series)), series.usable
     clipped = np.clip(deviations.normalised, -FARTHEST, FARTHEST)
-    for number, name in enumerate(series.channels):
-        marker = MARKERS[number % len(MARKERS)]
-        colour = channel_colour(name, number)
-        for rows, face in ((usable, colour), (~usable, PAPER)):
-            points(upper, t_s[rows], clipped[rows, number], marker, colour, face, size=3.6)
-    _residual_legend(figure, series)
+    marks = _shaded_zero(time, BAND)
+    for number in range(len(channels)):
+        marks += _channel_points(series, number, clipped[:, number], size_pt=3.6)
     reach = float(np.abs(clipped[usable]).max()) if usable.any() else BAND
-    upper.set_ylim(-max(reach * 1.1, 3.2), max(reach * 1.1, 3.2))
-    upper.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
-    upper.set_ylabel("Residual / σ")
-    if not several:
-        upper.set_xlabel(TIME_LABEL)
-        return figure
-    upper.tick_params(labelbottom=False)
-    lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=150, share_x=upper)
-    lower.axhspan(-200 * fit.flicker, 200 * fit.flicker, color=SHADE, linewidth=0)
-    lower.axhline(0, color=MUTED, linewidth=0.8)
+    reach = max(reach * 1.1, 3.2)
+    upper = Panel(
+        time,
+        linear_axis("Residual / σ", -reach, reach, most=6),
+        tuple(marks),
+        Margins(bottom=136.0 if several else 38.0),
+        has_x_labels=not several,
+    )
+    legend: list[tuple[str, Mark]] = [
+        (name, Points(colour, marker=marker, size_pt=5.0)) for name, marker, colour in channels
+    ]
+    if several:
+        legend.append(("in common", Points(INK, size_pt=2.6)))
+    if not usable.all():
+        legend.append(LEFT_OUT)
+    panels = (upper, _common_mode(series, fit, deviations, time)) if several else (upper,)
+    return Chart(panels, RESIDUALS_HEIGHT_PT if several else LOW_HEIGHT_PT, legend=tuple(legend))
+
+
+def _shaded_zero(time: Axis, reach: float) -> list[Mark]:
+    """Return the line at zero, and the shade of ± `reach` about it."""
+    ends, ones = np.array([time.low, time.high]), np.ones(2)
+    return [
+        Band(SHADE, ends, -reach * ones, reach * ones, opacity=1.0),
+        Line(MUTED, ends, 0 * ones, width_pt=0.8),
+    ]
+
+
+def _common_mode(series: Series, fit: FittedDecay, deviations: Residuals, time: Axis) -> Panel:
+    """Return the common-mode deviations of the frames that are known precisely."""
+    usable = series.usable
     precise = deviations.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(deviations.common_sigma))
     drawn = precise & usable if (precise & usable).any() else precise
-    common, common_sigma = 100 * deviations.common[drawn], 100 * deviations.common_sigma[drawn]
-    error_bars(lower, t_s[drawn], common, common_sigma, INK)
-    points(lower, t_s[drawn], common, "o", INK, INK, size=2.6)
-    reach = max(
-        float(np.max(np.abs(deviations.common[drawn]) + deviations.common_sigma[drawn])),
-        2.4 * fit.flicker,
+    t_s = exposure_middles_s(series)[drawn]
+    common, sigma = 100 * deviations.common[drawn], 100 * deviations.common_sigma[drawn]
+    reach = 1.1 * max(float(np.max(np.abs(common) + sigma)), 240 * fit.flicker)
+    return Panel(
+        time,
+        linear_axis("Common-mode / %", -reach, reach, most=4),
+        (
+            *_shaded_zero(time, BAND * 100 * fit.flicker),
+            ErrorBars(INK, t_s, common, sigma),
+            Points(INK, t_s, common, size_pt=2.6),
+        ),
+        Margins(top=150.0),
     )
-    lower.set_ylim(-110 * reach, 110 * reach)
-    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
-    lower.set_ylabel("Common-mode / %")
-    lower.set_xlabel(TIME_LABEL)
-    return figure
-
-
-def _residual_legend(figure: Figure, series: Series) -> None:
-    """Add the legend of channels and common-mode deviations."""
-    entries = [
-        marker_entry(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
-        for number, name in enumerate(series.channels)
-    ]
-    if len(series.channels) > 1:
-        entries.append(marker_entry("in common", ".", INK))
-    if not series.usable.all():
-        entries.append(marker_entry("left out", "o", MUTED, PAPER))
-    legend_above(figure, entries, columns=7)
 
 
 NOISE_HEIGHT_PT = 268.0
 #: Parts of the noise that are nowhere above this fraction of the total σ are not drawn.
 MIN_FRACTION = 0.03
 _LINES: dict[str, tuple[str, LineStyle]] = {
-    "photon noise": (OTHER_CHANNELS[1], "-"),
+    "photon noise": (OTHER_CHANNELS[1], SOLID),
     "read noise": (OTHER_CHANNELS[2], DASHED),
     "uneven light": (OTHER_CHANNELS[3], DASH_DOTTED),
     "flicker": (OTHER_CHANNELS[0], DOTTED),
@@ -416,102 +409,122 @@ def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
     return {name: part for name, part in parts.items() if (part > threshold).any()}
 
 
-def noise_figure(budget: NoiseBudget) -> Figure:
-    """Draw the relative standard uncertainty of the brightest channel, and its components."""
-    figure = new_figure(NOISE_HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+def noise_figure(budget: NoiseBudget) -> Chart:
+    """Return the relative standard uncertainty of the brightest channel, and its components."""
     total = 100 * budget.total
-    axes.set_yscale("log")
     # Broad and pale, since the largest part is nearly as large.
-    entries: list[Artist] = [line_entry("together", INK, width=4.5, opacity=BAND_OPACITY)]
+    together = Line(INK, budget.t_s, total, width_pt=4.5, opacity=BAND_OPACITY)
+    legend: list[tuple[str, Mark]] = [("together", together)]
     drawn_parts = [total]
-    axes.plot(budget.t_s, total, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
     for name, part in visible_parts(budget).items():
         percent, (colour, style) = 100 * part, _LINES[name]
-        axes.plot(budget.t_s, percent, color=colour, linewidth=1.2, linestyle=style)
-        entries.append(line_entry(name, colour, style))
+        legend.append((name, Line(colour, budget.t_s, percent, style=style)))
         drawn_parts.append(percent[percent > MIN_FRACTION * total])
     low, high = min(part.min() for part in drawn_parts), max(part.max() for part in drawn_parts)
-    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MAX_PERCENT), total.min()))
-    mark_decades(axes)
-    last = float(budget.t_s.max())
-    axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
-    axes.set_xlabel(TIME_LABEL)
-    axes.set_ylabel("σ of a value / % of the signal")
-    legend_above(figure, entries, columns=3)
-    return figure
+    top = 1.3 * max(min(high, MAX_PERCENT), total.min())
+    panel = Panel(
+        _time_axis(budget.t_s),
+        logarithmic_axis("σ of a value / % of the signal", 0.8 * low, top),
+        tuple(line for _, line in legend),
+        Margins(top=46.0),
+    )
+    return Chart((panel,), NOISE_HEIGHT_PT, legend=tuple(legend), columns=3)
 
 
 SMALL_WIDTH_PT, SMALL_HEIGHT_PT = 190.0, 140.0
 SMALL_FONT_PT = 9.5
+TILE_WIDTH_PT, TILE_HEIGHT_PT = 100.0, 64.0
 TIMING_HEIGHT_PT = 200.0
 
 
-def overview_figures(patches: Sequence[PatchReport]) -> list[Callable[[], Figure]]:
-    """Return functions that draw a small logarithmic decay of each patch, all on the same axes."""
+def overview_figures(patches: Sequence[PatchReport]) -> list[Chart]:
+    """Return a small logarithmic decay of each patch, all on the same axes."""
+    time, signal = _overview_axes(patches)
+    margins = Margins(left=50.0, bottom=32.0, right=14.0, top=6.0)
+    return [
+        Chart(
+            (Panel(time, signal, _small_decay(patch), margins),),
+            SMALL_HEIGHT_PT,
+            SMALL_WIDTH_PT,
+            label_pt=SMALL_FONT_PT,
+        )
+        for patch in patches
+    ]
+
+
+def overview_tiles(patches: Sequence[PatchReport]) -> tuple[list[Chart], str]:
+    """Return a tiny logarithmic decay of each patch, and their common axes in words."""
+    time, signal = _overview_axes(patches)
+    bare_time, bare_signal = (replace(axis, label="", short_ticks=()) for axis in (time, signal))
+    margins = Margins(left=1.0, bottom=1.0, right=1.0, top=1.0)
+    times, signals = (
+        f"{axis.ticks[0][1]} to {axis.ticks[-1][1]} {unit}"
+        for axis, unit in ((time, "s"), (signal, "DN/s"))
+    )
+    tiles = [
+        Chart(
+            (Panel(bare_time, bare_signal, _small_decay(patch), margins),),
+            TILE_HEIGHT_PT,
+            TILE_WIDTH_PT,
+        )
+        for patch in patches
+    ]
+    return tiles, f"grid lines from {times} and from {signals}"
+
+
+def _overview_axes(patches: Sequence[PatchReport]) -> tuple[Axis, Axis]:
+    """Return the axes of time and signal that show all decays."""
     ends = [log_axis_ends(patch.series) for patch in patches]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
     last_s = max(float(exposure_middles_s(patch.series).max()) for patch in patches) or 1.0
-    return [partial(_small_decay, patch, low, high, last_s) for patch in patches]
+    return (
+        linear_axis("Time / s", -0.03 * last_s, 1.03 * last_s, most=4),
+        logarithmic_axis("DN/s", low, high, most=6),
+    )
 
 
-def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> Figure:
-    """Draw a small logarithmic decay from `low` to `high` in DN/s and up to `last_s`."""
-    figure = new_figure(SMALL_HEIGHT_PT, SMALL_WIDTH_PT)
-    axes = place(figure, left=50, bottom=32, right=14, top=6)
-    axes.set_yscale("log", nonpositive="clip")
-    axes.set_ylim(low, high)
-    axes.set_xlim(-0.03 * last_s, 1.03 * last_s)
-    axes.xaxis.set_major_locator(MaxNLocator(4))
-    mark_decades(axes, most=6)
-    axes.tick_params(labelsize=SMALL_FONT_PT, pad=2)
-    axes.set_xlabel("Time / s", fontsize=SMALL_FONT_PT)
-    axes.set_ylabel("DN/s", fontsize=SMALL_FONT_PT)
+def _small_decay(patch: PatchReport) -> tuple[Mark, ...]:
+    """Return the marks of a small decay, its points without error bars."""
     series = patch.series
-    curve = fitted_curve(series, patch.fit) if isinstance(patch.fit, FittedDecay) else None
-    for number, name in enumerate(series.channels):
-        colour = channel_colour(name, number)
-        axes.plot(
-            exposure_middles_s(series)[series.usable],
-            series.values[series.usable, number],
-            linestyle="none",
-            marker=MARKERS[number % len(MARKERS)],
-            markersize=2.2,
-            markeredgewidth=0,
-            color=colour,
-        )
-        if curve is not None:
-            axes.plot(curve.t_s, curve.total[:, number], color=colour, linewidth=0.9)
-    return figure
+    t_s, usable = exposure_middles_s(series), series.usable
+    channels = _channels(series)
+    marks: list[Mark] = [
+        Points(colour, t_s[usable], series.values[usable, number], marker, size_pt=1.3)
+        for number, (_, marker, colour) in enumerate(channels)
+    ]
+    if isinstance(patch.fit, FittedDecay):
+        curve = fitted_curve(series, patch.fit)
+        marks += [
+            Line(colour, curve.t_s, curve.total[:, number], width_pt=0.9)
+            for number, (_, _, colour) in enumerate(channels)
+        ]
+    return tuple(marks)
 
 
-def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
-    """Draw the lateness of each exposure in ms, in one colour a unit."""
+def timing_figure(timings: Sequence[FrameTiming]) -> Chart:
+    """Return the lateness of each exposure in ms, in one colour a unit."""
     units = list(dict.fromkeys(timing.unit for timing in timings))
     several = 1 < len(units) <= len(MARKERS)
-    figure = new_figure(TIMING_HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46 if several else 14)
-    axes.axhline(0, color=MUTED, linewidth=0.8)
-    entries = []
-    for number, unit in enumerate(units):
-        unit_timings = [timing for timing in timings if timing.unit == unit]
-        marker = MARKERS[number % len(MARKERS)]
-        colour = INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
-        entries.append(marker_entry(unit, marker, colour))
-        axes.plot(
-            [timing.t_s for timing in unit_timings],
-            [1e3 * timing.late_s for timing in unit_timings],
-            linestyle="none",
-            marker=marker,
-            markersize=3.6,
-            color=colour,
-        )
+    t_s = np.array([timing.t_s for timing in timings])
     late_ms = np.array([1e3 * timing.late_s for timing in timings])
+    last = float(t_s.max())
     reach = max(float(np.abs(late_ms).max()), 0.1)
-    axes.set_ylim(min(float(late_ms.min()) * 1.15, -0.08 * reach), 1.15 * reach)
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
-    axes.set_xlabel(TIME_LABEL)
-    axes.set_ylabel("Late by / ms")
-    if several:
-        legend_above(figure, entries, columns=4)
-    return figure
+    time = linear_axis(TIME_LABEL, min(float(t_s.min()), -0.02 * last), 1.03 * last or 1.0)
+    late = linear_axis(
+        "Late by / ms", min(float(late_ms.min()) * 1.15, -0.08 * reach), 1.15 * reach, most=6
+    )
+    ends = np.array([time.low, time.high])
+    points = {}
+    for number, unit in enumerate(units):
+        rows = np.array([timing.unit == unit for timing in timings])
+        colour = INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
+        marker = MARKERS[number % len(MARKERS)]
+        points[unit] = Points(colour, t_s[rows], late_ms[rows], marker, size_pt=3.6)
+    panel = Panel(
+        time,
+        late,
+        (Line(MUTED, ends, np.zeros(2), width_pt=0.8), *points.values()),
+        Margins(top=46.0 if several else 14.0),
+    )
+    legend = tuple((unit, replace(mark, x=NO_VALUES, y=NO_VALUES)) for unit, mark in points.items())
+    return Chart((panel,), TIMING_HEIGHT_PT, legend=legend if several else (), columns=4)

@@ -1,22 +1,22 @@
 """Style of all figures of a report: sizes, colours, axes, legends."""
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
-import matplotlib.style
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.markers import TICKLEFT
-from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from labrig.number_format import power_of_ten
+from labrig.report.ticks import Ticks, decade_ticks
+
+# matplotlib is slow to load, and most pages do not need it.
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.axis import XAxis, YAxis
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
 FloatArray = NDArray[np.float64]
 
@@ -30,7 +30,9 @@ LEFT_PT = 62.0
 #: Distance between a label and the edge of the figure in points.
 EDGE_PT = 3.0
 
+Marker: TypeAlias = str | Literal[7]
 LineStyle: TypeAlias = str | tuple[float, tuple[float, ...]]
+SOLID: LineStyle = "-"
 DASHED: LineStyle = (0, (4, 2.5))
 LONG_DASHED: LineStyle = (0, (8, 3))
 DOTTED: LineStyle = (0, (1, 2))
@@ -40,6 +42,8 @@ INK, MUTED, RULE, PAPER, SHADE = "#1d2329", "#5f6b76", "#dde2e6", "#fefefe", "#e
 #: Colours of the channels R, G, B of a camera, and of other channels in turn.
 CHANNEL = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 OTHER_CHANNELS = ("#7a4fb5", "#b06a00", "#0f7f8a", "#a8326e", "#4f5b66")
+#: Marker of a value below an axis, its tip on the axis.
+CARET_DOWN: Literal[7] = 7
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
 #: Name of the page's variable for each colour, which has another value in the dark scheme.
@@ -80,6 +84,8 @@ def figure_style() -> Iterator[None]:
     ...     matplotlib.rcParams["font.size"]
     10.5
     """
+    import matplotlib.style
+
     with matplotlib.style.context(["default", _SETTINGS]):
         yield
 
@@ -89,7 +95,7 @@ def channel_colour(name: str, number: int) -> str:
     return CHANNEL.get(name, OTHER_CHANNELS[number % len(OTHER_CHANNELS)])
 
 
-def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> Figure:
+def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> "Figure":
     """Return an empty, transparent figure.
 
     Parameters
@@ -113,19 +119,21 @@ def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> Figure:
     >>> [round(72 * inches) for inches in figure.get_size_inches()]
     [420, 200]
     """
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(width_pt / 72, height_pt / 72), dpi=72)
     figure.patch.set_visible(False)
     return figure
 
 
 def place(
-    figure: Figure,
+    figure: "Figure",
     left: float,
     bottom: float,
     right: float,
     top: float,
-    share_x: Axes | None = None,
-) -> Axes:
+    share_x: "Axes | None" = None,
+) -> "Axes":
     """Add axes whose margins to the edges of the figure are given in points.
 
     Labels stand at the figure's edge, so that those of several axes are in line.
@@ -177,10 +185,10 @@ def place(
 
 
 def points(
-    axes: Axes,
+    axes: "Axes",
     x: FloatArray,
     y: FloatArray,
-    marker: str,
+    marker: Marker,
     colour: str,
     face: str,
     size: float = 3.8,
@@ -199,7 +207,7 @@ def points(
     )
 
 
-def error_bars(axes: Axes, x: FloatArray, y: FloatArray, sigma: FloatArray, colour: str) -> None:
+def error_bars(axes: "Axes", x: FloatArray, y: FloatArray, sigma: FloatArray, colour: str) -> None:
     """Draw bars of ± 1 σ, all in one path; as single paths they would be half of the file."""
     gap = np.full_like(y, np.nan)
     axes.plot(
@@ -215,7 +223,7 @@ def error_bars(axes: Axes, x: FloatArray, y: FloatArray, sigma: FloatArray, colo
 BAND_OPACITY = 0.3
 
 
-def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
+def legend_above(figure: "Figure", entries: Sequence["Artist"], columns: int) -> None:
     """Add a legend at the top of a figure.
 
     Parameters
@@ -253,8 +261,10 @@ def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> Non
     )
 
 
-def marker_entry(label: str, marker: str, colour: str, face: str | None = None) -> Line2D:
+def marker_entry(label: str, marker: Marker, colour: str, face: str | None = None) -> "Line2D":
     """Return the legend entry of points."""
+    from matplotlib.lines import Line2D
+
     return Line2D(
         [],
         [],
@@ -268,8 +278,8 @@ def marker_entry(label: str, marker: str, colour: str, face: str | None = None) 
 
 
 def line_entry(
-    label: str, colour: str, style: LineStyle = "-", width: float = 1.2, opacity: float = 1.0
-) -> Line2D:
+    label: str, colour: str, style: LineStyle = SOLID, width: float = 1.2, opacity: float = 1.0
+) -> "Line2D":
     """Return the legend entry of a curve.
 
     Parameters
@@ -298,61 +308,44 @@ def line_entry(
     >>> entry.get_label()
     'predicted'
     """
+    from matplotlib.lines import Line2D
+
     return Line2D([], [], color=colour, ls=style, linewidth=width, alpha=opacity, label=label)
 
 
-def band_entry(label: str, colour: str) -> Patch:
+def band_entry(label: str, colour: str) -> "Patch":
     """Return the legend entry of a band."""
+    from matplotlib.patches import Patch
+
     return Patch(color=colour, alpha=BAND_OPACITY, linewidth=0, label=label)
 
 
-#: Number of decades of an axis below which ticks between decades are labelled, too.
-FEW_DECADES = 2.0
-#: Number of labels below which evenly spaced ticks are labelled instead.
-FEWEST_LABELS = 2
-
-
-def mark_decades(axes: Axes, most: int = 8) -> None:
+def mark_decades(axes: "Axes", most: int = 8) -> None:
     """Set the ticks of a logarithmic vertical axis whose limits are set.
 
     Labelled ticks stand at `most` decades or between them; if every decade is labelled, short ticks
     stand at its multiples from 2 to 9.
     """
-    low, high = axes.get_ylim()
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    inside = [decade for decade in decades if low <= 10.0**decade <= high]
-    step = max(1, math.ceil(len(inside) / most))
-    labelled_decades = decades[::step]
-    labelled = [10.0**decade for decade in labelled_decades]
-    if high < low * 10**FEW_DECADES:
-        labelled = [digit * 10.0**decade for decade in labelled_decades for digit in (1, 2, 5)]
-    labelled = [tick for tick in labelled if low <= tick <= high]
-    if len(labelled) < FEWEST_LABELS:
-        labelled = [tick for tick in MaxNLocator(5).tick_values(low, high) if low <= tick <= high]
-    axes.yaxis.set_major_locator(FixedLocator(labelled))
-    axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
+    set_ticks(axes.yaxis, *decade_ticks(*axes.get_ylim(), most))
+
+
+def set_ticks(axis: "XAxis | YAxis", ticks: Ticks, short_ticks: Sequence[float] = ()) -> None:
+    """Set the labelled ticks of an axis, and those of a vertical axis that have no label."""
+    from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
+
+    axis.set_major_locator(FixedLocator([value for value, _ in ticks]))
+    axis.set_major_formatter(FixedFormatter([text for _, text in ticks]))
     # Matplotlib's own minor ticks would be half of the work of drawing the figure.
-    axes.yaxis.set_minor_locator(NullLocator())
-    if step == 1:
-        multiples = [digit * 10.0**decade for decade in decades for digit in range(2, 10)]
-        minor_ticks = [tick for tick in multiples if low <= tick <= high]
-        axes.plot(
-            np.zeros(len(minor_ticks)),
-            minor_ticks,
-            transform=axes.get_yaxis_transform(),
+    axis.set_minor_locator(NullLocator())
+    if short_ticks:
+        axis.axes.plot(
+            np.zeros(len(short_ticks)),
+            short_ticks,
+            transform=axis.axes.get_yaxis_transform(),
             linestyle="none",
-            marker=TICKLEFT,
+            marker=0,  # a tick that points to the left
             markersize=2,
             markeredgewidth=0.6,
             color=MUTED,
             clip_on=False,
         )
-
-
-def decade_text(value: float, _: int | None) -> str:
-    """Return the label of a tick: `0.001` to `10000`, beyond that with a power of ten."""
-    exponent = math.floor(math.log10(value) + 1e-9)
-    if -3 <= exponent <= 4:
-        return f"{value:g}"
-    digit = round(value / 10.0**exponent)
-    return power_of_ten(exponent) if digit == 1 else f"{digit} × {power_of_ten(exponent)}"

@@ -87,7 +87,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
         figures.append(
             Picture(
                 f"glow-{name}",
-                partial(logarithmic_decay, patch.series, patch.fit),
+                logarithmic_decay(patch.series, patch.fit),
                 f"The glow{_patch_suffix(name, result)} over time, with ± 1 σ; lines are the fit.",
             )
         )

@@ -3,7 +3,7 @@
 import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +12,19 @@ from labrig.errors import LabrigError, UsageError
 from labrig.number_format import exposure_text, rounded
 from labrig.record import FrameRecord
 from labrig.reduce import (
-    LinearFrame,
+    MakeThumbnail,
     Picture,
-    RawFrame,
-    binned,
-    is_grey,
+    Reduction,
+    SaturatedFraction,
+    Thumbnail,
     jpeg,
-    read_raw,
-    saturated_cells,
-    small,
+    reduce_frames,
 )
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.report_model import GlowPhotograph, PatchReport
+
+Reduced = TypeVar("Reduced")
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
@@ -130,10 +130,10 @@ class GlowPicture:
 def sensor_of(frames: Sequence[FrameRecord]) -> Sensor | None:
     """Return the camera from the first frame that can be read; None if none can."""
     for frame in frames:
-        raw = _read(frame.path)
-        if raw is not None:
-            make = raw.make if raw.make and raw.make not in (raw.model or "") else None
-            return Sensor(" ".join(filter(None, (make, raw.model))), raw.width, raw.height)
+        view = _reduced(frame, MakeThumbnail(GLOW_WIDTH))
+        if view is not None:
+            make = view.make if view.make and view.make not in (view.model or "") else None
+            return Sensor(" ".join(filter(None, (make, view.model))), view.width, view.height)
     return None
 
 
@@ -144,45 +144,48 @@ def daylight_picture(
 
     The result is None if no frame can be read.
     """
-    best: tuple[FrameRecord, RawFrame] | None = None
-    for frame in sorted(frames, key=lambda frame: frame.exposure_s):
-        raw = _read(frame.path)
-        if raw is None:
-            continue
-        saturated_fraction = float(LinearFrame(raw).is_saturated().mean())
-        if best is not None and saturated_fraction > CLIPPED_FRACTION:
-            break
-        best = frame, raw
-    if best is None:
+    frame = _well_exposed(frames)
+    view = None if frame is None else _reduced(frame, MakeThumbnail(DAYLIGHT_WIDTH))
+    if frame is None or view is None:
         return None
-    frame, raw = best
-    linear = into_gamut(_to_screen(raw, small(binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
+    linear = into_gamut(_to_screen(view, view.rgb, screen.lamp_lit))
     # How well it was exposed does not matter here: what is bright should look bright.
     linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
     balance = "white balanced for a halogen lamp" if screen.known else "in raw colours"
-    if is_grey(raw):
+    if view.is_grey:
         balance = "from a monochrome sensor"
     return Daylight(
         source=_data_uri(encoded(linear)),
         width=width,
         height=height,
-        marks=_marks(patches, raw, width, height),
+        marks=_marks(patches, view, width, height),
         caption=f"Frame {frame.path.name}, {exposure_text(frame.exposure_s)}, {balance}.",
     )
+
+
+def _well_exposed(frames: Sequence[FrameRecord]) -> FrameRecord | None:
+    """Return the frame of longest exposure that is not overexposed; None if none can be read."""
+    best = None
+    for frame in sorted(frames, key=lambda frame: frame.exposure_s):
+        saturated_fraction = _reduced(frame, SaturatedFraction())
+        if saturated_fraction is None:
+            continue
+        if best is not None and saturated_fraction > CLIPPED_FRACTION:
+            break
+        best = frame
+    return best
 
 
 def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tuple[GlowPicture, ...]:
     """Return photographs of one decay on a common scale of DN/s, and each brightened."""
     prepared = []
-    for photograph in photographs:
-        raw = _read(photograph.frame.path)
-        if raw is not None:
-            picture = small(binned(raw), GLOW_WIDTH)
-            saturated = small(saturated_cells(raw).astype(np.float32), GLOW_WIDTH)
-            has_saturation = (saturated > SATURATED_CELL_FRACTION)[..., np.newaxis]
+    views = _thumbnails([photograph.frame for photograph in photographs])
+    for photograph, view in zip(photographs, views, strict=True):
+        if view is not None:
+            has_saturation = (view.saturated > SATURATED_CELL_FRACTION)[..., np.newaxis]
             exposure_factor = _exposure_factor(photograph.frame)
-            linear = into_gamut(_to_screen(raw, picture / exposure_factor, screen.glow))
+            linear = into_gamut(_to_screen(view, view.rgb / exposure_factor, screen.glow))
             prepared.append((photograph, linear, has_saturation))
     if not prepared:
         return ()
@@ -205,10 +208,18 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
     return tuple(pictures)
 
 
-def _read(path: Path) -> RawFrame | None:
-    """Return the frame; None if it cannot be read, since a report must not fail for a picture."""
+def _thumbnails(frames: Sequence[FrameRecord]) -> list[Thumbnail | None]:
+    """Return small pictures of the glow; None for a frame that cannot be read."""
     try:
-        return read_raw(path)
+        return [*reduce_frames(frames, MakeThumbnail(GLOW_WIDTH))]
+    except LabrigError:
+        return [_reduced(frame, MakeThumbnail(GLOW_WIDTH)) for frame in frames]
+
+
+def _reduced(frame: FrameRecord, reduction: Reduction[Reduced]) -> Reduced | None:
+    """Reduce a frame; None if it cannot be read, since a report must not fail for a picture."""
+    try:
+        return reduce_frames([frame], reduction)[0]
     except LabrigError:
         return None
 
@@ -218,9 +229,11 @@ def _exposure_factor(frame: FrameRecord) -> float:
     return frame.exposure_s * frame.iso / (frame.f_number or 1.0) ** 2
 
 
-def _to_screen(raw: RawFrame, picture: Picture, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_screen(
+    view: Thumbnail, picture: Picture, matrix: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return a picture in linear sRGB by a colour matrix; a grey one is returned unchanged."""
-    return np.asarray(picture @ (np.eye(3) if is_grey(raw) else matrix).T)
+    return np.asarray(picture @ (np.eye(3) if view.is_grey else matrix).T)
 
 
 def _data_uri(rgb: NDArray[np.uint8]) -> str:
@@ -229,16 +242,16 @@ def _data_uri(rgb: NDArray[np.uint8]) -> str:
 
 
 def _marks(
-    patches: Sequence[PatchReport], raw: RawFrame, width: int, height: int
+    patches: Sequence[PatchReport], view: Thumbnail, width: int, height: int
 ) -> tuple[RegionMark, ...]:
     """Return the rectangles of the patches whose region is known."""
     marks = []
-    across, down = width / raw.width, height / raw.height
+    across, down = width / view.width, height / view.height
     for number, patch in enumerate(patches, start=1):
         if patch.region is None:
             continue
         try:
-            x, y, region_width, region_height = region_pixels(patch.region, raw.width, raw.height)
+            x, y, region_width, region_height = region_pixels(patch.region, view.width, view.height)
         except UsageError:
             continue  # photographs of another size than the measured frames
         rectangle = (x * across, y * down, region_width * across, region_height * down)

@@ -1,11 +1,9 @@
 """Sections of a report that do not depend on the protocol: lamp, shield, door, temperature."""
 
 from collections.abc import Collection
-from functools import partial
 from itertools import groupby
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from labrig.quantity import duration_text
@@ -18,7 +16,8 @@ from labrig.record import (
     glow_temperature_c,
     relative_rate_change,
 )
-from labrig.report.figure_style import INK, LEFT_PT, MUTED, SHADE, new_figure, place, points
+from labrig.report.chart import Band, Chart, Line, Margins, Panel, Points, linear_axis
+from labrig.report.figure_style import INK, MUTED, SHADE
 from labrig.report.sections import Picture, Section
 from labrig.report.timing import moves_text
 
@@ -33,8 +32,8 @@ MIN_SPAN_C = 2.0
 
 def temperature_figure(
     time_s: FloatArray, celsius: FloatArray, smooth: FloatArray, glow_s: FloatArray
-) -> Figure:
-    """Draw readings of the temperature and their smoothed course.
+) -> Chart:
+    """Return the chart of readings of the temperature and their smoothed course.
 
     Parameters
     ----------
@@ -49,18 +48,24 @@ def temperature_figure(
         (m, 2).
     """
     unit_s, unit = (60.0, "min") if time_s[-1] <= LONGEST_IN_MINUTES_S else (3600.0, "h")
-    figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
-    for begin_s, end_s in glow_s:
-        axes.axvspan(begin_s / unit_s, end_s / unit_s, color=SHADE, linewidth=0)
-    points(axes, time_s / unit_s, celsius, "o", MUTED, MUTED, size=2.2)
-    axes.plot(time_s / unit_s, smooth, color=INK, linewidth=1.2, zorder=4)
     middle = (float(celsius.min()) + float(celsius.max())) / 2
     reach = max(float(np.ptp(celsius)) * 1.1, MIN_SPAN_C) / 2
-    axes.set_ylim(middle - reach, middle + reach)
-    axes.set_xlabel(f"Time since the run began / {unit}")
-    axes.set_ylabel("Temperature / °C")
-    return figure
+    low, high, last = middle - reach, middle + reach, float(time_s[-1]) / unit_s
+    shades = tuple(
+        Band(SHADE, span_s / unit_s, np.full(2, low), np.full(2, high), opacity=1.0)
+        for span_s in glow_s
+    )
+    panel = Panel(
+        linear_axis(f"Time since the run began / {unit}", -0.03 * last, 1.03 * last or 1.0),
+        linear_axis("Temperature / °C", low, high, most=5),
+        (
+            *shades,
+            Points(MUTED, time_s / unit_s, celsius, size_pt=1.3),
+            Line(INK, time_s / unit_s, smooth),
+        ),
+        Margins(top=14.0),
+    )
+    return Chart((panel,), HEIGHT_PT)
 
 
 def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
@@ -145,9 +150,7 @@ def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Sectio
     shaded = " Shaded: the glow from which rates are fitted." if len(glow_s) else ""
     picture = Picture(
         "temperature",
-        partial(
-            temperature_figure, history.time - run_start, history.celsius, history.smooth, glow_s
-        ),
+        temperature_figure(history.time - run_start, history.celsius, history.smooth, glow_s),
         f"Readings, and their means over five minutes (line).{shaded}",
     )
     text = (

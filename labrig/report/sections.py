@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any, Protocol
 
 from labrig.acquire import RigFile
 from labrig.optics import CameraResponse
 from labrig.record import RunDescription, RunRecord
+from labrig.report.chart import Chart
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -19,15 +21,23 @@ class Picture:
     ----------
     name
         Name of its file: lower case, unique in its section.
-    draw
-        Function that draws the figure, called within `figure_style`.
+    drawing
+        Chart, or function that draws a figure with matplotlib, called within `figure_style`.
     caption
         Description of the figure, with units and the meaning of error bars.
     """
 
     name: str
-    draw: Callable[[], Figure]
+    drawing: "Chart | Callable[[], Figure]"
     caption: str = ""
+
+    def figure(self) -> "Figure":
+        """Return the figure as drawn by matplotlib, within `figure_style`."""
+        if isinstance(self.drawing, Chart):
+            from labrig.report.chart_figure import chart_figure  # matplotlib is slow to load
+
+            return chart_figure(self.drawing)
+        return self.drawing()
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What was found, as frozen values with uncertainties and units; one reader and writer a file.
+"""Results as frozen values with uncertainties and units; one reader and writer a file.
 
 Names are listed in `__init__.pyi`, and loaded when first used.
 """

@@ -70,4 +70,4 @@ class BlankResult(RunResult):
 
     def write_files(self, folder: Path) -> None:
         """Write `blank.yaml`."""
-        BLANK_KIND.write_into(folder, self.calibration)
+        BLANK_KIND.write(folder, self.calibration)

@@ -134,4 +134,4 @@ class CameraCalibrationResult(RunResult):
 
     def write_files(self, folder: Path) -> None:
         """Write `camera.yaml`."""
-        CAMERA_KIND.write_into(folder, self.calibration)
+        CAMERA_KIND.write(folder, self.calibration)

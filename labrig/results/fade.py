@@ -143,4 +143,4 @@ class FadeResult(RunResult):
 
     def write_files(self, folder: Path) -> None:
         """Write `fade.yaml`."""
-        FADE_KIND.write_into(folder, self.calibration)
+        FADE_KIND.write(folder, self.calibration)

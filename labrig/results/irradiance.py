@@ -97,4 +97,4 @@ class IrradianceResult(RunResult):
 
     def write_files(self, folder: Path) -> None:
         """Write `irradiance.yaml`."""
-        IRRADIANCE_KIND.write_into(folder, self.calibration)
+        IRRADIANCE_KIND.write(folder, self.calibration)

@@ -249,4 +249,4 @@ class LvfCalibrationResult(RunResult):
 
     def write_files(self, folder: Path) -> None:
         """Write `lvf.yaml`."""
-        LVF_KIND.write_into(folder, self.calibration)
+        LVF_KIND.write(folder, self.calibration)

@@ -16,6 +16,8 @@ NO_LIBUSB = (
     "libusb-1.0-0, macOS: brew install libusb, Windows: pip install libusb-package)"
 )
 _STILL_IMAGE = 6
+#: Of a reflex camera whose mirror has to swing.
+USUAL_SHUTTER_LAG = "60 ms"
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,22 @@ class _Board:
     keys: str = ""
     role: str = "lamp"
     hints: tuple[str, ...] = ()
+
+
+#: Keys for the sketch of the guide "Use boards of your own".
+_SKETCH = (
+    ', on: {send: "on 0", answer: "ok"}, off: {send: "off 0", answer: "ok"}'
+    ', state: {send: "state 0", on: "on", off: "off"}, warm_up: 15 min'
+)
+_UNKNOWN_HINT = (
+    "nothing tells what is behind it: if it is a relay board, write its own commands and answers "
+    "in place of these"
+)
+
+
+def _unlisted(name: str) -> _Board:
+    """Return a board whose commands a person has to fill in."""
+    return _Board(name, "serial_relay", _SKETCH, hints=(_UNKNOWN_HINT,))
 
 
 _MAESTRO = _Board(
@@ -54,11 +72,21 @@ _BOARDS: dict[tuple[int, int | None], _Board] = {
     (0x1FFB, 0x008B): _MAESTRO,
     (0x1FFB, 0x008C): _MAESTRO,
     (0x1FFB, None): _Board("Pololu servo controller"),
-    (0x0403, None): _Board("FTDI adapter; the device behind it is not known"),
-    (0x10C4, 0xEA60): _Board("CP210x adapter; the device behind it is not known"),
-    (0x2341, None): _Board("Arduino"),
+    (0x0403, None): _unlisted("FTDI adapter"),
+    (0x10C4, 0xEA60): _unlisted("CP210x adapter"),
+    (0x2341, None): _Board(
+        "Arduino",
+        "serial_relay",
+        ", starts_in: 2 s" + _SKETCH,
+        hints=("these are the commands of the sketch in the guide 'Use boards of your own'",),
+    ),
     (0x1313, None): _Board("Thorlabs instrument"),
-    (0x04D8, 0xFFEE): _Board("Devantech relay board"),
+    (0x04D8, 0xFFEE): _Board(
+        "Devantech relay board",
+        "serial_relay",
+        ', on: "hex 65", off: "hex 6F", warm_up: 15 min',
+        hints=("these are the commands of the first relay; it never acknowledges",),
+    ),
 }
 
 #: USB vendors whose cameras need proprietary commands for photographs, which `ptp_camera` lacks and
@@ -164,10 +192,12 @@ def _serial(port: Port, drivers: Collection[str]) -> FoundDevice:
         return FoundDevice(port.device, "not on USB")
     ids = f"{port.vid:04x}:{port.pid:04x}"
     board = _BOARDS.get((port.vid, port.pid)) or _BOARDS.get((port.vid, None))
-    if board is None:
-        return FoundDevice(port.device, f"{port.description} ({ids}), unknown to labrig")
     serial = f", serial {port.serial_number}" if port.serial_number else ""
-    name = f"{board.name} ({ids}{serial})"
+    if board is None:
+        board = _unlisted(port.description)
+        name = f"{board.name} ({ids}{serial}), unknown to labrig"
+    else:
+        name = f"{board.name} ({ids}{serial})"
     if board.driver not in drivers:
         return FoundDevice(port.device, name)
     return FoundDevice(
@@ -210,7 +240,14 @@ def _camera(device: Any, host: Host, drivers: Collection[str], has_twin: bool) -
             f"{maker} has commands of its own, which libgphoto2 knows (Linux, macOS): "
             "pip install 'labrig[gphoto2]'"
         )
-    snippet = f'camera: {{driver: {driver}, address: "{address}", warm_up: 30 min}}'
+    snippet = (
+        f'camera: {{driver: {driver}, address: "{address}", warm_up: 30 min, '
+        f"shutter_lag: {USUAL_SHUTTER_LAG}}}"
+    )
+    hints.append(
+        f"no camera reports its shutter_lag: {USUAL_SHUTTER_LAG} is usual, the protocol 'fade' "
+        "measures it"
+    )
     return FoundDevice(
         address,
         " ".join(word for word in name_parts if word) or "camera",

@@ -62,7 +62,7 @@ class RunFollower:
         }
         self._last_look: tuple[object, ...] = ()
         self._record = RunRecord(run, [], False, 0.0)
-        self._status: RunStatus = "unfinished"
+        self._status: RunStatus = "interrupted"
         self._points: dict[str, list[dict[str, Any]]] = {}
         self._newest_frame: dict[str, Any] = {}
         self._unreadable: set[str] = set()
@@ -81,7 +81,7 @@ class RunFollower:
         if sizes[0] and sizes != self._last_look[:2]:
             self._record = read_run(self.run)
         is_complete = len(self._record.completed()) == len(self._units)
-        self._status = status_of(self.run, is_complete)
+        self._status = status_of(self._record, is_complete=is_complete)
         is_new = (*sizes, self._status) != self._last_look
         self._last_look = (*sizes, self._status)
         return self._read_frames() or is_new

@@ -8,7 +8,8 @@ import { duration, exposure, grouped, tag } from "./watch_words.js";
 const $ = (id) => document.getElementById(id);
 const NOTHING_NEXT = {
   running: "Between two attempts.",
-  unfinished: "Nobody is at it. Go on with: labrig resume",
+  interrupted: "Nobody is at it. Go on with: labrig resume",
+  failed: "A fault ended it. Go on with: labrig resume",
   recorded: "Everything is recorded; the analysis follows, or else: labrig process",
   processed: "Done; the report is in the run's folder: result/report.html",
 };

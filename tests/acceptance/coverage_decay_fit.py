@@ -1,4 +1,4 @@
-"""What the decay fit's uncertainties and choices are worth, over many seeds.
+"""Coverage of the decay fit's uncertainties, and its choices of a model, over many seeds.
 
     python -m tests.acceptance.coverage_decay_fit [--seeds 500] [--jobs 2] [--case NAME ...]
 

@@ -58,7 +58,7 @@ EXPONENTIAL = ("blue-paint", "double-medium-bright", "double-close-even")
 
 @dataclass(frozen=True)
 class Scenario:
-    """What stands in the room, and what is wrong with it."""
+    """The samples in the room, and the faults of its devices."""
 
     name: str
     sensor: dict[str, Any] = field(default_factory=dict)
@@ -68,13 +68,13 @@ class Scenario:
 
     @property
     def noise(self) -> Noise:
-        """What the sensor adds, for the bound."""
+        """Return the sensor's noise, for the bound."""
         told = {key: value for key, value in self.sensor.items() if key != "curves"}
         return Noise(**SENSOR, **told)
 
     @property
     def patches(self) -> dict[str, Region]:
-        """What is measured of each sample."""
+        """Return the region of each sample."""
         return dict(zip(self.samples, PATCHES, strict=False))
 
 
@@ -186,7 +186,7 @@ def _fit(series: Series) -> DecayFit | None:
 
 
 def true_rates(sample: str) -> list[float]:
-    """By falling rate, 1/s."""
+    """Return the true rates in 1/s, the fastest first."""
     return sorted((state.k_r_per_s for state in read_material(sample).states), reverse=True)
 
 

@@ -1,4 +1,4 @@
-"""How well the rates of a decay can be known at best, from the simulated sensor's true noise.
+"""Cramér-Rao bound of the rates of a decay, from the simulated sensor's true noise.
 
 The Cramér–Rao bound, shared with neither labrig's noise estimates nor its fits: photo-electrons of
 all pixels of a patch, with crosstalk, read noise, noise that rows share, rounding, and flicker;
@@ -23,7 +23,7 @@ NODES, FRACTIONS = np.polynomial.legendre.leggauss(24)
 
 @dataclass(frozen=True)
 class Noise:
-    """What the simulated room was told; keys as in `SensorSettings`."""
+    """Noise of the simulated sensor; names as in `SensorSettings`."""
 
     width: int
     height: int
@@ -56,7 +56,7 @@ class PatchNoise:
 
     @classmethod
     def of(cls, noise: Noise, region: Region, iso: float) -> "PatchNoise":
-        """Of a patch in a frame."""
+        """Return the noise of a patch in a frame."""
         x, y, wide, high = region_pixels(region, noise.width, noise.height)
         rows, columns = np.arange(y - 1, y + high + 1), np.arange(x - 1, x + wide + 1)
         colour = np.array(BAYER_RGGB).reshape(2, 2)[rows[:, None] % 2, columns % 2]

@@ -93,7 +93,7 @@ def main() -> None:
 
 
 def summary(name: str, errors: NDArray[np.float64], seeds: int) -> str:
-    """Of one material: (fits with the true number of states, states) errors in σ."""
+    """Errors of one material in σ, of shape (fits with the true number of states, states)."""
     one, two = (100 * np.mean(np.abs(errors) < sigmas, axis=0) for sigmas in (1, 2))
     with np.printoptions(precision=2, suppress=True):
         return (
@@ -108,7 +108,7 @@ def has_true_number_of_states(fit: dict[str, object], material: str) -> bool:
 
 
 def assessment(fit: dict[str, object], material: str) -> str:
-    """What came out, in a line."""
+    """Return one line with the outcome."""
     said = f"χ² {fit['reduced_chi2']:.2f}  ρ {fit['flicker']:.4f}  n {fit['n_states']}"
     if material == WITHOUT_TRUE_STATES:
         return f"{said}  {'flagged' if fit['better_model'] else 'NOT FLAGGED'}  {fit['warnings']}"

@@ -49,7 +49,7 @@ _ACKNOWLEDGED = re.compile(r"frame \d+ of \d+: ")
 
 @dataclass(frozen=True)
 class Ended:
-    """How one process ended, what it said, and how often it changed something on the disk."""
+    """End of a process: exit code, messages, and its number of changes on the disk."""
 
     code: int
     lines: list[str]
@@ -57,7 +57,7 @@ class Ended:
 
     @property
     def complaints(self) -> list[str]:
-        """What it said beside its progress."""
+        """Return its messages beside its progress."""
         return [line for line in self.lines if not line.startswith("[")]
 
     @property
@@ -79,7 +79,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Bench:
-    """What is run, and what comes of it on a sound disk."""
+    """A run, and its result on a sound disk."""
 
     protocol: Path
     rig: Path

@@ -29,7 +29,7 @@ BRIGHT = 0.02
 
 
 def measured(material: str, seed: int) -> list[tuple[EmissionSpectrum, bool]]:
-    """With and without the white picture; whether the spectrum was said to change."""
+    """Measure with and without the white picture, each with whether a change was reported."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         sample = [{"material": material, "region": [0.03, 0.1, 0.94, 0.8]}]

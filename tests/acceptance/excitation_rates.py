@@ -39,7 +39,7 @@ def run(material: Material, seed: int) -> tuple[FittedExcitation, Bench]:
 
 
 def deviations(found: FittedExcitation, bench: Bench) -> FloatArray:
-    """In σ: k_r, amplitude and k_e of every state in turn."""
+    """Return the deviations in σ of k_r, amplitude and k_e of every state in turn."""
     rows = []
     for state, truth, full in zip(
         found.states, bench.material.states, bench.amplitudes(), strict=True

@@ -76,7 +76,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Ending:
-    """What one process left behind; `calls` is how often it asked the rig's clock."""
+    """End of a process; `calls` counts its questions to the rig's clock."""
 
     code: int
     complaints: list[str]
@@ -215,7 +215,7 @@ def _completed(run: Path) -> dict[str, str]:
 
 
 def _damage(run: Path) -> Iterator[str]:
-    """What is wrong with the journal and the frames that it acknowledges."""
+    """Return the faults of the journal and of the frames that it acknowledges."""
     documents = read_journal(run / "journal.jsonl").documents
     uids = [doc["uid"] for _, doc in documents]
     if len(set(uids)) < len(uids):
@@ -293,7 +293,7 @@ def _child(arguments: list[object], folder: Path, stop: Stop | None = None) -> E
 
 
 def _run(arguments: list[str], report: Path, stop: Stop | None) -> int:
-    """In the child: the command, watched by a room that is remembered and a clock that counts."""
+    """Run the command in the child, watched by a remembered room and a counting clock."""
     stands: list[Bench] = []
     now, calls = VirtualClock.now, 0
 

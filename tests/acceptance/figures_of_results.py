@@ -28,7 +28,7 @@ def figures(result: Path) -> Figures:
 
 
 def furthest_in_sigma(some: Figures, others: Figures) -> tuple[int, float, str]:
-    """How many are in both, and the largest difference in σ of it, and whose that is."""
+    """Return the number of figures in both, the largest difference in σ, and its name."""
     off = {
         name: abs(others[name][0] - value) / math.hypot(sigma, others[name][1])
         for name, (value, sigma) in some.items()

@@ -1,4 +1,4 @@
-"""What libgphoto2 adds before the shutter opens, and how well the driver knows when it opened.
+"""Time that libgphoto2 adds before the shutter opens, and the driver's error of that moment.
 
     python -m tests.acceptance.gphoto2_latency [--frames 20]
 

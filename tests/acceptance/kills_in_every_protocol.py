@@ -60,7 +60,7 @@ class Undisturbed:
     bench: dict[str, Any]
 
     def furthest(self, result: Path) -> tuple[int, float, str]:
-        """Of the figures in a result folder: how many, the largest difference in σ, and whose."""
+        """Return the number of figures in a result, the largest difference in σ, and its name."""
         return furthest_in_sigma(figures(self.folder / "result"), figures(result))
 
     @classmethod
@@ -224,7 +224,7 @@ def leave_bench(run: Path, *, morning: bool) -> None:
 
 
 def damage(run: Path, peace: Undisturbed) -> Iterator[str]:
-    """What is wrong with a run that is complete."""
+    """Return the faults of a complete run."""
     record = read_run(run)
     success = [attempt.unit for attempt in record.attempts if attempt.completed]
     if success != peace.units:

@@ -52,7 +52,7 @@ class Labrig:
 
     @property
     def complaints(self) -> list[str]:
-        """What it said beside its progress."""
+        """Return its messages beside its progress."""
         lines = self._err.read_text().splitlines()
         return [line for line in lines if not line.startswith(("[", "warning:"))]
 
@@ -83,7 +83,7 @@ def _child(told: str, arguments: list[str]) -> int:
 
 
 def _left(stand: Bench) -> dict[str, Any]:
-    """What the room knows, whatever relay, servo and driver say."""
+    """Return the room's true state, whatever relay, servo and driver report."""
     assert stand.room is not None
     room, now_s = stand.room.room, stand.clock.now()
     doors = {"door": room.door, "shield": room._doors.shield}

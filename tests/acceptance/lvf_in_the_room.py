@@ -20,7 +20,7 @@ import yaml
 from numpy.typing import NDArray
 
 from labrig import resources
-from labrig.calibration import read_irradiance_file, read_lvf_file
+from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.cli.exit_codes import guarded
 from labrig.fit.least_squares import FloatArray
 from labrig.optics import read_curve_file
@@ -107,8 +107,8 @@ def main() -> None:
             calibration, irradiance = measured(
                 Path(folder), seed, asked.width, asked.filters, not asked.shipped
             )
-            lvf = read_lvf_file(calibration / "result" / "lvf.yaml")
-            light = read_irradiance_file(irradiance / "result" / "irradiance.yaml")
+            lvf = LVF_KIND.read(calibration / "result" / "lvf.yaml")
+            light = IRRADIANCE_KIND.read(irradiance / "result" / "irradiance.yaml")
             simulation = simulation_of(calibration)
         assert lvf.before_camera is not None
         assert lvf.on_sample is not None

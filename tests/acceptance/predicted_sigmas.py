@@ -106,7 +106,7 @@ def run(folder: Path, case: Case, day: int, *more: str) -> Path:
 
 
 def fitted(case: Case, day: int) -> Fitted:
-    """What one day finds, with the true number of states; without the report's pictures."""
+    """Fit one day's frames with the true number of states, without the report's pictures."""
     with tempfile.TemporaryDirectory() as folder:
         made = run(Path(folder), case, day, "--no-process")
         patches = Overrides().patches(read_run_protocol(made))
@@ -124,7 +124,7 @@ def fitted(case: Case, day: int) -> Fitted:
 
 
 def predicted(folder: Path, case: Case, material: Path) -> dict[str, Any]:
-    """What `plan --predict` says of the case's only patch."""
+    """Return the prediction of `plan --predict` for the case's only patch."""
     protocol, rig = written(folder, case, PILOT_DAY)
     said = json.loads(labrig("plan", protocol, "--rig", rig, "--predict", material, "--json"))
     (patch,) = said["patches"].values()

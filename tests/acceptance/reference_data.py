@@ -22,14 +22,14 @@ ULTRAVIOLET = (Line((253.6517,)), Line((365.0158,)))
 
 
 def digits(name: str, start: int) -> float:
-    """To which all parameters of a set agree."""
+    """Return the number of digits to which all parameters of a set agree."""
     reference = strd.read(STRD / f"{name}.dat")
     fit = least_squares(reference.residuals, reference.starts[start])
     return float(reference.certified_digits(fit.parameters))
 
 
 def rms_nm(lines: tuple[Line, ...], low_nm: float) -> tuple[int, float]:
-    """How many lines were found above `low_nm`, and what is left after a straight line."""
+    """Return the number of lines above `low_nm`, and the residual of a straight line."""
     lamp = read_spectrum(LAMP, "Generic.germicidal")
     part = (lamp.wavelength_nm > low_nm) & (lamp.wavelength_nm < 590)
     found = locate_lines(lamp.wavelength_nm[part], lamp.value[part], lines=lines, fwhm_nm=1.2)

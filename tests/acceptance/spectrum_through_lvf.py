@@ -1,4 +1,4 @@
-"""What spectra from one picture through a variable filter are worth.
+"""Errors of spectra from one picture through a variable filter, and coverage of their bands.
 
     python -m tests.acceptance.spectrum_through_lvf [count]
 

@@ -83,7 +83,7 @@ class Charges(ProtocolModel):
 
 
 def trial(rng: random.Random, folder: Path, shim: Path) -> tuple[str, bool]:
-    """What went wrong, and whether the PC slept while the lamp was on."""
+    """Return the fault, and whether the PC slept while the lamp was on."""
     board, slept = WatchedBoard(), folder / "slept"
     slept.touch()
     with on_a_terminal(board) as address:

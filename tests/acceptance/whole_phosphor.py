@@ -63,7 +63,7 @@ def protocol_file(folder: Path, material: str) -> Path:
 
 
 def run(folder: Path, material: str, seed: int, width: int) -> tuple[Material | str, float]:
-    """What came out, or what was said instead, and how long it took."""
+    """Return the material, or the message of a failure, and the time that it took."""
     began = time.monotonic()
     ended = subprocess.run(
         [
@@ -80,7 +80,7 @@ def run(folder: Path, material: str, seed: int, width: int) -> tuple[Material | 
 
 
 def brightness(run: Path) -> float:
-    """Of the room's lamp in the last charge: it loses 0.2 % an hour."""
+    """Return the brightness of the room's lamp in the last charge: it loses 0.2 % an hour."""
     (off,) = [
         action
         for action in list(read_run(run).completed().values())[-1].actions
@@ -91,7 +91,7 @@ def brightness(run: Path) -> float:
 
 
 class Errors(NamedTuple):
-    """Of one state: numbers in σ from the truth, unless said otherwise.
+    """Errors of one state in σ, unless said otherwise.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Errors(NamedTuple):
     radiated: FloatArray
 
     def line(self) -> str:
-        """For the terminal."""
+        """Return a line for the terminal."""
         return (
             f"k_r {self.k_r:+5.1f} σ  r(0) {self.r0[0]:.3f} ({self.r0[1]:.3f}) "
             f"{self.r0_off:+5.1f} σ  k_e {_furthest(self.k_e_percent):+6.1f} % "
@@ -121,7 +121,7 @@ class Errors(NamedTuple):
 
 
 def errors(found: Material, true: Material, brightness: float) -> list[Errors]:
-    """Of every state; `brightness` of the lamp in the last charge."""
+    """Return the errors of every state; `brightness` is the lamp's in the last charge."""
     assert true.bands_nm is not None
     cells, lamp = band_cells(true.bands_nm), filament_spectrum(BURNING_K)
     direct = cells @ lamp / np.linalg.norm(cells @ lamp)
@@ -208,7 +208,7 @@ def main(arguments: Sequence[str]) -> None:
 def _told(
     material: str, seed: int, took_s: float, found: Material | str, run: Path
 ) -> list[Errors]:
-    """Of one run, printed."""
+    """Print the errors of one run."""
     every: list[Errors] = []
     true = read_material(material)
     if isinstance(found, str):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from labrig import resources
 from labrig.acquire import Plan, RunObserver
-from labrig.calibration import LvfFile, write_lvf_file
+from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.clock import Clock
 from labrig.material import read_material
@@ -43,7 +43,7 @@ def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path
     for device in content["devices"].values():
         device.pop("warm_up", None)
     content["optics"]["lvf"] = "lvf.yaml"
-    write_lvf_file(folder / "lvf.yaml", true_lvf_file())
+    LVF_KIND.write(folder, true_lvf_file())
     path = folder / name
     path.write_text(yaml.safe_dump(content))
     return path

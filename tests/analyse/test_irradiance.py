@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from labrig.analyse.irradiance import in_bands, mean_ratio, strip_scale
-from labrig.calibration import read_irradiance_file, write_lvf_file
+from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.errors import DataError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError
@@ -110,7 +110,7 @@ def test_on_the_simulated_bench_it_is_the_rooms(tmp_path: Path) -> None:
     width, height = 192, 64
     on_sample = Strip(left=(0.08, 0.5), right=(0.92, 0.5), height=0.25, rising=False)
     calibrated = true_lvf_file(width, height).model_copy(update={"on_sample": on_sample})
-    write_lvf_file(tmp_path / "lvf.yaml", calibrated)
+    LVF_KIND.write(tmp_path, calibrated)
 
     def change(rig: dict[str, Any]) -> None:
         rig["optics"]["lvf"] = str(tmp_path / "lvf.yaml")
@@ -122,7 +122,7 @@ def test_on_the_simulated_bench_it_is_the_rooms(tmp_path: Path) -> None:
     result = process_run(run)
     assert isinstance(result, IrradianceResult)
     file = result.calibration
-    assert read_irradiance_file(run / "result" / "irradiance.yaml") == file
+    assert IRRADIANCE_KIND.read(run / "result" / "irradiance.yaml") == file
     assert_read_back(result)
     expected = true_irradiance(simulation_of(run), file.strip, file.bands_nm).sum(axis=1)
     through = np.array(file.through).sum(axis=1)

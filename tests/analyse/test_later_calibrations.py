@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from labrig.analyse.overrides import Overrides
-from labrig.calibration import write_blank_file
+from labrig.calibration import BLANK_KIND
 from labrig.errors import UsageError
 from labrig.process import process_run
 from tests.analyse.recorded import record
@@ -28,7 +28,7 @@ def test_one_that_came_later_is_used_and_recorded(tmp_path: Path) -> None:
         "constant_sigma_dn_per_s": (1.0,) * 3,
         "ambient_sigma_dn_per_s": (0.1,) * 3,
     }
-    write_blank_file(file, BLANK.model_copy(update=three | leaking))
+    BLANK_KIND.write(tmp_path, BLANK.model_copy(update=three | leaking))
     assert not any("falls on the blank" in said for said in process_run(run).warnings)
     result = process_run(run, Overrides.parse([], [], optics=[f"blank={file}"]))
     assert any("DN/s in G falls on the blank" in said for said in result.warnings)

@@ -7,6 +7,7 @@ import pytest
 
 from labrig.analyse.decay import noise_budget, noise_parts
 from labrig.fit import DecayFit
+from labrig.report.chart_figure import chart_figure
 from labrig.report.decay_figures import noise_figure, visible_parts
 from labrig.report.figure_style import figure_style
 from labrig.results import Series
@@ -88,7 +89,7 @@ def test_the_figure_has_a_line_for_each_part_that_matters() -> None:
     budget = noise_budget(SERIES, FIT)
     assert budget is not None
     with figure_style():
-        figure = noise_figure(budget)
+        figure = chart_figure(noise_figure(budget))
         figure.canvas.draw()
         (legend,) = figure.legends
         assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1

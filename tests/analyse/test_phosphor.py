@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from labrig.acquire import read_protocol
-from labrig.calibration import write_irradiance_file
+from labrig.calibration import IRRADIANCE_KIND
 from labrig.errors import UsageError
 from labrig.material import read_material
 from labrig.number_format import plus_minus
@@ -31,7 +31,7 @@ SHORT = {key: value for key, value in QUICK.items() if key != "sample"} | {
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("phosphor")
-    write_irradiance_file(folder / "irradiance.yaml", true_irradiance(WIDTH, HEIGHT))
+    IRRADIANCE_KIND.write(folder, true_irradiance(WIDTH, HEIGHT))
 
     def change(rig: dict[str, dict[str, object]]) -> None:
         rig["optics"]["irradiance"] = str(folder / "irradiance.yaml")

@@ -14,14 +14,14 @@ from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.strip import StripPatch, for_each_patch, slice_strip, tilt_offset
-from labrig.calibration import write_irradiance_file, write_lvf_file
+from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.compare.run import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
 from labrig.optics import Strip
 from labrig.process import Processed, process_and_report
 from labrig.record import read_run
-from labrig.reduce import RawFrame
+from labrig.reduce import SensorLayout
 from labrig.region import Region
 from labrig.results import read_fitted_decays
 from labrig.results.emission_spectrum import read_emission_spectrum
@@ -60,8 +60,8 @@ def chain(**keys: Any) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("phosphor")
-    write_irradiance_file(folder / "irradiance.yaml", true_irradiance(WIDTH, HEIGHT))
-    write_lvf_file(folder / "lvf.yaml", true_lvf_file(WIDTH, HEIGHT))
+    IRRADIANCE_KIND.write(folder, true_irradiance(WIDTH, HEIGHT))
+    LVF_KIND.write(folder, true_lvf_file(WIDTH, HEIGHT))
 
     def change(rig: dict[str, dict[str, Any]]) -> None:
         rig["optics"] |= {name: str(folder / f"{name}.yaml") for name in ("irradiance", "lvf")}
@@ -160,11 +160,11 @@ def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
 
 
 STRIP = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.3, rising=True)
-RAW = RawFrame(np.zeros((HEIGHT, WIDTH), np.uint16), "RGGB", (0.0,) * 4, 1000.0)
+LAYOUT = SensorLayout(WIDTH, HEIGHT, "RGGB")
 
 
 def cut_of(region: Region) -> dict[str, Region]:
-    (slices,) = slice_strip([StripPatch("a", "a", region, alone=False)], STRIP, RAW)[0].values()
+    (slices,) = slice_strip([StripPatch("a", "a", region, alone=False)], STRIP, LAYOUT)[0].values()
     return slices
 
 
@@ -199,7 +199,7 @@ def test_rows_of_a_tilted_strip_lie_further_along(down: float, below: float) -> 
     }
     left, right = (np.array(end) * [WIDTH, HEIGHT] for end in (strip.left, strip.right))
     for (x, y, width, height), further in zip(
-        slices.values(), tilt_offset(strip, slices, RAW), strict=True
+        slices.values(), tilt_offset(strip, slices, LAYOUT), strict=True
     ):
         middle = np.array([(x + width / 2) * WIDTH, (y + height / 2) * HEIGHT])
         along = (middle - left) @ (right - left) / np.sum((right - left) ** 2)

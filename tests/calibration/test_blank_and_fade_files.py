@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.calibration import (
+    BLANK_KIND,
+    FADE_KIND,
     BlankFile,
     Change,
     FadeFile,
-    read_blank_file,
-    read_fade_file,
-    write_blank_file,
-    write_fade_file,
 )
 from labrig.errors import DataError, UsageError
 from labrig.results import Transient
@@ -48,9 +46,9 @@ def test_a_written_blank_reads_back_as_itself(
         | {"t_s": times, "rate_dn_per_s": rows, "sigma_dn_per_s": [(1.0, 2.0)] * len(times)}
         | {"first_clean_s": data.draw(st.none() | st.floats(0, 100))}
     )
-    path = tmp_path_factory.mktemp("blank") / "blank.yaml"
-    write_blank_file(path, file)
-    assert read_blank_file(path) == file
+    folder = tmp_path_factory.mktemp("blank")
+    BLANK_KIND.write(folder, file)
+    assert BLANK_KIND.read(folder / "blank.yaml") == file
 
 
 def test_when_a_blank_is_clean_and_what_leaks() -> None:
@@ -77,9 +75,9 @@ def test_a_written_fade_reads_back_as_itself(
     times = [0.0, *np.cumsum(steps).tolist()]
     rows = [(fraction, fraction / 3)] * len(times)
     file = fade(rise={"t_s": times, "fraction": rows, "sigma": rows})
-    path = tmp_path_factory.mktemp("fade") / "fade.yaml"
-    write_fade_file(path, file)
-    assert read_fade_file(path) == file
+    folder = tmp_path_factory.mktemp("fade")
+    FADE_KIND.write(folder, file)
+    assert FADE_KIND.read(folder / "fade.yaml") == file
 
 
 def test_a_fade_is_what_the_excitation_fit_takes() -> None:
@@ -108,7 +106,7 @@ def test_a_malformed_fade_is_one_clear_line(
     path = tmp_path / "fade.yaml"
     path.write_text(yaml.safe_dump({**fade().model_dump(mode="json"), **_plain(changes)}))
     with pytest.raises(UsageError) as caught:
-        read_fade_file(path)
+        FADE_KIND.read(path)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 

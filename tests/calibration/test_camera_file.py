@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.calibration import CameraFile, Linearity, Noise, read_camera_file, write_camera_file
+from labrig.calibration import CAMERA_KIND, CameraFile, Linearity, Noise
 from labrig.errors import DataError, UsageError
 from labrig.optics import Factor, Flat
 
@@ -55,9 +55,9 @@ def test_a_written_camera_reads_back_as_itself(
         ),
         linearity=Linearity(level_dn=(1.0, 2.0), deviation=(0.0, -0.01), sigma=(0.001, 0.002)),
     )  # fmt: skip
-    path = tmp_path_factory.mktemp("camera") / "camera.yaml"
-    write_camera_file(path, file)
-    assert read_camera_file(path) == file
+    folder = tmp_path_factory.mktemp("camera")
+    CAMERA_KIND.write(folder, file)
+    assert CAMERA_KIND.read(folder / "camera.yaml") == file
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_malformed_file_is_one_clear_line(
     path = tmp_path / "camera.yaml"
     path.write_text(yaml.safe_dump(camera().model_dump(mode="json") | changes))
     with pytest.raises(UsageError) as caught:
-        read_camera_file(path)
+        CAMERA_KIND.read(path)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.calibration import IrradianceFile, read_irradiance_file, write_irradiance_file
+from labrig.calibration import IRRADIANCE_KIND, IrradianceFile
 from labrig.errors import UsageError
 from labrig.optics import Strip
 from labrig.yaml_file import yaml_text
@@ -42,9 +42,9 @@ def test_what_is_written_comes_back_exactly(
     file = IrradianceFile.model_validate(
         content(through=through, direct=direct, vector_length=scale)
     )
-    path = tmp_path_factory.mktemp("irradiance") / "irradiance.yaml"
-    write_irradiance_file(path, file)
-    assert read_irradiance_file(path) == file
+    folder = tmp_path_factory.mktemp("irradiance")
+    IRRADIANCE_KIND.write(folder, file)
+    assert IRRADIANCE_KIND.read(folder / "irradiance.yaml") == file
 
 
 @pytest.mark.parametrize(
@@ -62,5 +62,5 @@ def test_a_malformed_file_is_one_line(tmp_path: Path, changed: dict[str, Any], s
     path = tmp_path / "irradiance.yaml"
     path.write_text(yaml_text(content(**changed)))
     with pytest.raises(UsageError, match=said) as caught:
-        read_irradiance_file(path)
+        IRRADIANCE_KIND.read(path)
     assert "\n" not in str(caught.value)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import BaseModel
 
 from labrig import plugins
 from labrig.acquire import read_rig_file
@@ -32,18 +33,22 @@ def test_a_rig_file_names_its_file_and_analyses_have_it(
     assert kind.protocol in plugins.names(plugins.ANALYSES)
 
 
-@pytest.mark.parametrize("found", [[], ["one"], ["one", "two"]], ids=len)
-def test_the_file_itself_or_the_one_in_a_runs_result(found: list[str], tmp_path: Path) -> None:
-    kind = CalibrationKind(
-        "text", "blank", "text", "text.yaml",
-        read=lambda path: path.read_text(), write=lambda path, file: None,
-    )  # fmt: skip
-    for part in found:
-        (tmp_path / "result" / part).mkdir(parents=True)
-        (tmp_path / "result" / part / "text.yaml").write_text(part)
-    if found == ["one"]:
-        assert kind.read_named(tmp_path) == "one"
-        assert kind.read_named(tmp_path / "result" / "one" / "text.yaml") == "one"
+class Text(BaseModel):
+    """A file of a kind of its own."""
+
+    text: str
+
+
+@pytest.mark.parametrize("parts", [[], ["one"], ["one", "two"]], ids=len)
+def test_the_file_itself_or_the_one_in_a_runs_result(parts: list[str], tmp_path: Path) -> None:
+    kind = CalibrationKind("text", "blank", "text", "text.yaml", Text)
+    for part in parts:
+        folder = tmp_path / "result" / part
+        folder.mkdir(parents=True)
+        kind.write(folder, Text(text=part))
+    if parts == ["one"]:
+        assert kind.read(tmp_path).text == "one"
+        assert kind.read(tmp_path / "result" / "one" / "text.yaml").text == "one"
     else:
-        with pytest.raises(UsageError, match=f"one text.yaml in its result, got {len(found)}"):
-            kind.read_named(tmp_path)
+        with pytest.raises(UsageError, match=f"one text.yaml in its result, got {len(parts)}"):
+            kind.read(tmp_path)

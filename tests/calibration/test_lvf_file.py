@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
-from labrig.calibration import LvfFile, read_lvf_file, write_lvf_file
+from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.errors import UsageError
 from labrig.optics import Bands, Strip, WavelengthMap
@@ -73,9 +73,9 @@ def test_what_is_written_comes_back_exactly(
         on_sample=strip,
         source=source,
     )
-    path = tmp_path_factory.mktemp("lvf") / "lvf.yaml"
-    write_lvf_file(path, file)
-    assert read_lvf_file(path) == file
+    folder = tmp_path_factory.mktemp("lvf")
+    LVF_KIND.write(folder, file)
+    assert LVF_KIND.read(folder / "lvf.yaml") == file
 
 
 @given(strips(), st.integers(1, 40))
@@ -123,9 +123,9 @@ def test_what_is_no_filter_is_refused(build: Callable[[], object], said: str) ->
 
 
 def test_a_malformed_file_is_one_line(tmp_path: Path) -> None:
+    LVF_KIND.write(tmp_path, lvf_file())
     path = tmp_path / "lvf.yaml"
-    write_lvf_file(path, lvf_file())
     path.write_text(path.read_text().replace("centre_nm", "center_nm", 1))
     with pytest.raises(UsageError, match="did you mean 'centre_nm'") as caught:
-        read_lvf_file(path)
+        LVF_KIND.read(path)
     assert "\n" not in str(caught.value)

@@ -204,14 +204,27 @@ def test_what_cannot_be_reduced_is_exit_code_4(labrig: Labrig, tmp_path: Path) -
     one_line(labrig("fit", "decay", tmp_path / "short.csv"), 4)
 
 
-def test_the_command_starts_fast_and_lists_what_there_is(labrig: Labrig) -> None:
+def test_what_there_is_is_listed(labrig: Labrig) -> None:
     assert "decay" in labrig("protocol", "list").out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "slow"),
+    [
+        ("--help", ("numpy", "scipy", "pydantic", "event_model", "rawpy")),
+        ("runs list --runs .", ("numpy", "scipy", "yaml", "event_model", "rawpy")),
+        ("plan decay --rig sim", ("scipy", "event_model", "rawpy", "matplotlib")),
+    ],
+)
+def test_commands_load_what_they_use_only(
+    tmp_path: Path, arguments: str, slow: tuple[str, ...]
+) -> None:
     done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "labrig", "--help"],
-        capture_output=True, text=True, check=True,
+        [sys.executable, "-X", "importtime", "-m", "labrig", *arguments.split()],
+        capture_output=True, text=True, check=True, cwd=tmp_path,
     )  # fmt: skip
-    for slow in ("numpy", "scipy", "pydantic", "event_model", "rawpy"):
-        assert f"| {slow}\n" not in done.stderr.replace("|   ", "| "), f"--help imports {slow}"
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert not imported.intersection(slow)
 
 
 def test_a_rig_copied_elsewhere_still_runs(

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 import yaml
 
+from labrig import resources
 from labrig.drivers.numato import NumatoRelay
 from labrig.drivers.ptp.camera import PtpCamera
 from labrig.errors import DeviceError
+from labrig.yaml_file import read_yaml, yaml_text
 from tests.conftest import Ended
 
 Report = dict[str, Any]
@@ -49,6 +51,24 @@ def test_its_numbers_are_the_simulated_devices_own(labrig: Labrig, make_rig: Mak
     assert suggested["frame_size"] == "13 kB"
     assert sum("dark frame" in what for what in measured) == 3
     assert {finding["severity"] for finding in camera["findings"]} == {"fine"}
+
+
+def test_a_board_whose_commands_are_in_the_rig_file(labrig: Labrig, tmp_path: Path) -> None:
+    rig = read_yaml(resources.folder("config") / "sim-arduino.yaml")
+    rig["simulation"]["sensor"] = {"width": 96, "height": 64}
+    path = tmp_path / "rig.yaml"
+    path.write_text(yaml_text(rig))
+    report = json.loads(labrig("rig", "check", path, "--json").out)
+    assert (report["failures"], report["refusals"], report["unsafe"]) == ([], [], None)
+    assert device(report, "lamp")["identity"] == "serial relay, labrig relays 1"
+    assert len(device(report, "lamp")["measured"]) == 2
+    assert len(device(report, "leds")["measured"]) == 3
+    rig["devices"]["leds"]["baud"] = 19200
+    path.write_text(yaml_text(rig))
+    ended = labrig("rig", "check", path)
+    assert ended.code == 2
+    (line,) = ended.err.splitlines()
+    assert "one at 9600 baud, 8N1, the other at 19200 baud, 8N1; give both the same" in line
 
 
 SPOILERS: dict[str, tuple[dict[str, object], str]] = {

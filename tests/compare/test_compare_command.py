@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from labrig import resources
-from labrig.calibration import LvfFile, write_lvf_file
+from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import CurveColumns
 from labrig.cli.exit_codes import guarded
 from labrig.optics import read_camera
@@ -155,7 +155,7 @@ def test_curves_that_a_calibration_found_go_before_the_rigs(
     copy = Path(shutil.copytree(run, tmp_path / "copy"))
     of_rig = compared(labrig, copy)
     if found_by == "an earlier run":
-        write_lvf_file(tmp_path / "lvf.yaml", lvf)
+        LVF_KIND.write(tmp_path, lvf)
         rig = yaml.safe_load((copy / "rig.yaml").read_text())
         rig["optics"]["lvf"] = str(tmp_path / "lvf.yaml")
         (copy / "rig.yaml").write_text(yaml.safe_dump(rig))

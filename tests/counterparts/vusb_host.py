@@ -43,7 +43,7 @@ class OnTheBus:
     def __init__(self, bus: VirtualBus) -> None:
         self._bus = bus
 
-    def serial(self, address: str, baudrate: int) -> SerialPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
         raise AssertionError("no serial line here")
 
     def usb(self, address: str, serial_of: object = None) -> Any:

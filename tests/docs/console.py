@@ -22,7 +22,7 @@ class Command:
 
 
 def commands(page: Path) -> Iterator[Command]:
-    """What a reader of the page would type, in order."""
+    """Yield the commands and cells of a page, in order."""
     for kind, block in _BLOCK.findall(page.read_text(encoding="utf-8")):
         if kind == "python":
             yield Command(kind, block, "")

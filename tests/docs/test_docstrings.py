@@ -4,7 +4,7 @@ import doctest
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,19 +26,28 @@ def faces() -> Iterator[str]:
             yield module.name
 
 
-def exported() -> dict[str, Callable[..., Any]]:
-    """Every exported function by the name of its shortest export."""
-    found: dict[Any, str] = {}
+def exported() -> dict[str, Any]:
+    """Every exported function and class by the name of its shortest export."""
+    names: dict[Any, str] = {}
     for face in faces():
         module = importlib.import_module(face)
         for name in module.__all__:
             member = getattr(module, name)
-            if inspect.isfunction(member):
-                found.setdefault(member, f"{face}.{name}")
-    return {name: function for function, name in found.items()}
+            if inspect.isfunction(member) or inspect.isclass(member):
+                names.setdefault(member, f"{face}.{name}")
+    return {name: member for member, name in names.items()}
 
 
-FUNCTIONS = exported()
+EXPORTED = exported()
+FUNCTIONS = [name for name, member in EXPORTED.items() if inspect.isfunction(member)]
+#: A class may be described without an example; tests of results run those of results.
+CLASSES_WITH_EXAMPLE = [
+    name
+    for name, member in EXPORTED.items()
+    if inspect.isclass(member)
+    and ">>>" in (member.__doc__ or "")
+    and not member.__module__.startswith("labrig.results")
+]
 
 
 def test_all_packages_are_looked_through() -> None:
@@ -51,12 +60,11 @@ def test_parameters_returns_and_example_are_there(name: str) -> None:
     assert not errors, f"{name}: {errors}"
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("name", [*FUNCTIONS, *CLASSES_WITH_EXAMPLE])
 def test_its_example_runs(name: str, examples: Path) -> None:
-    function = FUNCTIONS[name]
     runner = doctest.DocTestRunner(optionflags=OPTIONS)
-    said: list[str] = []
-    for test in doctest.DocTestFinder(recurse=False).find(function, name, globs={}):
-        runner.run(test, out=said.append)
+    failures: list[str] = []
+    for test in doctest.DocTestFinder(recurse=False).find(EXPORTED[name], name, globs={}):
+        runner.run(test, out=failures.append)
     assert runner.summarize(verbose=False).attempted > 0, "no example"
-    assert not said, "".join(said)
+    assert not failures, "".join(failures)

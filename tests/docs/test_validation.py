@@ -4,7 +4,9 @@ import re
 
 import pytest
 
-from tests.acceptance.validation import CAMPAIGNS, FIGURES, OUTPUTS, PAGE, ROOT, Figure, page
+from tests.acceptance.campaigns import CAMPAIGNS, OUTPUTS, ROOT
+from tests.acceptance.validation import PAGE, page
+from tests.acceptance.validation_figures import FIGURES, Figure
 
 KEPT = {name: output for name, one in CAMPAIGNS.items() if (output := one.kept) is not None}
 

@@ -65,7 +65,7 @@ class Wired:
         self.clock = clock
         self._port = port
 
-    def serial(self, address: str, baudrate: int) -> ScriptedPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> ScriptedPort:
         return self._port
 
     def usb(self, address: str, serial_of: object = None) -> None:

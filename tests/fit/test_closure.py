@@ -64,7 +64,7 @@ def test_its_picture_is_labelled_and_inside(charges: NDArray[np.float64]) -> Non
     picture = closure_picture(closed)
     assert f"{closed.rms_percent:.2g} %" in picture.caption
     with figure_style():
-        figure = picture.draw()
+        figure = picture.figure()
     figure.canvas.draw()
     width, height = figure.get_size_inches() * figure.dpi
     for axes in figure.axes:

@@ -11,7 +11,7 @@ import yaml
 
 from labrig import resources
 from labrig.acquire import ManualStep, Plan, RunObserver, plan, read_protocol, read_rig_file
-from labrig.calibration import read_irradiance_file, read_lvf_file
+from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.clock import Clock, Interrupted
 from labrig.errors import UsageError
 from labrig.process import process_run
@@ -166,7 +166,7 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     assert isinstance(result, LvfCalibrationResult)
     assert not result.warnings
     file = result.calibration
-    assert read_lvf_file(folder / "result" / "lvf.yaml") == file
+    assert LVF_KIND.read(folder / "result" / "lvf.yaml") == file
     assert read_result(folder).to_json() == result.to_json()
     assert_read_back(result)
     assert result.filters == tuple(result.through_filters)[1:] == FEW
@@ -201,7 +201,7 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     rig.write_text(yaml.safe_dump(content))
     ended = labrig("run", write("irradiance"), "--rig", rig, "--runs", tmp_path, "--yes")
     assert ended.code == 0, ended.err
-    light = read_irradiance_file(ended.run_folder / "result" / "irradiance.yaml")
+    light = IRRADIANCE_KIND.read(ended.run_folder / "result" / "irradiance.yaml")
     expected = true_irradiance(room, light.strip, light.bands_nm)
     assert np.linalg.norm(light.direct) == pytest.approx(1.0)
     through, spread = np.array(light.through), np.array(light.through_sigma)

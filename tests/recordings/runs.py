@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from labrig.calibration import write_irradiance_file, write_lvf_file
+from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.process import process_run
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.analyse.recorded import record
@@ -103,8 +103,8 @@ class Recorded:
 
 
 def _calibrations(folder: Path) -> tuple[str, ...]:
-    write_irradiance_file(folder / "irradiance.yaml", true_irradiance(WIDTH, HEIGHT))
-    write_lvf_file(folder / "lvf.yaml", true_lvf_file(WIDTH, HEIGHT))
+    IRRADIANCE_KIND.write(folder, true_irradiance(WIDTH, HEIGHT))
+    LVF_KIND.write(folder, true_lvf_file(WIDTH, HEIGHT))
     return "irradiance", "lvf"
 
 

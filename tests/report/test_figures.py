@@ -6,21 +6,24 @@ from dataclasses import replace
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from labrig.fit import DecayFit
+from labrig.report.chart import Chart, Points
+from labrig.report.chart_figure import chart_figure
 from labrig.report.decay_figures import (
     fitted_curve,
     linear_decay,
     logarithmic_decay,
     overview_figures,
+    overview_tiles,
     residual_figure,
     residuals,
     timing_figure,
     values_below_axis,
 )
-from labrig.report.figure_style import figure_style
-from labrig.report.page import FigureFiles
+from labrig.report.figure_files import FigureFiles
+from labrig.report.figure_style import CARET_DOWN, figure_style
+from labrig.report.sections import Picture
 from labrig.report.timing import FrameTiming
 from labrig.results import Series
 
@@ -48,14 +51,14 @@ TIMINGS = [FrameTiming(f"{n}", f"decay-{n % 2}", 5.0 * n, 0.001 * n) for n in ra
         lambda: linear_decay(SERIES, FIT),
         lambda: logarithmic_decay(SERIES, FIT),
         lambda: residual_figure(SERIES, FIT),
-        lambda: overview_figures([patch(SERIES)])[0](),
+        lambda: overview_figures([patch(SERIES)])[0],
         lambda: timing_figure(TIMINGS),
     ],
     ids=["linear", "log", "residuals", "overview", "timing"],
 )
-def test_axes_are_labelled_and_inside_the_figure(make: Callable[[], Figure]) -> None:
+def test_axes_are_labelled_and_inside_the_figure(make: Callable[[], Chart]) -> None:
     with figure_style():
-        figure = make()
+        figure = chart_figure(make())
         figure.canvas.draw()
         width, height = figure.get_size_inches() * figure.dpi
         assert figure.axes[-1].get_xlabel().endswith("/ s")
@@ -72,10 +75,10 @@ def test_axes_are_labelled_and_inside_the_figure(make: Callable[[], Figure]) -> 
 @pytest.mark.parametrize("series", [SERIES, FLAGGED], ids=["plain", "flagged"])
 @pytest.mark.parametrize("make", [linear_decay, logarithmic_decay])
 def test_the_legend_covers_no_data(
-    make: Callable[[Series, DecayFit | None], Figure], series: Series
+    make: Callable[[Series, DecayFit | None], Chart], series: Series
 ) -> None:
     with figure_style():
-        figure = make(series, FIT)
+        figure = chart_figure(make(series, FIT))
         figure.canvas.draw()
         (legend,) = figure.legends
         box, axes = legend.get_window_extent(), figure.axes[0].get_window_extent()
@@ -88,7 +91,7 @@ def test_the_legend_covers_no_data(
 
 def test_timing_of_several_units_has_a_legend_in_the_figure() -> None:
     with figure_style():
-        figure = timing_figure(TIMINGS)
+        figure = chart_figure(timing_figure(TIMINGS))
         figure.canvas.draw()
         (legend,) = figure.legends
         assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1
@@ -97,13 +100,12 @@ def test_timing_of_several_units_has_a_legend_in_the_figure() -> None:
 def test_values_that_a_logarithm_cannot_show_are_marked() -> None:
     series = replace(SERIES, values=SERIES.values - 100.0)
     assert values_below_axis(series) >= np.count_nonzero(series.values <= 0) > 0
-    with figure_style():
-        axes = logarithmic_decay(series, FIT).axes[0]
-    low = axes.get_ylim()[0]
-    carets = [line for line in axes.lines if str(line.get_marker()) == "7"]
-    at_foot = sum(np.size(line.get_xdata()) for line in carets)
-    assert low > 0
-    assert at_foot == values_below_axis(series)
+    (panel,) = logarithmic_decay(series, FIT).panels
+    points = [mark for mark in panel.marks if isinstance(mark, Points)]
+    carets = [mark for mark in points if mark.marker == CARET_DOWN]
+    assert panel.y.low > 0
+    assert all((mark.y == panel.y.low).all() for mark in carets)
+    assert sum(len(mark.x) for mark in carets) == values_below_axis(series)
 
 
 def test_the_curve_goes_through_what_the_fit_predicts() -> None:
@@ -133,16 +135,16 @@ def test_each_channel_s_own_offset_is_no_signal() -> None:
 
 def test_overviews_share_their_axes() -> None:
     dim = replace(SERIES, values=SERIES.values / 50, sigma=SERIES.sigma / 50)
-    with figure_style():
-        small = overview_figures([patch(SERIES), replace(patch(dim), fit="too dim")])
-        first, second = (draw() for draw in small)
-    assert first.axes[0].get_ylim() == second.axes[0].get_ylim()
+    patches = [patch(SERIES), replace(patch(dim), fit="too dim")]
+    for charts in (overview_figures(patches), overview_tiles(patches)[0]):
+        first, second = (chart.panels[0] for chart in charts)
+        assert (first.x, first.y) == (second.x, second.y)
 
 
 def test_svg_follows_the_page_and_not_the_users_settings() -> None:
     def drawn() -> str:
-        with figure_style(), FigureFiles("test") as figure_files:
-            return figure_files.add(linear_decay(SERIES, FIT), "a", 'Decay of "x" <b>').element
+        picture = Picture("linear", lambda: chart_figure(linear_decay(SERIES, FIT)))
+        return FigureFiles().add(picture, "a", 'Decay of "x" <b>').element
 
     plain = drawn()
     with mpl.rc_context({"font.size": 30, "svg.fonttype": "path", "axes.grid": False}):

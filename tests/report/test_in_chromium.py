@@ -31,7 +31,7 @@ return [...document.querySelectorAll("body *")]
   .map(element => element.outerHTML.slice(0, 80));
 """
 TICK_COLOUR = """
-const tick = document.querySelector('[id$="-xtick_1"] text');
+const tick = document.querySelector('.plot svg text');
 return getComputedStyle(tick).fill;
 """
 

@@ -1,14 +1,18 @@
 """Figures as files: as drawn, in vectors, the same bytes every time."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
+from labrig.report import Section, write_figures_pdf
+from labrig.report.chart_figure import chart_figure
 from labrig.report.decay_figures import linear_decay
-from labrig.report.figure_style import CHANNEL, INK, figure_style
-from labrig.report.page import FigureFiles
+from labrig.report.figure_files import FigureFiles
+from labrig.report.figure_style import CHANNEL, INK
+from labrig.report.sections import Picture
 
 from .made import decay_series
 
@@ -17,17 +21,21 @@ pytestmark = pytest.mark.drawn
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+CHART = linear_decay(decay_series(), None)
+#: The same figure, drawn by labrig's own means and by matplotlib.
+PICTURES = (Picture("chart", CHART), Picture("figure", lambda: chart_figure(CHART)))
+
+
 def written(folder: Path) -> Path:
-    series = decay_series()
-    with figure_style(), FigureFiles("Öl & co") as figure_files:
-        first = figure_files.add(linear_decay(series, None), "linear-1-Öl & co", "first")
-        second = figure_files.add(linear_decay(series, None), "linear-2-Öl & co", "second")
-    assert first.svg_link == "figures/linear-1-l-co.svg"
-    assert first.pdf_link == "figures/figures.pdf#page=1"
-    assert second.pdf_link == "figures/figures.pdf#page=2"
+    figure_files = FigureFiles()
+    for picture in PICTURES:
+        figure_file = figure_files.add(picture, f"{picture.name}-Öl & co", "first")
+        assert figure_file.link == f"figures/{picture.name}-l-co.svg"
     folder.mkdir()
     figure_files.write(folder)
-    return folder / "figures"
+    pdf = folder / "figures" / "figures.pdf"
+    assert write_figures_pdf(pdf, "Öl & co", [Section("All", figures=PICTURES)]) == 2
+    return pdf.parent
 
 
 @pytest.fixture
@@ -35,14 +43,15 @@ def figures(tmp_path: Path) -> Path:
     return written(tmp_path / "one")
 
 
-def test_an_svg_file_stands_alone(figures: Path) -> None:
-    root = ElementTree.parse(figures / "linear-1-l-co.svg").getroot()
+@pytest.mark.parametrize("name", [picture.name for picture in PICTURES])
+def test_an_svg_file_stands_alone(figures: Path, name: str) -> None:
+    root = ElementTree.parse(figures / f"{name}-l-co.svg").getroot()
     assert (root.get("width"), root.get("height")) == ("420pt", "256pt")
     ground = root[0]
     assert (ground.tag, ground.get("fill")) == (f"{SVG}rect", "#ffffff")
     texts = ["".join(text.itertext()) for text in root.iter(f"{SVG}text")]
     assert "Time after lamp off / s" in texts
-    text = (figures / "linear-1-l-co.svg").read_text(encoding="utf-8")
+    text = (figures / f"{name}-l-co.svg").read_text(encoding="utf-8")
     # Programs other than browsers do not know variables.
     assert "var(--" not in text
     assert INK in text
@@ -50,14 +59,13 @@ def test_an_svg_file_stands_alone(figures: Path) -> None:
     assert "DejaVu Sans" in text
 
 
-def test_numbers_on_axes_keep_their_digits(figures: Path) -> None:
-    series = decay_series()
-    with figure_style(), FigureFiles("small") as figure_files:
-        figure = linear_decay(series, None)
-        figure.axes[0].set_ylabel("0.12345")
-        figure_file = figure_files.add(figure, "a", "b")
-    assert ">0.12345<" in figure_file.element
-    assert not re.search(r'="[^"<>]*\d\.\d{3,}', figure_file.element)
+def test_numbers_on_axes_keep_their_digits() -> None:
+    (panel,) = CHART.panels
+    chart = replace(CHART, panels=(replace(panel, y=replace(panel.y, label="0.12345")),))
+    for picture in (Picture("a", chart), Picture("a", lambda: chart_figure(chart))):
+        element = FigureFiles().add(picture, "a", "b").element
+        assert ">0.12345<" in element
+        assert not re.search(r'="[^"<>]*\d\.\d{3,}', element)
 
 
 def test_the_pdf_has_a_page_a_figure_and_fonts_that_publishers_take(figures: Path) -> None:

@@ -12,8 +12,10 @@ import yaml
 from labrig import plugins
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
+from labrig.drivers.ptp import PtpCamera
 from labrig.setup import Host, Process, discover, host as host_module
 from labrig.sim.camera import SimulatedCamera
+from labrig.yaml_file import parse_yaml, validate
 
 DRIVERS = ("numato_relay", "ptp_camera")
 
@@ -99,14 +101,18 @@ def test_serial_ports_are_reported_by_their_usb_numbers(
         ((0x1A86, 0x7523), "lcus_relay", "lamp", "only if it is an LCUS board"),
         ((0x1FFB, 0x0089), "maestro_door", "door", "usually the lower one"),
         ((0x1FFB, 0x008C), "maestro_door", "door", "USB Dual Port"),
+        ((0x2341, 0x0043), "serial_relay", "lamp", "commands of the sketch"),
+        ((0x0403, 0x6001), "serial_relay", "lamp", "write its own commands"),
+        ((0x04D8, 0xFFEE), "serial_relay", "lamp", "never acknowledges"),
+        ((0x1234, 0x5678), "serial_relay", "lamp", "write its own commands"),
     ],
-    ids=["LCUS", "Maestro Micro 6", "Maestro Mini 24"],
+    ids=["LCUS", "Maestro Micro 6", "Maestro Mini 24", "Arduino", "FTDI", "Devantech", "unknown"],
 )
 def test_a_board_has_the_line_of_its_driver(
     ids: tuple[int, int], driver: str, role: str, hint: str
 ) -> None:
     (found,) = discover(pc([Plugged("COM5", "USB", *ids)]), [driver]).ports
-    line = yaml.safe_load(found.snippet)
+    line = parse_yaml(found.snippet, "a test")
     assert (line[role]["driver"], line[role]["address"]) == (driver, "COM5")
     assert hint in found.hints[0]
     settings = {key: line[role][key] for key in line[role] if key not in DeviceEntry.model_fields}
@@ -132,7 +138,11 @@ def test_a_camera_is_named_and_left_free() -> None:
     (device,) = cameras()
     (found,) = discover(pc(usb_devices=[device]), DRIVERS).cameras
     assert found.name == "Canon Inc. Canon Digital Camera"
-    assert found.hints == ()
+    (hint,) = found.hints
+    assert "shutter_lag" in hint
+    line = parse_yaml(found.snippet, "a test")
+    camera = validate(line["camera"], DeviceEntry, "a test")
+    assert validate(camera.settings(), PtpCamera.Settings, "a test").shutter_lag > 0
     usb.util.claim_interface(device, 0)
 
 
@@ -180,7 +190,7 @@ def test_what_may_hold_the_camera_and_how_to_free_it(
 ) -> None:
     around = pc(usb_devices=cameras(), processes=[Process(1, "init"), process], platform=platform)
     (found,) = discover(around, DRIVERS).cameras
-    (hint,) = found.hints
+    hint, _ = found.hints
     assert process.name in hint
     assert "7" in hint
     assert remedy in hint

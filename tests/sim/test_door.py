@@ -285,11 +285,12 @@ def test_the_boards_time_out_closes_the_door_even_if_nobody_asks_it() -> None:
     assert hidden == pytest.approx(0, abs=3)
 
 
-@pytest.mark.parametrize("board", ["relays", "lcus"])
-def test_the_lamp_hangs_on_the_board_that_is_named(board: str) -> None:
-    off = {"relays": b"relay off 0\r", "lcus": bytes.fromhex("A00100A1")}
-    on = {"relays": b"relay on 0\r", "lcus": bytes.fromhex("A00101A2")}
-    (other,) = set(off) - {board}
+@pytest.mark.parametrize(
+    ("board", "other"), [("relays", "lcus"), ("lcus", "arduino"), ("arduino", "relays")]
+)
+def test_the_lamp_hangs_on_the_board_that_is_named(board: str, other: str) -> None:
+    off = {"relays": b"relay off 0\r", "lcus": bytes.fromhex("A00100A1"), "arduino": b"off 0\n"}
+    on = {"relays": b"relay on 0\r", "lcus": bytes.fromhex("A00101A2"), "arduino": b"on 0\n"}
     content = {**SMALL, "lamp": {"board": board}, "initial": {"lamp": "on"}}
     with open_room(content, "rig.yaml") as opened:
         assert opened.room.lamp_on

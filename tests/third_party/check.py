@@ -18,7 +18,7 @@ assert len(result.time_s) == 12
 assert abs(result.drift.value) < 1e-3, result.drift
 assert result.change_sigmas is None
 assert "plain relay 0" in (first / "result" / "report.html").read_text(encoding="utf-8")
-assert DRIFT_KIND.read_named(first).drift_per_s == result.drift.value
+assert DRIFT_KIND.read(first).drift_per_s == result.drift.value
 later = labrig.read_result(second)
 assert isinstance(later, LampDriftResult)
 assert later.change_sigmas is not None

@@ -107,7 +107,7 @@ def unit_states(state: State) -> list[str]:
 
 def test_what_is_done_and_what_comes(growing: Growing) -> None:
     following = RunFollower(growing.path)
-    assert settled(following)["run"]["status"] == "unfinished"
+    assert settled(following)["run"]["status"] == "interrupted"
     growing.grow_until(b'"unit": "decay-1"')
     growing.grow_until(b'"role": "decay"')
     with FileLock(growing.path / ".lock"):
@@ -203,7 +203,7 @@ def test_what_was_cut_off_counts_no_more_until_it_is_done_again(
     with FileLock(run / ".lock"):
         assert len(settled(following)["points"]) == 3
     state = settled(following)
-    assert (state["run"]["status"], state["run"]["now"]) == ("unfinished", None)
+    assert (state["run"]["status"], state["run"]["now"]) == ("interrupted", None)
     assert unit_states(state) == ["done", "again"]
     assert state["points"] == {}
     assert state["run"]["discarded_frames"] == 3

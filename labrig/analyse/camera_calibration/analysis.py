@@ -8,7 +8,11 @@ import numpy as np
 from labrig.analyse.camera_calibration.factors import CardFrame, Factors, fit_factors
 from labrig.analyse.camera_calibration.flat_field import fit_flat
 from labrig.analyse.camera_calibration.linearity import deviation, fit_linearity
-from labrig.analyse.camera_calibration.photon_transfer import pairs_of, photon_transfer, scatter
+from labrig.analyse.camera_calibration.photon_transfer import (
+    MeasureScatter,
+    pairs_of,
+    photon_transfer,
+)
 from labrig.analyse.frames import camera_identity, lens_of, part_frames, part_region, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.calibration import CameraFile, Linearity
@@ -16,7 +20,7 @@ from labrig.errors import DataError
 from labrig.number_format import exposure_text, plus_minus
 from labrig.protocols.camera_calibration import LINEARITY, CardFrames
 from labrig.record import FrameRecord, FrameRole
-from labrig.reduce import measure, read_raw, reduce_patches
+from labrig.reduce import measure_region, reduce_groups, reduce_patches
 from labrig.region import Region
 from labrig.results import (
     CameraCalibrationResult,
@@ -197,9 +201,9 @@ def _fit_transfer(
 
 def _dark_levels(darks: Sequence[FrameRecord], card: Region) -> FloatArray:
     """Return the mean of each channel above black in DN, shape (channels,)."""
-    measured = [measure(read_raw(frame.path), card) for frame in darks]
     levels = [
-        [channel.mean for channel in frame_stats.channels.values()] for frame_stats in measured
+        [channel.mean for channel in measured.channels.values()]
+        for measured in measure_region(darks, card)
     ]
     mean: FloatArray = np.mean(levels, axis=0)
     return mean
@@ -210,7 +214,7 @@ def _saturation_levels(brightest: FrameRecord, card: Region) -> tuple[float, flo
 
     The saturation level is None if less than half of the card clips.
     """
-    measured = measure(read_raw(brightest.path), card)
+    measured = measure_region([brightest], card)[0]
     clips = any(channel.saturated > channel.n / 2 for channel in measured.channels.values())
     return measured.range_dn, measured.range_dn if clips else None
 
@@ -218,12 +222,8 @@ def _saturation_levels(brightest: FrameRecord, card: Region) -> tuple[float, flo
 def _measure_scatters(
     pairs: Sequence[tuple[FrameRecord, FrameRecord]], card: Region, dark_dn: float
 ) -> list[PairScatter]:
-    scatters = []
-    for first_record, second_record in pairs:
-        first, second = read_raw(first_record.path), read_raw(second_record.path)
-        if not measure(first, card).clipped:
-            scatters.append(scatter(first, second, card, dark_dn))
-    return scatters
+    scatters = reduce_groups(pairs, MeasureScatter(card, dark_dn))
+    return [pair for scatter in scatters for pair in scatter]
 
 
 def _fit_flats(
@@ -234,7 +234,7 @@ def _fit_flats(
     flat_frames = [frame for frame in lit if frame.role == CardFrames.FLAT]
     return tuple(
         fit_flat(
-            [read_raw(frame.path) for frame in flat_frames if frame.f_number == f_number],
+            [frame for frame in flat_frames if frame.f_number == f_number],
             card,
             dark_dn,
             f_number,

@@ -1,6 +1,7 @@
 """Vignetting of a lens at one aperture, from frames of an evenly lit card."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import DataError
 from labrig.optics import Flat, rho_squared
-from labrig.reduce import LinearFrame, RawFrame
+from labrig.reduce import LinearFrame, RawFrame, StoredFrame, reduce_frames
 from labrig.region import Region, region_pixels
 from labrig.results import FittedFlat, FloatArray
 
@@ -20,14 +21,14 @@ EVIDENT_SIGMAS = 4.0
 
 
 def fit_flat(
-    frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray, f_number: float | None
+    frames: Sequence[StoredFrame], card: Region, dark_dn: FloatArray, f_number: float | None
 ) -> FittedFlat:
     """Fit A (1 + g·x + c₁ρ² + c₂ρ⁴) to blocks of the card by least squares, channel by channel.
 
     Parameters
     ----------
     frames
-        Frames of the card.
+        Frames of the card on disk.
     card
         Region of the card in fractions of the frame.
     dark_dn
@@ -42,10 +43,11 @@ def fit_flat(
     """
     if not frames:
         raise DataError("expected frames of the lit card, got none")
-    first = frames[0]
-    x, y, light = _block_light(frames, card, dark_dn)
+    blocks = reduce_frames(frames, MeasureBlocks(card, dark_dn))
+    first, light = blocks[0], np.mean([frame.light_dn for frame in blocks], axis=0)
     fits = [
-        _fit_channel(x, y, channel_light, first.width, first.height) for channel_light in light.T
+        _fit_channel(first.x, first.y, channel_light, first.width, first.height)
+        for channel_light in light.T
     ]
     powers = max(fit.powers for fit in fits)
     flat = Flat(
@@ -68,30 +70,56 @@ class _ChannelFit(NamedTuple):
     light: FloatArray
 
 
-def _block_light(
-    frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the light of blocks of the card.
+@dataclass(frozen=True, eq=False)
+class CardBlocks:
+    """Light of blocks of the card in one frame.
 
-    Returns
-    -------
-    tuple of ndarray
-        Centres x and y of the blocks in pixels, shape (blocks,), and their light in DN, shape
-        (blocks, channels).
+    Attributes
+    ----------
+    width, height
+        Size of the frame in pixels.
+    x, y
+        Centres of the blocks in pixels, shape (blocks,).
+    light_dn
+        Light of the blocks in DN, shape (blocks, channels).
     """
-    left, top, width, height = region_pixels(card, frames[0].width, frames[0].height)
-    side = frames[0].cfa_side
-    across = _block_edges(left, width, BLOCKS[0], side)
-    down = _block_edges(top, height, BLOCKS[1], side)
-    areas = [
-        (near, low, far - near, high - low)
-        for low, high in pairwise(down.tolist())
-        for near, far in pairwise(across.tolist())
-    ]
-    linear = [LinearFrame(frame, dark_dn) for frame in frames]
-    light = np.mean([[frame.sums(area).mean_dn for area in areas] for frame in linear], axis=0)
-    x, y = np.meshgrid((across[1:] + across[:-1]) / 2, (down[1:] + down[:-1]) / 2)
-    return x.ravel(), y.ravel(), light
+
+    width: int
+    height: int
+    x: FloatArray
+    y: FloatArray
+    light_dn: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MeasureBlocks:
+    """Measurement of blocks of the card in one frame.
+
+    Attributes
+    ----------
+    card
+        Region of the card in fractions of the frame.
+    dark_dn
+        Dark level above black in DN, shape (channels,).
+    """
+
+    card: Region
+    dark_dn: FloatArray
+
+    def __call__(self, frames: Iterator[RawFrame]) -> CardBlocks:
+        """Measure the blocks in the frame."""
+        raw = next(frames)
+        left, top, width, height = region_pixels(self.card, raw.width, raw.height)
+        across = _block_edges(left, width, BLOCKS[0], raw.cfa_side)
+        down = _block_edges(top, height, BLOCKS[1], raw.cfa_side)
+        linear = LinearFrame(raw, self.dark_dn)
+        light = [
+            linear.sums((near, low, far - near, high - low)).mean_dn
+            for low, high in pairwise(down.tolist())
+            for near, far in pairwise(across.tolist())
+        ]
+        x, y = np.meshgrid((across[1:] + across[:-1]) / 2, (down[1:] + down[:-1]) / 2)
+        return CardBlocks(raw.width, raw.height, x.ravel(), y.ravel(), np.array(light))
 
 
 def _block_edges(start: int, length: int, blocks: int, side: int) -> NDArray[np.intp]:

@@ -9,14 +9,22 @@ covariances with the eight neighbours compensate for it: a pixel's lost charge i
 without those that are lost in the noise would appear more certain than it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from labrig.calibration import Noise
 from labrig.errors import DataError
 from labrig.record import FrameRecord
-from labrig.reduce import ROUNDING_VARIANCE, LinearFrame, NoiseModel, RawFrame, variance_terms
+from labrig.reduce import (
+    ROUNDING_VARIANCE,
+    LinearFrame,
+    NoiseModel,
+    RawFrame,
+    measure,
+    variance_terms,
+)
 from labrig.region import Region, region_pixels
 from labrig.results import FloatArray, PairScatter, PhotonTransfer
 
@@ -28,6 +36,29 @@ LIT_SIGMAS = 3.0
 MAX_PIXELS = 1024
 #: Offsets of half of the eight neighbours; the others are symmetric.
 _NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
+
+
+@dataclass(frozen=True)
+class MeasureScatter:
+    """Measurement of the scatter between the two frames of a pair.
+
+    Attributes
+    ----------
+    region
+        Region in fractions of the frame.
+    dark_dn
+        Dark level above black in DN.
+    """
+
+    region: Region
+    dark_dn: float
+
+    def __call__(self, frames: Iterator[RawFrame]) -> tuple[PairScatter, ...]:
+        """Measure the scatter of a pair; there is none if the first frame clips."""
+        first, second = frames
+        if measure(first, self.region).clipped:
+            return ()
+        return (scatter(first, second, self.region, self.dark_dn),)
 
 
 def scatter(

@@ -26,7 +26,7 @@ from labrig.optics import (
     read_monochrome_camera,
     signal_through,
 )
-from labrig.reduce import LinearFrame, RawFrame, SeriesFrame, read_raw
+from labrig.reduce import SensorLayout, SeriesFrame, sensor_layout
 from labrig.region import Region
 from labrig.results import FilterFrames, FloatArray
 
@@ -106,13 +106,13 @@ def forward_models(
             "lvf_calibration, and name its run in the rig file (optics: {lvf: …}) or to labrig "
             "process --optics"
         )
-    raw, strip, lvf = read_raw(frame.path), calibration.before_camera, calibration.lvf
-    camera, holder = _camera_curves(part, raw.channels), _holder_regions(strip)
-    patches, refused = slice_strip(strip_regions(part), strip, raw)
+    layout, strip, lvf = sensor_layout(frame), calibration.before_camera, calibration.lvf
+    camera, holder = _camera_curves(part, layout.channels), _holder_regions(strip)
+    patches, refused = slice_strip(strip_regions(part), strip, layout)
     models = {}
     for patch, slices in patches.items():
         # At either end pixels reach a little beyond the places that were calibrated.
-        places = np.clip(_positions(raw, strip, slices), lvf.position[0], lvf.position[-1])
+        places = np.clip(_positions(layout, strip, slices), lvf.position[0], lvf.position[-1])
         lvfs = tuple(lvf.at(channel_positions) for channel_positions in places)
         models[patch] = ForwardModel(slices, holder, lvfs, camera, _system(lvfs, camera))
     return models, refused
@@ -202,15 +202,16 @@ def _holder_regions(strip: Strip) -> dict[str, Region]:
     }
 
 
-def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
+def _positions(layout: SensorLayout, strip: Strip, slices: Slices) -> FloatArray:
     """Return the middle of each channel's own pixels in every slice, shape (channels, positions).
 
     Pixels of one colour are two apart: where slices are few pixels wide, that is some nanometres.
     """
-    linear = LinearFrame(raw)
-    middles = np.array([linear.middle_columns(region) for region in slices.values()]).T
-    across = (strip.right[0] - strip.left[0]) * raw.width
-    fraction = (middles - strip.left[0] * raw.width) / across + tilt_offset(strip, slices, raw)
+    middles = np.array([layout.middle_columns(region) for region in slices.values()]).T
+    across = (strip.right[0] - strip.left[0]) * layout.width
+    fraction = (middles - strip.left[0] * layout.width) / across + tilt_offset(
+        strip, slices, layout
+    )
     return fraction if strip.rising else 1 - fraction
 
 

@@ -12,7 +12,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from labrig.analyse.frames import hot_pixels_of
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
 from labrig.reduce import (
@@ -20,13 +19,14 @@ from labrig.reduce import (
     STRIPS,
     TWO_DEGREES,
     DarkModel,
+    HotPixels,
     LinearFrame,
     NoiseModel,
-    PixelMask,
     RawFrame,
     SeriesFrame,
     fit_dark,
-    read_raw,
+    hot_pixels_of,
+    reduce_frames,
     variance_terms,
 )
 from labrig.region import Region
@@ -47,6 +47,48 @@ def sigma_dn(noise: Sequence[NoiseModel], level_dn: FloatArray, pixels: FloatArr
     variance = [model.variance_dn2(level_dn[..., number]) for number, model in enumerate(noise)]
     least = np.maximum(np.stack(variance, axis=-1), ROUNDING_VARIANCE)
     return np.asarray(np.sqrt(least / pixels))
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceLevels:
+    """Light of one frame in p places; the attributes are those of `MeasuredPlaces`."""
+
+    width: int
+    height: int
+    level_dn: FloatArray
+    pixels: FloatArray
+    strips: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurePlaces:
+    """Measurement of one frame in several places.
+
+    Attributes
+    ----------
+    regions
+        Regions of the places in fractions of the frame.
+    hot
+        Hot pixels to leave out; None leaves out none.
+    """
+
+    regions: tuple[Region, ...]
+    hot: HotPixels | None
+
+    def __call__(self, frames: Iterator[RawFrame]) -> PlaceLevels:
+        """Measure the frame in each place."""
+        raw = next(frames)
+        linear = LinearFrame(raw, hot=None if self.hot is None else self.hot.mask)
+        sums = [linear.region_sums(region) for region in self.regions]
+        deviations = np.full((len(sums), len(raw.channels), STRIPS), np.nan)
+        for region_deviations, region_sums in zip(deviations, sums, strict=True):
+            means = region_sums.strip_means_dn(min(STRIPS, len(region_sums.pixels) // raw.cfa_side))
+            region_deviations[:, : len(means)] = (means - means.mean(axis=0)).T
+        level = np.array(
+            [np.where(region_sums.is_clipped, np.nan, region_sums.mean_dn) for region_sums in sums]
+        )
+        pixels = np.array([np.maximum(region_sums.pixels.sum(axis=0), 1.0) for region_sums in sums])
+        return PlaceLevels(raw.width, raw.height, level, pixels, deviations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,10 +225,8 @@ def reduce_places(
         )
     holder_regions = dict(holder or {})
     regions = [region for slices in patches.values() for region in slices.values()]
-    lit, dark = (
-        _measure_frames(selected, [*regions, *holder_regions.values()], darks)
-        for selected in (frames, darks)
-    )
+    measure = MeasurePlaces((*regions, *holder_regions.values()), hot_pixels_of(darks))
+    lit, dark = (_measure_frames(selected, measure) for selected in (frames, darks))
     rising = sorted(dark, key=lambda measured: measured.frame.exposure_s)
     groups = [
         [measured for measured in lit if measured.frame.unit == unit]
@@ -240,12 +280,14 @@ def _patch_reduction(
     return PatchReduction(lit, slices, holder, camera, noise, models)
 
 
-def _measure_frames(
-    frames: Sequence[SeriesFrame], places: Sequence[Region], darks: Sequence[SeriesFrame]
-) -> list[MeasuredPlaces]:
-    """Measure every frame in every place, without hot pixels."""
-    hot = hot_pixels_of(darks)
-    return [_measure(frame, read_raw(frame.path), places, hot) for frame in frames]
+def _measure_frames(frames: Sequence[SeriesFrame], measure: MeasurePlaces) -> list[MeasuredPlaces]:
+    """Measure every frame in every place."""
+    return [
+        MeasuredPlaces(
+            frame, levels.width, levels.height, levels.level_dn, levels.pixels, levels.strips
+        )
+        for frame, levels in zip(frames, reduce_frames(frames, measure), strict=True)
+    ]
 
 
 def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> list[NoiseModel]:
@@ -265,22 +307,6 @@ def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> list[NoiseModel]:
         _fit_line(level[is_finite[:, c], c], scatter[is_finite[:, c], c])
         for c in range(level.shape[1])
     ]
-
-
-def _measure(
-    frame: SeriesFrame, raw: RawFrame, regions: Sequence[Region], hot: PixelMask | None
-) -> MeasuredPlaces:
-    linear = LinearFrame(raw, hot=hot)
-    sums = [linear.region_sums(region) for region in regions]
-    deviations = np.full((len(regions), len(raw.channels), STRIPS), np.nan)
-    for region_deviations, region_sums in zip(deviations, sums, strict=True):
-        means = region_sums.strip_means_dn(min(STRIPS, len(region_sums.pixels) // raw.cfa_side))
-        region_deviations[:, : len(means)] = (means - means.mean(axis=0)).T
-    level = np.array(
-        [np.where(region_sums.is_clipped, np.nan, region_sums.mean_dn) for region_sums in sums]
-    )
-    pixels = np.array([np.maximum(region_sums.pixels.sum(axis=0), 1.0) for region_sums in sums])
-    return MeasuredPlaces(frame, raw.width, raw.height, level, pixels, deviations)
 
 
 def _pair_scatters(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatArray]]:

@@ -13,7 +13,7 @@ from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
 from labrig.optics import Strip
 from labrig.record import FrameRole
-from labrig.reduce import LinearFrame, RawFrame, read_raw, reduce_patches
+from labrig.reduce import SensorLayout, reduce_patches, sensor_layout
 from labrig.region import Region
 from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, PatchCharging, Series
 
@@ -46,9 +46,9 @@ def patch_chargings(
     inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
     frames = charge_frames(part.run, overrides, warming.time_constant_s, inputs.blank)
     require_calibrated_camera(inputs.camera, part.run, list(frames.charge_of))
-    raw = read_raw(next(iter(frames.charge_of)).path)
+    layout = sensor_layout(next(iter(frames.charge_of)))
     sites, reasons = slice_strip(
-        strip_regions(part), irradiance.strip, raw, len(irradiance.position)
+        strip_regions(part), irradiance.strip, layout, len(irradiance.position)
     )
     series = reduce_patches(
         [
@@ -106,7 +106,7 @@ def patch_chargings(
             axis=1,
         )
         values = _interpolate_to_positions(
-            values, slices, np.array(irradiance.position), irradiance.strip, raw
+            values, slices, np.array(irradiance.position), irradiance.strip, layout
         )
         strip_series = series[_place_name(patch, WHOLE)]
         chargings[patch] = _divide_by_evenness(values, sigma, through, direct, strip_series, frames)
@@ -118,7 +118,7 @@ def _interpolate_to_positions(
     slices: Slices,
     position: FloatArray,
     strip: Strip,
-    raw: RawFrame,
+    layout: SensorLayout,
 ) -> FloatArray:
     """Interpolate values (n, P, C) to the positions (P,) along the strip, by the neighbours' slope.
 
@@ -136,14 +136,14 @@ def _interpolate_to_positions(
         Positions along the strip, 0 at the blue end to 1 at the red end.
     strip
         Place of the strip.
-    raw
-        Any frame, for its size and colours.
+    layout
+        Size and colours of the sensor.
     """
     along = position if strip.rising else 1 - position
-    left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
-    centre_column = left + (along - tilt_offset(strip, slices, raw)) * (right - left)
+    left, right = strip.left[0] * layout.width, strip.right[0] * layout.width
+    centre_column = left + (along - tilt_offset(strip, slices, layout)) * (right - left)
     interpolated = values.copy()
-    middles = np.array([LinearFrame(raw).middle_columns(region) for region in slices.values()])
+    middles = np.array([layout.middle_columns(region) for region in slices.values()])
     for number, x in enumerate(middles.T):
         slope = np.nan_to_num(np.gradient(values[..., number], x, axis=1))
         interpolated[..., number] += slope * (centre_column - x)

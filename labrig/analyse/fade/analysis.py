@@ -22,7 +22,7 @@ from labrig.number_format import plus_minus
 from labrig.optics import CameraResponse, Spectrum
 from labrig.protocols.fade import SWITCHED, LampFrames
 from labrig.record import FrameRecord, FrameRole
-from labrig.reduce import read_raw
+from labrig.reduce import sensor_layout
 from labrig.region import Region
 from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
 
@@ -123,8 +123,8 @@ def _places(
             "the fade through the variable filter needs its calibration: name it as optics.lvf in "
             "the rig file, or set through_lvf: false"
         )
-    strip, frame = lvf.before_camera, read_raw(frames[0].path)
-    transmission = lvf.lvf.at(strip.positions(frame.width, frame.height)).transmission(nm)
+    strip, layout = lvf.before_camera, sensor_layout(frames[0])
+    transmission = lvf.lvf.at(strip.positions(layout.width, layout.height)).transmission(nm)
     through = transmission[:, np.newaxis, :] * channel_light
     return strip.slices(), _normalise(through.reshape(-1, len(nm)))
 

@@ -33,7 +33,7 @@ from labrig.errors import DataError
 from labrig.fit.lvf import LvfCalibration
 from labrig.optics import Strip, WavelengthMap
 from labrig.protocols.lvf_calibration import LvfFrames, filter_unit
-from labrig.reduce import find_strip, read_hdr_frame, slice_values
+from labrig.reduce import slice_values, strip_profile_in
 from labrig.results import (
     CameraCurves,
     FilterMisfit,
@@ -60,11 +60,13 @@ def analyse(part: Part) -> LvfCalibrationResult:
         filters.
     """
     protocol, frames = part.protocol, StripFrames(part)
-    strip = find_strip(frames.hdr(LvfFrames.FILTER, filter_unit(None))).strip(rising=True)
-    before_camera = strip_lines(frames.hdr(LvfFrames.LINES), strip, protocol.rising)
+    strip = frames.find_strip(LvfFrames.FILTER, filter_unit(None)).strip(rising=True)
+    before_camera = strip_lines(frames.profile(LvfFrames.LINES, strip), strip, protocol.rising)
     fit = wavelengths_along(before_camera)
-    strip = find_strip(frames.hdr(LvfFrames.STRIP_ON_SAMPLE)).strip(rising=True)
-    on_sample = strip_lines(frames.hdr(LvfFrames.LINES_ON_SAMPLE), strip, protocol.rising_on_sample)
+    strip = frames.find_strip(LvfFrames.STRIP_ON_SAMPLE).strip(rising=True)
+    on_sample = strip_lines(
+        frames.profile(LvfFrames.LINES_ON_SAMPLE, strip), strip, protocol.rising_on_sample
+    )
     placed = place_on_sample(on_sample, fit.map)
     bench = Bench(
         lamp_spectrum(part.rig),
@@ -144,8 +146,8 @@ def _stripes(
     # A glow fades while it is photographed: one frame, the fullest that does not clip.
     for frame in sorted(frames.of(LvfFrames.STRIPES), key=lambda frame: -frame.exposure_s):
         try:
-            hdr = read_hdr_frame([frame], frames.hot)
-            return shifted_by_stripes(hdr, strip, lvf_fit.lvf, float(abs(nm[1] - nm[0]))), ""
+            profile = strip_profile_in([frame], strip, frames.hot)
+            return shifted_by_stripes(profile, strip, lvf_fit.lvf, float(abs(nm[1] - nm[0]))), ""
         except DataError as error:  # it clips, or nothing is seen
             reason = str(error)
     return None, reason

@@ -9,8 +9,7 @@ from labrig.errors import DataError, FitError
 from labrig.fit.lvf import WavelengthFit, fit_wavelengths, locate_lines
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import Lvf, Strip, WavelengthMap
-from labrig.reduce import HdrFrame, strip_profile
-from labrig.results import PlacedStrip, Stripes, StripLines
+from labrig.results import PlacedStrip, Stripes, StripLines, StripProfile
 
 #: Range of positions, from the blue end to the red end.
 WHOLE = (0.0, 1.0)
@@ -22,13 +21,13 @@ MAX_SHIFT = 0.08
 MIN_EXPLAINED = 0.7
 
 
-def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLines:
+def strip_lines(profile: StripProfile, strip: Strip, rising: bool | None) -> StripLines:
     """Locate the lines.
 
     Parameters
     ----------
-    frame
-        Frame of the strip under the mercury lamp.
+    profile
+        Light of the mercury lamp along the strip.
     strip
         Place of the strip; the direction of its wavelengths does not matter.
     rising
@@ -39,7 +38,6 @@ def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLine
     FitError
         There are no lines, or the strip is the wrong way round.
     """
-    profile = strip_profile(frame, strip)
     lines = locate_lines(profile.position, profile.value_dn_per_s, rising=rising)
     position = lines.position if lines.rising else 1 - lines.position
     return StripLines(
@@ -98,7 +96,9 @@ def _move_ends(strip: Strip, blue: float, red: float) -> Strip:
         ) from None
 
 
-def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: float) -> Stripes:
+def shifted_by_stripes(
+    profile: StripProfile, strip: Strip, lvf: Lvf, nm_per_strip: float
+) -> Stripes:
     """Shift the strip until the stripes of glow lie where the filter transmits mercury lines.
 
     Heights of the lines are free: how strongly each of them excites is unknown here.
@@ -108,7 +108,6 @@ def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: fl
     FitError
         No stripes are detected.
     """
-    profile = strip_profile(frame, strip)
     position = profile.position if strip.rising else 1 - profile.position
     glow = profile.value_dn_per_s.sum(axis=1)
     shapes = lvf.transmission(np.array(EXCITING_NM)).T

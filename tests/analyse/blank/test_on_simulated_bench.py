@@ -11,7 +11,7 @@ import pytest
 from labrig.analyse import Overrides, decay as decay_analysis
 from labrig.analyse.frames import intact_frames
 from labrig.analyse.inputs import Inputs
-from labrig.calibration import read_blank_file
+from labrig.calibration import BLANK_KIND
 from labrig.errors import DataError
 from labrig.process import process_run
 from labrig.record import read_run
@@ -43,7 +43,7 @@ def with_light(**simulation: Any) -> Callable[[dict[str, Any]], None]:
 def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
     run = record(tmp_path, PROTOCOL, without_door)
     result = process_run(run)
-    blank = read_blank_file(run / "result" / "blank.yaml")
+    blank = BLANK_KIND.read(run / "result" / "blank.yaml")
     assert blank.first_clean_s is not None
     # At 160 ms the filament still glows, at 560 ms it does not.
     assert blank.first_clean_s == pytest.approx(0.56, abs=0.02)
@@ -66,7 +66,7 @@ def test_a_hot_pixel_is_no_light_that_leaks_in(tmp_path: Path) -> None:
 def test_a_leak_is_found_and_reported_and_a_decay_is_warned(tmp_path: Path) -> None:
     leaking = record(tmp_path / "leak", PROTOCOL, with_light(ambient=1e-6))
     result = process_run(leaking)
-    blank = read_blank_file(leaking / "result" / "blank.yaml")
+    blank = BLANK_KIND.read(leaking / "result" / "blank.yaml")
     green = blank.channels.index("G")
     assert blank.ambient_dn_per_s[green] > 10 * blank.ambient_sigma_dn_per_s[green]
     # Dark frames hold it, too: nothing is left once they are subtracted.
@@ -84,7 +84,7 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     lamp = {"afterglow": 1e-5, "afterglow_fades": "20 s"}
     run = record(tmp_path, PROTOCOL, with_light(lamp=lamp))
     result = process_run(run)
-    blank = read_blank_file(run / "result" / "blank.yaml")
+    blank = BLANK_KIND.read(run / "result" / "blank.yaml")
     assert blank.first_clean_s is None
     assert any("still gets darker at its end" in said for said in result.warnings)
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "20 s",

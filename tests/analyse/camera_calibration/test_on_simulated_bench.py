@@ -12,7 +12,7 @@ import pytest
 
 from labrig.analyse import decay as decay_analysis
 from labrig.analyse.inputs import Inputs
-from labrig.calibration import CameraFile, read_camera_file
+from labrig.calibration import CAMERA_KIND, CameraFile
 from labrig.errors import DataError
 from labrig.process import Processed, process_and_report, process_run
 from labrig.record import read_run
@@ -61,7 +61,7 @@ def camera(result: CameraCalibrationResult) -> CameraFile:
 
 
 def test_the_result_and_its_file_are_read_back(run: Path, result: CameraCalibrationResult) -> None:
-    assert read_camera_file(run / "result" / "camera.yaml") == result.calibration
+    assert CAMERA_KIND.read(run / "result" / "camera.yaml") == result.calibration
     assert_read_back(result)
 
 

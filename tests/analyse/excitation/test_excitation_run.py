@@ -15,7 +15,7 @@ from labrig.analyse.excitation.charge_intervals import charge_frames
 from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
-from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
+from labrig.calibration.irradiance_file import IRRADIANCE_KIND, IrradianceFile
 from labrig.errors import DataError
 from labrig.material import read_material
 from labrig.optics import SLICES, Strip
@@ -79,7 +79,7 @@ def true_irradiance(width: int = WIDTH, height: int = HEIGHT) -> IrradianceFile:
 
 def recorded(folder: Path) -> Path:
     folder.mkdir(exist_ok=True)
-    write_irradiance_file(folder / "irradiance.yaml", true_irradiance())
+    IRRADIANCE_KIND.write(folder, true_irradiance())
 
     def change(rig: dict[str, Any]) -> None:
         rig["optics"]["irradiance"] = str(folder / "irradiance.yaml")

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from labrig.acquire import Plan, RunObserver
-from labrig.calibration import Change, FadeFile, read_fade_file
+from labrig.calibration import FADE_KIND, Change, FadeFile
 from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.process import Processed, process_and_report, process_run
@@ -102,7 +102,7 @@ def test_a_person_is_reported(processed: Processed) -> None:
 
 
 def test_the_result_and_its_file_are_read_back(run: Path, result: FadeResult) -> None:
-    assert read_fade_file(run / "result" / "fade.yaml") == result.calibration
+    assert FADE_KIND.read(run / "result" / "fade.yaml") == result.calibration
     assert_read_back(result)
 
 

@@ -15,7 +15,7 @@ from labrig.errors import DataError, FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.optics import Spectrum, Strip, nominal_lvf
 from labrig.reduce.hdr import hdr_frame
-from labrig.reduce.strip import find_strip
+from labrig.reduce.strip import find_strip, strip_profile
 from tests.analyse.lvf_calibration.strip_pictures import (
     TRUE_MAP,
     Scene,
@@ -44,7 +44,7 @@ def true_nm(scene: Scene, strip: Strip, position: FloatArray) -> FloatArray:
 def test_lines_tell_the_wavelength_along_the_strip(scene: Scene, rising: bool) -> None:
     scene = replace(scene, rising=rising)
     strip = find_strip(bracket(scene, halogen())).strip(rising=True)
-    found = strip_lines(bracket(scene, mercury(), (0.5, 4.0)), strip, None)
+    found = strip_lines(strip_profile(bracket(scene, mercury(), (0.5, 4.0)), strip), strip, None)
     assert found.strip.rising is rising
     fitted = wavelengths_along(found)
     position = np.linspace(0, 1, 9)
@@ -55,27 +55,30 @@ def test_lines_tell_the_wavelength_along_the_strip(scene: Scene, rising: bool) -
 
 def test_a_strip_the_wrong_way_round_is_refused() -> None:
     strip = find_strip(bracket(MIDDLE, halogen())).strip(rising=True)
-    frame = bracket(MIDDLE, mercury(), (0.5, 4.0))
-    strip_lines(frame, strip, rising=True)
+    profile = strip_profile(bracket(MIDDLE, mercury(), (0.5, 4.0)), strip)
+    strip_lines(profile, strip, rising=True)
     with pytest.raises(FitError, match="the strip is the wrong way round"):
-        strip_lines(frame, strip, rising=False)
+        strip_lines(profile, strip, rising=False)
 
 
 def test_light_without_lines_is_refused() -> None:
     frame = bracket(MIDDLE, halogen())
+    strip = find_strip(frame).strip(rising=True)
     with pytest.raises(FitError, match="no lines of mercury"):
-        strip_lines(frame, find_strip(frame).strip(rising=True), None)
+        strip_lines(strip_profile(frame, strip), strip, None)
 
 
 def test_the_strip_on_the_sample_is_placed_by_its_lines() -> None:
     before = replace(MIDDLE, tilt_degrees=1.0)
     strip = find_strip(bracket(before, halogen())).strip(rising=True)
     wavelengths = wavelengths_along(
-        strip_lines(bracket(before, mercury(), (0.5, 4.0)), strip, None)
+        strip_lines(strip_profile(bracket(before, mercury(), (0.5, 4.0)), strip), strip, None)
     )
     on_sample = replace(MIDDLE, length=0.72, rising=False, tilt_degrees=-1.0)
     strip = find_strip(bracket(on_sample, halogen())).strip(rising=True)
-    lines = strip_lines(bracket(on_sample, mercury(), (0.5, 4.0)), strip, None)
+    lines = strip_lines(
+        strip_profile(bracket(on_sample, mercury(), (0.5, 4.0)), strip), strip, None
+    )
     placed = place_on_sample(lines, wavelengths.map)
     assert placed.sigma_nm < 0.3
     position = np.linspace(0.05, 0.7, 8)
@@ -94,7 +97,7 @@ def test_stripes_that_glow_shift_the_strip(rising: bool) -> None:
     strip = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.25, rising=rising)
     lvf = nominal_lvf(TRUE_MAP, np.linspace(400.5, 709.5, 31), leakage=0.001)
     for raw, moved in ((glow, 0.0), (shifted, 4 / 240)):
-        found = shifted_by_stripes(hdr_frame([(raw, 1.0)]), strip, lvf, 310.0)
+        found = shifted_by_stripes(strip_profile(hdr_frame([(raw, 1.0)]), strip), strip, lvf, 310.0)
         assert found.strip.left[0] == pytest.approx(0.1 + moved, abs=0.0015)
         expected_nm = moved / 0.8 * 310 * (1 if rising else -1)
         assert found.shift_nm == pytest.approx(expected_nm, abs=0.6)
@@ -106,10 +109,10 @@ def test_a_sample_that_does_not_glow_shifts_nothing() -> None:
     strip = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.25, rising=True)
     lvf = nominal_lvf(TRUE_MAP, np.linspace(400.5, 709.5, 31))
     with pytest.raises(FitError, match="no stripes"):
-        shifted_by_stripes(hdr_frame([dark]), strip, lvf, 310.0)
+        shifted_by_stripes(strip_profile(hdr_frame([dark]), strip), strip, lvf, 310.0)
 
 
 def test_a_strip_that_clips_throughout_is_refused() -> None:
     strip = find_strip(bracket(MIDDLE, halogen())).strip(rising=True)
     with pytest.raises(DataError, match="clips in every frame"):
-        strip_lines(bracket(MIDDLE, mercury(), (30.0,)), strip, None)
+        strip_lines(strip_profile(bracket(MIDDLE, mercury(), (30.0,)), strip), strip, None)

@@ -57,7 +57,7 @@ class Loopback:
         self.clock = clock or SystemClock()
         self._usb = usb
 
-    def serial(self, address: str, baudrate: int) -> SerialPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
         raise NotImplementedError
 
     def usb(self, address: str, serial_of: object = None) -> Any:

@@ -1,11 +1,8 @@
 """The calibration that the protocol makes: the drift of one lamp, in a file."""
 
-from functools import partial
-
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.calibration import CalibrationKind
-from labrig.yaml_file import read_model, write_yaml
 
 
 class DriftFile(BaseModel):
@@ -29,6 +26,5 @@ DRIFT_KIND = CalibrationKind(
     protocol="lamp_drift",
     optics_key="lamp_drift",
     file_name="drift.yaml",
-    read=partial(read_model, model=DriftFile),
-    write=write_yaml,
+    model=DriftFile,
 )

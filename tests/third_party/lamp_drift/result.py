@@ -35,4 +35,4 @@ class LampDriftResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write `drift.yaml` into the result's folder."""
         file = DriftFile(drift_per_s=self.drift.value, drift_sigma_per_s=self.drift.sigma)
-        DRIFT_KIND.write_into(folder, file)
+        DRIFT_KIND.write(folder, file)

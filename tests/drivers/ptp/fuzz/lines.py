@@ -211,7 +211,7 @@ class _Network:
         self._relays: list[_Relay] = []
         self._steps = 0
 
-    def serial(self, address: str, baudrate: int) -> SerialPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
         raise AssertionError("a camera has no serial port")
 
     def usb(self, address: str, serial_of: object = None) -> NoReturn:

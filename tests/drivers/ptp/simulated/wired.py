@@ -43,7 +43,7 @@ class Wired:
         self.clock = clock
         self._camera = camera
 
-    def serial(self, address: str, baudrate: int) -> SerialPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
         raise AssertionError("no serial line here")
 
     def usb(self, address: str, serial_of: object = None) -> Any:

@@ -204,7 +204,7 @@ class OneDevice:
     def clock(self) -> VirtualClock:
         return self._wire.clock
 
-    def serial(self, address: str, baudrate: int) -> SerialPort:
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
         raise AssertionError("a camera has no serial port")
 
     def usb(self, address: str, serial_of: object = None) -> Any:

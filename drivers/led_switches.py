@@ -1,0 +1,85 @@
+"""LEDs behind relays of one board, one lit at a time."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Protocol
+
+from labrig.errors import DeviceError
+
+
+class Switch(Protocol):
+    """One relay, read back after each switching where its board can."""
+
+    def switch(self, *, on: bool) -> None:
+        """Switch the relay."""
+
+    def is_on(self) -> bool:
+        """Return the state of the relay."""
+
+
+class LedSwitches:
+    """Relays that each switch an LED.
+
+    Two LEDs are never lit together: all that may be lit are switched off and read back before
+    another one is switched on.
+
+    Parameters
+    ----------
+    board
+        Name of the board in messages.
+    switches
+        Relay of each LED by the LED's name.
+    resynchronise
+        Function after which the board understands the next command, whatever was interrupted.
+    """
+
+    def __init__(
+        self, board: str, switches: Mapping[str, Switch], resynchronise: Callable[[], None]
+    ) -> None:
+        self._board = board
+        self._switches = dict(switches)
+        self._resynchronise = resynchronise
+        #: LEDs not read back as off since they were last lit; after connecting, all.
+        self._may_be_lit = set(self._switches)
+
+    def light(self, channel: str) -> None:
+        """Switch off all LEDs that may be lit, then switch on one; all are read back."""
+        self.dark()
+        self._may_be_lit.add(channel)
+        self._switches[channel].switch(on=True)
+
+    def dark(self) -> None:
+        """Switch off all LEDs that may be lit, each even if another one fails; read all back."""
+        failure: DeviceError | None = None
+        for channel in [name for name in self._switches if name in self._may_be_lit]:
+            try:
+                self._switches[channel].switch(on=False)
+                self._may_be_lit.remove(channel)
+            except DeviceError as error:
+                failure = failure or error
+                with suppress(DeviceError):  # so that the next one is understood
+                    self._resynchronise()
+        if failure:
+            raise failure
+
+    def channel_on(self) -> str | None:
+        """Return the name of the LED that is on.
+
+        Raises
+        ------
+        DeviceError
+            Several LEDs are on.
+        """
+        names = [name for name, switch in self._switches.items() if switch.is_on()]
+        if len(names) > 1:
+            raise DeviceError(
+                f"{self._board}: {' and '.join(names)} are lit at once; something else has "
+                "switched them: leave the board to labrig while it measures"
+            )
+        return names[0] if names else None
+
+    def make_safe(self) -> None:
+        """Resynchronise the line, then switch all LEDs off, whatever their states before."""
+        self._resynchronise()
+        self._may_be_lit = set(self._switches)
+        self.dark()

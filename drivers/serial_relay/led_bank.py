@@ -1,0 +1,107 @@
+"""LEDs behind relays of any board on a serial line, one lit at a time."""
+
+from collections.abc import Sequence
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from labrig.acquire import Connections, Finding
+
+from ..led_switches import LedSwitches
+from .board import Board, Relay, findings
+from .settings import BoardSettings, SwitchCommands
+from .wire_text import wire_text
+
+Name = Annotated[str, Field(min_length=1)]
+
+
+class SerialLedBank:
+    """Several relays of a board whose commands are in the rig file, each switching an LED.
+
+    Parameters
+    ----------
+    address
+        Serial port of the board; its other relays may be used by other devices.
+    settings
+        The rig file's keys for this device.
+    connections
+        Connections that open the port.
+    """
+
+    class Settings(BoardSettings):
+        """Keys of LEDs on relays of any board on a serial line in a rig file.
+
+        Attributes
+        ----------
+        channels
+            Commands of each LED's relay by the LED's name, for example
+            `{"450 nm": {on: on 1, off: off 1}}`.
+        """
+
+        channels: dict[Name, SwitchCommands] = Field(min_length=1)
+
+        @model_validator(mode="after")
+        def _a_relay_each(self) -> Self:
+            if len({wire_text(led.on.send) for led in self.channels.values()}) < len(self.channels):
+                raise ValueError("expected a command 'on' of its own for each LED in 'channels'")
+            return self
+
+    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        self._board = Board(address, settings, connections)
+        self._relays = {
+            name: Relay(self._board, commands, name) for name, commands in settings.channels.items()
+        }
+        off = [relay.off for relay in self._relays.values()]
+        self._leds = LedSwitches(
+            self._board.name, self._relays, lambda: self._board.resynchronise(off)
+        )
+
+    @classmethod
+    def declared_channels(cls, settings: Settings) -> tuple[str, ...]:
+        """Return the names of the LEDs, for plans."""
+        return tuple(settings.channels)
+
+    def channels(self) -> tuple[str, ...]:
+        """Return the names of the LEDs, in the rig file's order."""
+        return tuple(self._relays)
+
+    def reads_back(self) -> bool:
+        """Return whether the rig file has a query for the state of every LED."""
+        return all(relay.reads_back for relay in self._relays.values())
+
+    def identity(self) -> str:
+        """Return the board's answer to its identity query, or its address, and the LEDs' names."""
+        return f"serial relays, {self._board.identity()}, LEDs {', '.join(self._relays)}"
+
+    def findings(self) -> Sequence[Finding]:
+        """Return whether anything but the camera can verify that the LEDs were switched."""
+        return findings(self._relays.values())
+
+    def light(self, channel: str) -> None:
+        """Switch off all LEDs that may be lit, then switch on one; read back where possible."""
+        self._leds.light(channel)
+
+    def dark(self) -> None:
+        """Switch off all LEDs that may be lit, each even if another one fails."""
+        self._leds.dark()
+
+    def channel_on(self) -> str | None:
+        """Return the LED that is on, as reported by the board, else as commanded last.
+
+        Raises
+        ------
+        DeviceError
+            Several LEDs are on.
+        """
+        return self._leds.channel_on()
+
+    def heartbeat(self) -> None:
+        """Restart the board's watchdog, if the rig file says how."""
+        self._board.keep_alive()
+
+    def make_safe(self) -> None:
+        """Resynchronise the line, then switch all LEDs off, whatever their states before."""
+        self._leds.make_safe()
+
+    def disconnect(self) -> None:
+        """Do nothing: the port belongs to the connections, which close it."""

@@ -1,0 +1,20 @@
+from .compare import (
+    Comparison as Comparison,
+    Difference as Difference,
+    PatchComparison as PatchComparison,
+    compare_runs as compare_runs,
+)
+from .listing import (
+    RunFilter as RunFilter,
+    find_run as find_run,
+    list_runs as list_runs,
+)
+from .run_summary import (
+    STATUSES as STATUSES,
+    RunStatus as RunStatus,
+    RunSummary as RunSummary,
+    status_of as status_of,
+)
+from .summarising import (
+    summarise as summarise,
+)

@@ -1,0 +1,59 @@
+from .attempt import (
+    AttemptWriter as AttemptWriter,
+)
+from .checksums import (
+    CACHE as CACHE,
+    FRAMES as FRAMES,
+    damaged_frames as damaged_frames,
+)
+from .frames import (
+    PERSON as PERSON,
+    UNDONE as UNDONE,
+    ActionRecord as ActionRecord,
+    FrameRecord as FrameRecord,
+    FrameRole as FrameRole,
+    TemperatureRecord as TemperatureRecord,
+    unit_in as unit_in,
+    unit_within as unit_within,
+)
+from .history import (
+    KNOWN_FOR_S as KNOWN_FOR_S,
+    SMOOTHED_S as SMOOTHED_S,
+    DeviceLine as DeviceLine,
+    RunDescription as RunDescription,
+    TemperatureHistory as TemperatureHistory,
+    charge_durations_s as charge_durations_s,
+    degrees_text as degrees_text,
+    frames_in_roles as frames_in_roles,
+    glow_temperature_c as glow_temperature_c,
+    interruptions as interruptions,
+    relative_rate_change as relative_rate_change,
+    time_text as time_text,
+)
+from .journal import (
+    REAL_DISK as REAL_DISK,
+    Disk as Disk,
+    Document as Document,
+    add_note as add_note,
+    read_journal as read_journal,
+    read_notes as read_notes,
+    write_durably as write_durably,
+)
+from .made import (
+    time_made as time_made,
+)
+from .run_folder import (
+    RunFolder as RunFolder,
+)
+from .run_lock import (
+    RunLock as RunLock,
+)
+from .run_record import (
+    Attempt as Attempt,
+    RunRecord as RunRecord,
+    read_run as read_run,
+)
+from .run_size import (
+    RunSize as RunSize,
+    size_text as size_text,
+)

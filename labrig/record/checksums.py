@@ -1,0 +1,113 @@
+"""Checksums of a run's frames, read anew only if a file was touched since.
+
+That a frame has the checksum of its journal is noted with the size and the modification time of its
+file. As long as both stay the same, the file is trusted and not read.
+"""
+
+import json
+import os
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from hashlib import file_digest
+from pathlib import Path
+
+from labrig.errors import DiskError
+from labrig.record.frames import FrameRecord
+from labrig.record.journal import write_durably
+
+#: Folder of the frames in a run folder.
+FRAMES = "frames"
+#: Folder in a run folder for what can be made again from the frames; it may be deleted.
+CACHE = "cache"
+_CHECKED = "checked_frames.json"
+#: Files read at once: hashing takes longer than reading from most disks.
+_READERS = 4
+
+#: Size in bytes, modification time in nanoseconds, and checksum of a file.
+_State = list[int | str]
+
+
+def damaged_frames(
+    run: Path, frames: Iterable[FrameRecord], *, trust: bool = True
+) -> dict[FrameRecord, str]:
+    """Return the frames whose files do not have the checksums of the journal, and their damage.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+    frames
+        Frames of the run.
+    trust
+        Whether a file that was read before, and has the same size and modification time since, is
+        not read again.
+
+    Returns
+    -------
+    dict of FrameRecord to str
+        For each damaged frame how its file differs, as in `is missing`.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import damaged_frames
+    >>> run = labrig.read_run("runs/decay")
+    >>> damaged_frames(run.folder, run.frames("decay"))
+    {}
+    """
+    checked = _read_checked(run) if trust else {}
+    unchecked = [frame for frame in frames if not _is_checked(frame, checked)]
+    with ThreadPoolExecutor(_READERS) as pool:
+        states = list(pool.map(_checked_state, unchecked))
+    damaged = {}
+    for frame, state in zip(unchecked, states, strict=True):
+        if isinstance(state, str):
+            damaged[frame] = state
+            checked.pop(frame.path.name, None)
+        else:
+            checked[frame.path.name] = state
+    if unchecked:
+        _write_checked(run, checked)
+    return damaged
+
+
+def _is_checked(frame: FrameRecord, checked: dict[str, _State]) -> bool:
+    """Return whether the frame's file is the one that was read before, by all that can be seen."""
+    try:
+        status = frame.path.stat()
+    except OSError:
+        return False
+    return checked.get(frame.path.name) == [status.st_size, status.st_mtime_ns, frame.sha256]
+
+
+def _checked_state(frame: FrameRecord) -> _State | str:
+    """Read a frame's file and return its state, or its damage as text."""
+    try:
+        with frame.path.open("rb") as file:
+            status = os.fstat(file.fileno())
+            # A file of another size need not be read; a forged one may have no end.
+            same_size = status.st_size == frame.size_bytes
+            if same_size and file_digest(file, "sha256").hexdigest() == frame.sha256:
+                return [status.st_size, status.st_mtime_ns, frame.sha256]
+    except FileNotFoundError:
+        return "is missing"
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
+    return "was changed after the run (its checksum differs)"
+
+
+def _read_checked(run: Path) -> dict[str, _State]:
+    """Return the states of the files that were checked before; none if the list is unusable."""
+    try:
+        content = json.loads((run / CACHE / _CHECKED).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _write_checked(run: Path, checked: dict[str, _State]) -> None:
+    """Write the list as far as the disk allows: without it, files are read again."""
+    with suppress(OSError, DiskError):
+        (run / CACHE).mkdir(exist_ok=True)
+        write_durably(run / CACHE / _CHECKED, json.dumps(checked).encode())

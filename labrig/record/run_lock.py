@@ -1,0 +1,86 @@
+"""A lock on a run folder that says who holds it."""
+
+import json
+import os
+import socket
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from filelock import FileLock, Timeout
+
+from labrig.clock import SystemClock
+from labrig.errors import DiskError, UsageError
+
+
+class RunLock:
+    """The right of one process to change a run folder, held until it is released or ends.
+
+    Parameters
+    ----------
+    path
+        File of the lock in the run folder; who holds it stands in a file beside it.
+    activity
+        What the process does, for the message to others, as in `processing this run`.
+
+    Raises
+    ------
+    UsageError
+        Another process holds the lock; the message names it.
+    DiskError
+        The folder cannot be written to.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import RunLock
+    >>> with RunLock(Path("runs/decay/.process.lock"), "processing this run"):
+    ...     pass
+    """
+
+    def __init__(self, path: Path, activity: str) -> None:
+        self._lock = FileLock(path)
+        holder = path.with_suffix(".holder")
+        try:
+            self._lock.acquire(timeout=0)
+        except Timeout:
+            raise UsageError(
+                f"{path.parent}: another labrig is {activity}{_holder_text(holder)}; wait until it "
+                "has ended"
+            ) from None
+        except OSError as error:
+            raise DiskError(
+                f"{path.parent}: the run cannot be written to ({error.strerror})"
+            ) from None
+        content = {"pid": os.getpid(), "host": socket.gethostname(), "since": SystemClock().wall()}
+        with suppress(OSError):  # it only helps others
+            holder.write_text(json.dumps(content), encoding="utf-8")
+
+    def release(self) -> None:
+        """Release the lock for other processes."""
+        with suppress(OSError):  # the system lets go of it when labrig ends
+            self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.release()
+
+
+def _holder_text(path: Path) -> str:
+    """Return who holds a lock and since when; empty if that is not known."""
+    try:
+        holder = json.loads(path.read_bytes())
+        since = datetime.fromtimestamp(float(holder["since"]), UTC)
+        pid, host = int(holder["pid"]), holder["host"]
+        return f" (process {pid} on {host}, since {since:%Y-%m-%d %H:%M:%S} UTC)"
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):
+        return ""

@@ -1,0 +1,165 @@
+"""Processes that decode and reduce frames, as many as fit into the memory set aside for them.
+
+LibRaw writes its messages to the stderr of the process, so that one process decodes one frame at a
+time. The processes are started anew rather than forked or spawned from this one's main module, so
+that a script or a notebook needs no precautions, on any system.
+"""
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from pathlib import Path
+from queue import SimpleQueue
+from typing import IO, Any
+
+from labrig.errors import DataError
+from labrig.reduce.decoding import Reduction
+from labrig.signals import name_of
+
+#: Memory of this process and its workers together, and that of this process alone, in bytes.
+MEMORY_BYTES, OWN_BYTES = 1_000_000_000, 300_000_000
+#: Memory of a worker without frames in bytes, and with one, per byte of its file.
+WORKER_BYTES, BYTES_PER_FILE_BYTE = 120_000_000, 8
+#: Size of all files together, in bytes, from which starting a worker is worth its second.
+WORTHWHILE_BYTES = 100_000_000
+#: Interval of checks for Ctrl-C, which does not interrupt a wait on Windows.
+_CHECK_INTERVAL_S = 0.2
+
+Paths = Sequence[Path]
+
+
+def worker_count(groups: Sequence[Paths]) -> int:
+    """Return the number of workers that are worth their start; 0 or 1 if there is little to do.
+
+    Parameters
+    ----------
+    groups
+        Paths of the frames that are reduced together.
+    """
+    sizes = [[_size_bytes(path) for path in group] for group in groups]
+    if sum(map(sum, sizes)) < WORTHWHILE_BYTES:
+        return 0
+    largest = max(max(group, default=0) for group in sizes)
+    worker_bytes = WORKER_BYTES + BYTES_PER_FILE_BYTE * largest
+    fitting = (MEMORY_BYTES - OWN_BYTES) // worker_bytes
+    return min(_cpus(), fitting, len(groups))
+
+
+def _size_bytes(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:  # reading it says what is wrong
+        return 0
+
+
+def _cpus() -> int:
+    """Return the number of CPUs that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def texts_from_workers(
+    groups: Sequence[Paths], reduction: Reduction[Any], workers: int
+) -> Iterator[str]:
+    """Reduce groups of frames in workers and yield what is made of them in their order.
+
+    Raises
+    ------
+    DataError
+        A frame is damaged or cannot be reduced, or a worker was killed.
+    UsageError, DiskError
+        A frame cannot be read.
+    """
+    free: SimpleQueue[_Worker] = SimpleQueue()
+    running: list[_Worker] = []
+
+    def reduced(paths: Paths) -> str:
+        worker = free.get()
+        try:
+            return worker.reduced(paths)
+        finally:
+            free.put(worker)
+
+    executor = ThreadPoolExecutor(workers)
+    try:
+        for _ in range(workers):
+            running.append(_Worker(reduction))
+            free.put(running[-1])
+        for future in [executor.submit(reduced, paths) for paths in groups]:
+            yield _result(future)
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)
+        for worker in running:
+            worker.close()
+        executor.shutdown()
+
+
+def _result(future: "Future[str]") -> str:
+    while not future.done():
+        wait([future], _CHECK_INTERVAL_S)
+    return future.result()
+
+
+class _Worker:
+    """A process that applies one reduction, one group of frames at a time."""
+
+    def __init__(self, reduction: Reduction[Any]) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "labrig.reduce.worker_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            # Ctrl-C is for the process that asks.
+            start_new_session=os.name != "nt",
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._questions: IO[bytes] = self._process.stdin
+        self._answers: IO[bytes] = self._process.stdout
+        self._ask(reduction)
+
+    def reduced(self, paths: Paths) -> str:
+        """Return what the worker makes of a group of frames.
+
+        Raises
+        ------
+        LabrigError
+            The frames cannot be reduced.
+        DataError
+            The worker was killed.
+        """
+        self._ask([str(path) for path in paths])
+        try:
+            answer = pickle.load(self._answers)
+        except (EOFError, OSError, pickle.UnpicklingError):
+            raise DataError(self._end_text(paths)) from None
+        if isinstance(answer, Exception):
+            raise answer
+        return str(answer)
+
+    def close(self) -> None:
+        """End the process, whatever it is doing."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._questions, self._answers):
+            with suppress(OSError):
+                pipe.close()
+
+    def _ask(self, question: Any) -> None:
+        with suppress(OSError):  # it has ended, which its answer shows
+            pickle.dump(question, self._questions)
+            self._questions.flush()
+
+    def _end_text(self, paths: Paths) -> str:
+        code = self._process.wait()
+        ending = f"was killed by {name_of(-code)}" if code < 0 else f"ended with code {code}"
+        return (
+            f"{paths[0]}: the process that decoded it {ending}, as when memory runs out; close "
+            "other programs and try again"
+        )

@@ -1,0 +1,99 @@
+"""What was reduced from the frames of a run, kept in the run folder for the next time.
+
+Each reduction, with its arguments, has a file of its own in the folder `cache`. A file that is
+damaged counts as missing; all of them may be deleted without loss.
+"""
+
+import json
+from contextlib import suppress
+from functools import cache
+from hashlib import sha256
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from labrig.errors import DiskError
+from labrig.record import CACHE, write_durably
+from labrig.reduce.codec import encoded
+
+#: Frames after which what is new is written, so that little is lost if the process is killed.
+_WRITE_EVERY = 100
+#: Libraries whose version changes what is reduced from a frame.
+_LIBRARIES = ("labrig", "numpy", "scipy", "rawpy")
+#: Modules beside those of `labrig.reduce` whose code reduces frames.
+_MODULES = ("labrig.nonnegative", "labrig.region", "labrig.optics.camera_model")
+
+
+class KeptReductions:
+    """What one reduction made of the frames of one run.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+    reduction
+        The reduction with its arguments.
+    """
+
+    def __init__(self, run: Path, reduction: Any) -> None:
+        kind = type(reduction)
+        identity = {
+            "reduction": f"{kind.__module__}.{kind.__qualname__}",
+            "arguments": json.loads(encoded(reduction)),
+            "code": _code_checksum(kind.__module__),
+        }
+        checksum = _checksum(json.dumps(identity))
+        self._path = run / CACHE / f"{kind.__qualname__}-{checksum[:16]}.jsonl"
+        self._identity = checksum
+        self._texts = self._read()
+        self._new = 0
+
+    def get(self, key: str) -> str | None:
+        """Return what was kept under a key; None if nothing was."""
+        return self._texts.get(key)
+
+    def add(self, key: str, text: str) -> None:
+        """Keep a line of text under a key."""
+        self._texts[key] = text
+        self._new += 1
+        if self._new >= _WRITE_EVERY:
+            self.write()
+
+    def write(self) -> None:
+        """Write what is new, as far as the disk allows: nothing depends on it."""
+        if not self._new:
+            return
+        content = "".join(f"{key} {text}\n" for key, text in self._texts.items())
+        head = f"{self._identity} {_checksum(content)}\n"
+        with suppress(OSError, DiskError):
+            self._path.parent.mkdir(exist_ok=True)
+            write_durably(self._path, (head + content).encode())
+        self._new = 0
+
+    def _read(self) -> dict[str, str]:
+        """Return the texts by key; none if the file is missing or damaged."""
+        try:
+            head, _, content = self._path.read_text(encoding="utf-8").partition("\n")
+        except (OSError, ValueError):
+            return {}
+        if head != f"{self._identity} {_checksum(content)}":
+            return {}
+        return dict(line.split(" ", 1) for line in content.splitlines())
+
+
+def _checksum(text: str) -> str:
+    return sha256(text.encode()).hexdigest()
+
+
+@cache
+def _code_checksum(module: str) -> str:
+    """Return the checksum of all code that turns a frame into what `module` makes of it."""
+    import cv2
+
+    digest = sha256(json.dumps([*map(version, _LIBRARIES), cv2.__version__]).encode())
+    folder = Path(__file__).parent
+    others = [Path(str(import_module(name).__file__)) for name in (*_MODULES, module)]
+    for path in (*sorted(folder.glob("*.py")), *others):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,159 @@
+"""Figures of a report as SVG: on the page, and as files beside it.
+
+On the page, colours are CSS variables with the colour of the light scheme as fallback, so that one
+figure serves the light scheme, the dark scheme and print. Text remains text: on the page it takes
+the page's font and can be searched, in the files it can be edited.
+"""
+
+import html
+import re
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from labrig.report.chart import Chart
+from labrig.report.chart_svg import svg_body
+from labrig.report.figure_style import VARIABLES, figure_style
+from labrig.report.sections import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FOLDER = "figures"
+#: Fonts of the SVG files: the font of matplotlib's figures, then fonts of the same width.
+_FONTS = "'DejaVu Sans', Verdana, Arial, sans-serif"
+_GROUND = '<rect width="100%" height="100%" fill="#ffffff"/>'
+_NAMESPACES = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+_TAG = re.compile(r"<[^>]*>")
+#: Pattern of the digits beyond a hundredth of a point.
+_TOO_FINE = re.compile(r"(?<=\.\d\d)\d+")
+#: Pattern of a group of markers that have the same style, each with its own style attribute.
+_MARKERS = re.compile(
+    r'<g( [^>]*)?>((?:<use [^>]*style="([^"]*)"/>)(?:<use [^>]*style="\3"/>)*)</g>'
+)
+_COLOUR = re.compile("|".join(VARIABLES))
+_LONGEST_SLUG = 40
+
+
+@dataclass(frozen=True)
+class FigureFile:
+    """Figure of the report.
+
+    Attributes
+    ----------
+    element
+        Element `<svg>` in the colours of the page.
+    link
+        Link to the SVG file of the figure.
+    """
+
+    element: Markup
+    link: str
+
+
+class FigureFiles:
+    """Collection of the figures of one report."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, str] = {}
+
+    def add(self, picture: Picture, name: str, description: str) -> FigureFile:
+        """Draw a picture and add it to the files.
+
+        Parameters
+        ----------
+        picture
+            Picture that is drawn.
+        name
+            Name, unique in the report; it begins the name of the file and the ids of its elements.
+        description
+            Description for screen readers.
+        """
+        name = slug(name)
+        if isinstance(picture.drawing, Chart):
+            width, height = picture.drawing.width_pt, picture.drawing.height_pt
+            body = svg_body(picture.drawing)
+        else:
+            with figure_style():
+                figure = picture.figure()
+                width, height = figure.get_size_inches() * 72
+                body = _matplotlib_body(figure)
+        box = _box(width, height)
+        self._files[f"{name}.svg"] = (
+            f'<?xml version="1.0" encoding="utf-8"?>\n<svg {_NAMESPACES} width="{width:g}pt" '
+            f'height="{height:g}pt" {box} font-family="{_FONTS}" '
+            f'stroke-linejoin="round">{_GROUND}{body}</svg>\n'
+        )
+        return FigureFile(
+            element=_element(box, _with_own_ids(body, name), description),
+            link=f"{FOLDER}/{name}.svg",
+        )
+
+    def write(self, folder: Path) -> None:
+        """Write all files into a folder `figures` in `folder`, after the last was added.
+
+        Raises
+        ------
+        OSError
+            If the files cannot be written.
+        """
+        figures_folder = folder / FOLDER
+        figures_folder.mkdir(exist_ok=True)
+        for name, text in self._files.items():
+            (figures_folder / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def chart_element(chart: Chart, description: str) -> Markup:
+    """Return a chart as element `<svg>` of the page, without a file of its own."""
+    return _element(_box(chart.width_pt, chart.height_pt), svg_body(chart), description)
+
+
+def _box(width_pt: float, height_pt: float) -> str:
+    """Return the attribute of the size of a figure."""
+    return f'viewBox="0 0 {width_pt:g} {height_pt:g}"'
+
+
+def _element(box: str, body: str, description: str) -> Markup:
+    """Return a figure as element `<svg>` in the colours of the page."""
+    body = _COLOUR.sub(lambda colour: f"var(--{VARIABLES[colour[0]]}, {colour[0]})", body)
+    return Markup(f'<svg {box} role="img" aria-label="{html.escape(description)}">{body}</svg>')
+
+
+def slug(name: str) -> str:
+    """Return a name with letters, digits and hyphens only, as addresses, files and ids need it."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", name)[:_LONGEST_SLUG].strip("-")
+
+
+def _matplotlib_body(figure: "Figure") -> str:
+    """Return what the element `<svg>` of a figure contains."""
+    buffer = BytesIO()
+    # Without dates and versions the same figures give the same bytes.
+    no_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(buffer, format="svg", metadata=no_metadata)
+    text = buffer.getvalue().decode("utf-8")
+    text = text[text.index("<svg") :].strip()
+    text = _TAG.sub(lambda tag: _TOO_FINE.sub("", tag[0]), text)
+    text = _MARKERS.sub(_share_style, re.sub(r">\s+<", "><", text))
+    body = text.split(">", 1)[1].removesuffix("</svg>")
+    # Its style sheet would hold for the whole page, which has one of its own.
+    body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, flags=re.DOTALL)
+    return re.sub(r" font-family: [^;\"]*;", "", body)
+
+
+def _share_style(markers: re.Match[str]) -> str:
+    """Return a group of markers with their common style at the group."""
+    own, uses, style = markers.groups()
+    bare = uses.replace(f' style="{style}"', "")
+    return f'<g{own or ""} style="{style}">{bare}</g>'
+
+
+def _with_own_ids(body: str, name: str) -> str:
+    """Return the body of a figure with ids that begin with its name.
+
+    Ids of matplotlib are unique in a figure, not in a page of figures.
+    """
+    body = re.sub(r'\bid="', f'id="{name}-', body)
+    return body.replace("url(#", f"url(#{name}-").replace('xlink:href="#', f'href="#{name}-')

@@ -1,0 +1,127 @@
+"""The campaigns: commands that measure how good labrig is, and what they printed last."""
+
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+OUTPUTS = Path(__file__).with_name("outputs")
+
+
+@dataclass(frozen=True)
+class Output:
+    """Text that a campaign printed, and its circumstances."""
+
+    header: dict[str, str]
+    printed: str
+
+    @classmethod
+    def of(cls, text: str) -> "Output":
+        """Return the output that `text` wrote."""
+        lines = text.splitlines()
+        n = next((k for k, line in enumerate(lines) if not line.startswith("# ")), len(lines))
+        pairs = (line.removeprefix("# ").partition(": ") for line in lines[:n])
+        return cls({key: value for key, _, value in pairs}, "\n".join(lines[n:]))
+
+    @property
+    def text(self) -> str:
+        """Return the text that is kept."""
+        header = "".join(f"# {key}: {value}\n" for key, value in self.header.items())
+        return f"{header}{self.printed}\n"
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A command that measures; `arguments` follow `python -m`."""
+
+    name: str
+    arguments: tuple[str, ...]
+
+    @property
+    def command(self) -> str:
+        """Return the command as a person types it."""
+        quoted = (f'"{part}"' if " " in part else part for part in self.arguments)
+        return " ".join(("python -m", *quoted))
+
+    @property
+    def path(self) -> Path:
+        """Return the path of the kept output."""
+        return OUTPUTS / f"{self.name}.txt"
+
+    @property
+    def kept(self) -> Output | None:
+        """Return the last output, if the command is still the same."""
+        if not self.path.is_file():
+            return None
+        output = Output.of(self.path.read_text(encoding="utf-8"))
+        return output if output.header["command"] == self.command else None
+
+    def run(self) -> str:
+        """Run the command, keep what it prints, and return its exit status."""
+        command = [sys.executable, "-m", *self.arguments]
+        ended = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+        header = {
+            "command": self.command,
+            "labrig": version("labrig"),
+            "date": f"{datetime.now(UTC):%Y-%m-%d}",
+            "exit status": str(ended.returncode),
+        }
+        OUTPUTS.mkdir(exist_ok=True)
+        # Complaints may name files; where those lay on one computer is of no use to others.
+        printed = ended.stdout.rstrip().replace(tempfile.gettempdir(), "TMPDIR")
+        printed = printed.replace(str(ROOT), "CLONE")
+        self.path.write_text(Output(header, printed).text, encoding="utf-8")
+        return header["exit status"]
+
+
+def _module(name: str, *arguments: str, called: str = "") -> Campaign:
+    return Campaign(called or name, (f"tests.acceptance.{name}", *arguments))
+
+
+CAMPAIGNS = {
+    campaign.name: campaign
+    for campaign in (
+        _module("coverage_pipeline", "--seeds", "100", "--scenario", "baseline", "all of it"),
+        _module(
+            "coverage_pipeline",
+            *("--seeds", "60", "--scenario", "another", "lamp", "flicker", "steady", "power"),
+            called="coverage_pipeline_other_scenarios",
+        ),
+        _module("coverage_decay_fit", "--seeds", "100"),
+        _module("reference_data"),
+        _module("predicted_sigmas", "--days", "32", "--only", "double"),
+        _module(
+            "predicted_sigmas",
+            *("--days", "32", "--only", "blue"),
+            called="predicted_sigmas_one_state",
+        ),
+        _module("excitation_rates", "--seeds", "40"),
+        _module("whole_phosphor"),
+        _module("lvf_in_the_room", "--width", "402", "--seeds", "3"),
+        _module("spectrum_through_lvf", "40"),
+        _module("emission_spectra", "3"),
+        _module("decays_of_all_materials", "--sensor", "384x256"),
+        _module("sao_charge_and_decay"),
+        _module("lightlogger"),
+        _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),
+        _module(
+            "kills_in_every_protocol",
+            *("decay", "fade", "blank", "camera_calibration", "saturation", "isotropy"),
+        ),
+        _module("disk_failures", "--every", "3"),
+        _module("mutated_files", "--cases", "10000"),
+        _module("ptp_fuzz", "--cases", "10000", "--seed", "4"),
+        _module("two_labrigs", "--trials", "40"),
+        _module("suspended", "--trials", "20"),
+        _module("lamp_off_however_it_ends"),
+        _module("gphoto2_latency"),
+        Campaign(
+            "benchmarks",
+            ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),
+        ),
+    )
+}

@@ -1,0 +1,552 @@
+"""Figures that say how good labrig is, and how each is found in what its campaign printed."""
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+Extract = Callable[[str], str]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A row of the table.
+
+    Attributes
+    ----------
+    what
+        Truth, conditions, sample size.
+    extract
+        Function that finds the figure in the campaign's output.
+    """
+
+    what: str
+    campaign: str
+    extract: Extract
+
+
+def _match(pattern: str, printed: str) -> str:
+    found = re.search(pattern, printed, re.M)
+    if found is None:
+        raise ValueError(f"not in the output: {pattern}")
+    return found[1]
+
+
+def _columns(pattern: str, printed: str) -> list[tuple[float, ...]]:
+    """Groups of all matches as numbers, column by column."""
+    rows = [tuple(map(float, match.groups())) for match in re.finditer(pattern, printed, re.M)]
+    if not rows:
+        raise ValueError(f"not in the output: {pattern}")
+    return list(zip(*rows, strict=True))
+
+
+def _part(printed: str, begin: str) -> str:
+    """Return the lines from the one that begins so to the next empty one."""
+    return _match(rf"(^{re.escape(begin)}(?:.|\n)*?)(?:\n\n|\Z)", printed)
+
+
+def _span(values: Iterable[float], digits: int = 0) -> str:
+    known = sorted(values)
+    low, high = (f"{value:.{digits}f}" for value in (known[0], known[-1]))
+    return low if low == high else f"{low} to {high}"
+
+
+def _furthest(values: Iterable[float]) -> float:
+    return max(map(abs, values))
+
+
+#: Of the pipeline's rows: within 1 σ, within 2 σ, bias in σ, scatter over the Cramér-Rao bound.
+_RATE = (
+    r"^\S+ +[\d.]+ +\d+ +([\d.]+) ± [\d.]+ +([\d.]+) ± [\d.]+ +([+-][\d.]+) ± [\d.]+"
+    r" +[+-][\d.]+ +[\d.]+ +[\d.]+ +([\d.]+) +[\d.]+$"
+)
+
+
+def _coverage(scenario: str) -> Extract:
+    def extract(printed: str) -> str:
+        one, two, bias, _ = _columns(_RATE, _part(printed, scenario))
+        return (
+            f"{_span(one)} % within 1 σ, {_span(two)} % within 2 σ, "
+            f"bias at most {_furthest(bias):.2f} σ"
+        )
+
+    return extract
+
+
+def _efficiency(printed: str) -> str:
+    *_, of_bound = _columns(_RATE, _part(printed, "baseline"))
+    return f"{_span(of_bound, 2)} ×"
+
+
+def _wrong_states(printed: str) -> str:
+    ((seeds,),) = _columns(r"^baseline.*: (\d+) seeds", printed)
+    part = _part(printed, "baseline")
+    wrong = {name: int(n) for name, n in re.findall(r"^([a-z-]+) +[\d.]+ +(\d+) ", part, re.M)}
+    return f"{sum(wrong.values())} of {seeds * len(wrong):.0f} fits"
+
+
+def _decay_fit(printed: str) -> str:
+    one, two = _columns(r"within σ (\d+) %, 2σ (\d+) %", printed)
+    return f"{_span(one)} % within 1 σ, {_span(two)} % within 2 σ"
+
+
+def _power_laws(printed: str) -> str:
+    (flagged,) = _columns(r"^power law .*power law ([\d.]+) %", printed)
+    return f"{_span(flagged)} %"
+
+
+def _certified(printed: str) -> str:
+    first, second = _columns(r"^\w+ +([\d.]+) +([\d.]+)$", _part(printed, "NIST set"))
+    return f"{_span([*first, *second])} digits"
+
+
+def _predicted(printed: str) -> str:
+    (ratio, _) = _columns(r"× ([\d.]+) +\S+ × ([\d.]+)", printed)
+    return f"{_span(ratio, 2)} × in {len(ratio)} rates"
+
+
+def _told(printed: str) -> str:
+    predicted, found = _columns(r" k1 .* (\d+) % +(\d+) %$", printed)
+    far = max(zip(predicted, found, strict=True), key=lambda pair: abs(pair[0] - pair[1]))
+    return f"{far[0]:.0f} % predicted, {far[1]:.0f} % found"
+
+
+def _excitation(printed: str) -> str:
+    in_sigma, percent = _columns(r"^[a-z]+ .* ([\d.]+) +([\d.]+)$", _part(printed, "material"))
+    return f"k_e within {max(percent):.1f} %, all within {max(in_sigma):.1f} σ"
+
+
+def _excitation_sigma(printed: str) -> str:
+    said = []
+    for name in ("k_r", "Λ", "k_e"):
+        (rms,) = _columns(rf"^state \d  {name}[ \d]* ([\d.]+) +[+-]", printed)
+        said.append(f"{name} {_span(rms, 2)}")
+    return ", ".join(said)
+
+
+def _phosphor(printed: str) -> str:
+    k_r, r0, percent, k_e, radiated = _columns(
+        r"k_r +(\S+) σ +r\(0\) .*? ([+-][\d.]+) σ +k_e +(\S+) % +(\S+) σ .* Λ +(\S+) σ", printed
+    )
+    return (
+        f"k_e of bands ≥ 0.002 /s within {_furthest(percent):.1f} % and {_furthest(k_e):.1f} σ, "
+        f"k_r within {_furthest(k_r):.1f} σ, Λ within {_furthest(radiated):.1f} σ, "
+        f"r(0) within {_furthest(r0):.1f} σ"
+    )
+
+
+def _phosphor_sigma(printed: str) -> str:
+    names = {"k_r": "k_r", "r0_off": "r(0)", "k_e": "k_e", "radiated": "Λ"}
+    rms = {name: _match(rf" {name} ([\d.]+) σ", printed) for name in names}
+    return ", ".join(f"{names[name]} {value}" for name, value in rms.items())
+
+
+def _variable_filter(printed: str) -> str:
+    (centre,) = _columns(r"^ +centre / nm +[\d.]+ +([\d.]+)", printed)
+    (width,) = _columns(r"^ +width / 1 +[\d.]+ +([\d.]+)", printed)
+    return f"centres within {max(centre):.3f} nm, widths within {100 * max(width):.1f} %"
+
+
+def _variable_filter_sigma(printed: str) -> str:
+    said = []
+    for name in ("centre / nm", "width / 1"):
+        (rms,) = _columns(rf"^ +{name} +[\d.]+ +[\d.]+ +[\d.]+ +([\d.]+)", printed)
+        said.append(f"{name.split()[0]} {_span(rms, 2)}")
+    return ", ".join(said)
+
+
+def _irradiance(printed: str) -> str:
+    (off,) = _columns(r"^ +irradiance / 1 +[\d.]+ +([\d.]+)", printed)
+    return f"{100 * max(off):.1f} %"
+
+
+def _colours(camera: str) -> Extract:
+    def extract(printed: str) -> str:
+        row = rf"^{camera} +the lamp  +([\d.]+) +([\d.]+)"
+        mean, percentile = _columns(row, printed)
+        return f"{mean[0]:.2f}, {percentile[0]:.2f}"
+
+    return extract
+
+
+def _spectrum_bands(kind: str) -> Extract:
+    def extract(printed: str) -> str:
+        row = rf"^{kind} +same curves .* ([\d.]+)% +([\d.]+)%$"
+        one, two = _columns(row, printed)
+        return f"{one[0]:.0f} %, {two[0]:.0f} %"
+
+    return extract
+
+
+def _emission(printed: str) -> str:
+    furthest, one, two = _columns(r"^\S+ +yes +[\d.]+ +([\d.]+) +(\d+)% +(\d+)%", printed)
+    return (
+        f"within {100 * max(furthest):.1f} % of the peak; "
+        f"{_span(one)} % within 1 σ, {_span(two)} % within 2 σ"
+    )
+
+
+def _decays(printed: str) -> str:
+    pulls = [float(pull) for pull in re.findall(r"\(([+-][\d.]+) σ\)", printed)]
+    wrong = len(re.findall("WRONG n|NOT FLAGGED", printed))
+    return (
+        f"{len(pulls)} rates within {_furthest(pulls):.1f} σ; "
+        f"{wrong} times a wrong number of states or a power law that is not flagged"
+    )
+
+
+def _real_charge(printed: str) -> str:
+    rows = _columns(r"^ +(\d) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+)$", printed)
+    two = [column[1] for column in rows]
+    return f"{two[2]:.0f} %, {two[3]:.0f} %, {two[4]:.0f} %, {two[5]:.0f} %"
+
+
+def _narrow_lights(printed: str) -> str:
+    thirds = _columns(r"^every third.* ([\d.]+) +([\d.]+) +([\d.]+) +[\d.]+ +([\d.]+)$", printed)
+    (low,), (median,), (high,), (worst,) = thirds
+    return f"median {median:.1f} nm, quartiles {low:.1f} nm and {high:.1f} nm, worst {worst:.1f} nm"
+
+
+def _narrow_lights_halved(printed: str) -> str:
+    median = _match(r"^every second.* ([\d.]+) +[\d.]+ +[\d.]+ +[\d.]+$", printed)
+    return f"median {median} nm"
+
+
+def _wrong(printed: str) -> str:
+    wrong = _match(r"^(\d+ of \d+) went wrong", printed)
+    return f"{wrong} trials wrong"
+
+
+def _kills(printed: str) -> str:
+    *killed, wrong = _columns(r"outside (\d+), writing (\d+), result (\d+) .* (\d+)$", printed)
+    kills = sum(map(sum, killed))
+    return f"{kills:.0f} kills in {len(wrong)} protocols, {sum(wrong):.0f} wrong"
+
+
+def _disk(printed: str) -> str:
+    failures, frames, wrong = _columns(r"^(?:run|result), \w+ +(\d+) +(\d+) +\d+ +(\d+) ", printed)
+    return (
+        f"{sum(wrong):.0f} of {sum(failures):.0f} wrong (run not usable, an acknowledged frame of "
+        f"{sum(frames):.0f} lost, more than one unit done again)"
+    )
+
+
+def _refused(printed: str) -> str:
+    (longest_s,) = _columns(r" ([\d.]+) s  ", printed)
+    wrong = _match(r"^(\d+ of \d+) went wrong", printed)
+    return f"{wrong} wrong; longest refusal {max(longest_s):.1f} s"
+
+
+def _containers(printed: str) -> str:
+    cases, failures = _columns(r"^.+? +(\d+) cases, (\d+) failures", printed)
+    return f"{sum(failures):.0f} failures in {sum(cases):.0f} containers, {len(cases)} ways"
+
+
+def _off_after(ways: str) -> Extract:
+    """The longest of the ways to end that match."""
+
+    def extract(printed: str) -> str:
+        times = _columns(rf"^(?:{ways}) +\d+ +[\d.]+ +([\d.]+|inf) +\d+$", printed)
+        return f"at most {max(times[0]):.1f} s"
+
+    return extract
+
+
+def _latency(printed: str) -> str:
+    said = []
+    for name in ("ptp_camera", "gphoto2, remote button", "gphoto2, trigger_capture"):
+        (median,) = _columns(rf"^{name} +[AM]F +([\d.]+)", printed)
+        said.append(f"{name} {_span(median, 1)} ms")
+    return "; ".join(said)
+
+
+def _times(what: str, *peers: str) -> Extract:
+    def extract(printed: str) -> str:
+        row = r"^{} +(\d\S* \S+) \(.*?\) +{} +(\d\S* \S+) \("
+        ours = _match(row.format(re.escape(what), ".*?"), printed)
+        theirs = [
+            _match(row.format(re.escape(what), re.escape(peer)).replace("(", "(?:", 1), printed)
+            for peer in peers
+        ]
+        said = (f"{peer} {time}" for peer, time in zip(peers, theirs, strict=True))
+        return "; ".join((f"labrig {ours}", *said))
+
+    return extract
+
+
+FIGURES = (
+    Figure(
+        "Simulated dark room, from lamp to fit: samples of one and of two states, sensor of "
+        "96 × 64 pixels, flicker of 0.7 %, 100 seeds. Fraction of the rates k_r within 1 σ and 2 σ "
+        "of the truth (68 % and 95 % if σ is right; chance alone makes ± 5 % and ± 2 %), and mean "
+        "error",
+        "coverage_pipeline",
+        _coverage("baseline"),
+    ),
+    Figure(
+        "The same runs: fits that choose a wrong number of states",
+        "coverage_pipeline",
+        _wrong_states,
+    ),
+    Figure(
+        "The same runs: scatter of the rates over the Cramér-Rao bound of the true noise",
+        "coverage_pipeline",
+        _efficiency,
+    ),
+    Figure(
+        "The same with lamp drift of 3 %/h, crosstalk of 3 % and row noise of 0.3 read noise in "
+        "addition, two decays, 100 seeds",
+        "coverage_pipeline",
+        _coverage("all of it"),
+    ),
+    Figure(
+        "The same, reduced with another laboratory's camera curves, 60 seeds (chance alone makes "
+        "± 6 % and ± 3 %)",
+        "coverage_pipeline_other_scenarios",
+        _coverage("another laboratory's curves"),
+    ),
+    Figure(
+        "The same with lamp drift of 3 %/h, two decays, 60 seeds",
+        "coverage_pipeline_other_scenarios",
+        _coverage("lamp drifts"),
+    ),
+    Figure(
+        "The same with flicker of 2 %, 60 seeds",
+        "coverage_pipeline_other_scenarios",
+        _coverage("flicker 2 %"),
+    ),
+    Figure(
+        "The same without flicker, 60 seeds",
+        "coverage_pipeline_other_scenarios",
+        _coverage("steady light"),
+    ),
+    Figure(
+        "A sample whose glow falls by a power law, 60 seeds: fits that say so",
+        "coverage_pipeline_other_scenarios",
+        lambda printed: _match(r"flagged as such (\d+ of \d+)", printed),
+    ),
+    Figure(
+        "Decay fit by itself, one to three states, flicker and dark level known or not, flicker "
+        "that the fit is not told of among them, 100 seeds in each case: fraction of the rates",
+        "coverage_decay_fit",
+        _decay_fit,
+    ),
+    Figure(
+        "The same, power laws of three shapes, 100 seeds each: fraction of the fits that say so",
+        "coverage_decay_fit",
+        _power_laws,
+    ),
+    Figure(
+        "Least-squares fit on the nonlinear reference sets of NIST, all 22 sets from both starts: "
+        "digits in agreement with the certified parameters, of 11 certified",
+        "reference_data",
+        _certified,
+    ),
+    Figure(
+        "Mercury lines of a real germicidal lamp: rms of four wavelengths about a straight line",
+        "reference_data",
+        lambda printed: _match(r"^visible +\d+ +([\d.]+)$", printed) + " nm",
+    ),
+    Figure(
+        "Scatter of fitted rates over the σ that `labrig plan --predict` states, materials of two "
+        "states, 8 protocols, 32 runs each (chance alone makes ± 0.13)",
+        "predicted_sigmas",
+        _predicted,
+    ),
+    Figure(
+        "Same runs: chance that both states are told apart, where prediction and runs differ most",
+        "predicted_sigmas",
+        _told,
+    ),
+    Figure(
+        "Scatter over predicted σ for a material of one state, 6 protocols, 32 runs each",
+        "predicted_sigmas_one_state",
+        _predicted,
+    ),
+    Figure(
+        "Excitation rates k_e ≥ 0.002 /s of Table 1's eight paints, charged by a numerical "
+        "integration and a filament that cools, one seed",
+        "excitation_rates",
+        _excitation,
+    ),
+    Figure(
+        "The same for a material of two states, 40 seeds: rms of error over σ (1 if σ is right)",
+        "excitation_rates",
+        _excitation_sigma,
+    ),
+    Figure(
+        "A whole phosphor, all calibrations made in the run itself, Table 1's eight paints, "
+        "one seed each",
+        "whole_phosphor",
+        _phosphor,
+    ),
+    Figure(
+        "Same runs: rms of error over σ (1 if σ is right)",
+        "whole_phosphor",
+        _phosphor_sigma,
+    ),
+    Figure(
+        "Linear variable filter calibrated in the simulated room with real colour filters, three "
+        "cameras: central wavelengths and widths of the pass bands from 420 nm to 680 nm",
+        "lvf_in_the_room",
+        _variable_filter,
+    ),
+    Figure(
+        "Same runs: rms of error over σ at all positions (1 if σ is right)",
+        "lvf_in_the_room",
+        _variable_filter_sigma,
+    ),
+    Figure(
+        "Same runs: relative irradiance behind the filter, summed over all bands, from 420 nm to "
+        "680 nm: largest error",
+        "lvf_in_the_room",
+        _irradiance,
+    ),
+    Figure(
+        "ColorChecker under a halogen lamp through a variable filter, camera curves known: mean "
+        "and 95th percentile of the 24 colour differences ΔE2000",
+        "spectrum_through_lvf",
+        _colours("same curves"),
+    ),
+    Figure(
+        "The same with another laboratory's curves of the camera, taken for exact",
+        "spectrum_through_lvf",
+        _colours("another's, taken for exact"),
+    ),
+    Figure(
+        "The same with another laboratory's curves of the camera, their uncertainty allowed for",
+        "spectrum_through_lvf",
+        _colours("another laboratory's"),
+    ),
+    Figure(
+        "Emission of 40 fluorophores through a variable filter, camera curves known: fraction of "
+        "the bands above 2 % of the peak within their credible bands of 68 % and 95 %",
+        "spectrum_through_lvf",
+        _spectrum_bands("fluorophores"),
+    ),
+    Figure(
+        "The same for 40 mercury lamps, whose lines are narrower than the filter's pass band",
+        "spectrum_through_lvf",
+        _spectrum_bands("mercury lines"),
+    ),
+    Figure(
+        "Emission spectra of five paints in the simulated room, camera curves as far off as "
+        "laboratories disagree, with a picture of a grey card, three seeds each: largest error, "
+        "and fraction of the bands above 2 % of the peak",
+        "emission_spectra",
+        _emission,
+    ),
+    Figure(
+        "Every shipped material in the simulated room, sensor of 384 × 256 pixels, by itself and "
+        "Table 1's eleven in one charge, one seed",
+        "decays_of_all_materials",
+        _decays,
+    ),
+    Figure(
+        "Real narrow-band lights from 400 nm to 700 nm, seen by a real sensor of 18 channels, "
+        "every third held out in turn, four intensities: error of the wavelength",
+        "lightlogger",
+        _narrow_lights,
+    ),
+    Figure("The same, every second held out", "lightlogger", _narrow_lights_halved),
+    Figure(
+        "Every third held out: rms of error over σ (1 if σ is right)",
+        "lightlogger",
+        lambda printed: _match(r"rms of error over σ ([\d.]+)$", printed),
+    ),
+    Figure(
+        "Charge and decay of a real SrAl2O4:Eu,Dy, two states: rms of misfit over glow in the "
+        "charge until 60 s, in the charge until 300 s, in the decay until 60 s, later",
+        "sao_charge_and_decay",
+        _real_charge,
+    ),
+    Figure(
+        "Faults of 15 kinds at random moments of a run, signals and kill -9 in addition; "
+        "interrupted runs are resumed. 450 trials",
+        "faults_at_any_moment",
+        _wrong,
+    ),
+    Figure(
+        "kill -9 at random moments of six of the shipped protocols and of the making of their "
+        "results; resumed until complete, compared with an undisturbed run",
+        "kills_in_every_protocol",
+        _kills,
+    ),
+    Figure(
+        "An I/O error or a loss of power at every third write, fsync, close, rename … of a run and "
+        "of the making of its result; the run is resumed",
+        "disk_failures",
+        _disk,
+    ),
+    Figure(
+        "Damaged YAML, CSV and journal files, 10 000 of them: refused with one line, or read",
+        "mutated_files",
+        _refused,
+    ),
+    Figure(
+        "Damaged PTP containers over USB and network, 10 000 each way: no hang, no traceback",
+        "ptp_fuzz",
+        _containers,
+    ),
+    Figure(
+        "Two labrigs on one relay board, by its path, a link, a relative path, two slashes, "
+        "another TMPDIR; half of the 40 trials with the first at work, half at once",
+        "two_labrigs",
+        _wrong,
+    ),
+    Figure(
+        "The PC sleeps for 1 s to 8 h at a random moment of a run (real process, the kernel's "
+        "clock shimmed), 20 trials: reported, the unit done again",
+        "suspended",
+        _wrong,
+    ),
+    Figure(
+        "Lamp off after a signal or a closed terminal, 10 trials each",
+        "lamp_off_however_it_ends",
+        _off_after(r"(?!SIGSTOP|SIGSEGV)SIG[^ ]+|closed terminal|Ctrl-Z"),
+    ),
+    Figure(
+        "Lamp off after kill -9, SIGSEGV, or where memory runs out, 10 trials each",
+        "lamp_off_however_it_ends",
+        _off_after(r"kill -9|SIGSEGV|out of memory"),
+    ),
+    Figure("Lamp off after SIGSTOP, 10 trials", "lamp_off_however_it_ends", _off_after("SIGSTOP")),
+    Figure(
+        "The same where the board answers 60 ms late or has come back under another name",
+        "lamp_off_however_it_ends",
+        _off_after(r"board (?:60 ms late|renamed), .*?"),
+    ),
+    Figure(
+        "The same where the board is silent for 20 s",
+        "lamp_off_however_it_ends",
+        _off_after(r"board silent for 20 s, SIGTERM"),
+    ),
+    Figure(
+        "Delay from the command to the full press of the shutter release, simulated Canon, "
+        "20 frames each: labrig's own driver and libgphoto2",
+        "gphoto2_latency",
+        _latency,
+    ),
+    Figure(
+        "Decay of two states, 60 frames in three channels: start, fit, alternative models, "
+        "diagnosis",
+        "benchmarks",
+        _times(
+            "2 states, 60 frames x 3 channels: all of it",
+            "lmfit leastsq, best of 15 starts",
+            "lmfit leastsq, one good start",
+        ),
+    ),
+    Figure(
+        "A frame of 25 MB and its journal line, durable",
+        "benchmarks",
+        _times("25 MB frame and its journal line, durable", "write and fsync of the same bytes"),
+    ),
+    Figure(
+        "Excitation, 31 sites: residuals and Jacobian",
+        "benchmarks",
+        _times(
+            "excitation, 31 sites, 3 charges: residuals and Jacobian",
+            "solve_ivp in the loop, finite differences",
+        ),
+    ),
+)

@@ -1,0 +1,181 @@
+"""The list of runs: true of every protocol and at every moment, with an index or without."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+
+from labrig import resources
+from labrig.acquire import ProtocolModel, read_protocol
+from labrig.catalogue import RunFilter, RunSummary, find_run, list_runs, summarise
+from labrig.record import RunFolder, add_note
+from labrig.results import write_fitted_decay
+from labrig.yaml_file import yaml_text
+from tests.conftest import Ended
+from tests.results.made import decay_result
+
+Labrig = Callable[..., Ended]
+
+SHIPPED = sorted(resources.names("protocols"))
+#: Virtual time at which every run of these tests begins, as in a simulated room.
+EPOCH_S = 1_767_225_600.0
+INDEX = ".runs-index"
+
+
+def record_run(runs: Path, protocol: ProtocolModel, endings: Sequence[str] = ()) -> Path:
+    """Record units without frames, each with the status by which its attempt ends."""
+    text = yaml_text(protocol.model_dump(mode="json", by_alias=True))
+    name = f"{protocol.protocol}_{protocol.sample.name}"
+    with RunFolder.create(runs, name, EPOCH_S, {"protocol.yaml": text}, 1) as folder:
+        for unit, ending in zip(protocol.units(), endings, strict=False):
+            attempt = folder.attempt(unit.name, lambda: EPOCH_S, {})
+            if ending:
+                attempt.stop(ending, "the lamp is lost")
+    return folder.path
+
+
+def settle(runs: Path) -> None:
+    """Make all files look an hour old, so that an index keeps what it knows of them."""
+    for path in [*runs.rglob("*"), runs]:
+        status = path.stat()
+        an_hour_ns = 3600 * 10**9
+        os.utime(path, ns=(status.st_atime_ns - an_hour_ns, status.st_mtime_ns - an_hour_ns))
+
+
+def statuses(runs: Path) -> list[str]:
+    return [run.status for run in list_runs(runs, RunFilter())]
+
+
+def decay() -> ProtocolModel:
+    return read_protocol(resources.find("protocols", "protocol", "decay"))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_protocol_is_listed_as_it_is(tmp_path: Path, labrig: Labrig, name: str) -> None:
+    protocol = read_protocol(resources.find("protocols", "protocol", name))
+    units = len(protocol.units())
+    all_done = ["success"] * units
+    begun = record_run(tmp_path, protocol, [*all_done[1:], ""])
+    stopped = record_run(tmp_path, protocol, [*all_done[1:], "abort"])
+    broken = record_run(tmp_path, protocol, [*all_done[1:], "fail"])
+    complete = record_run(tmp_path, protocol, all_done)
+    processed = record_run(tmp_path, protocol, all_done)
+    (processed / "result").mkdir()
+    made = [begun, stopped, broken, complete, processed]
+    expected = ["interrupted", "interrupted", "failed", "recorded", "processed"]
+    listed = json.loads(labrig("runs", "list", "--json", "--runs", tmp_path).out)
+    assert [run["folder"] for run in listed] == [str(path) for path in made]
+    assert [run["status"] for run in listed] == expected
+    assert {run["sample"] for run in listed} == {protocol.sample.name}
+    assert {run["units"] for run in listed} == {units}
+    assert [run["done"] for run in listed] == [units - 1] * 3 + [units] * 2
+    with FileLock(begun / ".lock"):
+        assert statuses(tmp_path) == ["running", *expected[1:]]
+    assert statuses(tmp_path) == expected
+
+
+def test_a_name_from_the_list_is_the_name_of_the_run(tmp_path: Path, labrig: Labrig) -> None:
+    made = [record_run(tmp_path / "runs", decay(), ["success"]) for _ in range(11)]
+    lines = labrig("runs", "list", "--runs", tmp_path / "runs").out.splitlines()[1:]
+    names = [line.split()[0] for line in lines]
+    assert names == [path.name for path in made]  # in order of making: -2, …, -10, -11
+    for name, path in zip(names, made, strict=True):
+        shown = labrig("runs", "show", name, "--runs", tmp_path / "runs")
+        assert shown.out.splitlines()[0] == str(path)
+
+
+def test_last_is_the_run_that_was_made_last_whatever_it_is_called(tmp_path: Path) -> None:
+    first, second = record_run(tmp_path, decay()), record_run(tmp_path, decay())
+    first = first.rename(tmp_path / "zinc-sulphide")
+    add_note(first, "a later change", EPOCH_S)
+    assert find_run(Path("last"), tmp_path) == second
+    copied = tmp_path / "copied"
+    shutil.copytree(first, copied, copy_function=shutil.copyfile)
+    shutil.rmtree(first)
+    assert find_run(Path("last"), tmp_path) == second
+    assert [run.folder for run in list_runs(tmp_path, RunFilter())] == [copied, second]
+
+
+def add_fit(run: Path, rate_per_s: float) -> None:
+    (run / "result.part").mkdir()
+    write_fitted_decay(run / "result.part" / "fit.json", decay_result((rate_per_s, 1.0)))
+    if (run / "result").exists():
+        (run / "result").rename(run / "result-1")
+    (run / "result.part").rename(run / "result")
+
+
+def finish(run: Path) -> None:
+    protocol = read_protocol(run / "protocol.yaml")
+    with RunFolder(run, 1) as folder:
+        for unit in protocol.units():
+            folder.attempt(unit.name, lambda: EPOCH_S, {}).stop("success")
+
+
+def rename_sample(run: Path) -> None:
+    text = (run / "protocol.yaml").read_text()
+    (run / "protocol.yaml").write_text(text.replace("blue-paint", "teal-paint"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        finish,
+        lambda run: add_fit(run, 0.1),
+        lambda run: shutil.rmtree(run / "result"),
+        lambda run: (run / "result" / "fit.json").unlink(),
+        lambda run: (run / "result" / "fit.json").write_text("{}"),
+        lambda run: (run / "journal.jsonl").write_text("{]\n{}\n"),
+        lambda run: (run / "journal.jsonl").unlink(),
+        lambda run: (run / "made.txt").write_text("2001-01-01T00:00:00+00:00\n"),
+        rename_sample,
+        lambda run: shutil.rmtree(run),
+        lambda run: run.rename(run.with_name("renamed")),
+        lambda run: (run.parent / INDEX).write_bytes(b"\0" * 100),
+        lambda run: (run.parent / INDEX).write_bytes((run.parent / INDEX).read_bytes()[:-9]),
+        lambda run: (run.parent / INDEX).unlink(),
+    ],
+)
+def test_the_index_never_lies(tmp_path: Path, change: Callable[[Path], object]) -> None:
+    all_done = ["success"] * len(decay().units())
+    for endings in ([], ["success", "fail"], all_done, all_done[1:]):
+        add_fit(record_run(tmp_path, decay(), endings), 0.05)
+    settle(tmp_path)
+    read = list_runs(tmp_path, RunFilter())
+    assert (tmp_path / INDEX).is_file()
+    assert list_runs(tmp_path, RunFilter()) == read == in_order(summaries(tmp_path))
+    change(read[-1].folder)
+    for _ in range(2):
+        assert list_runs(tmp_path, RunFilter()) == in_order(summaries(tmp_path))
+
+
+def summaries(runs: Path) -> list[RunSummary]:
+    return [summarise(path.parent) for path in runs.glob("*/protocol.yaml")]
+
+
+def in_order(runs: list[RunSummary]) -> list[RunSummary]:
+    return sorted(runs, key=lambda run: (run.made, run.folder.name))
+
+
+def test_what_was_just_written_is_read_again(tmp_path: Path) -> None:
+    """Some file systems count in seconds: a change within one does not show in a file's time."""
+    run = record_run(tmp_path, decay())
+    add_fit(run, 0.05)
+    fit = run / "result" / "fit.json"
+    list_runs(tmp_path, RunFilter())
+    status = fit.stat()
+    fit.write_text(fit.read_text().replace("0.05", "0.06"))
+    os.utime(fit, ns=(status.st_atime_ns, status.st_mtime_ns))
+    (again,) = list_runs(tmp_path, RunFilter())
+    assert [rate.value for rate in again.rates[""]] == [0.06]
+
+
+def test_a_folder_that_cannot_be_written_is_listed_as_well(tmp_path: Path) -> None:
+    record_run(tmp_path, decay())
+    settle(tmp_path)
+    (tmp_path / INDEX).mkdir()  # a file cannot take its place, not even for the superuser
+    assert statuses(tmp_path) == statuses(tmp_path) == ["interrupted"]
+    assert sorted(path.name for path in tmp_path.glob(f"{INDEX}*")) == [INDEX]
