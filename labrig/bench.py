@@ -62,11 +62,6 @@ class Bench:
         return None if self.room is None else self.room.seed
 
     @property
-    def is_simulated(self) -> bool:
-        """Whether the devices are in a simulated room, which the rig file describes completely."""
-        return self.room is not None
-
-    @property
     def disk(self) -> Disk:
         """Disk of the PC to which the rig is connected."""
         return REAL_DISK if self.room is None else self.room.disk

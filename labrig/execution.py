@@ -8,8 +8,10 @@ from importlib.metadata import version
 from typing import Any, Protocol, TypeVar
 
 from labrig.acquire import (
+    CAMERA,
     CHANGER,
     LIGHTS,
+    Camera,
     Checkable,
     Plan,
     ProtocolModel,
@@ -17,6 +19,7 @@ from labrig.acquire import (
     RunObserver,
     Unit,
     lights_that_read_back,
+    plan,
     run_units,
 )
 from labrig.bench import Bench
@@ -32,7 +35,7 @@ from labrig.errors import (
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
 from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
-from labrig.trial_frame import check_regions
+from labrig.trial_frame import offers_with_frame_size
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 
@@ -98,7 +101,8 @@ def execute(
 
         def use(rig: Rig) -> None:
             _refuse_what_spoils(rig)
-            _refuse_regions_outside(rig, protocol, folder, bench)
+            if CAMERA in rig:
+                _refuse_what_the_camera_cannot(rig[CAMERA], protocol, folder, bench)
             devices = rig.identities()
             _arrange_again(manual_actions, rig, observer)
             _report_exchanged_camera(folder, devices, observer)
@@ -228,12 +232,20 @@ def _refuse_what_spoils(rig: Rig) -> None:
         raise ProtocolError("this would spoil the measurement: " + "; ".join(spoilers))
 
 
-def _refuse_regions_outside(
-    rig: Rig, protocol: ProtocolModel, folder: RunFolder, bench: Bench
+def _refuse_what_the_camera_cannot(
+    camera: Camera, protocol: ProtocolModel, folder: RunFolder, bench: Bench
 ) -> None:
-    """Raise `ProtocolError` if a region is outside the frame; a resumed run has its own file."""
+    """Raise `ProtocolError` if no plan is possible with what the connected camera offers.
+
+    The plan before the run had to believe the rig file. A real camera takes a trial frame, which
+    shows whether the regions are inside of it: not after half an hour of warming up.
+    """
     try:
-        check_regions(protocol, rig, trust_offers=bench.is_simulated)
+        offers = camera.offers()
+        is_certain = offers.frame_pixels is not None and bench.room is not None
+        if protocol.named_regions() and not is_certain:
+            offers = offers_with_frame_size(camera)
+        plan(protocol, bench.file, bench.source, offers)
     except ProtocolError as error:
         if folder.read().attempts:
             files = " and ".join(str(folder.path / name) for name in ("protocol.yaml", "rig.yaml"))

@@ -8,6 +8,8 @@ from labrig.errors import UsageError
 
 #: Limit above the width of any sensor, which excludes infinity.
 MAX_PIXELS = 1_000_000
+#: Excess over the frame of fractions that were rounded.
+SLACK = 1e-3
 Corner = Annotated[float, Field(ge=0, le=MAX_PIXELS)]
 Extent = Annotated[float, Field(gt=0, le=MAX_PIXELS)]
 
@@ -17,6 +19,12 @@ def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[floa
         raise ValueError(
             "expected [x, y, width, height] in whole pixels, or all as fractions of the frame ≤ 1, "
             f"got {list(region)}"
+        )
+    x, y, width, height = region
+    if max(region) <= 1 and max(x + width, y + height) > 1 + SLACK:
+        raise ValueError(
+            f"expected a region inside of the frame, got {list(region)}: fractions that end at "
+            f"{x + width:g} of its width and {y + height:g} of its height"
         )
     return region
 

@@ -3,7 +3,6 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.connections import Connections, SerialPort
-from labrig.acquire.frame_regions import require_inside
 from labrig.acquire.loading import load_driver, read_protocol
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
@@ -62,7 +61,6 @@ __all__ = [
     "planned_rig",
     "read_protocol",
     "read_rig_file",
-    "require_inside",
     "run_units",
     "shutter_text",
 ]

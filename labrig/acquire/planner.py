@@ -13,6 +13,7 @@ from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import CAMERA, ROLES, Device
+from labrig.acquire.roles.camera import PlannedCamera
 from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import CameraOffers, Frame
 from labrig.clock import VirtualClock
@@ -27,7 +28,9 @@ MAX_STEPS = 50_000
 T = TypeVar("T")
 
 
-def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
+def plan(
+    protocol: ProtocolModel, rig: RigFile, source: str, offers: CameraOffers | None = None
+) -> Plan:
     """Lay out a protocol on the devices of a rig without opening any of them.
 
     The units of the protocol are run on stand-ins that take the time that the drivers declare.
@@ -41,6 +44,8 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
         Rig file with the devices.
     source
         Name or path of the rig file, for messages.
+    offers
+        Settings that the connected camera offers; None for those that the rig file declares.
 
     Returns
     -------
@@ -69,6 +74,8 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
     clock = bench.clock
     assert isinstance(clock, VirtualClock)
     protocol = protocol.suited_to(rig)
+    if offers is not None:
+        bench.devices[CAMERA.key] = PlannedCamera(clock, offers)
     offers = bench[CAMERA].offers() if CAMERA in bench else CameraOffers((), ())
     if offers.frame_pixels is not None:
         require_inside(protocol.named_regions(), offers.frame_pixels)

@@ -1,5 +1,6 @@
 """Text of a plan: a summary, then its units, those alike folded into one line."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Waits that are shorter in all are left out, in seconds.
 SHORT_S = 60.0
+#: A number with its unit, which are not parted by the end of a line.
+_QUANTITY = re.compile(r"(\d) (s|ms|min|h)\b")
 #: Column at which units begin, and width of a page where there is no terminal.
 INDENT, WIDTH = 26, 120
 #: Number of steps by hand that are written out for units that are folded.
@@ -81,7 +84,8 @@ def folded_units(plan: Plan) -> Iterator[str]:
         break_on_hyphens=False,
     )
     for line in _unit_lines(plan):
-        yield from wrapper.wrap(line)
+        unbroken = _QUANTITY.sub("\\1\N{NO-BREAK SPACE}\\2", line)
+        yield from (part.replace("\N{NO-BREAK SPACE}", " ") for part in wrapper.wrap(unbroken))
 
 
 def _unit_lines(plan: Plan) -> Iterator[str]:

@@ -64,7 +64,24 @@ class RunSize:
 
 
 def size_text(size_bytes: float) -> str:
-    """Format a size, such as `1.57 GB`, `153 MB`, `20 kB`."""
+    """Format a size.
+
+    Parameters
+    ----------
+    size_bytes
+        Size in bytes.
+
+    Returns
+    -------
+    str
+        Text such as `1.57 GB` or `20 kB`, to three digits.
+
+    Examples
+    --------
+    >>> from labrig.record import size_text
+    >>> size_text(152_460_000)
+    '152 MB'
+    """
     for factor, unit in ((1e9, "GB"), (1e6, "MB")):
         if size_bytes >= factor:
             return f"{size_bytes / factor:.3g} {unit}"

@@ -20,6 +20,7 @@ from labrig.acquire import (
 )
 from labrig.bench import Bench
 from labrig.errors import DeviceError, LabrigError
+from labrig.record import size_text
 from labrig.reduce import FrameMeasurement, measure, read_raw
 from labrig.setup.picture_stats import decode
 
@@ -33,10 +34,15 @@ class Photographs:
     """Reader of RAW frames and live pictures in a rig check."""
 
     def dark_frame(self, frame: Frame) -> Exercised:
-        """Return the noise of a dark frame, and whether it is dark and not rotated."""
+        """Return noise and size of a dark frame, and whether it is dark and not rotated."""
         reduced = measure(read_raw(frame.data, "the dark frame"))
         return Exercised(
-            tuple(_noise(reduced, frame)), (_darkness(reduced), _orientation(frame.data))
+            tuple(_noise(reduced, frame)),
+            (_darkness(reduced), _orientation(frame.data)),
+            (
+                Suggestion("frame_pixels", f"[{reduced.width}, {reduced.height}]"),
+                Suggestion("frame_size", size_text(len(frame.data))),
+            ),
         )
 
     def live_picture(self, jpeg: bytes) -> Measured:

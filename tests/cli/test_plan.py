@@ -28,7 +28,7 @@ def written(folder: Path, **keys: Any) -> Path:
     ("keys", "said"),
     [
         ({"protocol": "decay", "patches": {"a": [90, 60, 20, 10]}}, "patches.a: region"),
-        ({"protocol": "decay", "patches": {"a": [0.5, 0.5, 0.6, 0.2]}}, "96 x 64 pixels"),
+        ({"protocol": "decay", "patches": {"a": [0.5, 0.5, 0.6, 0.2]}}, "1.1 of its width"),
         ({"protocol": "decay", "dark": "background", "background": [0, 60, 90, 5]}, "background"),
         ({"protocol": "blank", "region": [90, 0, 8, 8]}, "region: region"),
         ({"protocol": "fade", "card": [90, 0, 8, 8]}, "card: region"),

@@ -49,7 +49,10 @@ def test_its_numbers_are_the_simulated_devices_own(labrig: Labrig, make_rig: Mak
     assert float(lag.split()[0]) == pytest.approx(60, abs=3), "the rig file's, plus half a trip"
     ready = next(value for what, value in measured.items() if what.startswith("exposure over"))
     assert 200 < float(ready.split()[0]) < 400, "the body reads out for 200 ms"
-    assert camera["suggestions"] == [{"key": "frame_time", "value": "300 ms"}]
+    suggested = {entry["key"]: entry["value"] for entry in camera["suggestions"]}
+    assert suggested["frame_time"] == "300 ms"
+    assert suggested["frame_pixels"] == "[96, 64]"
+    assert suggested["frame_size"] == "13 kB"
     assert sum("dark frame" in what for what in measured) == 3
     assert {finding["severity"] for finding in camera["findings"]} == {"fine"}
 

@@ -10,6 +10,7 @@ from labrig.acquire import CameraOffers, ExerciseContext, Exercised, ExposureSet
 from labrig.acquire.roles.camera import exercise_camera
 from labrig.clock import VirtualClock
 from labrig.errors import FrameError
+from labrig.reduce import read_raw
 from labrig.setup.check import Photographs
 from labrig.setup.picture_stats import decode, picture_stats
 from tests.reduce.conftest import _dng as write_dng
@@ -77,7 +78,11 @@ def test_noise_of_every_channel_is_reported(cfa: str) -> None:
         assert mean == pytest.approx(0.0, abs=0.3)
         assert std == pytest.approx(5.0, rel=0.05)
     assert {finding.severity for finding in report.findings} == {"fine"}
-    assert [str(entry.value) for entry in report.suggestions] == ["300 ms"]
+    suggested = {entry.key: entry.value for entry in report.suggestions}
+    raw = read_raw(dark_frame(cfa), "frame")
+    assert suggested["frame_time"] == "300 ms"
+    assert suggested["frame_pixels"] == f"[{raw.width}, {raw.height}]"
+    assert suggested["frame_size"].endswith(" kB")
 
 
 @every_sensor

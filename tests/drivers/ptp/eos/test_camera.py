@@ -72,7 +72,13 @@ def test_declared_offers_are_thirds_of_stops_by_their_true_times() -> None:
     assert all(math.isclose(r, 2 ** (1 / 3)) for r in ratios)
     assert offers.isos == (100, 400)
     assert offers.overhead_s == settings.frame_time
-    assert offers.frame_bytes == settings.frame_size
+    assert offers.frame_pixels is None
+    for given, frame_bytes in (
+        ({"frame_size": "27 MB"}, 27_000_000),
+        ({"frame_pixels": [5634, 3752]}, 1.5 * 5634 * 3752),
+    ):
+        settings = PtpCamera.Settings.model_validate(given)
+        assert PtpCamera.declared_offers(settings).frame_bytes == frame_bytes
 
 
 @pytest.mark.parametrize(
