@@ -130,7 +130,8 @@ def read_dng(content: bytes, height: int, width: int) -> DngPattern | None:
 
     # tifffile warns through logging of every odd tag; the relevant ones are checked here.
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
-    with tifffile.TiffFile(io.BytesIO(content)) as file:
+    # tifffile's objects refer to one another and would keep the bytes of data that are not closed.
+    with io.BytesIO(content) as data, tifffile.TiffFile(data) as file:
         for page in _pages(file):
             if (page.imagelength, page.imagewidth) == (height, width):
                 if page.photometric == _CFA:

@@ -21,9 +21,9 @@ from labrig.reduce.decoding import Reduction
 from labrig.signals import name_of
 
 #: Memory of this process and its workers together, and that of this process alone, in bytes.
-MEMORY_BYTES, OWN_BYTES = 1_000_000_000, 300_000_000
+MEMORY_BYTES, OWN_BYTES = 1_000_000_000, 400_000_000
 #: Memory of a worker without frames in bytes, and with one, per byte of its file.
-WORKER_BYTES, BYTES_PER_FILE_BYTE = 120_000_000, 8
+WORKER_BYTES, BYTES_PER_FILE_BYTE = 120_000_000, 7
 #: Size of all files together, in bytes, from which starting a worker is worth its second.
 WORTHWHILE_BYTES = 100_000_000
 #: Interval of checks for Ctrl-C, which does not interrupt a wait on Windows.

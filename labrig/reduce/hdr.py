@@ -19,6 +19,8 @@ Image = NDArray[np.float32]
 #: Fraction of the range above which single pixels are left out: noise carries some of those at the
 #: same light beyond the range, which `is_clipped` allows a mean over many.
 FULL = 0.95
+#: Rows that are combined at once, so that only the sums take much memory.
+_ROWS_AT_ONCE = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +112,12 @@ def hdr_frame(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = 
             seconds = np.zeros(raw.mosaic.shape)
         if raw.mosaic.shape != counts.shape or raw.cfa != reference.cfa:
             raise DataError("expected frames of one sensor and size; choose those of one camera")
-        light = LinearFrame(raw).value_dn()
-        is_unclipped = light < FULL * (raw.white - max(raw.black))
-        counts += np.where(is_unclipped, light, 0.0)
-        seconds += np.where(is_unclipped, exposure_s, 0.0)
+        for first in range(0, raw.height, _ROWS_AT_ONCE):
+            rows = slice(first, min(first + _ROWS_AT_ONCE, raw.height))
+            light = LinearFrame(raw).value_dn((0, first, raw.width, rows.stop - first))
+            is_unclipped = light < FULL * (raw.white - max(raw.black))
+            counts[rows] += np.where(is_unclipped, light, 0.0)
+            seconds[rows] += np.where(is_unclipped, exposure_s, 0.0)
     if counts is None:
         raise DataError("expected frames of the strip, got none; take them again")
     if hot is not None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -43,7 +42,7 @@ class HotPixels:
         height, width = mask.shape
         return cls(height, width, np.flatnonzero(mask).astype(np.int64))
 
-    @cached_property
+    @property
     def mask(self) -> PixelMask:
         """True where a pixel is hot, shape (height, width)."""
         mask = np.zeros(self.height * self.width, np.bool_)

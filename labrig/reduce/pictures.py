@@ -61,7 +61,8 @@ def binned(raw: RawFrame) -> Picture:
     >>> [f"{fraction:.0%}" for fraction in picture[16, 24]]
     ['1%', '4%', '2%']
     """
-    picture = cell_means_dn(raw) / np.float32(raw.white - max(raw.black))
+    picture = cell_means_dn(raw)
+    picture /= np.float32(raw.white - max(raw.black))
     return np.repeat(picture, 3, axis=-1) if is_grey(raw) else picture
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -380,8 +380,11 @@ def _decode(content: bytes) -> RawFrame:
     # LibRaw reports damage on the process's stderr besides raising.
     with libraw_stderr():
         try:
+            exif = read_exif(content)
             with rawpy.imread(io.BytesIO(content)) as raw:
-                return _frame(raw, rawpy.RawType.Flat, content, read_exif(content))
+                mosaic, sensor = _mosaic_and_sensor(raw, rawpy.RawType.Flat, content, exif)
+            # LibRaw's own copy of the pixels is freed before more memory is taken.
+            return _frame(mosaic, sensor, exif)
         except FrameError:
             raise
         except (rawpy.LibRawIOError, rawpy.LibRawFileUnsupportedError):
@@ -398,8 +401,16 @@ def _decode(content: bytes) -> RawFrame:
             ) from None
 
 
-def _frame(raw: Any, flat: Any, content: bytes, exif: Exif) -> RawFrame:
-    """Return the frame of `raw`, an open rawpy file, if it is undemosaiced."""
+class _Sensor(NamedTuple):
+    """Colours, black levels and white level of a file."""
+
+    cfa: str
+    black: tuple[float, ...]
+    white: float
+
+
+def _mosaic_and_sensor(raw: Any, flat: Any, content: bytes, exif: Exif) -> tuple[Mosaic, _Sensor]:
+    """Return the pixels of an open rawpy file, if they are undemosaiced, and their levels."""
     if raw.raw_type != flat:
         raise FrameError(
             f"{_EXPECTED}, got an image with all colours in every pixel (linear DNG, sRAW or "
@@ -407,11 +418,15 @@ def _frame(raw: Any, flat: Any, content: bytes, exif: Exif) -> RawFrame:
         )
     cfa, black = sensor_pattern(raw, content if exif.dng else None)
     mosaic = np.array(raw.raw_image_visible)  # a copy: LibRaw frees its own
+    return mosaic, _Sensor(cfa, black, float(raw.white_level))
+
+
+def _frame(mosaic: Mosaic, sensor: _Sensor, exif: Exif) -> RawFrame:
     return RawFrame(
         mosaic=mosaic,
-        cfa=cfa,
-        black=black,
-        white=clip_level(mosaic, max(black), float(raw.white_level)),
+        cfa=sensor.cfa,
+        black=sensor.black,
+        white=clip_level(mosaic, max(sensor.black), sensor.white),
         exposure_s=exif.exposure_s,
         iso=exif.iso,
         f_number=exif.f_number,

@@ -2,17 +2,19 @@
 
 import json
 import shutil
+import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from socket import gethostname
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 
-from labrig.record import read_run
+from labrig.record import RunLock, read_run
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
@@ -190,6 +192,25 @@ def test_a_frame_changed_on_disk_is_noticed(labrig: Labrig, finished: Path) -> N
     frame.unlink()
     one_line(labrig("process", finished), 4, frame.name, "missing")
     assert labrig("process", finished, "--exclude", frame.name).code == 0
+
+
+def test_verify_reads_what_looks_untouched(labrig: Labrig, finished: Path) -> None:
+    frame = read_run(finished).frames("decay")[1].path
+    status, content = frame.stat(), frame.read_bytes()
+    frame.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    os.utime(frame, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert labrig("process", finished).code == 0
+    one_line(labrig("process", finished, "--verify"), 4, frame.name, "checksum")
+    frame.write_bytes(content)
+    ended = labrig("process", finished, "--verify")
+    assert ended.code == 0
+    assert "checksums" in ended.err
+
+
+def test_a_second_process_of_a_run_is_told_who_has_it(labrig: Labrig, finished: Path) -> None:
+    with RunLock(finished / ".process.lock", "processing this run"):
+        one_line(labrig("process", finished), 2, str(os.getpid()), gethostname(), "UTC")
+    assert labrig("process", finished).code == 0
 
 
 def test_a_series_without_light_is_kept_and_reported(labrig: Labrig, finished: Path) -> None:
