@@ -108,6 +108,7 @@ def least_squares(
     upper: ArrayLike = np.inf,
     max_iterations: int = 20_000,
     tolerance: float = 0.0,
+    least_gain: float = 0.0,
 ) -> LeastSquaresFit:
     """Minimise ‖r(x)‖² within a box.
 
@@ -124,6 +125,9 @@ def least_squares(
         Largest number of evaluations of `residuals` in the damped search.
     tolerance
         Relative step at which to stop; 0 continues to the precision of the arithmetic.
+    least_gain
+        Gain in χ² of a step at which the damped search ends, for fits that are only compared: along
+        a flat valley it would creep for long without a gain that matters.
 
     Returns
     -------
@@ -159,13 +163,13 @@ def least_squares(
                 "ones; start nearer to the solution"
             )
         point, iterations = _damped_search(
-            residuals, point, low, high, max_iterations, max(tolerance, SEARCH_STEP)
+            residuals, point, low, high, max_iterations, max(tolerance, SEARCH_STEP), least_gain
         )
         point, step = _polish(residuals, point, low, high, tolerance)
-        if step >= CONVERGED_STEP > tolerance and iterations < max_iterations:
+        if step >= CONVERGED_STEP > tolerance and iterations < max_iterations and not least_gain:
             # Along a flat, curved valley damped steps are short long before its lowest place.
             remaining = max_iterations - iterations
-            point, extra = _damped_search(residuals, point, low, high, remaining, 0.0)
+            point, extra = _damped_search(residuals, point, low, high, remaining, 0.0, 0.0)
             point, step = _polish(residuals, point, low, high, tolerance)
             iterations += extra
         return _result(point, low, high, iterations, step < CONVERGED_STEP)
@@ -243,7 +247,7 @@ class _Linearised:
         return cls.by_qr(point) if failed else cls((factors * lengths)[:p])
 
     def directions(
-        self, free: NDArray[np.bool_], scale: FloatArray
+        self, free: NDArray[np.bool_], scale: FloatArray, before: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Decompose the free columns of J over `scale` into singular values.
 
@@ -251,13 +255,47 @@ class _Linearised:
         -------
         values, directions, along
             Singular values s (k,), their directions v (k, p) in units of the parameters, and r
-            along them (k,): the undamped step is −Σ_i (r_i/s_i) v_i.
+            along them (k,), after a step `before` (p,) of others: the undamped step is
+            −Σ_i (r_i/s_i) v_i.
         """
         scaled = self.triangle * (free / scale)
         u, s, vt, _ = lapack.dgesdd(scaled[:, free], full_matrices=0)
         in_parameters = np.zeros((len(s), len(scale)))
         in_parameters[:, free] = vt
-        return s, in_parameters / scale, self.rotated @ u
+        rotated = self.rotated if before is None else self.rotated + self.triangle @ before
+        return s, in_parameters / scale, rotated @ u
+
+
+def _damped_step(
+    decomposed: tuple[FloatArray, FloatArray, FloatArray], damping: float
+) -> FloatArray:
+    s, directions, along = decomposed
+    step: FloatArray = -(s * along / (s * s + damping * s[0] ** 2)) @ directions
+    return step
+
+
+def _stopped_at_bounds(
+    step: FloatArray,
+    linearised: _Linearised,
+    free: NDArray[np.bool_],
+    scale: FloatArray,
+    damping: float,
+    low: FloatArray,
+    high: FloatArray,
+) -> FloatArray:
+    """Return a damped step within a box: parameters that leave it stop at their bound.
+
+    The others are solved for again, given those: without it a step that a bound cuts off may be as
+    good as none, and the search crawls along the bound.
+    """
+    stopped = np.zeros_like(step)
+    while (leaving := free & ((step < low) | (step > high))).any():
+        stopped[leaving] = np.clip(step, low, high)[leaving]
+        free = free & ~leaving
+        if not free.any():
+            return stopped
+        step = stopped + _damped_step(linearised.directions(free, scale, stopped), damping)
+    return step
 
 
 def _damped_search(
@@ -267,6 +305,7 @@ def _damped_search(
     high: FloatArray,
     max_iterations: int,
     tolerance: float,
+    least_gain: float,
 ) -> tuple[_Point, int]:
     scale = np.zeros_like(point.x)
     damping, growth, evaluations = INITIAL_DAMPING, 2.0, 1
@@ -277,11 +316,14 @@ def _damped_search(
         linearised = _Linearised.by_normal_equations(point)
         # Moré: scales never shrink, so that a flat stretch does not set a parameter loose.
         scale = np.maximum(scale, linearised.norms)
-        s, directions, along = linearised.directions(free, scale)
+        directions = linearised.directions(free, scale)
         length = _length(point.x * scale) + EPSILON
         accepted = False
         while not accepted and evaluations < max_iterations:
-            step = -(s * along / (s * s + damping * s[0] ** 2)) @ directions
+            step = _damped_step(directions, damping)
+            step = _stopped_at_bounds(
+                step, linearised, free, scale, damping, low - point.x, high - point.x
+            )
             trial_x = np.minimum(np.maximum(point.x + step, low), high)
             step = trial_x - point.x
             size = _length(step * scale) / length
@@ -298,11 +340,11 @@ def _damped_search(
             if accepted:
                 damping *= max(MIN_DAMPING_FACTOR, 1 - (2 * min(gain, 1.0) - 1) ** 3)
                 growth = 2.0
-                point = trial
+                gained, point = point.chi2 - trial.chi2, trial
             else:
                 damping *= growth
                 growth *= 2
-        if accepted and size < tolerance and damping < 1:
+        if accepted and damping < 1 and (size < tolerance or gained < least_gain):
             break
     return point, evaluations
 

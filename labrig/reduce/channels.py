@@ -151,7 +151,7 @@ class PlaneCount:
     saturated
         Number of pixels at white or above.
     hot
-        Number of isolated outliers.
+        Number of isolated outliers; None if they were not counted.
     noise
         Temporal noise of the pixels.
     """
@@ -160,12 +160,15 @@ class PlaneCount:
     value: Floats
     count: Floats
     saturated: int
-    hot: int
+    hot: int | None
     noise: PlaneNoise
 
 
 def count_planes(
-    raw: RawFrame, areas: Sequence[tuple[int, int, int, int]], hot: PixelMask | None
+    raw: RawFrame,
+    areas: Sequence[tuple[int, int, int, int]],
+    hot: PixelMask | None,
+    outliers: bool,
 ) -> list[list[PlaneCount]]:
     """Count the pixels of every CFA position in each area, without the hot ones.
 
@@ -177,6 +180,8 @@ def count_planes(
         Areas as x, y, width and height in pixels.
     hot
         Hot pixels to leave out, shape (height, width); None leaves out none.
+    outliers
+        Whether to count isolated outliers.
 
     Returns
     -------
@@ -188,7 +193,9 @@ def count_planes(
     noises = plane_noise(planes)
     positions = raw.cfa_side**2
     return [
-        _count_region(raw, area, hot, window, noises[positions * index : positions * (index + 1)])
+        _count_region(
+            raw, area, hot, window, noises[positions * index : positions * (index + 1)], outliers
+        )
         for index, (area, window) in enumerate(zip(areas, windows, strict=True))
     ]
 
@@ -238,19 +245,13 @@ def _count_region(
     hot: PixelMask | None,
     window: _Window,
     noises: Sequence[PlaneNoise],
+    outliers: bool,
 ) -> list[PlaneCount]:
     """Count the pixels of every CFA position in a region; `noises` are those of its window."""
     x, y, width, height = area
     side = raw.cfa_side
     noise_by_position = dict(zip(np.ndindex(side, side), noises, strict=True))
-    out_y, out_x = isolated_outliers(
-        window.pixels, (window.top, window.left), side, noise_by_position
-    )
-    inside = (y <= out_y) & (out_y < y + height) & (x <= out_x) & (out_x < x + width)
-    out_y, out_x = out_y[inside], out_x[inside]
-    if hot is not None:
-        is_hot = hot[out_y, out_x]
-        out_y, out_x = out_y[~is_hot], out_x[~is_hot]
+    hot_counts = _count_outliers(raw, area, hot, window, noise_by_position) if outliers else {}
     planes = []
     for (row, column), noise in noise_by_position.items():
         slices = (
@@ -267,11 +268,33 @@ def _count_region(
                 value=np.asarray(level - raw.black[position], dtype=np.float64),
                 count=count,
                 saturated=int(count[level >= raw.white].sum()),
-                hot=int(np.count_nonzero((out_y % side == row) & (out_x % side == column))),
+                hot=hot_counts.get((row, column)),
                 noise=noise,
             )
         )
     return planes
+
+
+def _count_outliers(
+    raw: RawFrame,
+    area: tuple[int, int, int, int],
+    hot: PixelMask | None,
+    window: _Window,
+    noises: Mapping[tuple[int, int], PlaneNoise],
+) -> dict[tuple[int, int], int]:
+    """Count the isolated outliers of every CFA position in a region, without the hot pixels."""
+    x, y, width, height = area
+    side = raw.cfa_side
+    out_y, out_x = isolated_outliers(window.pixels, (window.top, window.left), side, noises)
+    inside = (y <= out_y) & (out_y < y + height) & (x <= out_x) & (out_x < x + width)
+    out_y, out_x = out_y[inside], out_x[inside]
+    if hot is not None:
+        is_hot = hot[out_y, out_x]
+        out_y, out_x = out_y[~is_hot], out_x[~is_hot]
+    return {
+        (row, column): int(np.count_nonzero((out_y % side == row) & (out_x % side == column)))
+        for row, column in noises
+    }
 
 
 def _grow(start: int, length: int, limit: int, side: int) -> tuple[int, int]:
@@ -304,7 +327,8 @@ class ChannelStats:
     saturated
         Number of pixels at or above white.
     hot
-        Number of pixels that exceed their neighbours by more than 8 standard deviations.
+        Number of pixels that exceed their neighbours by more than 8 standard deviations; None if
+        they were not counted.
     """
 
     mean: float
@@ -313,7 +337,7 @@ class ChannelStats:
     peak: float
     n: int
     saturated: int
-    hot: int
+    hot: int | None
 
     @property
     def clipped(self) -> bool:
@@ -395,7 +419,7 @@ class FrameMeasurement:
         black = ", ".join(f"{level:g}" for level in dict.fromkeys(self.black))
         rows = [
             f"{name:<4}{stats.mean:>12.2f}{stats.sigma:>10.3f}{stats.std:>10.2f}"
-            f"{stats.n:>11}{stats.saturated:>9}{stats.hot:>6}"
+            f"{stats.n:>11}{stats.saturated:>9}{'–' if stats.hot is None else stats.hot:>6}"
             for name, stats in self.channels.items()
         ]
         return "\n".join(
@@ -447,11 +471,15 @@ def measure(
     G 590 DN, sigma 0.8 DN, 768 pixels
     B 337 DN, sigma 0.9 DN, 384 pixels
     """
-    return measure_regions(raw, [region], hot)[0]
+    return measure_regions(raw, [region], hot, outliers=True)[0]
 
 
 def measure_regions(
-    raw: RawFrame, regions: Sequence[Region | None], hot: PixelMask | None = None
+    raw: RawFrame,
+    regions: Sequence[Region | None],
+    hot: PixelMask | None = None,
+    *,
+    outliers: bool = False,
 ) -> list[FrameMeasurement]:
     """Measure each channel of a frame in each region.
 
@@ -463,6 +491,8 @@ def measure_regions(
         Regions as (x, y, width, height) in fractions of the frame; None is the whole frame.
     hot
         Hot pixels to leave out, shape (height, width), as `hot_pixels` finds them in dark frames.
+    outliers
+        Whether to count isolated outliers, of which a series makes no use.
 
     Returns
     -------
@@ -487,7 +517,7 @@ def measure_regions(
         else region_pixels(region, raw.width, raw.height)
         for region in regions
     ]
-    return [_measured(raw, planes) for planes in count_planes(raw, areas, hot)]
+    return [_measured(raw, planes) for planes in count_planes(raw, areas, hot, outliers)]
 
 
 def _measured(raw: RawFrame, planes: Sequence[PlaneCount]) -> FrameMeasurement:
@@ -526,6 +556,7 @@ def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
     if min(plane.noise.mean_variance for plane in planes) < ROUNDING_VARIANCE:
         # Without noise to dither it, rounding is the same in every pixel and does not average out.
         variance = max(variance, ROUNDING_VARIANCE)
+    outliers = [plane.hot for plane in planes if plane.hot is not None]
     return ChannelStats(
         mean=mean,
         sigma=float(np.sqrt(variance)),
@@ -533,5 +564,5 @@ def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
         peak=float(peak),
         n=int(n),
         saturated=sum(plane.saturated for plane in planes),
-        hot=sum(plane.hot for plane in planes),
+        hot=sum(outliers) if outliers else None,
     )

@@ -216,9 +216,9 @@ def _photon_line(level: Floats, variance: Floats) -> NoiseModel:
     with structure, however many at one brightness and however rough, pull no more than the cap.
     """
     groups = max(1, min(16, len(level) // 6))
-    x, y = _medians_of_groups(level, variance, groups)
     if groups == 1:
-        return NoiseModel(float(y[0]), 0.0)
+        return NoiseModel(float(_median(variance)), 0.0)
+    x, y = _medians_of_groups(level, variance, groups)
     first, second = np.triu_indices(len(x), k=1)
     rising = (x[second] > x[first]) & (y[second] > y[first])
     first, second = first[rising], second[rising]

@@ -144,7 +144,7 @@ def clips(frame: MeteringFrame) -> bool:
     and it is saturated in a long exposure in any darkness.
     """
     return any(
-        is_clipped(max(channel.saturated - channel.hot, 0), channel.n)
+        is_clipped(max(channel.saturated - (channel.hot or 0), 0), channel.n)
         for patch in frame.patches
         for channel in patch.channels.values()
     )

@@ -191,16 +191,18 @@ def lmfit_three_channels(y: Floats, sigma: Floats, start: Floats) -> tuple[Float
     return np.array(list(result.params.valuesdict().values()))[:4], float(result.chisqr)
 
 
-def test_three_channels_cold(against: Against) -> None:
-    """As a camera gives it: three channels that share their rates."""
+def three_channels(flicker: float = 0.0) -> Series:
+    """Return a decay as a camera gives it: three channels that share their rates."""
+    random = np.random.default_rng(5)
     light = np.multiply.outer(model(T_S, *TRUTH), WEIGHTS)
     sigma = np.sqrt(4.0 + light / 20)
-    y = light + OFFSETS + sigma * np.random.default_rng(5).normal(size=light.shape)
+    values = light + OFFSETS + sigma * random.normal(size=light.shape)
+    values += flicker * light * random.normal(size=(len(T_S), 1))
     n = len(T_S)
-    series = Series(
+    return Series(
         t_s=T_S,
         exposure_s=np.full(n, EXPOSURE_S),
-        values=y,
+        values=values,
         sigma=sigma,
         dark_sigma=np.full(3, OFFSET_SIGMA),
         channels=("R", "G", "B"),
@@ -210,6 +212,12 @@ def test_three_channels_cold(against: Against) -> None:
         unit=("",) * n,
         flag=("",) * n,
     )
+
+
+def test_three_channels_cold(against: Against) -> None:
+    """The same number of states and the same noise for both."""
+    series = three_channels()
+    y, sigma = series.values, series.sigma
 
     def cold() -> Floats:
         fit = fit_series(series, states=2, flicker=0.0)
@@ -227,4 +235,24 @@ def test_three_channels_cold(against: Against) -> None:
         },
         rounds=15,
         what="2 states, 60 frames x 3 channels: all of it",
+    )
+
+
+def test_as_a_run_does_it(against: Against) -> None:
+    """Number of states and flicker are labrig's to find; the peer is told the former."""
+    series = three_channels(flicker=0.007)
+    y, sigma = series.values, series.sigma
+    assert len(fit_series(series).states) == 2
+    against(
+        lambda: fit_series(series),
+        {
+            "lmfit leastsq, 2 states, best of 15 starts": lambda: best_of_starts(
+                lambda start: lmfit_three_channels(y, sigma, start), y[:, 1]
+            ),
+            "lmfit leastsq, 2 states, one good start": lambda: lmfit_three_channels(
+                y, sigma, START
+            ),
+        },
+        rounds=15,
+        what="decay of a run: 60 frames x 3 channels, 1 to 3 states",
     )

@@ -85,6 +85,7 @@ def fit_jointly(
     upper: FloatArray,
     max_iterations: int,
     tolerance: float,
+    least_gain: float = 0.0,
 ) -> JointFit:
     """Fit θ, weights and offsets by least squares.
 
@@ -102,6 +103,8 @@ def fit_jointly(
         Number of evaluations after which a slowly converging fit is accepted.
     tolerance
         Relative step at which to stop; 0 for full precision.
+    least_gain
+        Gain in χ² of a step at which to stop; 0 for full precision.
     """
     theta = start
     for _ in range(CHANGES_OF_LEAD):
@@ -115,6 +118,7 @@ def fit_jointly(
             upper=problem.pack(upper, np.full_like(weights, np.inf), np.full_like(weights, np.inf)),
             max_iterations=max_iterations,
             tolerance=tolerance,
+            least_gain=least_gain,
         )
         theta, weights, offsets = problem.unpack(solution.parameters)
         # Of two channels about equally bright the other one may turn out to lead.

@@ -11,6 +11,7 @@ from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
+from labrig.fit.propagation import propagated_covariance
 from labrig.results import DecayState, FittedDecay
 
 
@@ -131,18 +132,7 @@ def _covariances(
     transform[
         2 * n_states + fitted, len(fitted_covariance) - len(fitted) + np.arange(len(fitted))
     ] = series.peak
-    return _propagated(fitted_covariance, transform), _propagated(fitted_covariance, to_log_rates)
-
-
-def _propagated(covariance: FloatArray, transform: FloatArray) -> FloatArray:
-    """Return T Cov Tᵀ; an infinite variance stays infinite and correlates with nothing."""
-    is_finite = np.isfinite(np.diag(covariance))
-    finite = np.where(np.multiply.outer(is_finite, is_finite), covariance, 0.0)
-    # What the data say nothing about may overflow: that is as good as infinite.
-    with np.errstate(over="ignore", invalid="ignore"):
-        result: FloatArray = transform @ finite @ transform.T
-    unbounded = (transform[:, ~is_finite] != 0).any(axis=1) | ~np.isfinite(np.diag(result))
-    result[unbounded, :] = 0.0
-    result[:, unbounded] = 0.0
-    result[unbounded, unbounded] = np.inf
-    return np.where(np.isfinite(result) | np.eye(len(result), dtype=bool), result, 0.0)
+    return (
+        propagated_covariance(fitted_covariance, transform),
+        propagated_covariance(fitted_covariance, to_log_rates),
+    )

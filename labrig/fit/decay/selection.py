@@ -18,6 +18,8 @@ from labrig.results import Candidate
 #: Significance level of a further state of known rate. Searching the rate adds false positives,
 #: the BIC removes some: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
 F_TEST_LEVEL = 0.002
+#: Gain in χ² that a creeping candidate may still reach: hardly ever more than 2.
+CREEPING_GAIN = 4.0
 #: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
 
@@ -58,8 +60,9 @@ def choose_states(
     """
     chosen: StatesFit | None = None
     tried: list[Candidate] = []
+    needed_chi2 = np.inf
     for n_states in numbers:
-        fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets)
+        fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets, needed_chi2)
         if fit is None:
             break
         p_value = None if chosen is None else f_test(data, chosen.joint, fit.joint, noise_dof)
@@ -72,6 +75,8 @@ def choose_states(
             break
         chosen = fit
         weights, offsets = fit.joint.weights, fit.joint.offsets
+        penalty = 2 * float(np.log(data.independent_data(weights)))
+        needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
     return chosen, tried
 
 

@@ -47,6 +47,9 @@ APART_SIGMAS = 3.0
 #: Evaluations and relative step of a candidate, which is only compared by its χ².
 CANDIDATE_ITERATIONS = 100
 CANDIDATE_TOLERANCE = 1e-8
+#: Gain in χ² of a step at which a candidate stops that does not come near the χ² it needs: a state
+#: too many creeps along a flat valley.
+CANDIDATE_GAIN = 0.01
 #: Evaluations of the final fit, to full precision.
 FINAL_ITERATIONS = 1000
 
@@ -149,13 +152,18 @@ def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
 
 
 def fit_states(
-    data: WhitenedSeries, n_free: int, fixed: FloatArray, weights: FloatArray, offsets: FloatArray
+    data: WhitenedSeries,
+    n_free: int,
+    fixed: FloatArray,
+    weights: FloatArray,
+    offsets: FloatArray,
+    needed_chi2: float = np.inf,
 ) -> StatesFit | None:
     """Fit `n_free` exponentials besides those of the `fixed` log rates (f,).
 
-    The result is None if the data do not support that many: an amplitude vanishes or two rates
-    merge, so that fewer states fit as well. A fixed rate without amplitude is dropped from the
-    result.
+    A fit that creeps and stays above `needed_chi2` is given up. The result is None if the data do
+    not support that many states: an amplitude vanishes or two rates merge, so that fewer states fit
+    as well. A fixed rate without amplitude is dropped from the result.
     """
     problem = projection(data, weights)
     log_rates: FloatArray | None = np.empty(0)
@@ -168,10 +176,14 @@ def fit_states(
     start[0 : 2 * n_free : 2] = log_rates
     start[1 : 2 * n_free : 2] = amplitudes[:n_free]
     start[2 * n_free :] = amplitudes[n_free:]
-    fit = _fit_from(data, start, fixed, weights, offsets, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE)
+    limits = CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE
+    fit = _fit_from(data, start, fixed, weights, offsets, *limits, CANDIDATE_GAIN)
+    if not fit.joint.least_squares.converged and fit.joint.chi2 < needed_chi2:
+        joint = fit.joint
+        fit = _fit_from(data, joint.shape, fixed, joint.weights, joint.offsets, *limits)
     vanished = fit.vanished
     if vanished[n_free:].any():
-        return fit_states(data, n_free, fixed[~vanished[n_free:]], weights, offsets)
+        return fit_states(data, n_free, fixed[~vanished[n_free:]], weights, offsets, needed_chi2)
     merged = n_free > 1 and np.diff(np.sort(fit.joint.shape[0 : 2 * n_free : 2])).min()
     if vanished.any() or (n_free > 1 and merged < MERGED_LOG_RATE):
         return None
@@ -212,6 +224,7 @@ def _fit_from(
     offsets: FloatArray,
     max_iterations: int,
     tolerance: float,
+    least_gain: float = 0.0,
 ) -> StatesFit:
     n_free = (len(start) - len(fixed)) // 2
     low, high = data.series.log_rate_bounds
@@ -219,6 +232,6 @@ def _fit_from(
     lower[0 : 2 * n_free : 2], upper[0 : 2 * n_free : 2] = low, high
     shape = exponentials(data.series, n_free, fixed)
     joint = fit_jointly(
-        data, shape, start, weights, offsets, lower, upper, max_iterations, tolerance
+        data, shape, start, weights, offsets, lower, upper, max_iterations, tolerance, least_gain
     )
     return StatesFit(joint, fixed)

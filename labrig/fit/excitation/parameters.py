@@ -10,6 +10,9 @@ import numpy as np
 from labrig.errors import FitError
 from labrig.results import ChargingSeries, FloatArray
 
+#: Least amplitude as a fraction of the largest value: that of a state which is not there.
+LEAST_AMPLITUDE = 1e-9
+
 
 class Rates(NamedTuple):
     """Parameters of the fit by name.
@@ -79,14 +82,16 @@ class RelativeSigmas:
 
 
 class ParameterLayout(NamedTuple):
-    """Slices of θ = [ln k_r, A, k_e, weights, parameters with a prior].
+    """Slices of θ = [ln k_r, A, A k_e, weights, parameters with a prior].
 
+    A weakly charged sample determines A k_e, how fast its glow grows, far better than A and k_e.
+    With it as parameter the search need not follow the hyperbola on which A and k_e trade off.
     The slice of a parameter that is not fitted is empty.
     """
 
     k_r: slice
     amplitude: slice
-    k_e: slice
+    growth: slice
     weights: slice
     scale: slice
     brightness: slice
@@ -135,6 +140,8 @@ class Parameters:
     ) -> None:
         self.states, self.bands, self._series = states, bands_of(series), len(series)
         channels = series[0].values.shape[2]
+        brightest = max(float(np.nanmax(charging.values)) for charging in series)
+        self._least_amplitude = LEAST_AMPLITUDE * brightest
         self.others = [channel for channel in range(channels) if channel != reference]
         self._first_charge = _begins([len(charging.charges) for charging in series])
         self._first_mode = _begins(
@@ -162,9 +169,10 @@ class Parameters:
         return slice(*self._first_mode[number : number + 2])
 
     def lower(self) -> FloatArray:
-        """Return lower bounds of θ: amplitudes, excitation rates and weights are not negative."""
+        """Return lower bounds of θ: excitation rates and weights ≥ 0, amplitudes hardly above."""
         bounds = np.full(self.count, -np.inf)
-        bounds[self.columns.amplitude.start : self.columns.weights.stop] = 0.0
+        bounds[self.columns.growth.start : self.columns.weights.stop] = 0.0
+        bounds[self.columns.amplitude] = self._least_amplitude
         return bounds
 
     def as_stated(
@@ -178,14 +186,16 @@ class Parameters:
         theta = np.zeros(self.count)
         columns = self.columns
         theta[columns.k_r] = np.log(k_r_per_s)
+        amplitude = np.maximum(amplitude, self._least_amplitude)
         theta[columns.amplitude] = amplitude
-        theta[columns.k_e] = k_e_per_s.ravel()
+        theta[columns.growth] = (amplitude[:, None] * k_e_per_s).ravel()
         theta[columns.weights] = weights[self.others]
         return theta
 
     def unpack(self, theta: FloatArray) -> Rates:
         """Return the parameters in θ by name."""
         columns = self.columns
+        amplitude = theta[columns.amplitude]
         weights = np.ones(len(self.others) + 1)
         weights[self.others] = theta[columns.weights]
         log_scale, log_brightness = np.zeros(self._series), np.zeros(self._first_charge[-1])
@@ -195,8 +205,8 @@ class Parameters:
             log_brightness[:] = theta[columns.brightness]
         return Rates(
             np.exp(theta[columns.k_r]),
-            theta[columns.amplitude],
-            theta[columns.k_e].reshape(self.states, self.bands),
+            amplitude,
+            theta[columns.growth].reshape(self.states, self.bands) / amplitude[:, None],
             weights,
             log_scale,
             log_brightness,
@@ -204,6 +214,17 @@ class Parameters:
             theta[columns.off],
             theta[columns.offset],
         )
+
+    def stated_slopes(self, rates: Rates) -> FloatArray:
+        """Return the derivatives by θ of θ with k_r, A and k_e in place of ln k_r, A and A k_e."""
+        columns, slopes = self.columns, np.eye(self.count)
+        slopes[columns.k_r, columns.k_r] = np.diag(rates.k_r_per_s)
+        growth = np.arange(columns.growth.start, columns.growth.stop)
+        amplitude = np.repeat(rates.amplitude, self.bands)
+        slopes[growth, growth] = 1 / amplitude
+        state = np.repeat(np.arange(columns.amplitude.start, columns.amplitude.stop), self.bands)
+        slopes[growth, state] = -rates.k_e_per_s.ravel() / amplitude
+        return slopes
 
 
 def bands_of(series: Sequence[ChargingSeries]) -> int:

@@ -129,14 +129,16 @@ class ExcitationProblem:
     ) -> tuple[FloatArray, FloatArray]:
         level = levels(charging, rates.k_r_per_s, rates.k_e_per_s)
         shots, sites = level.value.shape[:2]
-        columns, bands = self.parameters.columns, self.parameters.bands
+        columns = self.parameters.columns
         glow = level.value @ rates.amplitude
         # By θ of the glow, before channels come into it.
         slopes = np.zeros((shots, sites, self.parameters.count))
         slopes[..., columns.k_r] = level.by_k_r * (rates.amplitude * rates.k_r_per_s)
-        slopes[..., columns.amplitude] = level.value
-        slopes[..., columns.k_e] = level.by_k_e.reshape(shots, sites, -1)
-        slopes[..., columns.k_e] *= np.repeat(rates.amplitude, bands)
+        # A k_e is held where A is varied, and k_e with it.
+        slopes[..., columns.amplitude] = level.value - np.einsum(
+            "fpnb,nb->fpn", level.by_k_e, rates.k_e_per_s
+        )
+        slopes[..., columns.growth] = level.by_k_e.reshape(shots, sites, -1)
         self._set_light_derivatives(number, charging, rates, slopes)
         inverse = self._inverse_sigma[number]
         jacobian = slopes[:, :, None, :] * (rates.weights * inverse)[..., None]
@@ -150,10 +152,11 @@ class ExcitationProblem:
     def _set_light_derivatives(
         self, number: int, charging: ChargingSeries, rates: Rates, slopes: FloatArray
     ) -> None:
-        """Set the derivatives by all parameters of the light, from those by k_e."""
+        """Set the derivatives by all parameters of the light, from those by A k_e."""
         columns, charges = self.parameters.columns, self.parameters.charges(number)
-        by_k_e = slopes[..., columns.k_e].reshape(*slopes.shape[:2], *rates.k_e_per_s.shape)
-        by_band = np.einsum("fpnb,nb->fpb", by_k_e, rates.k_e_per_s)
+        growth = rates.amplitude[:, None] * rates.k_e_per_s
+        by_growth = slopes[..., columns.growth].reshape(*slopes.shape[:2], *growth.shape)
+        by_band = np.einsum("fpnb,nb->fpb", by_growth, growth)
         by_light = by_band.sum(axis=2)
         if is_fitted(columns.scale) and number:
             slopes[..., columns.scale.start + number - 1] = by_light

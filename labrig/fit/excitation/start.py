@@ -42,7 +42,7 @@ def starts(
             k_r_per_s,
             total * fractions,
             np.outer(k_r_per_s / mean_rate, np.maximum(k_e, 1e-3 * k_e.max())),
-            _weights(problem, reference),
+            channel_weights(problem, reference),
         )
 
 
@@ -72,7 +72,7 @@ def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: in
     return best
 
 
-def _weights(problem: ExcitationProblem, reference: int) -> FloatArray:
+def channel_weights(problem: ExcitationProblem, reference: int) -> FloatArray:
     """Estimate channel weights (C,) over the reference from all values."""
     totals = sum(np.nansum(charging.values, axis=(0, 1)) for charging in problem.series)
     weights: FloatArray = np.maximum(totals / totals[reference], 0)
