@@ -1,11 +1,13 @@
-"""Processing of a run folder: analysis, report and exports."""
+"""Processing of a run folder, or of a table: analysis, report and exports."""
 
 from labrig.process.result_changes import other_settings
 from labrig.process.run import Processed, process_and_report, process_run
+from labrig.process.table import report_table
 
 __all__ = [
     "Processed",
     "other_settings",
     "process_and_report",
     "process_run",
+    "report_table",
 ]

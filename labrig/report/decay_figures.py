@@ -128,7 +128,6 @@ def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatAr
 
 
 TIME_LABEL = "Time after lamp off / s"
-SIGNAL_LABEL = "Signal / (DN/s)"
 HEIGHT_PT = 256.0
 #: Lower end of a logarithmic axis as a fraction of the noise at the end of the decay.
 FRACTION_OF_NOISE = 0.5
@@ -142,7 +141,7 @@ LEFT_OUT_SHOWN = 3.0
 
 def linear_decay(series: Series, fit: FittedDecay | None) -> Figure:
     """Draw the signal over time."""
-    figure, axes = _axes()
+    figure, axes = _axes(series.value_unit)
     _draw(axes, series, fit)
     highest, lowest = max(_highest(series), 0.0), min(float(_usable_values(series).min()), 0.0)
     room = 0.06 * (highest - lowest) or 1.0
@@ -151,14 +150,14 @@ def linear_decay(series: Series, fit: FittedDecay | None) -> Figure:
     unit = 10.0**exponent
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value / unit)))
     if exponent:
-        axes.set_ylabel(f"Signal / ({power_of_ten(exponent)} DN/s)")
+        axes.set_ylabel(_signal_label(f"{power_of_ten(exponent)} {series.value_unit}".strip()))
     _legend(figure, series, fit)
     return figure
 
 
 def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Figure:
     """Draw the signal over time on a logarithmic axis; values below it are marked at its foot."""
-    figure, axes = _axes()
+    figure, axes = _axes(series.value_unit)
     axes.set_yscale("log", nonpositive="clip")
     _draw(axes, series, fit)
     low, high = log_axis_ends(series)
@@ -199,13 +198,20 @@ def log_axis_ends(series: Series) -> tuple[float, float]:
     return min(low, highest / 10), highest * 1.6
 
 
-def _axes() -> tuple[Figure, Axes]:
-    """Return a figure with axes of signal over time."""
+def _axes(unit: str) -> tuple[Figure, Axes]:
+    """Return a figure with axes of signal, in `unit`, over time."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.set_xlabel(TIME_LABEL)
-    axes.set_ylabel(SIGNAL_LABEL)
+    axes.set_ylabel(_signal_label(unit))
     return figure, axes
+
+
+def _signal_label(unit: str) -> str:
+    """Return the label of an axis of signals, whose unit may not be known."""
+    if not unit:
+        return "Signal"
+    return f"Signal / ({unit})" if "/" in unit or " " in unit else f"Signal / {unit}"
 
 
 def _common_exponent(highest: float) -> int:
