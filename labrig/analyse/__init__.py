@@ -3,13 +3,16 @@
 from labrig.analyse.frames import verify_frames
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.overrides import Overrides, read_run_protocol
-from labrig.analyse.series_fit import fit_series, fit_table
+from labrig.analyse.series_fit import fit_series
+from labrig.analyse.table_fit import FittedTable, TableFitOptions, fit_table
 from labrig.analyse.temperature import temperature_warnings
 
 __all__ = [
+    "FittedTable",
     "Inputs",
     "Overrides",
     "Part",
+    "TableFitOptions",
     "fit_series",
     "fit_table",
     "read_run_protocol",

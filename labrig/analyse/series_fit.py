@@ -1,19 +1,14 @@
 """The fit of one series: common to a run's processing and `labrig fit decay`."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.errors import FitError, UsageError
+from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.quantity import FRACTION, parse
-from labrig.results import Series, join_series, read_series
+from labrig.results import Series
 
-#: Least counts in a Poisson weight, since fewer would weigh a point too much.
-MIN_COUNTS = 5.0
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
 TYPICAL_FLICKER = 0.007
@@ -96,110 +91,3 @@ def fit_series(
             "long enough?"
         )
     return fit
-
-
-def fit_table(
-    path: Path,
-    states: int | None,
-    offset: str,
-    flicker: str,
-    weights: str,
-    origin_s: float,
-    from_s: float | None,
-) -> list[tuple[str, DecayFit]]:
-    """Fit a sum of exponentials to every region in a table, from the texts of a command line.
-
-    Parameters
-    ----------
-    path
-        Path of the table, as `read_series` reads it.
-    states
-        Number of states; None chooses it.
-    offset
-        Constant background: `zero`, `free`, or its prior standard uncertainty in the data's unit.
-    flicker
-        Relative scatter common to the channels of a frame: `auto`, a percentage, or a fraction.
-    weights
-        Uncertainties of the values: `given` in the table, or those of `counts` (Poisson).
-    origin_s
-        Time of lamp off in the table's seconds.
-    from_s
-        Time in the table's seconds from which points are fitted; None takes all.
-
-    Returns
-    -------
-    list of (str, DecayFit)
-        Name and fit of each region in order of appearance.
-
-    Raises
-    ------
-    UsageError
-        A text is none of those, no point is left, or the table is malformed.
-    DataError
-        The table has values that are missing or not finite.
-    FitError
-        The data do not allow a fit.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.analyse import fit_table
-    >>> fits = fit_table(
-    ...     Path("series.csv"), states=2, offset="zero", flicker="auto", weights="given",
-    ...     origin_s=0.0, from_s=None,
-    ... )
-    >>> for region, fit in fits:
-    ...     print(region, [f"{rate.value:.2g} {rate.unit}" for rate in fit.rates])
-    sample ['0.2 1/s', '0.01 1/s']
-    """
-    offset_sigma = {"zero": 0.0, "free": np.inf}.get(offset)
-    if offset_sigma is None:
-        offset_sigma = _parse_sigma(offset)
-    rho = None if flicker == "auto" else _parse_flicker(flicker)
-    if weights not in ("given", "counts"):
-        raise UsageError(f"--weights: expected 'given' or 'counts', got '{weights}'")
-    fits = []
-    for series in _join_regions(read_series(path)):
-        rows = np.flatnonzero(series.t_s >= (-np.inf if from_s is None else from_s))
-        if not len(rows):
-            raise UsageError(f"{path}: no point at {from_s:g} s or later; give an earlier --from")
-        part = series.take(rows)
-        part = replace(part, t_s=part.t_s - origin_s)
-        if weights == "counts":
-            part = replace(part, sigma=np.sqrt(np.maximum(part.values, MIN_COUNTS)))
-        # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
-        without_sigma = flicker == "auto" and np.isnan(part.sigma).all()
-        fits.append(
-            (part.region, fit_series(part, states, offset_sigma, 0.0 if without_sigma else rho))
-        )
-    return fits
-
-
-def _join_regions(parts: Sequence[Series]) -> list[Series]:
-    """Join the repeats of each region's decay: they share rates and amplitudes."""
-    regions: dict[str, list[Series]] = {}
-    for part in parts:
-        regions.setdefault(part.region, []).append(part)
-    return [join_series(same) for same in regions.values()]
-
-
-def _parse_sigma(text: str) -> float:
-    try:
-        sigma = float(text)
-    except ValueError:
-        sigma = -1.0
-    if not sigma >= 0:
-        raise UsageError(
-            f"--offset: expected 'zero', 'free' or the σ of a background in the data's unit, got "
-            f"'{text}'"
-        )
-    return sigma
-
-
-def _parse_flicker(text: str) -> float:
-    try:
-        return parse(text, FRACTION) if "%" in text else float(text)
-    except ValueError:
-        raise UsageError(
-            f"--flicker: expected 'auto', a percentage such as '0.7 %' or 0, got '{text}'"
-        ) from None

@@ -15,9 +15,11 @@ def fits() -> None:
 
 @app.command("decay")
 def decay(
-    series: Annotated[
+    table: Annotated[
         Path,
-        typer.Argument(help="series.csv of a run, or a table of time, value and optionally sigma."),
+        typer.Argument(
+            help="series.csv of a run, or any table of times and values, with σ or not."
+        ),
     ],
     states: Annotated[
         int | None,
@@ -40,10 +42,42 @@ def decay(
     start: Annotated[
         float | None, typer.Option("--from", help="Use points from this time on, in seconds.")
     ] = None,
+    column: Annotated[
+        str | None, typer.Option("--column", help="Name of the column of values, of several.")
+    ] = None,
+    time: Annotated[str | None, typer.Option("--time", help="Name of the column of times.")] = None,
+    time_unit: Annotated[
+        str | None,
+        typer.Option("--time-unit", help="Unit of the times: ns, ms, s, min, h, …"),
+    ] = None,
+    decimal: Annotated[
+        str | None,
+        typer.Option("--decimal", help="Decimal mark of the numbers, 'point' or 'comma'."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for result/: page, figures, fit.json, result.json."),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print fit.json.")] = False,
 ) -> None:
-    """Rates and amplitudes of a sum of exponentials, with uncertainties."""
-    from labrig.analyse import fit_table
+    """Rates and amplitudes of a sum of exponentials, with uncertainties.
 
-    for name, fit in fit_table(series, states, offset, flicker, weights, origin, start):
-        typer.echo(fit.to_json() if json else f"{name}\n{fit}".strip())
+    Columns, units, separators and decimal marks are found in the table. Without σ in the table, σ
+    is taken from the scatter about the best monotone curve.
+    """
+    from labrig.analyse import TableFitOptions, fit_table
+    from labrig.results import TableLayout
+
+    options = TableFitOptions(states, offset, flicker, weights, origin, start)
+    fitted = fit_table(table, options, TableLayout(time, column, time_unit, decimal))
+    for part in fitted:
+        fit = part.fit
+        typer.echo(fit.to_json() if json else f"{part.region}\n{fit}".strip())
+    if out is not None:
+        from labrig.process import report_table
+
+        processed = report_table(table, fitted, options, out)
+        if not json:
+            for line in processed.changes:
+                typer.echo(line)
+            typer.echo(f"report: {processed.report}")

@@ -1,7 +1,8 @@
-"""Processing of a run folder: analysis, report and exports."""
+"""Processing of a run folder, or of a table: analysis, report and exports."""
 
 from labrig.process.result_changes import other_settings
 from labrig.process.run import Processed, draw_figures, process_and_report, process_run
+from labrig.process.table import report_table
 
 __all__ = [
     "Processed",
@@ -9,4 +10,5 @@ __all__ = [
     "other_settings",
     "process_and_report",
     "process_run",
+    "report_table",
 ]

@@ -7,6 +7,9 @@ from .curve_sketch import (
     describe_curves as describe_curves,
     draw_curves as draw_curves,
 )
+from .decay import (
+    table_sections as table_sections,
+)
 from .decay_figures import (
     exposure_middles_s as exposure_middles_s,
 )

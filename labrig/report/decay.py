@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from labrig.record import FrameRecord, FrameRole
+from labrig.record import FrameRecord, FrameRole, RunDescription
 from labrig.report.colours import Screen, Swatch, screen_for, swatches
 from labrig.report.decay_figures import (
     linear_decay,
@@ -21,6 +21,7 @@ from labrig.report.methods import REFERENCES, UNKNOWN, methods
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.report_model import (
     DECAY_ASSUMPTIONS,
+    TABLE_ASSUMPTIONS,
     DecayReport,
     GlowPhotograph,
     PatchReport,
@@ -266,7 +267,9 @@ def decay_sections(
     late = frame_lateness(timings)
     content = _Content(report, patches, screen.known, late)
     sensor = sensor_of([photograph.frame for photograph in report.glow])
-    overview = _results(content, anchor), _sample(content, screen, anchor)
+    overview = [_results(content, anchor)]
+    if report.frames:
+        overview.append(_sample(content, screen, anchor))
     results = (
         # A long table would hide the photograph that says where the patches are.
         *(reversed(overview) if content.is_folded else overview),
@@ -292,7 +295,44 @@ def decay_sections(
             "unknown": UNKNOWN,
         },
     )
-    return results, (methods_section, Section("Assumptions", points=DECAY_ASSUMPTIONS))
+    assumptions = DECAY_ASSUMPTIONS if report.frames else TABLE_ASSUMPTIONS
+    return results, (methods_section, Section("Assumptions", points=assumptions))
+
+
+def table_sections(
+    result: DecayResult, about: RunDescription
+) -> tuple[tuple[Section, ...], tuple[Section, ...]]:
+    """Return the sections of a decay from another program's table, with results and with methods.
+
+    Parameters
+    ----------
+    result
+        Fitted decay of each region of the table.
+    about
+        Description of the table.
+
+    Returns
+    -------
+    results : tuple of Section
+        Sections with results.
+    methods : tuple of Section
+        Sections with methods.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import RunDescription
+    >>> from labrig.report import table_sections
+    >>> about = RunDescription(
+    ...     title="series.csv", protocol="decay", run="series.csv", started="", ended="", rig="",
+    ...     simulated=False, labrig_version="0.1.0"
+    ... )
+    >>> results, methods = table_sections(labrig.read_result("runs/decay"), about)
+    >>> [section.title for section in results]
+    ['Results', 'Patch sample']
+    """
+    patches = tuple(_patch_report(name, patch) for name, patch in result.patches.items())
+    return decay_sections(DecayReport(about, patches, states=result.states_requested))
 
 
 def _patch_report(name: str, patch: DecayPatch) -> PatchReport:

@@ -128,7 +128,6 @@ def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatAr
 
 
 TIME_LABEL = "Time after lamp off / s"
-SIGNAL_LABEL = "Signal / (DN/s)"
 HEIGHT_PT = 256.0
 #: Lower end of a logarithmic axis as a fraction of the noise at the end of the decay.
 FRACTION_OF_NOISE = 0.5
@@ -149,7 +148,7 @@ def linear_decay(series: Series, fit: FittedDecay | None) -> Chart:
     exponent = _common_exponent(highest)
     unit = 10.0**exponent
     axis = linear_axis(
-        f"Signal / ({power_of_ten(exponent)} DN/s)" if exponent else SIGNAL_LABEL,
+        _signal_label(f"{power_of_ten(exponent) if exponent else ''} {series.value_unit}".strip()),
         lowest - (room if lowest < 0 else 0.0),
         highest + room,
         text=lambda value: rounded(value / unit),
@@ -160,7 +159,7 @@ def linear_decay(series: Series, fit: FittedDecay | None) -> Chart:
 def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Chart:
     """Return the signal over time on a logarithmic axis; values below it are marked at its foot."""
     low, high = log_axis_ends(series)
-    axis = logarithmic_axis(SIGNAL_LABEL, low, high)
+    axis = logarithmic_axis(_signal_label(series.value_unit), low, high)
     t_s = exposure_middles_s(series)
     carets = []
     for number, name in enumerate(series.channels):
@@ -187,6 +186,13 @@ def log_axis_ends(series: Series) -> tuple[float, float]:
     floor = FRACTION_OF_NOISE * float(np.median(noise)) if noise.size else 0.0
     low = max(positive * 0.7, floor, highest * 10.0**-MAX_DECADES)
     return min(low, highest / 10), highest * 1.6
+
+
+def _signal_label(unit: str) -> str:
+    """Return the label of an axis of signals, whose unit may not be known."""
+    if not unit:
+        return "Signal"
+    return f"Signal / ({unit})" if "/" in unit or " " in unit else f"Signal / {unit}"
 
 
 def _common_exponent(highest: float) -> int:
@@ -352,8 +358,8 @@ def overview_tiles(patches: Sequence[PatchReport]) -> tuple[list[Chart], str]:
     bare_time, bare_signal = (replace(axis, label="", short_ticks=()) for axis in (time, signal))
     margins = Margins(left=1.0, bottom=1.0, right=1.0, top=1.0)
     times, signals = (
-        f"{axis.ticks[0][1]} to {axis.ticks[-1][1]} {unit}"
-        for axis, unit in ((time, "s"), (signal, "DN/s"))
+        f"{axis.ticks[0][1]} to {axis.ticks[-1][1]} {unit}".strip()
+        for axis, unit in ((time, "s"), (signal, patches[0].series.value_unit))
     )
     tiles = [
         Chart(
@@ -373,7 +379,7 @@ def _overview_axes(patches: Sequence[PatchReport]) -> tuple[Axis, Axis]:
     last_s = max(float(exposure_middles_s(patch.series).max()) for patch in patches) or 1.0
     return (
         linear_axis("Time / s", -0.03 * last_s, 1.03 * last_s, most=4),
-        logarithmic_axis("DN/s", low, high, most=6),
+        logarithmic_axis(patches[0].series.value_unit, low, high, most=6),
     )
 
 

@@ -24,6 +24,9 @@ def recording(
     report: DecayReport, sensor: Sensor | None, late: LatenessStatistics | None
 ) -> Iterator[str]:
     """Yield the sentences on the measurement, from the charge to the values."""
+    if not report.frames:
+        yield from _table(report)
+        return
     how = "simulated" if report.about.simulated else "measured"
     yield f"The decay of the phosphorescence of {report.about.title} was {how} with labrig."
     decays = [frame for frame in report.frames if frame.role == FrameRole.DECAY]
@@ -35,6 +38,16 @@ def recording(
     yield _mean(report, sensor)
     yield from _dark(report)
     yield from _exclusions(report)
+
+
+def _table(report: DecayReport) -> Iterator[str]:
+    """Yield the sentences on a decay that was read from another program's table."""
+    counts = [len(patch.series.t_s) for patch in report.patches]
+    t_s = np.concatenate([patch.series.t_s for patch in report.patches])
+    yield (
+        f"The decay was read from the table {report.about.run}: {sum(counts)} values from "
+        f"{rounded(float(t_s.min()), 3)} s to {rounded(float(t_s.max()), 3)} s after lamp off."
+    )
 
 
 def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
@@ -270,7 +283,13 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     else:
         yield f"Here k_i are the rates and a_i the amplitudes; there are w_c = 1 and {offset}."
     yield "All parameters were fitted together by weighted nonlinear least squares."
-    yield f"The weights follow the photon and read noise found in the frames{_flicker(fits)}."
+    scatter = next((fit.scatter for fit in fits if fit.scatter), None)
+    noise = "the photon and read noise found in the frames"
+    if scatter is not None:
+        noise = f"the standard uncertainty of the values, taken {scatter}"
+    elif not report.frames:
+        noise = "the standard uncertainties in the table"
+    yield f"The weights follow {noise}{_flicker(fits)}."
     states = [str(number) for number in sorted({fit.n_states for fit in fits})]
     number = f"n = {states[0]}" if len(states) == 1 else f"n = {' or '.join(states)} by patch"
     if report.states is not None:
@@ -305,4 +324,5 @@ def _software(report: DecayReport) -> Iterator[str]:
     ]
     with_libraries = f" with {listed(libraries)}" if libraries else ""
     version = report.about.labrig_version
-    yield f"Recording and analysis were done by labrig {version}{with_libraries}."
+    done = "Recording and analysis were" if report.frames else "The analysis was"
+    yield f"{done} done by labrig {version}{with_libraries}."

@@ -56,8 +56,8 @@ class CandidateRow:
     chosen: bool
 
 
-def state_rows(fit: FittedDecay) -> list[Row]:
-    """Return rows of rates, lifetimes, half-lives and amplitudes, with one column a state."""
+def state_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
+    """Return rows of rates, lifetimes, half-lives and amplitudes in `unit`, one column a state."""
     rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in fit.states]
     lifetimes = [_lifetime(rate, sigma) for rate, sigma in rates]
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
@@ -66,12 +66,12 @@ def state_rows(fit: FittedDecay) -> list[Row]:
         Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _value_texts(rates)),
         Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _value_texts(lifetimes)),
         Row("Half-life", "s", _value_texts(half_lives)),
-        Row("Amplitude a", "DN/s", _value_texts(amplitudes)),
+        Row("Amplitude a", unit, _value_texts(amplitudes)),
     ]
 
 
-def quality_rows(fit: FittedDecay) -> list[Row]:
-    """Return rows of the parameters that the states share: weights, offsets, flicker and χ²."""
+def quality_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
+    """Return rows of what the states share: weights, offsets in `unit`, flicker and χ²."""
     rows = []
     several = len(fit.channels) > 1
     if several:
@@ -83,11 +83,11 @@ def quality_rows(fit: FittedDecay) -> list[Row]:
     if several and any(fit.offsets_sigma):
         offsets = zip(fit.channels, fit.offsets, fit.offsets_sigma, strict=True)
         rows += [
-            Row(f"Offset of {name}", "DN/s", (plus_minus(offset, sigma),))
+            Row(f"Offset of {name}", unit, (plus_minus(offset, sigma),))
             for name, offset, sigma in offsets
         ]
     else:
-        rows.append(Row("Offset", "DN/s", (plus_minus(fit.offset, fit.offset_sigma),)))
+        rows.append(Row("Offset", unit, (plus_minus(fit.offset, fit.offset_sigma),)))
     if several or fit.flicker > 0:
         flicker = plus_minus(100 * fit.flicker, 100 * fit.flicker_sigma)
         rows.append(Row("Flicker of a frame", "%", (flicker,)))

@@ -22,6 +22,15 @@ DECAY_ASSUMPTIONS = (
     "temperature or stray light.",
 )
 
+#: Assumptions of a decay from another program's table.
+TABLE_ASSUMPTIONS = (
+    "The amplitudes aᵢ are the signal at lamp off in the unit of the table, extrapolated.",
+    "Times and values are as they stand in the table; where it has no exposures, a value is taken "
+    "to be momentary.",
+    "Uncertainties are standard uncertainties (1 σ). They do not cover a wrong model, temperature "
+    "or stray light.",
+)
+
 
 @dataclass(frozen=True)
 class GlowPhotograph:
@@ -75,7 +84,8 @@ class DecayReport:
     patches
         Patches of the sample, at least one.
     frames
-        All frames of the run; those of the role `decay` are used for the timing.
+        All frames of the run; those of the role `decay` are used for the timing. Empty for a decay
+        from another program's table.
     daylight
         Photographs under the lamp of different exposures; the best exposed one is shown.
     glow

@@ -45,6 +45,7 @@ from .fitted_decay import (
     Candidate as Candidate,
     DecayState as DecayState,
     FittedDecay as FittedDecay,
+    ScatterSigma as ScatterSigma,
     find_fitted_decays as find_fitted_decays,
     read_fitted_decay as read_fitted_decay,
     read_fitted_decays as read_fitted_decays,
@@ -114,4 +115,7 @@ from .series_table import (
     join_series as join_series,
     parse_series as parse_series,
     read_series as read_series,
+)
+from .table_columns import (
+    TableLayout as TableLayout,
 )

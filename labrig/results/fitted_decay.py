@@ -3,8 +3,9 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,10 @@ from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text, write_json
 
 FILE = "fit.json"
+#: Width of a line for people.
+LINE_WIDTH = 100
+#: Relative difference below which the σ of all values is given as one.
+_SAME_SIGMA = 0.05
 #: Version of that file: another number means renamed keys or other meanings.
 SCHEMA_VERSION = 1
 
@@ -88,6 +93,44 @@ class AlternativeModel:
 
 
 @dataclass(frozen=True)
+class ScatterSigma:
+    """Standard uncertainty σ of values that came without, from their scatter about a smooth curve.
+
+    At the signal s it is σ² = constant² + counting · s + (proportional · s)².
+
+    Attributes
+    ----------
+    constant
+        Part that is the same for all values, in their unit.
+    counting
+        Increase of the variance with the signal, in the unit of the values; 1 for counts.
+    proportional
+        Part in proportion to the signal.
+    at_brightest, at_faintest
+        σ of the brightest and of the faintest value, in their unit.
+    dof
+        Degrees of freedom of the estimate: values less those that the curve took.
+    """
+
+    constant: float
+    counting: float
+    proportional: float
+    at_brightest: float
+    at_faintest: float
+    dof: float
+
+    def __str__(self) -> str:
+        """Return where σ came from, and σ of the brightest and the faintest value."""
+        values = (
+            f"{self.at_brightest:.3g} for all values"
+            if abs(self.at_brightest - self.at_faintest) < _SAME_SIGMA * self.at_faintest
+            else f"{self.at_brightest:.3g} at the brightest value, {self.at_faintest:.3g} at the "
+            "faintest"
+        )
+        return f"from the scatter about the best monotone curve, {values}"
+
+
+@dataclass(frozen=True)
 class FittedDecay:
     """Decay model Σ_i a_i e^(−k_i t), times a weight and plus an offset for each channel.
 
@@ -120,6 +163,8 @@ class FittedDecay:
         Power law and stretched exponential, fitted to the same series.
     better_model
         Alternative model that is clearly better than exponentials; None if none is.
+    scatter
+        Uncertainties of the values from their scatter; None if they were given.
     """
 
     states: tuple[DecayState, ...]
@@ -140,6 +185,7 @@ class FittedDecay:
     candidates: tuple[Candidate, ...]
     alternative_models: tuple[AlternativeModel, ...]
     better_model: AlternativeModel | None
+    scatter: ScatterSigma | None = field(default=None, kw_only=True)
 
     @property
     def covariance_parameters(self) -> tuple[str, ...]:
@@ -258,6 +304,7 @@ class FittedDecay:
             "candidates": [asdict(candidate) for candidate in self.candidates],
             "alternative_models": [asdict(alternative) for alternative in self.alternative_models],
             "better_model": self.better_model.name if self.better_model else None,
+            "sigma_from_scatter": asdict(self.scatter) if self.scatter else None,
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -289,6 +336,8 @@ class FittedDecay:
         if self.flicker or self.flicker_sigma:
             percent = with_uncertainty(100 * self.flicker, 100 * self.flicker_sigma)
             lines.append(f"flicker  {percent} %")
+        if self.scatter is not None:
+            lines += wrap(f"σ        {self.scatter}", LINE_WIDTH, subsequent_indent=" " * 9)
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         lines += [f"! {warning}" for warning in self.warnings]
         return "\n".join(lines)
@@ -431,7 +480,7 @@ def _from_dict(content: Any) -> FittedDecay:
         AlternativeModel(**model | {"exponent_sigma": _number_or(model["exponent_sigma"])})
         for model in content["alternative_models"]
     )
-    better = content["better_model"]
+    better, scatter = content["better_model"], content.get("sigma_from_scatter")
     return FittedDecay(
         states=tuple(
             DecayState(
@@ -467,6 +516,7 @@ def _from_dict(content: Any) -> FittedDecay:
         ),
         alternative_models=alternative_models,
         better_model=next((model for model in alternative_models if model.name == better), None),
+        scatter=None if scatter is None else ScatterSigma(**scatter),
     )
 
 

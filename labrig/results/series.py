@@ -57,6 +57,8 @@ class Series:
     dark_correlation
         Correlation of the channels' dark levels, whose σ is `dark_sigma`, shape (C, C); None if
         unknown. Not a column of series.csv.
+    value_unit
+        Unit of `values`; empty if unknown. Not a column of series.csv.
     """
 
     t_s: FloatArray
@@ -73,6 +75,7 @@ class Series:
     region: str = ""
     correlation: FloatArray | None = None
     dark_correlation: FloatArray | None = None
+    value_unit: str = "DN/s"
 
     def __post_init__(self) -> None:
         _check_shapes(self)
@@ -101,6 +104,7 @@ class Series:
             region=self.region if region is None else region,
             correlation=self.correlation,
             dark_correlation=self.dark_correlation,
+            value_unit=self.value_unit,
         )
 
     def by_unit(self) -> list["Series"]:

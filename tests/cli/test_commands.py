@@ -1,8 +1,8 @@
 """The commands as a person uses them: results, exit codes, one line when something is wrong."""
 
 import json
-import shutil
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 from labrig.record import RunLock, read_run
+from labrig.results import DecayResult, read_result
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
@@ -309,4 +310,55 @@ def test_a_table_of_time_and_value_is_fitted_with_the_defaults(
     fit = json.loads(ended.out)
     rate = fit["states"][0]
     assert abs(rate["k_r_per_s"] - 0.05) < 4 * rate["k_r_sigma_per_s"]
-    assert any("from their scatter" in warning for warning in fit["warnings"])
+    assert fit["warnings"] == []
+    assert fit["sigma_from_scatter"]["at_brightest"] == pytest.approx(5, rel=0.3)
+    assert "from the scatter" in labrig("fit", "decay", tmp_path / "table.csv").out
+
+
+def test_a_table_has_page_figures_and_result_as_a_run_has(
+    labrig: Callable[..., Ended], tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(5)
+    t_min = np.arange(0.0, 2.0, 0.05)
+    values = 1000 * np.exp(-0.05 * 60 * t_min) + rng.normal(0, 5, len(t_min))
+    rows = [f"{t};{value}".replace(".", ",") for t, value in zip(t_min, values, strict=True)]
+    table = tmp_path / "paint.csv"
+    table.write_text("\n".join(["Zeit / min;Signal [mV]", *rows]), encoding="utf-16")
+    ended = labrig("fit", "decay", table, "--out", tmp_path / "out")
+    assert ended.code == 0, ended.err
+    result = tmp_path / "out" / "result"
+    assert ended.out.splitlines()[-1] == f"report: {result / 'report.html'}"
+    assert {path.name for path in (result / "figures").iterdir()} >= {"figures.pdf"}
+    read = read_result(tmp_path / "out")
+    assert isinstance(read, DecayResult)
+    fit = read.fits["paint"]
+    assert fit.scatter is not None
+    assert fit.rates[0].value == pytest.approx(0.05, rel=0.05)
+    assert fit.scatter.at_brightest == pytest.approx(5, rel=0.3)
+    page = (result / "report.html").read_text(encoding="utf-8")
+    assert "mV" in page
+    assert "DN/s" not in page
+    assert "from the scatter about the best monotone curve" in page
+    again = labrig("fit", "decay", table, "--out", tmp_path / "out")
+    assert "the same result as before" in again.out
+    other = labrig("fit", "decay", table, "--out", tmp_path / "out", "--from", "6")
+    assert "options from_s" in other.out
+    assert (tmp_path / "out" / "result-1" / "fit.json").is_file()
+
+
+OPEN_TABLES = [
+    ("t,A,B\n0,9,8\n1,5,4\n2,3,2\n", 2, "--column A"),
+    ("wl,counts\n400,9\n410,5\n", 2, "--time NAME"),
+    ("t [frames],A\n0,9\n1,5\n", 2, "--time-unit"),
+    ("t\tA\n1,234\t9,000\n2,345\t5,000\n", 2, "--decimal comma"),
+    ("t,A\n-5,9\n1,5\n2,3\n", 2, "--from 0"),
+    ("t,A\n" + "".join(f"{k},{min(k, 30 - k)}\n" for k in range(30)), 4, "--from 15"),
+]
+
+
+@pytest.mark.parametrize(("text", "code", "option"), OPEN_TABLES)
+def test_a_table_that_leaves_something_open_is_asked_for_an_option(
+    labrig: Callable[..., Ended], tmp_path: Path, text: str, code: int, option: str
+) -> None:
+    (tmp_path / "table.csv").write_text(text)
+    one_line(labrig("fit", "decay", tmp_path / "table.csv"), code, option)

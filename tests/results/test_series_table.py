@@ -1,13 +1,14 @@
 """Anybody's table of a decay."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from labrig.errors import DataError, LabrigError, UsageError
-from labrig.results import parse_series, read_series
+from labrig.results import TableLayout, parse_series, read_series
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,26 @@ TABLES = [
     Table("settings, short rows", "t\tcounts\tt0\tt1\n0\t10\t30\t330\n1\t5\n"),
     Table("trailing comma", "t,counts,\n0,10,\n1,5,\n"),
     Table("time is not first", "counts,t\n10,0\n5,1\n"),
+    Table("units", "time / s;counts [a.u.]\n0;10\n1;5\n"),
+    Table("minutes", "t (min)\tcounts\n0\t10\n0.016666666666666666\t5\n"),
+    Table("milliseconds", "time_ms,counts\n0,10\n1000,5\n"),
+    Table(
+        "German", "Zeit in h;counts;Fehler\n0,0;10,0;0,5\n0,0002777777777777778;5;0,5\n", sigma=0.5
+    ),
+    Table("quoted decimal commas", '"t","counts"\n"0,0","10,0"\n"1,0","5"\n'),
+    Table("error with a unit", "t,counts,Error (V)\n0,10,0.5\n1,5,0.5\n", sigma=0.5),
+    Table("plus-minus", "t;counts;±\n0;10;0,5\n1;5;0,5\n", sigma=0.5),
+    Table("σ of the name", "t counts σ_counts\n0 10 0.5\n1 5 0.5\n", sigma=0.5),
+    Table("standard deviation", "t,counts,counts std\n0,10,0.5\n1,5,0.5\n", sigma=0.5),
+    Table("preamble", "Counter: 7\nDate;1.11.2026\nGain;5\n\nTime [s];counts\n0;10\n1;5\n"),
+    Table("line of units", "Time,counts\nms,V\n0,10\n1000,5\n"),
+    Table("names in a comment", "# t counts\n0 10\n1 5\n"),
+    Table("spaces in names", "Time (s)   counts (a.u.)\n0.0   10\n1.0   5\n"),
+    Table("as NIST writes", "Data:   counts   x\n  10  0\n  5   1\n"),
+    Table("numbered rows", ",t,counts\n0,0,10\n1,1,5\n"),
+    Table("Excel's separator", "sep=;\nt;counts\n0;10\n1;5\n"),
+    Table("old line ends", "t,counts\r0,10\r1,5\r"),
+    Table("a minus sign of typesetters", "t,counts,dy\n\u22120,10,.5\n1,5,.5\n", sigma=0.5),
 ]
 
 
@@ -78,18 +99,22 @@ REFUSED: list[tuple[str, type[LabrigError], str]] = [
     ("t,counts\n0,1\n1e999,1\n", DataError, "line 3: expected a finite number for 't'"),
     ("t,counts\n0,1\n#\n1,many\n", UsageError, "line 4: .* got 'many'"),
     ("t,counts\n0,1_0\n", UsageError, "line 2: .* got '1_0'"),
-    ("t;counts\n0;1,5\n", UsageError, "decimal point .* got '1,5'"),
+    ("t;counts\n0;1,5\n1;many\n", UsageError, "line 3: .* decimal comma .* got 'many'"),
     ("t,R,G\n0,1,2\n1,2,3\n2,,4\n", DataError, "line 4: expected a number for 'R', got nothing"),
     ("t,counts\n0,1\n1,2,3\n", UsageError, "line 3: expected 2 columns .* got 3"),
     ("t,R,G\n0,1,2\n1,2\n2,3,4\n", DataError, "line 3: expected a number for 'G'"),
-    ("wl,counts\n420,1\n", UsageError, "a column t_s .* got wl, counts"),
+    ("wl,counts\n420,1\n", UsageError, "a column of times .* got wl, counts; .* '--time NAME'"),
     ("t,frame\n0,a\n", UsageError, "a column of values is missing"),
     ("t,time_s,R\n0,0,1\n", UsageError, "one of the columns t, time_s"),
     ("t,R,R\n0,1,1\n", UsageError, "a name of its own"),
-    ("t,R,\n0,1,1\n1,1,1\n", UsageError, "a name of its own"),
+    ("t,R,\n0,1,1\n1,1,1\n", UsageError, "a name for each of the 3 columns"),
     ("t,R,G,sigma\n0,1,1,1\n", UsageError, "for each of R, G"),
-    ("1\n2\n", UsageError, "1 columns without names"),
-    ("1,2,3,4\n", UsageError, "4 columns without names"),
+    ("1\n2\n", UsageError, "1 column without names"),
+    ("t\tI\n1,234\t5,678\n", UsageError, "'1,234', .* thousands .* '--decimal comma'"),
+    ("t,I\n0,5,1,25\n1,0,1,1\n", UsageError, "4 columns .* decimal commas between commas"),
+    ("time (frames),I\n0,1\n1,2\n", UsageError, "unit of time .* '--time-unit s'"),
+    ("t,A,B,±\n0,1,2,3\n1,2,3,4\n", UsageError, "each of A, B, .* '--column NAME'"),
+    ("t,A,sigma,Error\n0,1,2,3\n", UsageError, "one column of uncertainties for 'A'"),
     ("t,counts,sigma\n0,1,0\n", DataError, "sigma above 0"),
     ("t,exposure_s,counts\n0,-1,1\n", DataError, "negative"),
 ]
@@ -103,12 +128,89 @@ def test_refused(text: str, kind: type[LabrigError], why: str) -> None:
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    ("encoding", "text"),
+    [
+        ("utf-8-sig", "t;I;±\n0;10;0,5\n1;5;0,5\n"),
+        ("utf-16", "t\tI\t±\n0\t10\t0,5\n1\t5\t0,5\n"),
+        ("cp1252", "t / µs;I;±\n0;10;0,5\n1000000;5;0,5\n"),
+    ],
+)
+def test_encodings_of_excel_and_instruments(encoding: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / "decay.txt").write_text(text, encoding=encoding)
+    (series,) = read_series(tmp_path / "decay.txt")
+    assert series.t_s == pytest.approx([0, 1])
+    assert series.values.tolist() == [[10], [5]]
+    assert series.sigma.tolist() == [[0.5], [0.5]]
+
+
+def test_what_is_open_is_answered_by_the_layout() -> None:
+    table = "wl\tA\t±\tB\t±\n1,500\t3,250\t0,100\t4,500\t0,200\n2,500\t1,250\t0,100\t2,500\t0,200\n"
+    layout = TableLayout(time="wl", column="B", time_unit="ms", decimal="comma")
+    (series,) = parse_series(table, "x", layout)
+    assert series.channels == ("B",)
+    assert series.t_s == pytest.approx([1.5e-3, 2.5e-3])
+    assert series.values.tolist() == [[4.5], [2.5]]
+    assert series.sigma.tolist() == [[0.2], [0.2]]
+    for wrong, option in (({"time": "x"}, "--time"), ({"column": "C"}, "--column")):
+        with pytest.raises(UsageError, match=f"{option}: expected one of .* got"):
+            parse_series(table, "x", replace(layout, **wrong))
+    for bad, option in (({"time_unit": "mile"}, "--time-unit"), ({"decimal": ";"}, "--decimal")):
+        with pytest.raises(UsageError, match=f"{option}: expected"):
+            TableLayout(**bad)
+
+
+def test_each_column_of_values_has_the_uncertainty_right_of_it() -> None:
+    (series,) = parse_series("t;A;±;B;±\n0;1;0,1;2;0,2\n1;1;0,3;2;0,4\n", "x")
+    assert series.channels == ("A", "B")
+    assert series.sigma.tolist() == [[0.1, 0.2], [0.3, 0.4]]
+
+
+_finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    rows=st.lists(
+        st.tuples(_finite, _finite, st.floats(min_value=1e-300, max_value=1e300)),
+        min_size=2,
+        max_size=6,
+    ),
+    delimiter=st.sampled_from([";", "\t", "; ", " ", "   "]),
+    comma=st.booleans(),
+    unit=st.sampled_from(["", " (s)", " [s]", "/s"]),
+    name=st.sampled_from(["Error", "±", "σ", "sigma", "std", "uncertainty", "err", "signal_err"]),
+    head=st.sampled_from(["", "# made by a script\n", "Instrument: XY-3\n\n"]),
+    line_end=st.sampled_from(["\n", "\r\n"]),
+)
+def test_any_style_reads_back_the_same_numbers(
+    rows: list[tuple[float, float, float]],
+    delimiter: str,
+    comma: bool,
+    unit: str,
+    name: str,
+    head: str,
+    line_end: str,
+) -> None:
+    cells = [[f"{number:.17e}" for number in row] for row in rows]
+    if comma:
+        cells = [[cell.replace(".", ",") for cell in row] for row in cells]
+    lines = [delimiter.join((f"time{unit}", "signal", name)), *map(delimiter.join, cells)]
+    (series,) = parse_series(line_end.join([*head.splitlines(), *lines]), "x")
+    read = np.column_stack([series.t_s, series.values, series.sigma])
+    assert read.tolist() == [list(row) for row in rows]
+    assert series.channels == ("signal",)
+
+
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such file"):
         read_series(tmp_path / "missing.csv")
     (tmp_path / "frame.cr2").write_bytes(bytes(range(256)))
     with pytest.raises(UsageError, match="UTF-8"):
         read_series(tmp_path / "frame.cr2")
+    (tmp_path / "decay.xlsx").write_bytes(b"PK\x03\x04" + bytes(20))
+    with pytest.raises(UsageError, match=r"a workbook.*CSV"):
+        read_series(tmp_path / "decay.xlsx")
 
 
 @pytest.mark.shared_data

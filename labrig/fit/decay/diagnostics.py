@@ -76,7 +76,7 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
         factor = np.sqrt(frame_chi2 / misfit.frame_dof)
         warnings.append(
             f"frames scatter {factor:.2g} times as much as σ and flicker explain; every σ given "
-            "here is too small by about that: estimate the flicker (flicker=None) or check σ"
+            "here is too small by about that: estimate the flicker (--flicker auto) or check σ"
         )
     if _excess_p_value(misfit.colour_chi2, misfit.colour_dof, np.inf) < MISFIT_LEVEL:
         warnings.append(
@@ -97,7 +97,8 @@ def _outlier_warnings(misfit: Misfit) -> list[str]:
     outliers = np.flatnonzero((size > OUTLIER_SIGMAS * typical) & (size > OUTLIER_OWN_SIGMAS))
     return [
         f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(typical, 1e-3):.0f} times as "
-        "far off the curve as the others do: look at it, leave it out if something disturbed it"
+        "far off the curve as the others do: look at it, leave it out if something disturbed it "
+        "(labrig process --exclude, labrig fit decay --from, or its row)"
         for row in outliers[np.argsort(-size[outliers])][:MAX_NAMED]
     ]
 
@@ -164,7 +165,7 @@ def state_warnings(
         elif state.k_r_per_s > 0.999 * fastest:
             warnings.append(
                 f"{rate} is the fastest rate the steps in time can tell: take the first frames "
-                "closer together, or leave the first one out if the lamp still glowed"
+                "closer together, or start after the lamp's own glow (labrig fit decay --from)"
             )
         elif sigma[number - 1] > ILL_DETERMINED:
             long_lived = number == len(states) and lifetime_s > span_s
@@ -176,7 +177,8 @@ def state_warnings(
     for number, apart in enumerate(sigmas_apart(log_rates, log_rate_covariance), start=1):
         if apart < APART_SIGMAS:
             warnings.append(
-                f"k{number} and k{number + 1} cannot be distinguished: ask for one state fewer"
+                f"k{number} and k{number + 1} cannot be distinguished: ask for one state fewer "
+                f"(--states {len(states) - 1})"
             )
     is_fixed = states[-1].k_r_sigma_per_s == 0
     if lifetime_s > span_s and not is_fixed and sigma[-1] <= ILL_DETERMINED:

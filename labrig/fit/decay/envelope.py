@@ -66,8 +66,6 @@ class Envelope:
         `FEWEST_NOISE_DOF` degrees of freedom one σ(ρ²) above the estimate.
     likely_flickers
         Equally probable values of ρ after the measurement, or the given one, shape (m,).
-    noise_scale
-        Scatter in units of σ; 1 unless σ was not given.
     """
 
     series: DecaySeries
@@ -78,7 +76,6 @@ class Envelope:
     flicker: float
     flicker_sigma: float
     likely_flickers: FloatArray
-    noise_scale: float
 
 
 def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
@@ -98,12 +95,12 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     is_single = len(weights) == len(series.repeats) == 1
     if is_single and flicker == 0 and series.sigma_given:
         n_frames = series.n_frames
-        return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1), 1.0)
-    rho, rho_sigma, noise_scale = 0.0, 0.0, 1.0
+        return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1))
+    rho, rho_sigma = 0.0, 0.0
     likely = np.array([flicker or 0.0])
     for _ in range(ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN):
         data = whitened(series, signal, rho)
-        curve, offsets, leverage = _monotone_curve(data, weights)
+        curve, offsets, leverage = monotone_curve(data, weights)
         dof = max(series.n_frames - float(leverage.sum()), 1.0)
         if len(weights) > 1:
             weights, curve = _channel_weights(data, curve, offsets)
@@ -117,10 +114,7 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
             rho, rho_sigma, dof, likely = _flicker(series, signal, offsets, leverage)
         else:
             rho = flicker
-    if not series.sigma_given:
-        residual = series.inverse_sigma * (series.values - signal - offsets)
-        noise_scale = float(np.sqrt((residual**2).sum() / dof))
-    return Envelope(series, signal, weights, offsets, dof, rho, rho_sigma, likely, noise_scale)
+    return Envelope(series, signal, weights, offsets, dof, rho, rho_sigma, likely)
 
 
 def _first_weights(series: DecaySeries) -> FloatArray:
@@ -131,10 +125,18 @@ def _first_weights(series: DecaySeries) -> FloatArray:
     return weights / weights.max() if weights.max() > 0 else np.ones_like(weights)
 
 
-def _monotone_curve(
+def monotone_curve(
     data: WhitenedSeries, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the curve (n,), the offsets (C,) and their leverage on each frame (n,)."""
+    """Return the best completely monotone curve (n,), offsets (C,) and their leverage (n,).
+
+    Parameters
+    ----------
+    data
+        Series in units of its noise.
+    weights
+        Weights of the channels, shape (C,).
+    """
     series = data.series
     problem = projection(data, weights)
     low, high = series.log_rate_bounds

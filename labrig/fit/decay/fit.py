@@ -1,7 +1,6 @@
 """Fit of rates and amplitudes to the frames of a decay: `fit_decay`."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,18 +10,17 @@ from labrig.fit.decay.alternative_models import ALTERNATIVES, fit_alternative, f
 from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
 from labrig.fit.decay.result import DecayFit, assemble
+from labrig.fit.decay.scatter import with_scatter_sigma
 from labrig.fit.decay.selection import CLEAR_BIC, bic, choose_states
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
-from labrig.results import AlternativeModel, Candidate
+from labrig.results import AlternativeModel, Candidate, ScatterSigma
 
 #: Iterations in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
 REWEIGHTED_ENOUGH = 1e-9
-#: Scatter below which data are exact up to rounding.
-EXACT = 1e-13
 FEWEST_FOR_FLICKER = 6
 MAX_STATES = 8
 
@@ -57,8 +55,8 @@ def fit_decay(
         Signals linear in light with the dark level subtracted, shape (n,) or (n, C), in any unit.
     sigma
         Standard uncertainties of the values without flicker, > 0, broadcast to `values`; inf
-        excludes a value. None, for a single channel only, estimates one σ for all values from the
-        scatter.
+        excludes a value. None, for a single channel only, estimates them from the scatter about the
+        best monotone curve, whatever the number of states; flicker is part of it and must be 0.
     exposure_s
         Length of the exposures in seconds, ≥ 0, a scalar or of shape (n,).
     channels
@@ -121,15 +119,14 @@ def fit_decay(
     fixed = _log_rates(fixed_rates, series.span_s)
     numbers = _numbers_of_states(series, n_states, max_states, len(fixed))
     _check_flicker(series, flicker)
+    scatter: ScatterSigma | None = None
+    if not series.sigma_given:
+        series, scatter = with_scatter_sigma(series)
     smooth = envelope(series, flicker)
     series = smooth.series
-    if not series.sigma_given:
-        scale = max(smooth.noise_scale, EXACT)
-        series = replace(series, inverse_sigma=series.inverse_sigma / scale)
     data = whitened(series, smooth.signal, smooth.flicker)
     refuse_if_rising(data, smooth.weights)
-    noise_estimated = flicker is None or not series.sigma_given
-    noise_dof = smooth.dof if noise_estimated else np.inf
+    noise_dof = scatter.dof if scatter else smooth.dof if flicker is None else np.inf
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
     alternative_models = _alternatives(data, chosen)
     best = min(alternative_models, key=lambda alternative: alternative.bic)
@@ -141,6 +138,7 @@ def fit_decay(
         chosen,
         Evidence(
             noise=smooth,
+            scatter=scatter,
             noise_dof=noise_dof,
             candidates=tuple(tried),
             alternative_models=alternative_models,
@@ -192,7 +190,7 @@ def _numbers_of_states(
 
 
 def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
-    if flicker is None and not series.sigma_given:
+    if flicker != 0 and not series.sigma_given:
         raise FitError(
             "expected σ of the values to tell flicker from other noise, got none; "
             "give σ, or set the flicker to 0"

@@ -17,7 +17,7 @@ from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
-from labrig.results import AlternativeModel, Candidate, DecayState
+from labrig.results import AlternativeModel, Candidate, DecayState, ScatterSigma
 
 RISING_SIGMAS = 5.0
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
@@ -32,6 +32,8 @@ class Evidence:
     ----------
     noise, noise_dof
         Envelope, and its degrees of freedom if σ or flicker were estimated from it, else inf.
+    scatter
+        Uncertainties of the values from their scatter; None if they were given.
     candidates, alternative_models
         Numbers of states and other models that were tried.
     better_model
@@ -42,6 +44,7 @@ class Evidence:
 
     noise: Envelope
     noise_dof: float
+    scatter: ScatterSigma | None
     candidates: tuple[Candidate, ...]
     alternative_models: tuple[AlternativeModel, ...]
     better_model: AlternativeModel | None
@@ -105,19 +108,17 @@ def warnings_about(
     """
     series, joint = data.series, fit.joint
     warnings = []
-    if not series.sigma_given:
-        scatter = np.sqrt(joint.chi2 / max(fit.dof(data), 1)) * series.peak
-        scatter /= series.inverse_sigma.max()
-        warnings.append(
-            f"σ was not given: taken as {scatter:.3g} for all values, from their scatter; "
-            "give each value's σ for the right weights"
-        )
     if fit.dof(data) <= 0:
         warnings.append(
             "there are no more values than parameters: nothing is left to test the fit with; "
             "record more frames"
         )
-    if evidence.noise_dof < FEWEST_NOISE_DOF:
+    if evidence.noise_dof < FEWEST_NOISE_DOF and evidence.scatter:
+        warnings.append(
+            f"σ was taken from the scatter of {max(evidence.noise_dof, 0):.0f} values to spare: "
+            "give each value's σ in a column sigma, or record more frames"
+        )
+    elif evidence.noise_dof < FEWEST_NOISE_DOF:
         warnings.append(
             f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
             "signal: give a flicker measured elsewhere, or record more frames while it is bright"
@@ -126,7 +127,8 @@ def warnings_about(
     if fit.n_states < requested:
         warnings.append(
             f"{requested} states were asked for, the data support {fit.n_states}: "
-            "the others' amplitude is zero; ask for fewer or take more light"
+            f"the others' amplitude is zero; ask for fewer (--states {fit.n_states}) or take more "
+            "light"
         )
     alternative = evidence.better_model
     if alternative is not None:
@@ -137,12 +139,14 @@ def warnings_about(
             "do not extrapolate them beyond the times recorded"
         )
     advice = (
-        "allow more states"
+        f"allow more states (--states {fit.n_states + 1})"
         if fit.n_states < evidence.max_states
         else "look for another law of decay"
     )
     warnings += misfit_warnings(
-        _misfit(data, fit, evidence), fit.n_states, f"{advice}, and check background and times"
+        _misfit(data, fit, evidence),
+        fit.n_states,
+        f"{advice}, and check background and times (labrig fit decay --offset, --origin, --from)",
     )
     warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.selection import bic
@@ -21,11 +20,15 @@ class DecayFit(FittedDecay):
 
     Attributes
     ----------
+    sigma
+        Standard uncertainties of the values without flicker, in their unit: those given, or those
+        from their scatter, in the order given, shape (n, C); inf where left out.
     residuals, normalised_residuals
         Value − model, one row per frame in the order given, one column per channel: in the values'
         unit, and whitened (independent, of unit variance if the noise is as assumed).
     """
 
+    sigma: FloatArray
     residuals: FloatArray
     normalised_residuals: FloatArray
 
@@ -33,7 +36,7 @@ class DecayFit(FittedDecay):
 def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayFit:
     """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
-    fitted_covariance = _fitted_covariance(fit, data, evidence.noise)
+    fitted_covariance = _fitted_covariance(fit, data, evidence)
     covariance, log_rate_covariance = _covariances(fit, data, fitted_covariance)
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates[order]) / series.span_s
@@ -51,6 +54,9 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     residuals = np.empty_like(series.values)
     residual = series.values - fit.signal(series) - joint.offsets
     residuals[series.order] = residual * series.frame_levels
+    sigma_used = np.empty_like(series.values)
+    with np.errstate(divide="ignore"):
+        sigma_used[series.order] = series.frame_levels * series.peak / series.inverse_sigma
     kept = [*range(2 * fit.n_states), 2 * fit.n_states + int(np.argmax(joint.weights))]
     normalised = np.empty_like(series.values)
     n_values = series.values.size
@@ -78,22 +84,24 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         candidates=evidence.candidates,
         alternative_models=evidence.alternative_models,
         better_model=evidence.better_model,
+        scatter=evidence.scatter,
+        sigma=sigma_used,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
     )
 
 
-def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, noise: Envelope) -> FloatArray:
+def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> FloatArray:
     """Return the covariance of the fitted parameters (p, p), with the noise's uncertainty in it.
 
     An estimated flicker is marginalised: the covariance is the mean over its likely values. Where
     flicker dominates and is known with ν degrees of freedom, the normal distribution becomes
-    Student's t.
+    Student's t, as it does where σ is the scatter's: then the variance is ν/(ν − 2) times larger.
     """
-    covariance = fit.joint.least_squares.covariance
-    if not data.series.sigma_given:
-        dof = fit.dof(data)
-        return covariance * (fit.joint.chi2 / dof if dof > 0 else np.inf)
+    covariance, noise = fit.joint.least_squares.covariance, evidence.noise
+    if evidence.scatter is not None:
+        dof = evidence.scatter.dof
+        return covariance * (dof / (dof - 2) if dof > 2 else np.inf)
     if len(noise.likely_flickers) == 1:
         return covariance
     signal = fit.signal(data.series)

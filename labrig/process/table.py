@@ -1,0 +1,141 @@
+"""Result and report of another program's table, as those of a run."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+
+from labrig.analyse import FittedTable, TableFitOptions
+from labrig.errors import DiskError
+from labrig.process.provenance import library_versions
+from labrig.process.run import Processed, new_result, put_in_place
+from labrig.record import RunDescription
+from labrig.report import Report, table_sections, write_report
+from labrig.results import DecayPatch, DecayResult, write_result
+from labrig.yaml_file import write_yaml
+
+
+class TableProvenance(BaseModel):
+    """Content of the `provenance.yaml` of a table's result.
+
+    Attributes
+    ----------
+    labrig
+        Version of labrig.
+    libraries
+        Versions of the libraries by name.
+    table, sha256
+        File name and checksum of the table.
+    options
+        Options of the fit.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    labrig: str
+    libraries: dict[str, str]
+    table: str
+    sha256: str
+    options: dict[str, str]
+
+
+def report_table(
+    table: Path, fitted: Sequence[FittedTable], options: TableFitOptions, folder: Path
+) -> Processed:
+    """Write the result and the report of a table to the folder `result` in `folder`.
+
+    An earlier result that differs is kept as `result-1`, `result-2`, …, as that of a run is.
+
+    Parameters
+    ----------
+    table
+        Path of the table.
+    fitted
+        Fits of the table, by `labrig.analyse.fit_table`.
+    options
+        Options of the fit.
+    folder
+        Folder, made if there is none.
+
+    Returns
+    -------
+    Processed
+        Result, path of the report, and changes since the result before.
+
+    Raises
+    ------
+    DiskError
+        A file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.analyse import TableFitOptions, fit_table
+    >>> from labrig.process import report_table
+    >>> table, options = Path("series.csv"), TableFitOptions()
+    >>> processed = report_table(table, fit_table(table, options), options, Path("my-decay"))
+    >>> processed.report.as_posix()
+    'my-decay/result/report.html'
+    """
+    result = DecayResult(
+        patches={
+            part.region or table.stem: DecayPatch(
+                region=None,
+                series=part.series,
+                fit=part.fit,
+                normalised_residuals=part.fit.normalised_residuals,
+            )
+            for part in fitted
+        },
+        states_requested=options.states,
+        warnings=tuple(
+            f"{part.region}: {text}" if len(fitted) > 1 else text
+            for part in fitted
+            for text in part.fit.warnings
+        ),
+    )
+    provenance = TableProvenance(
+        labrig=version("labrig"),
+        libraries=library_versions(),
+        table=table.name,
+        sha256=hashlib.sha256(table.read_bytes()).hexdigest(),
+        options={name: str(value) for name, value in asdict(options).items() if value is not None},
+    )
+    about = RunDescription(
+        title=table.stem,
+        protocol="decay",
+        run=table.name,
+        started="",
+        ended="",
+        rig="",
+        simulated=False,
+        labrig_version=provenance.labrig,
+        libraries=tuple(provenance.libraries.items()),
+        sample=(("SHA-256", provenance.sha256), *_uncertainties(fitted, options)),
+    )
+    sections, methods = table_sections(result, about)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        result_folder = new_result(folder)
+    except OSError as error:
+        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+    write_yaml(result_folder / "provenance.yaml", provenance)
+    write_result(result_folder, result)
+    report = Report(about, result.warnings, sections, methods)
+    write_report(result_folder / "report.html", report)
+    changes = put_in_place(result_folder)
+    return Processed(result, folder / "result" / "report.html", (), changes)
+
+
+def _uncertainties(
+    fitted: Sequence[FittedTable], options: TableFitOptions
+) -> tuple[tuple[str, str], ...]:
+    """Return where the uncertainties of the values came from."""
+    if fitted[0].fit.scatter is not None:
+        source = str(fitted[0].fit.scatter)
+    else:
+        source = "counting, √counts" if options.weights == "counts" else "the table"
+    return (("σ of the values", source),)

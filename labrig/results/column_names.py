@@ -1,0 +1,103 @@
+"""Names of columns in tables from anywhere: times and their units, uncertainties, row numbers."""
+
+import re
+
+#: Names of a column of times, in lower case and without a unit.
+_TIMES = frozenset(
+    {
+        "t", "time", "times", "elapsed", "elapsed time", "decay time", "delay", "delay time",
+        "zeit", "zeitpunkt", "messzeit", "verzögerung", "temps", "durée", "tempo", "tiempo",
+        "t_s", "seconds", "second", "sec", "sekunden", "secondes", "minutes", "minuten", "hours",
+        "stunden", "milliseconds", "millisekunden",
+    }
+)  # fmt: skip
+#: Name of the abscissa, if no column is called a time.
+ABSCISSA = "x"
+#: Units of time in seconds by their names, in lower case.
+_UNITS_S = {
+    unit: seconds
+    for seconds, units in (
+        (1e-12, ("ps",)),
+        (1e-9, ("ns", "nanoseconds")),
+        (1e-6, ("us", "µs", "μs", "microseconds")),
+        (1e-3, ("ms", "msec", "milliseconds", "millisekunden")),
+        (1.0, ("s", "sec", "second", "seconds", "sek", "sekunden", "secondes")),
+        (60.0, ("min", "mins", "minute", "minutes", "minuten")),
+        (3600.0, ("h", "hr", "hrs", "hour", "hours", "std", "stunden", "heures")),
+        (86400.0, ("d", "day", "days", "tage", "jours")),
+    )
+    for unit in units
+}
+#: Names of an uncertainty, in lower case.
+_SIGMA = (
+    r"sigma|σ|±|\+/-|\+-|errors?|err|std|std\.? ?dev\.?|stdev|standard deviation|standard error|"
+    r"uncertainty|uncert|unc|s\.?d\.?|s\.?e\.?|u|δ|delta|fehler|unsicherheit|abweichung|"
+    r"standardabweichung|erreur|incertitude|[dy]?error|y ?err|dy"
+)
+_SIGMA_ALONE = re.compile(_SIGMA)
+_SIGMA_AFTER = re.compile(rf"(?P<of>.+?)(?:[\s_.\-]+(?:{_SIGMA})|\s*[±σ])")
+_SIGMA_BEFORE = re.compile(
+    rf"(?:(?:{_SIGMA})[\s_.\-]+(?:(?:of|in|von|de)\s+)?|[±σδ]\s*|d_)(?P<of>.+)"
+)
+_SIGMA_OF = re.compile(rf"(?:{_SIGMA})\s*\((?P<of>.+)\)")
+_ROW_NUMBERS = frozenset({"", "#", "no", "no.", "nr", "nr.", "n", "index", "point", "row", "id"})
+#: Forms of a name with its unit: `time (s)`, `I [a.u.]`, `t / s`, `Zeit in s`, `time_ms`.
+_WITH_UNIT = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"(?P<name>.*\S)\s*[(\[]\s*(?P<unit>[^()\[\]]*?)\s*[)\]]",
+        r"(?P<name>.*\S)\s*/\s*(?P<unit>\S.*)",
+        r"(?P<name>.*\S)\s*,?\s+in\s+(?P<unit>\S+)",
+    )
+)
+_TIME_WITH_UNIT = re.compile(r"(?P<name>.*[^\s_.,])[\s_.,]+(?P<unit>[^\s_.,]+)")
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Divide a name such as `I [a.u.]` or `time / s` into name and unit, which may be empty."""
+    name = " ".join(name.split())
+    for form in _WITH_UNIT:
+        if match := form.fullmatch(name):
+            return match["name"], match["unit"]
+    return name, ""
+
+
+def time_unit_s(unit: str) -> float | None:
+    """Return a unit of time in seconds; None if it is none."""
+    return _UNITS_S.get(unit.strip(" ()[]/.").lower())
+
+
+def split_time(name: str) -> tuple[str, str] | None:
+    """Divide the name of a column of times into name and unit; None if it is no name of times."""
+    base, unit = split_unit(name)
+    if base.lower() in _TIMES:
+        return base, unit or (base if time_unit_s(base) is not None else "")
+    match = _TIME_WITH_UNIT.fullmatch(base)
+    if match and match["name"].lower() in _TIMES and time_unit_s(match["unit"]) is not None:
+        return match["name"], match["unit"]
+    return None
+
+
+def is_time(name: str) -> bool:
+    """Return whether a column of that name holds times."""
+    return split_time(name) is not None
+
+
+def is_row_number(name: str) -> bool:
+    """Return whether a column of that name may number the rows."""
+    return name.lower() in _ROW_NUMBERS
+
+
+def is_sigma(name: str) -> bool:
+    """Return whether a column of that name holds the uncertainty of another one."""
+    return _SIGMA_ALONE.fullmatch(split_unit(name)[0].lower()) is not None
+
+
+def sigma_of(name: str) -> str | None:
+    """Return the name, in lower case, of the column whose uncertainty `name` says it is."""
+    lower = " ".join(name.lower().split())
+    for text in (lower, split_unit(lower)[0]):
+        for form in (_SIGMA_OF, _SIGMA_AFTER, _SIGMA_BEFORE):
+            if match := form.fullmatch(text):
+                return match["of"].strip()
+    return None

@@ -1,0 +1,75 @@
+"""σ of values that come without, and of the rates that follow.
+
+The bounds fail at a σ that is 20 % too large or too small: the standard error of each figure is a
+third of the distance or less. Many more cases and seeds: `tests.acceptance.coverage_table_sigma`.
+"""
+
+import numpy as np
+import pytest
+
+from labrig.errors import FitError
+from labrig.fit import fit_decay
+from tests.acceptance.coverage_table_sigma import DECAYS, NOISES, coverage
+from tests.fit import truths
+
+T_S = np.linspace(0.5, 200, 60)
+SEEDS = range(100, 160)
+
+
+@pytest.mark.parametrize("noise", ["constant", "2000 counts"])
+@pytest.mark.parametrize("decay", ["1 state", "2 states"])
+def test_sigma_of_values_and_rates_is_right(decay: str, noise: str) -> None:
+    found = coverage(DECAYS[decay], NOISES[noise], len(T_S), SEEDS)
+    # 60 values of each of 60 seeds: the standard error of the ratio is below 2 %.
+    assert 0.92 < found.sigma_ratio < 1.1
+    assert found.refused == 0
+    # One figure for all rates, 60 or 120 pulls; its standard error is 7 to 9 %.
+    assert 0.83 < np.sqrt(np.mean(found.pulls**2)) < 1.2
+
+
+@pytest.mark.parametrize("noise", ["constant", "2000 counts"])
+@pytest.mark.parametrize("decay", ["power law", "stretched exponential"])
+def test_a_decay_of_another_law_is_not_taken_for_noise(decay: str, noise: str) -> None:
+    found = coverage(DECAYS[decay], NOISES[noise], len(T_S), range(100, 120))
+    assert 0.9 < found.sigma_ratio < 1.12
+
+
+def test_sigma_does_not_grow_with_the_misfit_of_too_few_states() -> None:
+    rng = np.random.default_rng(3)
+    values = DECAYS["2 states"].signal(T_S) + 0.003 * rng.normal(size=len(T_S))
+    fit = fit_decay(T_S, values, None, n_states=1)
+    assert np.median(fit.sigma) == pytest.approx(0.003, rel=0.2)
+    assert fit.reduced_chi2 > 50
+    assert any("does not describe this decay" in text for text in fit.warnings)
+
+
+def test_noise_of_counting_is_told_from_constant_noise() -> None:
+    rng = np.random.default_rng(4)
+    t_s = np.linspace(0, 200, 400)
+    counts = rng.poisson(2000 * np.exp(-0.03 * t_s)).astype(np.float64)
+    scatter = fit_decay(t_s, counts, None).scatter
+    assert scatter is not None
+    assert scatter.at_brightest == pytest.approx(np.sqrt(2000), rel=0.2)
+    assert scatter.at_faintest < 5
+    assert 380 < scatter.dof < 399
+
+
+def test_sigma_has_the_unit_of_the_values_and_their_order() -> None:
+    rng = np.random.default_rng(5)
+    values = truths.exponentials((0.03, 1.0))(T_S) + 0.01 * rng.normal(size=len(T_S))
+    fit = fit_decay(T_S, values, None)
+    shuffled = rng.permutation(len(T_S))
+    other = fit_decay(T_S[shuffled], 1e6 * values[shuffled], None)
+    assert other.sigma == pytest.approx(1e6 * fit.sigma[shuffled], rel=1e-6)
+    assert other.states[0].k_r_sigma_per_s == pytest.approx(fit.states[0].k_r_sigma_per_s, rel=1e-6)
+
+
+def test_a_few_values_without_sigma_leave_the_rate_open() -> None:
+    fit = fit_decay([0.0, 10.0, 20.0], [1.0, 0.62, 0.35], None)
+    assert np.isinf(fit.states[0].k_r_sigma_per_s)
+    assert any("a column sigma" in text for text in fit.warnings)
+
+
+def test_flicker_needs_sigma() -> None:
+    with pytest.raises(FitError, match="to tell flicker from other noise"):
+        fit_decay(T_S, np.exp(-0.03 * T_S), None, flicker=0.007)
