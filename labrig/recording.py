@@ -12,6 +12,7 @@ from labrig.execution import Watch, execute
 from labrig.optics import read_camera
 from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run
+from labrig.run_log import run_log
 from labrig.yaml_file import yaml_text
 
 #: Free disk space required besides the frames: journal, results, report.
@@ -92,7 +93,7 @@ class Recording:
                 bench.disk,
             )
             try:
-                with folder:
+                with folder, run_log(folder.path, self.rig.name, bench.clock):
                     execute(folder, self.protocol, bench, self.plan, watch)
             except BaseException:
                 if not folder.read().attempts:  # no device was reached, nothing happened
@@ -118,6 +119,7 @@ def resume_run(path: Path, watch: Watch) -> Path:
     with (
         open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as bench,
         RunFolder(path, bench.seed, bench.disk) as folder,
+        run_log(path, rig.name, bench.clock),
     ):
         execute(folder, protocol, bench, run_plan, watch)
     return path

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from labrig.cli.completion import complete_protocol
+
 app = typer.Typer(help="The protocols that can be run.")
 
 
@@ -36,7 +38,13 @@ def _summary(text: str) -> str:
 
 @app.command("new")
 def new_protocol(
-    name: Annotated[str, typer.Argument(help="A shipped protocol, see 'labrig protocol list'.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A shipped protocol, see 'labrig protocol list'.",
+            autocompletion=complete_protocol,
+        ),
+    ],
     file: Annotated[
         Path | None, typer.Argument(help="Path of the new file.", show_default="./my-NAME.yaml")
     ] = None,
