@@ -22,6 +22,8 @@ from labrig.record.run_record import RunRecord, run_record
 
 #: File by which a run folder is recognised.
 PROTOCOL = "protocol.yaml"
+#: Time to wait for the lock: who only looks whether a run is being written holds it for a moment.
+LOCK_TIMEOUT_S = 0.5
 
 
 class RunFolder:
@@ -50,7 +52,7 @@ class RunFolder:
         self._disk = disk
         self._lock = FileLock(path / ".lock")
         try:
-            self._lock.acquire(timeout=0)
+            self._lock.acquire(timeout=LOCK_TIMEOUT_S)
         except Timeout:
             raise UsageError(f"{path}: another labrig is writing to this run") from None
         except OSError as error:
