@@ -3,6 +3,7 @@
 pyserial's own time-outs count on the system's clock, so ports are opened non-blocking.
 """
 
+import logging
 from collections.abc import Callable
 
 import serial
@@ -20,6 +21,8 @@ LATEST_ANSWER_S = 0.25
 DRAIN_S = 1.0
 #: Interval of polling while draining.
 DRAIN_POLL_S = 0.01
+
+_logger = logging.getLogger(__name__)
 
 
 class SerialLine:
@@ -50,6 +53,7 @@ class SerialLine:
         DeviceLostError
             The device is gone.
         """
+        _logger.debug("to %s: %r", self._name, data)
         try:
             self._port.write(data)
         except serial.SerialTimeoutException:
@@ -95,6 +99,8 @@ class SerialLine:
                 quiet_since_s = self._clock.now()
             else:
                 self._clock.sleep(DRAIN_POLL_S)
+        if received:
+            self._log(received)
         return received
 
     def read_burst(self, quiet_s: float) -> bytes:
@@ -118,7 +124,11 @@ class SerialLine:
                 )
             if not byte:
                 self._clock.sleep(POLL_S)
+        self._log(received)
         return received
+
+    def _log(self, received: bytes) -> None:
+        _logger.debug("from %s: %r", self._name, received)
 
     def _read_byte(self) -> bytes:
         try:

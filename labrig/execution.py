@@ -34,6 +34,7 @@ from labrig.errors import (
 )
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
+from labrig.run_log import LoggedObserver
 from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 from labrig.trial_frame import offers_with_frame_size
 
@@ -75,7 +76,8 @@ def execute(
     record = folder.read()
     done = record.completed()
     # More signals while the attempt is being closed must not cut that short.
-    with interrupting(bench.clock), watch(laid_out, list(done), bench.clock) as observer:
+    with interrupting(bench.clock), watch(laid_out, list(done), bench.clock) as watching:
+        observer = LoggedObserver(watching)
         for unit in interrupted_units:
             observer.warn(f"the unit {unit} was cut off and is done again")
         for oddity in _oddities(folder, record):

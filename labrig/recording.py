@@ -19,6 +19,7 @@ from labrig.bench_optics import require_optics
 from labrig.errors import DiskError, UsageError
 from labrig.execution import Watch, execute
 from labrig.record import RunFolder, RunSize, read_run, size_text
+from labrig.run_log import run_log
 from labrig.yaml_file import yaml_text
 
 
@@ -84,7 +85,7 @@ class Recording:
                 bench.disk,
             )
             try:
-                with folder:
+                with folder, run_log(folder.path, self.rig.name, bench.clock):
                     execute(folder, self.protocol, bench, self.plan, watch)
             except BaseException:
                 if not folder.read().attempts:  # no device was reached, nothing happened
@@ -114,6 +115,7 @@ def resume_run(path: Path, watch: Watch) -> Path:
     with (
         open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as bench,
         RunFolder(path, bench.seed, bench.disk) as folder,
+        run_log(path, rig.name, bench.clock),
     ):
         execute(folder, protocol, bench, run_plan, watch)
     return path

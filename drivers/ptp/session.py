@@ -1,5 +1,6 @@
 """One PTP session: transactions of command, data and response, each answered before the next."""
 
+import logging
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -29,6 +30,8 @@ FIRST_BACK_OFF_S = 0.02
 LONGEST_BACK_OFF_S = 0.5
 #: More than any answer but a frame: an EOS lists its properties in some 20 kB.
 MAX_ANSWER_BYTES = 4 * 1024 * 1024
+
+_logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,7 @@ class Session:
         self._next_id = 0
         self._under_way: int | None = None
         self._lost_by: int | None = None
+        self._logged: tuple[IntEnum, tuple[int, ...], int, int] | None = None
 
     def open(self) -> bool:
         """Open the session; return whether one was open already, left by a program that died.
@@ -153,6 +157,7 @@ class Session:
             sent_s = self._clock.now()
             response, incoming = self._exchange(operation, params, data, timeouts, most_bytes)
             answered_s = self._clock.now()
+            self._log(operation, params, response, len(incoming), answered_s - sent_s)
             if response.code == OK:
                 return Reply(response.params, incoming, sent_s, answered_s)
             if response.code in SESSION_LOST:
@@ -205,6 +210,27 @@ class Session:
         self._under_way = None
         self._lost_by = None
         self.open()
+
+    def _log(
+        self,
+        operation: IntEnum,
+        params: tuple[int, ...],
+        response: Container,
+        received_bytes: int,
+        took_s: float,
+    ) -> None:
+        """Log a transaction; the same one with the same answer, as in polling, only once."""
+        exchange = (operation, params, response.code, received_bytes)
+        if exchange != self._logged:
+            self._logged = exchange
+            _logger.debug(
+                "%s%s: %s, %d bytes, after %.3f s",
+                operation_text(operation),
+                "".join(f" 0x{param:X}" for param in params),
+                "OK" if response.code == OK else response_text(response.code),
+                received_bytes,
+                took_s,
+            )
 
     def _open(self) -> None:
         self._next_id = 0  # OpenSession is transaction 0, the session's first is 1

@@ -1,5 +1,6 @@
 """The runner: performs the units of a protocol and records them in the run folder."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
@@ -21,6 +22,8 @@ from labrig.record import (
 )
 
 T = TypeVar("T")
+
+_logger = logging.getLogger(__name__)
 
 
 class RunObserver(Observer, Protocol):
@@ -175,6 +178,7 @@ class _Recorder:
         wall, unit = self._clock.wall, self._writer.unit
         record = ActionRecord(unit, device, action, wall(start_s), wall(end_s), late_s, task)
         self._writer.action(record)
+        _logger.info("%s: %s", device, action)
         self.kept_actions.append(record)
 
     def temperature(self, celsius: float, at_s: float) -> None:

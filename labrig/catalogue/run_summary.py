@@ -18,6 +18,8 @@ RunStatus = Literal["running", "interrupted", "failed", "recorded", "processed",
 STATUSES: tuple[RunStatus, ...] = get_args(RunStatus)
 #: Statuses of a run of which units are missing, in which it may be running at another moment.
 INCOMPLETE: frozenset[RunStatus] = frozenset({"running", "interrupted", "failed"})
+#: Time for which a lock has to be held to be that of a run: who only looks holds it for a moment.
+LOOK_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ def is_being_written(folder: Path) -> bool:
     if not lock.exists():
         return False
     try:
-        with FileLock(lock, timeout=0):
+        with FileLock(lock, timeout=LOOK_S, poll_interval=LOOK_S / 20):
             return False
     except Timeout:
         return True

@@ -22,7 +22,6 @@ from labrig.cli import (
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.completion import complete_material
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -18,6 +20,7 @@ PredictOption = Annotated[
         metavar="[PATCH=]MATERIAL",
         help="Expected σ of its rates, instead of the timeline: a shipped material, a file, or "
         "RUN/result/material.yaml, which knows camera and brightness. Repeatable.",
+        autocompletion=complete_material,
     ),
 ]
 LikeOption = Annotated[

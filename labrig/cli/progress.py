@@ -1,5 +1,6 @@
 """Progress of a run: present action, next step, lab time left."""
 
+import logging
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -23,6 +24,7 @@ from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
+from labrig.run_log import logging_to
 from labrig.watch import Previews, RenderedPreview
 
 #: Width of the last frame's thumbnail in characters.
@@ -37,6 +39,7 @@ def progress(
     *,
     yes: bool = False,
     has_changer: bool = False,
+    verbose: bool = False,
 ) -> Iterator[RunObserver]:
     """Create an observer that reports to the terminal, or to a log, on standard error.
 
@@ -52,6 +55,8 @@ def progress(
         Whether the rig's changer does the manual steps; no person is asked then.
     has_changer
         Whether the rig has a changer.
+    verbose
+        Whether to print the run's log instead of its progress.
 
     Raises
     ------
@@ -65,6 +70,10 @@ def progress(
             "--yes, or on a simulated rig that has one: --rig sim-phosphor"
         )
     state = _State(plan, done, clock, yes=yes)
+    if verbose:
+        with logging_to(logging.StreamHandler(DetachableStream(sys.stderr)), clock):
+            yield LogProgress(state)
+        return
     if not sys.stderr.isatty():
         yield PlainProgress(state)
         return
@@ -176,6 +185,13 @@ class PlainProgress:
     def _print(self, text: str) -> None:
         time_left = _countdown(self._state.left_s())
         print(f"[{time_left} left] {text}", file=DetachableStream(sys.stderr), flush=True)
+
+
+class LogProgress(PlainProgress):
+    """Progress of a run whose log is printed, which tells the same and more."""
+
+    def _print(self, text: str) -> None:
+        pass
 
 
 class LiveProgress:

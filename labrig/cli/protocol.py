@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from labrig.cli.completion import complete_protocol
+
 app = typer.Typer(help="The protocols that can be run.")
 
 
@@ -39,7 +41,8 @@ def new_protocol(
     name: Annotated[
         str,
         typer.Argument(
-            help="A shipped protocol, see 'labrig protocol list'; with --python the new one's name."
+            help="A shipped protocol, see 'labrig protocol list'; with --python a new name.",
+            autocompletion=complete_protocol,
         ),
     ],
     file: Annotated[

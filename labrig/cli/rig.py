@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labrig.cli import view
+from labrig.cli import default_rig, view
+from labrig.cli.default_rig import RigArgument, rig_path
 from labrig.errors import DeviceError, ProtocolError
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def list_devices(
 
 @app.command("check")
 def check(
-    rig: Annotated[str, typer.Argument(help="A shipped rig, such as 'sim', or a path.")],
+    rig: RigArgument = None,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """Connect, identify, look for settings that spoil photometry, exercise gently, leave safe.
@@ -55,12 +56,11 @@ def check(
     """
     from json import dumps
 
-    from labrig import resources
     from labrig.acquire import read_rig_file
     from labrig.bench import open_bench
     from labrig.setup import check_rig
 
-    path = resources.find("config", "rig", rig)
+    path = rig_path(rig)
     with open_bench(read_rig_file(path), str(path)) as bench:
         report = check_rig(bench)
     if json:
@@ -71,6 +71,7 @@ def check(
 
 
 app.command("view")(view.view)
+app.command("use")(default_rig.use)
 
 
 def _print_discovery(discovery: "Discovery") -> None:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.completion import complete_protocol, complete_run
+from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
@@ -14,10 +16,11 @@ if TYPE_CHECKING:
     from labrig.recording import Recording
 
 Protocol = Annotated[
-    str, typer.Argument(help="A shipped protocol, such as 'decay', or a path to a YAML file.")
-]
-RigOption = Annotated[
-    str, typer.Option("--rig", help="A shipped rig, such as 'sim', or a path to a YAML file.")
+    str,
+    typer.Argument(
+        help="A shipped protocol, such as 'decay', or a path to a YAML file.",
+        autocompletion=complete_protocol,
+    ),
 ]
 Runs = Annotated[Path, typer.Option("--runs", help="Folder in which run folders are created.")]
 NoProcess = Annotated[
@@ -28,14 +31,23 @@ Yes = Annotated[
     bool,
     typer.Option("--yes", help="Non-interactive: the rig's 'changer' does the manual steps."),
 ]
+Verbose = Annotated[
+    bool,
+    typer.Option(
+        "--verbose",
+        help="Print every command to a device, its answer and every decision with the time, as in "
+        "the run's log.txt.",
+    ),
+]
 
 
 def run(
     protocol: Protocol,
-    rig: RigOption,
+    rig: RigOption = None,
     runs: Runs = Path("runs"),
     yes: Yes = False,
     no_process: NoProcess = False,
+    verbose: Verbose = False,
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
@@ -45,14 +57,15 @@ def run(
     recording = _prepared(protocol, rig, runs)
     with notify_at_end(recording.rig.on_finish) as ending:
         has_changer = "changer" in recording.rig.devices
-        folder = recording.record(partial(progress, yes=yes, has_changer=has_changer))
+        watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
+        folder = recording.record(watch)
         _finish(folder, no_process, json)
         ending.message = str(folder)
 
 
 def plan(
     protocol: Protocol,
-    rig: RigOption,
+    rig: RigOption = None,
     runs: Runs = Path("runs"),
     predict: PredictOption = None,
     like: LikeOption = None,
@@ -85,7 +98,10 @@ def plan(
 
 def resume(
     run: Annotated[
-        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+        Path,
+        typer.Argument(
+            help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
+        ),
     ],
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     yes: Yes = False,
@@ -94,6 +110,7 @@ def resume(
         bool,
         typer.Option("--on-finish", help="Run the command in 'on_finish' of the run's rig.yaml."),
     ] = False,
+    verbose: Verbose = False,
     json: Json = False,
 ) -> None:
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
@@ -106,7 +123,8 @@ def resume(
     folder = find_run(run, runs)
     path = folder / "rig.yaml"
     rig = read_rig_file(path) if path.is_file() else None
-    watch = partial(progress, yes=yes, has_changer=rig is not None and "changer" in rig.devices)
+    has_changer = rig is not None and "changer" in rig.devices
+    watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
     command = None if rig is None else rig.on_finish
     if isinstance(command, tuple) and not on_finish:
         typer.echo(
@@ -120,14 +138,12 @@ def resume(
         ending.message = str(folder)
 
 
-def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":
+def _prepared(protocol: str, rig: str | None, runs: Path) -> "Recording":
     from labrig import resources
     from labrig.recording import Recording
 
     recording = Recording.prepare(
-        resources.find("protocols", "protocol", protocol),
-        resources.find("config", "rig", rig),
-        runs,
+        resources.find("protocols", "protocol", protocol), rig_path(rig), runs
     )
     for note in recording.notes():
         typer.echo(f"note: {note}", err=True)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from labrig.cli.completion import complete_protocol, complete_run
+
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
     from labrig.results import Measured
@@ -29,9 +31,16 @@ app = typer.Typer(
 )
 
 Runs = Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")]
-Run = Annotated[Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")]
+Run = Annotated[
+    Path,
+    typer.Argument(
+        help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
+    ),
+]
 Sample = Annotated[str, typer.Option(help="Only samples of this name; * stands for anything.")]
-Protocol = Annotated[str, typer.Option(help="Only runs of this protocol.")]
+Protocol = Annotated[
+    str, typer.Option(help="Only runs of this protocol.", autocompletion=complete_protocol)
+]
 Since = Annotated[
     datetime | None,
     typer.Option(formats=["%Y-%m-%d"], help="Only runs of this day or later."),

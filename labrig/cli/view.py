@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
+from labrig.cli.default_rig import RigArgument, rig_path
+
 
 def view(
-    rig: Annotated[
-        str, typer.Argument(help="A shipped rig, such as 'sim', or a path to a YAML file.")
-    ],
+    rig: RigArgument = None,
     protocol: Annotated[
         Path | None,
         typer.Option("--protocol", help="Your protocol file; regions are written into it."),
@@ -22,7 +22,6 @@ def view(
     ] = False,
 ) -> None:
     """Live view for aiming and focus, regions drawn into a protocol. Ctrl-C ends it."""
-    from labrig import resources
     from labrig.setup import view_rig
 
     def tell(url: str) -> None:
@@ -32,4 +31,4 @@ def view(
 
             webbrowser.open(url)
 
-    view_rig(resources.find("config", "rig", rig), protocol, port, tell)
+    view_rig(rig_path(rig), protocol, port, tell)

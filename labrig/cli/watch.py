@@ -5,10 +5,15 @@ from typing import Annotated
 
 import typer
 
+from labrig.cli.completion import complete_run
+
 
 def watch(
     run: Annotated[
-        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+        Path,
+        typer.Argument(
+            help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
+        ),
     ] = Path("last"),
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     port: Annotated[

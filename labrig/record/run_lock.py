@@ -14,6 +14,9 @@ from filelock import FileLock, Timeout
 from labrig.clock import SystemClock
 from labrig.errors import DiskError, UsageError
 
+#: Time to wait for a lock: who only looks whether it is held, holds it for a moment.
+LOCK_TIMEOUT_S = 0.5
+
 
 class RunLock:
     """The right of one process to change a run folder, held until it is released or ends.
@@ -44,7 +47,7 @@ class RunLock:
         self._lock = FileLock(path)
         holder = path.with_suffix(".holder")
         try:
-            self._lock.acquire(timeout=0)
+            self._lock.acquire(timeout=LOCK_TIMEOUT_S)
         except Timeout:
             raise UsageError(
                 f"{path.parent}: another labrig is {activity}{_holder_text(holder)}; wait until it "

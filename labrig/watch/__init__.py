@@ -1,6 +1,8 @@
-"""Display of a run while it is recorded, from outside the dark room."""
+"""Display of a run while it is recorded, from outside the dark room.
 
-from labrig.watch.previews import Previews, RenderedPreview
-from labrig.watch.server import watch_run
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = ["Previews", "RenderedPreview", "watch_run"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

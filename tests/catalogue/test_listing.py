@@ -3,6 +3,8 @@
 import json
 import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -179,3 +181,16 @@ def test_a_folder_that_cannot_be_written_is_listed_as_well(tmp_path: Path) -> No
     (tmp_path / INDEX).mkdir()  # a file cannot take its place, not even for the superuser
     assert statuses(tmp_path) == statuses(tmp_path) == ["interrupted"]
     assert sorted(path.name for path in tmp_path.glob(f"{INDEX}*")) == [INDEX]
+
+
+def test_lists_made_at_the_same_time_agree(tmp_path: Path) -> None:
+    for _ in range(5):
+        add_fit(record_run(tmp_path, decay(), ["success"]), 0.05)
+    settle(tmp_path)
+    command = [sys.executable, "-m", "labrig", "runs", "list", "--json", "--runs", str(tmp_path)]
+    together = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+    listed = {process.communicate()[0] for process in together}
+    assert len(listed) == 1
+    assert len(json.loads(listed.pop())) == 5
+    assert [path.name for path in tmp_path.glob(f"{INDEX}*")] == [INDEX]
+    assert list_runs(tmp_path, RunFilter()) == in_order(summaries(tmp_path))

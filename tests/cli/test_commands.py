@@ -104,9 +104,7 @@ def test_a_duplicate_key_is_named_with_its_line(labrig: Labrig, tmp_path: Path) 
     one_line(labrig("plan", path, "--rig", "sim"), 2, "line 3", "'every' stands twice")
 
 
-@pytest.mark.parametrize(
-    "arguments", [["frobnicate"], ["run"], ["run", "decay"], ["plan", "decay", "--rgi", "sim"]]
-)
+@pytest.mark.parametrize("arguments", [["frobnicate"], ["run"], ["plan", "decay", "--rgi", "sim"]])
 def test_wrong_usage(labrig: Labrig, arguments: list[str]) -> None:
     one_line(labrig(*arguments), 2, "see labrig --help")
 

@@ -1,0 +1,49 @@
+"""What a shell may complete: names of protocols, rigs, materials and runs.
+
+No file is opened, since a person waits for the answer; an unreadable folder has no names.
+"""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+def complete_protocol(incomplete: str) -> list[str]:
+    """Return the shipped protocols that begin so."""
+    return [name for name in _shipped("protocols") if name.startswith(incomplete)]
+
+
+def complete_rig(incomplete: str) -> list[str]:
+    """Return the shipped rigs that begin so."""
+    return [name for name in _shipped("config") if name.startswith(incomplete)]
+
+
+def complete_material(incomplete: str) -> list[str]:
+    """Return the shipped materials that begin so."""
+    return [name for name in _shipped("config/materials") if name.startswith(incomplete)]
+
+
+def complete_run(ctx: Any, incomplete: str) -> list[str]:
+    """Return the names of the runs that begin so, in the folder given by `--runs`."""
+    runs = Path(ctx.params.get("runs") or "runs")
+    names = ["last", *sorted(_folders(runs), reverse=True)]
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def _shipped(place: str) -> list[str]:
+    try:
+        files = [path for path in (_PACKAGE / place).iterdir() if path.suffix in (".yaml", ".yml")]
+    except OSError:
+        return []
+    return sorted(path.stem for path in files)
+
+
+def _folders(runs: Path) -> Iterator[str]:
+    try:
+        with os.scandir(runs) as entries:
+            yield from (entry.name for entry in entries if entry.is_dir())
+    except OSError:
+        return

@@ -1,0 +1,154 @@
+"""The rig that commands use where none is given: of the environment, or chosen by `rig use`."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labrig.cli.completion import complete_rig
+from labrig.errors import UsageError
+
+#: Environment variable with a rig, which has priority over the one that was chosen.
+VARIABLE = "LABRIG_RIG"
+
+RigOption = Annotated[
+    str | None,
+    typer.Option(
+        "--rig",
+        help="A shipped rig, such as 'sim', or a path to a YAML file; by default that of 'labrig "
+        "rig use'.",
+        autocompletion=complete_rig,
+    ),
+]
+RigArgument = Annotated[
+    str | None,
+    typer.Argument(
+        help="A shipped rig, such as 'sim', or a path to a YAML file; by default that of 'labrig "
+        "rig use'.",
+        autocompletion=complete_rig,
+    ),
+]
+
+
+@dataclass(frozen=True)
+class DefaultRig:
+    """A rig that needs not be given.
+
+    Attributes
+    ----------
+    name
+        Name of a shipped rig, or path of a file.
+    source
+        Where it was chosen, in words.
+    """
+
+    name: str
+    source: str
+
+    def path(self) -> Path:
+        """Return the path of the rig's file.
+
+        Raises
+        ------
+        UsageError
+            It is gone, or was misspelt in the environment variable.
+        """
+        from labrig import resources
+
+        try:
+            return resources.find("config", "rig", self.name)
+        except UsageError as error:
+            raise UsageError(
+                f"{error}; it is the default rig, by {self.source}: choose another one "
+                "(labrig rig use FILE), or give --rig"
+            ) from None
+
+
+def default_rig() -> DefaultRig | None:
+    """Return the default rig, None if there is none."""
+    if name := os.environ.get(VARIABLE):
+        return DefaultRig(name, f"the environment variable {VARIABLE}")
+    choice = _choice_file()
+    try:
+        name = choice.read_text(encoding="utf-8").strip()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(
+            f"{choice}: the default rig cannot be read ({error}); choose it again: "
+            "labrig rig use FILE"
+        ) from None
+    return DefaultRig(name, "'labrig rig use'") if name else None
+
+
+def rig_path(rig: str | None) -> Path:
+    """Return the file of a rig as given, or else of the default rig, which is then printed.
+
+    Raises
+    ------
+    UsageError
+        There is no such rig, or none was given and there is no default.
+    """
+    from labrig import resources
+
+    if rig is not None:
+        return resources.find("config", "rig", rig)
+    default = default_rig()
+    if default is None:
+        raise UsageError(
+            "expected a rig, got none: give one, such as --rig sim or --rig ./my-rig.yaml, or make "
+            "yours the default: labrig rig use ./my-rig.yaml"
+        )
+    path = default.path()
+    typer.echo(f"rig: {default.name}, by {default.source}", err=True)
+    return path
+
+
+def use(
+    rig: Annotated[
+        str | None,
+        typer.Argument(
+            help="A shipped rig, such as 'sim', or a path.",
+            autocompletion=complete_rig,
+            show_default=False,
+        ),
+    ] = None,
+    forget: Annotated[bool, typer.Option("--forget", help="Have no default rig.")] = False,
+) -> None:
+    """Make a rig the default of all commands; without RIG, print which it is and who says so.
+
+    The environment variable LABRIG_RIG has priority over this choice.
+    """
+    if forget and rig is not None:
+        raise UsageError(f"--forget: expected no rig beside it, got '{rig}'")
+    if forget:
+        _choice_file().unlink(missing_ok=True)
+    elif rig is not None:
+        _choose(rig)
+    default = default_rig()
+    if default is None:
+        typer.echo("there is no default rig; choose one: labrig rig use ./my-rig.yaml")
+        return
+    default.path()
+    typer.echo(f"{default.name}, by {default.source}")
+
+
+def _choose(rig: str) -> None:
+    from labrig import resources
+    from labrig.acquire import read_rig_file
+
+    path = resources.find("config", "rig", rig)
+    read_rig_file(path)  # a mistake in it is better found now
+    is_shipped = resources.names("config").get(rig) == path
+    choice = _choice_file()
+    choice.parent.mkdir(parents=True, exist_ok=True)
+    part = choice.with_name(f"{choice.name}.{os.getpid()}.part")
+    part.write_text((rig if is_shipped else str(path.absolute())) + "\n", encoding="utf-8")
+    part.replace(choice)
+
+
+def _choice_file() -> Path:
+    """Return the file with the chosen rig in the folder of this user's settings."""
+    return Path(typer.get_app_dir("labrig")) / "rig.txt"

@@ -1,0 +1,7 @@
+from .previews import (
+    Previews as Previews,
+    RenderedPreview as RenderedPreview,
+)
+from .server import (
+    watch_run as watch_run,
+)
