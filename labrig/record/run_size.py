@@ -6,9 +6,11 @@ from typing import Self
 
 from labrig.errors import DiskError
 
-#: Journal, tables and NeXus file, per frame; and report, figures and fits, per patch.
+#: Journal, tables and NeXus file, per frame; report, figures and fits, per patch; and what is kept
+#: of the pictures in the report, for the next processing.
 RECORDS_PER_FRAME_BYTES = 5_000
 RESULTS_PER_PATCH_BYTES = 2_000_000
+PICTURES_BYTES = 24_000_000
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,7 @@ class RunSize:
     frames_bytes
         Size of the frames in bytes.
     results_bytes
-        Size of all else in bytes: journal, notes, results.
+        Size of all else in bytes: journal, notes, results, what is kept of reduced frames.
     """
 
     frames: int
@@ -33,7 +35,7 @@ class RunSize:
     def expected(cls, frames: int, frame_bytes: int, patches: int) -> Self:
         """Return the size to be expected of a run with that many frames and patches."""
         results_bytes = frames * RECORDS_PER_FRAME_BYTES + patches * RESULTS_PER_PATCH_BYTES
-        return cls(frames, frames * frame_bytes, results_bytes)
+        return cls(frames, frames * frame_bytes, results_bytes + PICTURES_BYTES)
 
     @classmethod
     def measured(cls, folder: Path) -> Self:
