@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy.typing as npt
 import pytest
 import rawpy
 
+from labrig.record import FrameRecord, damaged_frames
 from labrig.reduce import SeriesFrame, measure, read_raw, reduce_patches
 from labrig.sim.dng import Shot, encode_dng
 from tests.benchmarks.lossless_jpeg import encode_compressed_dng
@@ -24,7 +26,9 @@ REGIONS = {
     "whole frame": (0.0, 0.0, 1.0, 1.0),
 }
 SHOT = Shot(1.7e9, 1.0, 400, 4.0)
-FRAMES = 6
+FRAMES = 14
+#: Frames of a run that is processed again; nothing depends on their size.
+MANY = 500
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +70,7 @@ def test_one_frame(region: str, dng: tuple[str, bytes], against: Against) -> Non
 
 
 def test_a_run(dng: tuple[str, bytes], against: Against, tmp_path: Path) -> None:
-    """From files, with dark frames and their hot pixels: what `labrig process` does."""
+    """From files, with dark frames and their hot pixels, in workers: what `labrig process` does."""
     kind, content = dng
     paths = []
     for number in range(FRAMES):
@@ -82,8 +86,39 @@ def test_a_run(dng: tuple[str, bytes], against: Against, tmp_path: Path) -> None
 
     against(
         lambda: reduce_patches(frames, {"sample": REGIONS["half by half"]}, darks),
-        {"rawpy decodes": peer},
+        {"rawpy decodes in one process": peer},
         rounds=3,
         what=f"21 MP {kind}, half by half, {FRAMES - 2} frames, 2 darks",
         each=FRAMES,
+    )
+
+
+def test_a_run_again(mosaic: Mosaic, against: Against, tmp_path: Path) -> None:
+    """What is left to do when a run is fitted again: checksums are trusted, numbers are kept."""
+    (tmp_path / "frames").mkdir()
+    records = []
+    for number in range(MANY):
+        path = tmp_path / "frames" / f"{number:06d}.dng"
+        content = encode_dng(mosaic[:416, :624], SHOT) + b"%06d" % number
+        path.write_bytes(content)
+        records.append(
+            FrameRecord(
+                path, sha256(content).hexdigest(), len(content), "decay-1", "decay", 1.0, 400, 4.0,
+                5.0 * number, 5.0 * number + 1, 0.0,
+            )
+        )  # fmt: skip
+    frames = [
+        SeriesFrame(record.path, record.start_time, 1.0, sha256=record.sha256) for record in records
+    ]
+
+    def again() -> None:
+        assert not damaged_frames(tmp_path, records)
+        reduce_patches(frames, {"sample": REGIONS["half by half"]})
+
+    against(
+        again,
+        {"stat of each file": lambda: [record.path.stat() for record in records]},
+        rounds=5,
+        what=f"reducing {MANY} frames again",
+        each=MANY,
     )
