@@ -34,6 +34,12 @@ def test_a_decay_of_another_law_is_not_taken_for_noise(decay: str, noise: str) -
     assert 0.9 < found.sigma_ratio < 1.12
 
 
+def test_rates_of_too_few_states_scatter_by_their_sigma() -> None:
+    """Three exponentials in a power law: without the misfit's curvature σ is a third too small."""
+    found = coverage(DECAYS["power law"], NOISES["2000 counts"], 100, range(100, 160))
+    assert 0.83 < np.sqrt(np.mean(found.pulls**2)) < 1.25
+
+
 def test_sigma_does_not_grow_with_the_misfit_of_too_few_states() -> None:
     rng = np.random.default_rng(3)
     values = DECAYS["2 states"].signal(T_S) + 0.003 * rng.normal(size=len(T_S))

@@ -6,6 +6,7 @@ import numpy as np
 
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.joint import weight_sigma
+from labrig.fit.decay.misfit_covariance import with_misfit
 from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
@@ -97,11 +98,13 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     An estimated flicker is marginalised: the covariance is the mean over its likely values. Where
     flicker dominates and is known with ν degrees of freedom, the normal distribution becomes
     Student's t, as it does where σ is the scatter's: then the variance is ν/(ν − 2) times larger.
+    There a misfit of the model is allowed for, too.
     """
     covariance, noise = fit.joint.least_squares.covariance, evidence.noise
     if evidence.scatter is not None:
         dof = evidence.scatter.dof
-        return covariance * (dof / (dof - 2) if dof > 2 else np.inf)
+        student = dof / (dof - 2) if dof > 2 else np.inf
+        return with_misfit(covariance, fit, data, noise) * student
     if len(noise.likely_flickers) == 1:
         return covariance
     signal = fit.signal(data.series)
