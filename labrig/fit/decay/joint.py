@@ -5,11 +5,12 @@ The model is w_c h(t; θ) + b_c: a shape h shared by all channels, times one wei
 channel's weight is held at 1, which fixes the scale of h.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import (
     FloatArray,
@@ -166,12 +167,36 @@ class JointProblem:
         return residuals, jacobian
 
 
-def covariance_under(data: WhitenedSeries, shape: Shape, fit: JointFit) -> FloatArray:
-    """Return the covariance of the parameters of `fit` for the noise of `data`."""
+def covariances_under(
+    series: DecaySeries, shape: Shape, fit: JointFit, matrices: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Return the covariance of the parameters of `fit` for each of several noises.
+
+    Parameters
+    ----------
+    series
+        The series, whose offsets have priors.
+    shape
+        Function that returns h and its Jacobian.
+    fit
+        The fit.
+    matrices
+        Whitening matrices of each noise, shape (n, C, C).
+    """
+    h, slopes = shape(fit.shape)
     others = [c for c in range(len(fit.weights)) if c != fit.brightest]
-    problem = JointProblem(data, shape, len(fit.shape), others)
-    _, jacobian = problem.residuals(fit.least_squares.parameters)
-    return parameter_covariance(jacobian)[0]
+    q, first_offset = len(fit.shape), len(fit.shape) + len(others)
+    n_parameters = first_offset + len(series.fitted_offsets)
+    model = np.zeros((series.n_frames, len(fit.weights), n_parameters))
+    model[:, :, :q] = fit.weights[:, None] * slopes[:, None, :]
+    model[:, others, range(q, first_offset)] = h[:, None]
+    model[:, series.fitted_offsets, range(first_offset, n_parameters)] = 1.0
+    priors = np.zeros((len(series.offset_prior), n_parameters))
+    priors[:, first_offset:] = series.offset_prior
+    return [
+        parameter_covariance(np.vstack([(whitening @ model).reshape(-1, n_parameters), priors]))[0]
+        for whitening in matrices
+    ]
 
 
 def weight_sigma(fit: JointFit, covariance: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.misfit_covariance import with_misfit
 from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
-from labrig.fit.decay.whitening import WhitenedSeries, whitened
+from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
 from labrig.results import DecayState, FittedDecay
@@ -108,11 +108,10 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     if len(noise.likely_flickers) == 1:
         return covariance
     signal = fit.signal(data.series)
-    covariances = [
-        fit.covariance_under(whitened(data.series, signal, flicker))
-        for flicker in noise.likely_flickers
+    matrices = [
+        whitening_matrices(data.series, signal, flicker) for flicker in noise.likely_flickers
     ]
-    return np.asarray(np.mean(covariances, axis=0))
+    return np.asarray(np.mean(fit.covariances_under(data.series, matrices), axis=0))
 
 
 def _covariances(

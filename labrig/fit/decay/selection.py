@@ -18,8 +18,9 @@ from labrig.results import Candidate
 #: Significance level of a further state of known rate. Searching the rate adds false positives,
 #: the BIC removes some: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
 F_TEST_LEVEL = 0.002
-#: Gain in χ² that a creeping candidate may still reach: hardly ever more than 2.
-CREEPING_GAIN = 4.0
+#: Gain in χ² that a creeping candidate may still reach where fewer states fit well already, hardly
+#: ever more than 2; and the reduced χ² below which they do.
+CREEPING_GAIN, GOOD_REDUCED_CHI2 = 4.0, 1.5
 #: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
 
@@ -75,8 +76,9 @@ def choose_states(
             break
         chosen = fit
         weights, offsets = fit.joint.weights, fit.joint.offsets
-        penalty = 2 * float(np.log(data.independent_data(weights)))
-        needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
+        if fit.joint.least_squares.reduced_chi2 < GOOD_REDUCED_CHI2:
+            penalty = 2 * float(np.log(data.independent_data(weights)))
+            needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
     return chosen, tried
 
 

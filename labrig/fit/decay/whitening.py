@@ -106,14 +106,7 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         Relative flicker ρ ≥ 0.
     """
     measured = series.inverse_sigma > 0
-    matrices = series.whiteners
-    if flicker > 0:
-        u = flicker * np.einsum("fcd,fd->fc", matrices, signal)
-        root = np.sqrt(1 + np.einsum("fc,fc->f", u, u))
-        # (1 + u uᵀ)^(−1/2) = 1 − u uᵀ / (root (1 + root)), without dividing by |u|.
-        shrink = u / (root * (1 + root))[:, None]
-        along = np.einsum("fc,fcd->fd", u, matrices)
-        matrices = matrices - shrink[:, :, None] * along[:, None, :]
+    matrices = whitening_matrices(series, signal, flicker)
     own_variance = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
     values = np.einsum("fcd,fd->fc", matrices, series.values)
     fitted = series.fitted_offsets
@@ -126,3 +119,16 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         offset_design=np.vstack([matrices[:, :, fitted].reshape(values.size, -1), prior]),
         variance=np.where(measured, own_variance + (flicker * signal) ** 2, np.inf),
     )
+
+
+def whitening_matrices(series: DecaySeries, signal: FloatArray, flicker: float) -> FloatArray:
+    """Return one W per frame with Wᵀ W = Cov⁻¹, shape (n, C, C); the arguments are as above."""
+    matrices = series.whiteners
+    if flicker > 0:
+        u = flicker * np.einsum("fcd,fd->fc", matrices, signal)
+        root = np.sqrt(1 + np.einsum("fc,fc->f", u, u))
+        # (1 + u uᵀ)^(−1/2) = 1 − u uᵀ / (root (1 + root)), without dividing by |u|.
+        shrink = u / (root * (1 + root))[:, None]
+        along = np.einsum("fc,fcd->fd", u, matrices)
+        matrices = matrices - shrink[:, :, None] * along[:, None, :]
+    return matrices
