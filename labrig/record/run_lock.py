@@ -45,13 +45,13 @@ class RunLock:
 
     def __init__(self, path: Path, activity: str) -> None:
         self._lock = FileLock(path)
-        holder = path.with_suffix(".holder")
+        self._holder = path.with_suffix(".holder")
         try:
             self._lock.acquire(timeout=LOCK_TIMEOUT_S)
         except Timeout:
+            holder = _holder_text(self._holder)
             raise UsageError(
-                f"{path.parent}: another labrig is {activity}{_holder_text(holder)}; wait until it "
-                "has ended"
+                f"{path.parent}: another labrig is {activity}{holder}; wait until it has ended"
             ) from None
         except OSError as error:
             raise DiskError(
@@ -59,10 +59,12 @@ class RunLock:
             ) from None
         content = {"pid": os.getpid(), "host": socket.gethostname(), "since": SystemClock().wall()}
         with suppress(OSError):  # it only helps others
-            holder.write_text(json.dumps(content), encoding="utf-8")
+            self._holder.write_text(json.dumps(content), encoding="utf-8")
 
     def release(self) -> None:
         """Release the lock for other processes."""
+        with suppress(OSError):  # the next holder writes its own
+            self._holder.unlink()
         with suppress(OSError):  # the system lets go of it when labrig ends
             self._lock.release()
 

@@ -1,7 +1,8 @@
 """What was reduced from the frames of a run, kept in the run folder for the next time.
 
 Each reduction, with its arguments, has a file of its own in the folder `cache`. A file that is
-damaged counts as missing; all of them may be deleted without loss.
+damaged counts as missing; all of them may be deleted without loss. Files that other code made, such
+as an older labrig, are deleted when the reduction is kept anew.
 """
 
 import json
@@ -38,14 +39,11 @@ class KeptReductions:
 
     def __init__(self, run: Path, reduction: Any) -> None:
         kind = type(reduction)
-        identity = {
-            "reduction": f"{kind.__module__}.{kind.__qualname__}",
-            "arguments": json.loads(encoded(reduction)),
-            "code": _code_checksum(kind.__module__),
-        }
-        checksum = _checksum(json.dumps(identity))
-        self._path = run / CACHE / f"{kind.__qualname__}-{checksum[:16]}.jsonl"
-        self._identity = checksum
+        name, code = f"{kind.__module__}.{kind.__qualname__}", _code_checksum(kind.__module__)
+        arguments = _checksum(f"{name} {encoded(reduction)}")
+        self._name, self._ending = kind.__qualname__, f"{code[:16]}.jsonl"
+        self._path = run / CACHE / f"{self._name}-{arguments[:16]}-{self._ending}"
+        self._identity = f"{arguments} {code}"
         self._texts = self._read()
         self._new = 0
 
@@ -69,6 +67,9 @@ class KeptReductions:
         with suppress(OSError, DiskError):
             self._path.parent.mkdir(exist_ok=True)
             write_durably(self._path, (head + content).encode())
+            for path in self._path.parent.glob(f"{self._name}-*.jsonl"):
+                if not path.name.endswith(self._ending):
+                    path.unlink()
         self._new = 0
 
     def _read(self) -> dict[str, str]:

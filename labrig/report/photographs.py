@@ -13,7 +13,6 @@ from labrig.number_format import exposure_text, rounded
 from labrig.record import FrameRecord
 from labrig.reduce import (
     MakeThumbnail,
-    Picture,
     Reduction,
     SaturatedFraction,
     Thumbnail,
@@ -148,7 +147,7 @@ def daylight_picture(
     view = None if frame is None else _reduced(frame, MakeThumbnail(DAYLIGHT_WIDTH))
     if frame is None or view is None:
         return None
-    linear = into_gamut(_to_screen(view, view.rgb, screen.lamp_lit))
+    linear = into_gamut(_to_screen(view, view.rgb.astype(np.float64), screen.lamp_lit))
     # How well it was exposed does not matter here: what is bright should look bright.
     linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
@@ -185,7 +184,8 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
         if view is not None:
             has_saturation = (view.saturated > SATURATED_CELL_FRACTION)[..., np.newaxis]
             exposure_factor = _exposure_factor(photograph.frame)
-            linear = into_gamut(_to_screen(view, view.rgb / exposure_factor, screen.glow))
+            picture = view.rgb.astype(np.float64) / exposure_factor
+            linear = into_gamut(_to_screen(view, picture, screen.glow))
             prepared.append((photograph, linear, has_saturation))
     if not prepared:
         return ()
@@ -230,7 +230,7 @@ def _exposure_factor(frame: FrameRecord) -> float:
 
 
 def _to_screen(
-    view: Thumbnail, picture: Picture, matrix: NDArray[np.float64]
+    view: Thumbnail, picture: NDArray[np.float64], matrix: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return a picture in linear sRGB by a colour matrix; a grey one is returned unchanged."""
     return np.asarray(picture @ (np.eye(3) if view.is_grey else matrix).T)

@@ -21,8 +21,6 @@ from pathlib import Path
 
 import yaml
 
-from labrig import resources
-
 RUNS = 5000
 PATCHES = 50
 FRAMES = 16
@@ -59,6 +57,11 @@ class Labrig:
     def timed(self, *arguments: object) -> Times:
         """Run a command of labrig in its folder."""
         return self._timed([self.python, "-m", "labrig", *map(str, arguments)])[0]
+
+    def shipped(self, kind: str) -> Path:
+        """Return the folder of its shipped files of a kind."""
+        code = f"from labrig import resources; print(resources.folder({kind!r}))"
+        return Path(self._timed([self.python, "-c", code])[1])
 
     def fit(self, series: Path) -> Times:
         """Fit a series again and again in one process; the least time."""
@@ -109,7 +112,7 @@ def record(labrig: Labrig, protocol: str, rig: str, protocol_changes: Mapping[st
         ("protocols", protocol, protocol_changes),
         ("config", rig, {}),
     ):
-        content = yaml.safe_load((resources.folder(kind) / f"{name}.yaml").read_text())
+        content = yaml.safe_load((labrig.shipped(kind) / f"{name}.yaml").read_text())
         if kind == "config":
             # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
             content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}

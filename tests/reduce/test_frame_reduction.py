@@ -101,7 +101,17 @@ def test_a_value_comes_back_to_the_last_bit(value: Anything) -> None:
     }
 
 
-@pytest.mark.parametrize("text", ["", "{", "[1]", '{"dtype":"O","shape":[1],"base64":"AAAA"}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[1]",
+        '{"dtype":"O","shape":[1],"zlib":"AAAA"}',
+        '{"dtype":"<f8","shape":[1],"zlib":"AAAA"}',
+        '{"dtype":"<f8","shape":[1],"zlib":"?"}',
+    ],
+)
 def test_a_text_that_is_no_such_value_is_refused(text: str) -> None:
     with pytest.raises(ValueError):  # noqa: PT011
         decoded(text, Anything)
@@ -180,6 +190,18 @@ def test_a_damaged_file_is_made_again(run: Sequence[SeriesFrame], damage: str) -
     )
     assert reduce_frames(run, MeanLevel()) == first
     assert file.read_bytes() == intact
+
+
+def test_what_other_code_kept_is_deleted(run: Sequence[SeriesFrame]) -> None:
+    reduce_frames(run, MeanLevel())
+    (file,) = kept_files(run)
+    older = file.with_name(f"{file.name[: -len('0.jsonl')]}x.jsonl")
+    older.write_bytes(file.read_bytes())
+    other = file.with_name("OtherReduction-0-0.jsonl")
+    other.write_bytes(b"")
+    reduce_frames(run, MeanLevel(2.0))
+    assert older not in kept_files(run)
+    assert {file, other} < {*kept_files(run)}
 
 
 def test_nothing_is_kept_of_frames_without_checksum_or_run(
