@@ -5,7 +5,6 @@ model of such. Text, unlike a pickle, cannot run anything when it is read.
 """
 
 import json
-import zlib
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -16,9 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 #: Keys of an array.
-_ARRAY = {"dtype", "shape", "zlib"}
-#: Level of compression: what there is to gain is gained by the quickest.
-_QUICKLY = 1
+_ARRAY = {"dtype", "shape", "base64"}
 #: Kinds of numbers in arrays: bool, signed and unsigned integer, float.
 _NUMBERS = "biuf"
 
@@ -50,8 +47,8 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 def _plain(value: Any) -> Any:
     """Return a value in JSON's own types."""
     if isinstance(value, np.ndarray):
-        content = b64encode(zlib.compress(value.tobytes(), _QUICKLY)).decode("ascii")
-        return {"dtype": value.dtype.str, "shape": list(value.shape), "zlib": content}
+        content = b64encode(value.tobytes()).decode("ascii")
+        return {"dtype": value.dtype.str, "shape": list(value.shape), "base64": content}
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, BaseModel):
@@ -71,9 +68,5 @@ def _array_or_object(content: dict[str, Any]) -> Any:
     dtype = np.dtype(content["dtype"])
     if dtype.kind not in _NUMBERS:
         raise ValueError(f"expected an array of numbers, got one of {dtype}")
-    try:
-        data = zlib.decompress(b64decode(content["zlib"], validate=True))
-    except zlib.error as error:
-        raise ValueError(f"expected a compressed array, got none ({error})") from None
-    array = np.frombuffer(data, dtype)
+    array = np.frombuffer(b64decode(content["base64"], validate=True), dtype)
     return array.reshape(content["shape"]).copy()

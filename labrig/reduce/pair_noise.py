@@ -35,6 +35,8 @@ FEWEST_DOF = 50
 SCALED_SIGMAS = 5.0
 #: Least fraction of the σ by a frame alone: frames without noise are no measurement of it.
 MIN_FRACTION = 0.1
+#: Multiple of the brightness in the pairs up to which their noise tells that of a brighter frame.
+MAX_EXTRAPOLATION = 2.0
 #: Iterations of the weights by the fitted noise.
 REWEIGHTINGS = 4
 #: Regularisation that keeps a correlation below 1.
@@ -231,7 +233,9 @@ def _sigma_of_means(
 ) -> Floats:
     """Return σ of the means of one channel in DN, shape (n,), from pairs of frames.
 
-    The uneven part is proportional to the light but not common to the patch.
+    The uneven part is proportional to the light but not common to the patch. A frame much brighter
+    than all pairs keeps the σ by itself alone: scaled to a dark frame, it leaves none of its noise
+    in the difference.
     """
     scales, differences = _differences(frames, frames.sigma, first, second)
     scale, difference, sigma = scales[:, channel], differences[:, channel], frames.sigma[:, channel]
@@ -246,4 +250,7 @@ def _sigma_of_means(
         expected = variance[second] + np.square(scale) * variance[first]
         noise = NoiseModel.fit(pair_terms, scatter, sigma_dn2=expected)
         variance = np.maximum(noise.variance_dn2(light), least)
-    return np.sqrt(variance)
+    pair_light = (light[second] + np.square(scale) * light[first]) / (1 + np.square(scale))
+    is_bright = light > SCALED_SIGMAS * sigma
+    is_beyond = is_bright & (light > MAX_EXTRAPOLATION * pair_light.max())
+    return np.where(is_beyond, sigma, np.sqrt(variance))

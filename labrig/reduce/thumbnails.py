@@ -10,9 +10,6 @@ from labrig.reduce.frame import LinearFrame, saturated_cells
 from labrig.reduce.pictures import binned, is_grey, small
 from labrig.reduce.raw import RawFrame
 
-#: Half precision: 11 bits at any brightness, finer than what a screen shows.
-SmallPicture = NDArray[np.float16]
-
 
 @dataclass(frozen=True, eq=False)
 class Thumbnail:
@@ -21,9 +18,10 @@ class Thumbnail:
     Attributes
     ----------
     rgb
-        R, G and B above black as fractions of the saturation level, shape (rows, columns, 3).
-    saturated
-        Fraction of the cells in each pixel that are saturated, shape (rows, columns).
+        R, G and B above black as fractions of the saturation level, shape (rows, columns, 3). Half
+        precision, 11 bits at any brightness, is finer than what a screen shows.
+    is_saturated
+        Whether most cells in each pixel are saturated, shape (rows, columns).
     is_grey
         Whether the sensor is monochrome.
     width, height
@@ -32,8 +30,8 @@ class Thumbnail:
         Camera by EXIF; None where absent.
     """
 
-    rgb: SmallPicture
-    saturated: SmallPicture
+    rgb: NDArray[np.float16]
+    is_saturated: NDArray[np.bool_]
     is_grey: bool
     width: int
     height: int
@@ -58,7 +56,7 @@ class MakeThumbnail:
         raw = next(frames)
         return Thumbnail(
             small(binned(raw), self.columns).astype(np.float16),
-            small(saturated_cells(raw).astype(np.float32), self.columns).astype(np.float16),
+            small(saturated_cells(raw).astype(np.float32), self.columns) > 0.5,
             is_grey(raw),
             raw.width,
             raw.height,

@@ -29,8 +29,6 @@ DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
 #: Largest fraction of saturated pixels in a well exposed daylight photograph; for display only.
 CLIPPED_FRACTION = 0.002
-#: Fraction of saturated cells above which a pixel is shown as saturated; for display only.
-SATURATED_CELL_FRACTION = 0.5
 #: Quantile of the pixels that is shown at full brightness, so that hot pixels have no influence.
 BRIGHT_QUANTILE = 0.995
 #: Linear level to which this quantile is scaled in a daylight photograph.
@@ -182,7 +180,7 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
     views = _thumbnails([photograph.frame for photograph in photographs])
     for photograph, view in zip(photographs, views, strict=True):
         if view is not None:
-            has_saturation = (view.saturated > SATURATED_CELL_FRACTION)[..., np.newaxis]
+            has_saturation = view.is_saturated[..., np.newaxis]
             exposure_factor = _exposure_factor(photograph.frame)
             picture = view.rgb.astype(np.float64) / exposure_factor
             linear = into_gamut(_to_screen(view, picture, screen.glow))

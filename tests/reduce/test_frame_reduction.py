@@ -107,9 +107,9 @@ def test_a_value_comes_back_to_the_last_bit(value: Anything) -> None:
         "",
         "{",
         "[1]",
-        '{"dtype":"O","shape":[1],"zlib":"AAAA"}',
-        '{"dtype":"<f8","shape":[1],"zlib":"AAAA"}',
-        '{"dtype":"<f8","shape":[1],"zlib":"?"}',
+        '{"dtype":"O","shape":[1],"base64":"AAAA"}',
+        '{"dtype":"<f8","shape":[1],"base64":"AAAA"}',
+        '{"dtype":"<f8","shape":[1],"base64":"?"}',
     ],
 )
 def test_a_text_that_is_no_such_value_is_refused(text: str) -> None:

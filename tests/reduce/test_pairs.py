@@ -195,6 +195,20 @@ def test_clipped_frames_are_in_no_pair(tmp_path: Path, write_dng: WriteDng) -> N
     assert np.mean(seen.sigma / expected_sigma(seen)) == pytest.approx(1, abs=0.07)
 
 
+def test_a_bright_frame_before_dark_ones_tells_its_own_noise(
+    tmp_path: Path, write_dng: WriteDng
+) -> None:
+    """Scaled to a dark frame, it leaves nothing of its noise in the difference."""
+    ratios = []
+    for seed in range(30, 38):
+        times_s = [0.0, *(400.0 + TIMES_S)]
+        series = reduce_series(recorded(tmp_path, write_dng, seed, times_s=times_s), PATCH)
+        ratios.append(series.sigma / expected_sigma(series))
+    assert np.median(ratios, axis=0)[0] == pytest.approx(1, abs=0.25)
+    assert np.max(np.abs(np.log(ratios)[:, 0])) < np.log(2)
+    assert np.median(ratios, axis=0)[1:].mean() == pytest.approx(1, abs=0.1)
+
+
 def test_few_frames_say_each_for_itself(tmp_path: Path, write_dng: WriteDng) -> None:
     frames = recorded(tmp_path, write_dng, 4, times_s=TIMES_S[:3])
     series = reduce_series(frames, PATCH)

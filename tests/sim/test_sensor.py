@@ -56,6 +56,25 @@ def test_few_photons_are_poisson_distributed(steady: Sensor, electrons: float) -
     assert skew == pytest.approx(electrons, rel=0.3, abs=0.5)
 
 
+def test_single_photons_fall_where_the_light_is(steady: Sensor) -> None:
+    light = np.broadcast_to(np.linspace(0.02, 0.9, SHAPE[1]), SHAPE).astype(np.float32)
+    gain, dark = gain_electrons_per_dn(6400), np.zeros(SHAPE, dtype=np.float32)
+    lit, unlit = (
+        np.array(
+            [
+                steady.expose(electrons, 0.01, 6400, COOL_C, np.random.default_rng([seed, n]))
+                for n in range(60)
+            ],
+            dtype=float,
+        )
+        for seed, electrons in ((11, light), (12, dark))
+    )
+    mean = gain * (lit - unlit).mean(axis=(0, 1))
+    assert np.polyfit(light[0], mean, 1) == pytest.approx([1, 0], abs=0.03)
+    variance = gain**2 * (lit.var(axis=0, ddof=1) - unlit.var(axis=0, ddof=1)).mean(axis=0)
+    assert np.polyfit(light[0], variance, 1) == pytest.approx([1, 0], abs=0.1)
+
+
 def test_all_light_of_a_frame_flickers_together() -> None:
     sensor = Sensor(np.random.default_rng(5), np.ones((64, 96)), flicker=0.007)
     light = np.full((64, 96), 9000.0, dtype=np.float32)
