@@ -128,10 +128,12 @@ def _as_fitted(problem: ExcitationProblem, fit: FittedExcitation, reference: int
 
 
 def _minimised(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> LeastSquaresFit:
+    lower, upper = problem.parameters.bounds()
     return least_squares(
         problem.residuals,
         start,
-        lower=problem.parameters.lower(),
+        lower=lower,
+        upper=upper,
         max_iterations=MAX_ITERATIONS,
         tolerance=tolerance,
     )
