@@ -11,7 +11,7 @@ from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.material import Material, read_material
 from labrig.results import Charge, ChargingSeries, FittedExcitation, Transient
-from tests.fit.charged_samples import DOOR_S, Bench, lvf_windows, two_states
+from tests.fit.charged_samples import DOOR_S, WEIGHTS, Bench, lvf_windows, two_states
 
 LVF = lvf_windows(np.linspace(405, 695, 12))
 BARE = np.ones((1, 160))
@@ -98,6 +98,41 @@ def test_weak_light_leaves_the_level_unknown_and_says_so() -> None:
         found.at_off[0].amplitude_sigma[0] / found.at_off[0].amplitude[0]
         < found.states[0].amplitude_sigma / found.states[0].amplitude / 5
     ), "a is measured, Λ and r(0) are not"
+
+
+@pytest.mark.parametrize(("irradiance", "seed"), [(0.1, 25), (0.02, 22)])
+def test_the_search_ends_where_one_from_the_truth_does(irradiance: float, seed: int) -> None:
+    """Far from saturation and with the light known to 10 %: amplitudes have hardly an upper end."""
+    bench = Bench(two_states(), irradiance=irradiance, seed=seed)
+    light_sigma = 0.1
+    off = np.exp(light_sigma * bench.random.normal(size=(len(LVF), 1)))
+    each_site = light_sigma * np.eye(len(LVF))[:, :, None] * np.ones(8)
+    through = replace(
+        bench.series("through LVF", LVF * off, (8, 16, 32, 64)),
+        irradiance=bench.irradiances(LVF),
+        site_modes=each_site,
+    )
+    series = [bench.series("bare lamp", BARE, (8, 64, 600), every_s=6.0), through]
+    found = fitted(bench, series)
+    states = zip(found.states, bench.material.states, bench.amplitudes(), strict=True)
+    truth = replace(
+        found,
+        states=tuple(
+            replace(
+                state,
+                k_r_per_s=true.k_r_per_s,
+                amplitude=amplitude,
+                k_e_per_s=np.array(true.k_e_per_s),
+            )
+            for state, true, amplitude in states
+        ),
+        channel_weights=WEIGHTS,
+    )
+    rates = [state.k_r_per_s for state in bench.material.states]
+    from_truth = fit(
+        series, rates, bench.amplitudes(), RelativeSigmas(bench.flicker, LAMP), near=truth
+    )
+    assert found.chi2 == pytest.approx(from_truth.chi2, abs=0.01)
 
 
 def test_a_sample_that_is_no_phosphor_of_these_states_is_reported() -> None:

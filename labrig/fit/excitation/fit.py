@@ -28,6 +28,8 @@ WHITENINGS = (ROUGH, ROUGH, FINE)
 MAX_ITERATIONS = 60
 #: Relative error of the light on a place, which the starting points take for noise.
 LIGHT_SIGMA = 0.05
+#: Factor from its start value within which the starting points leave a k_r.
+ROUGH_K_R_FACTOR = 2.0
 #: Relative σ of an amplitude above which a warning is given.
 LEVEL_KNOWN = 0.3
 #: Reduced χ² above which a warning is given.
@@ -95,7 +97,8 @@ def _roughly(
     """Return θ of the best of several starts, in the brightest channel with the light as stated.
 
     The errors of the light count as noise here: with a fifth of the parameters and a third of the
-    values a start takes a tenth of the time.
+    values a start takes a tenth of the time. A k_r stays near the decay's: with so much noise it
+    may leave for a rate that all values together rule out, with no way back from there.
     """
     rough = ExcitationProblem(
         [
@@ -112,7 +115,10 @@ def _roughly(
         0,
         RelativeSigmas(),
     )
-    fits = [_minimised(rough, start, ROUGH) for start in starts(rough, k_r_per_s, fractions, 0)]
+    fits = [
+        _minimised(rough, start, ROUGH, ROUGH_K_R_FACTOR)
+        for start in starts(rough, k_r_per_s, fractions, 0)
+    ]
     best = rough.parameters.unpack(min(fits, key=_chi2).parameters)
     weights = channel_weights(problem, reference)
     return problem.parameters.as_stated(best.k_r_per_s, best.amplitude, best.k_e_per_s, weights)
@@ -127,11 +133,18 @@ def _as_fitted(problem: ExcitationProblem, fit: FittedExcitation, reference: int
     )
 
 
-def _minimised(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> LeastSquaresFit:
+def _minimised(
+    problem: ExcitationProblem, start: FloatArray, tolerance: float, k_r_factor: float = np.inf
+) -> LeastSquaresFit:
+    """Return the minimum from a start, each k_r within a factor of its start value."""
+    lower, upper = problem.parameters.bounds()
+    k_r = problem.parameters.columns.k_r
+    lower[k_r], upper[k_r] = start[k_r] - np.log(k_r_factor), start[k_r] + np.log(k_r_factor)
     return least_squares(
         problem.residuals,
         start,
-        lower=problem.parameters.lower(),
+        lower=lower,
+        upper=upper,
         max_iterations=MAX_ITERATIONS,
         tolerance=tolerance,
     )

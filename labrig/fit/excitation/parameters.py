@@ -10,8 +10,9 @@ import numpy as np
 from labrig.errors import FitError
 from labrig.results import ChargingSeries, FloatArray
 
-#: Least amplitude as a fraction of the largest value: that of a state which is not there.
-LEAST_AMPLITUDE = 1e-9
+#: Amplitudes over the largest value: of a state which is not there, and of one so far from
+#: saturation that its amplitude is without influence.
+LEAST_AMPLITUDE, LARGEST_AMPLITUDE = 1e-9, 1e9
 
 
 class Rates(NamedTuple):
@@ -82,15 +83,17 @@ class RelativeSigmas:
 
 
 class ParameterLayout(NamedTuple):
-    """Slices of θ = [ln k_r, A, A k_e, weights, parameters with a prior].
+    """Slices of θ = [ln k_r, 1/A, A k_e, weights, parameters with a prior].
 
-    A weakly charged sample determines A k_e, how fast its glow grows, far better than A and k_e.
-    With it as parameter the search need not follow the hyperbola on which A and k_e trade off.
-    The slice of a parameter that is not fitted is empty.
+    The glow y of a state obeys dy/dt = A k_e E (1 − y/A) − k_r y. A weakly charged sample
+    determines how fast it grows, A k_e, far better than A and k_e, and of A hardly more than that
+    it is large. With A k_e as parameter the search need not follow the hyperbola on which A and k_e
+    trade off; with 1/A it finds its way back from amplitudes without end, where the model is flat
+    in A. The slice of a parameter that is not fitted is empty.
     """
 
     k_r: slice
-    amplitude: slice
+    inverse_amplitude: slice
     growth: slice
     weights: slice
     scale: slice
@@ -142,6 +145,7 @@ class Parameters:
         channels = series[0].values.shape[2]
         brightest = max(float(np.nanmax(charging.values)) for charging in series)
         self._least_amplitude = LEAST_AMPLITUDE * brightest
+        self._largest_amplitude = LARGEST_AMPLITUDE * brightest
         self.others = [channel for channel in range(channels) if channel != reference]
         self._first_charge = _begins([len(charging.charges) for charging in series])
         self._first_mode = _begins(
@@ -168,12 +172,13 @@ class Parameters:
         """Return the slice of a series' irradiance modes among those of all series."""
         return slice(*self._first_mode[number : number + 2])
 
-    def lower(self) -> FloatArray:
-        """Return lower bounds of θ: excitation rates and weights ≥ 0, amplitudes hardly above."""
-        bounds = np.full(self.count, -np.inf)
-        bounds[self.columns.growth.start : self.columns.weights.stop] = 0.0
-        bounds[self.columns.amplitude] = self._least_amplitude
-        return bounds
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of θ: excitation rates and weights ≥ 0, amplitudes in their range."""
+        lower, upper = np.full(self.count, -np.inf), np.full(self.count, np.inf)
+        lower[self.columns.growth.start : self.columns.weights.stop] = 0.0
+        lower[self.columns.inverse_amplitude] = 1 / self._largest_amplitude
+        upper[self.columns.inverse_amplitude] = 1 / self._least_amplitude
+        return lower, upper
 
     def as_stated(
         self,
@@ -186,8 +191,8 @@ class Parameters:
         theta = np.zeros(self.count)
         columns = self.columns
         theta[columns.k_r] = np.log(k_r_per_s)
-        amplitude = np.maximum(amplitude, self._least_amplitude)
-        theta[columns.amplitude] = amplitude
+        amplitude = np.clip(amplitude, self._least_amplitude, self._largest_amplitude)
+        theta[columns.inverse_amplitude] = 1 / amplitude
         theta[columns.growth] = (amplitude[:, None] * k_e_per_s).ravel()
         theta[columns.weights] = weights[self.others]
         return theta
@@ -195,7 +200,7 @@ class Parameters:
     def unpack(self, theta: FloatArray) -> Rates:
         """Return the parameters in θ by name."""
         columns = self.columns
-        amplitude = theta[columns.amplitude]
+        amplitude = 1 / theta[columns.inverse_amplitude]
         weights = np.ones(len(self.others) + 1)
         weights[self.others] = theta[columns.weights]
         log_scale, log_brightness = np.zeros(self._series), np.zeros(self._first_charge[-1])
@@ -216,14 +221,15 @@ class Parameters:
         )
 
     def stated_slopes(self, rates: Rates) -> FloatArray:
-        """Return the derivatives by θ of θ with k_r, A and k_e in place of ln k_r, A and A k_e."""
+        """Return the derivatives by θ of θ with k_r, A and k_e for ln k_r, 1/A and A k_e."""
         columns, slopes = self.columns, np.eye(self.count)
         slopes[columns.k_r, columns.k_r] = np.diag(rates.k_r_per_s)
+        inverse = columns.inverse_amplitude
+        slopes[inverse, inverse] = -np.diag(rates.amplitude**2)
         growth = np.arange(columns.growth.start, columns.growth.stop)
-        amplitude = np.repeat(rates.amplitude, self.bands)
-        slopes[growth, growth] = 1 / amplitude
-        state = np.repeat(np.arange(columns.amplitude.start, columns.amplitude.stop), self.bands)
-        slopes[growth, state] = -rates.k_e_per_s.ravel() / amplitude
+        state = np.repeat(np.arange(self.states), self.bands)
+        slopes[growth, growth] = 1 / rates.amplitude[state]
+        slopes[growth, inverse.start + state] = (rates.amplitude[:, None] * rates.k_e_per_s).ravel()
         return slopes
 
 

@@ -134,10 +134,9 @@ class ExcitationProblem:
         # By θ of the glow, before channels come into it.
         slopes = np.zeros((shots, sites, self.parameters.count))
         slopes[..., columns.k_r] = level.by_k_r * (rates.amplitude * rates.k_r_per_s)
-        # A k_e is held where A is varied, and k_e with it.
-        slopes[..., columns.amplitude] = level.value - np.einsum(
-            "fpnb,nb->fpn", level.by_k_e, rates.k_e_per_s
-        )
+        # A k_e is held where 1/A is varied, and k_e with it.
+        by_amplitude = level.value - np.einsum("fpnb,nb->fpn", level.by_k_e, rates.k_e_per_s)
+        slopes[..., columns.inverse_amplitude] = -(rates.amplitude**2) * by_amplitude
         slopes[..., columns.growth] = level.by_k_e.reshape(shots, sites, -1)
         self._set_light_derivatives(number, charging, rates, slopes)
         inverse = self._inverse_sigma[number]
