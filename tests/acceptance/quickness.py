@@ -23,7 +23,8 @@ import yaml
 
 RUNS = 5000
 PATCHES = 50
-FRAMES = 16
+#: Frames of the short decay, those of darkness, metering and looks included.
+FRAMES = 38
 
 FIT = """
 import sys, time, labrig
@@ -83,6 +84,10 @@ class Labrig:
 Run = Callable[[Labrig], Times]
 
 
+def nothing(labrig: Labrig) -> None:
+    """Prepare nothing."""
+
+
 @dataclass(frozen=True)
 class Row:
     """Something that people wait for.
@@ -90,17 +95,15 @@ class Row:
     Attributes
     ----------
     prepare
-        Makes what `run` needs in the folder of a labrig; untimed, once.
-    divisor
-        Number of things that `run` does: the times are of one.
+        Makes what `run` needs in the folder of a labrig, untimed; rows that have it in common go on
+        in one folder.
     rounds
         Most rounds; what changes its own input can be done once only.
     """
 
     name: str
     run: Run
-    prepare: Callable[[Labrig], object] = lambda labrig: None
-    divisor: int = 1
+    prepare: Callable[[Labrig], object] = nothing
     rounds: int = 100
     one_core: bool = True
 
@@ -138,7 +141,7 @@ def record_many_patches(labrig: Labrig) -> None:
 
 def record_large_frames(labrig: Labrig) -> None:
     """Record a short decay with a sensor of 21 megapixels."""
-    changes = {"for": f"{5 * FRAMES} s", "charge": "5 min"}
+    changes = {"for": "80 s", "charge": "5 min"}
     record(labrig, "decay", "sim", changes, {"sensor": {"width": 5616, "height": 3744}})
 
 
@@ -163,16 +166,6 @@ def process_last(labrig: Labrig) -> Times:
     return labrig.timed("process", "last")
 
 
-def processed(record_run: Callable[[Labrig], None]) -> Callable[[Labrig], None]:
-    """Return a function that records a run and processes it."""
-
-    def prepare(labrig: Labrig) -> None:
-        record_run(labrig)
-        process_last(labrig)
-
-    return prepare
-
-
 def make_series(labrig: Labrig) -> None:
     """Make the series of the shipped decay."""
     record(labrig, "decay", "sim", {}, {})
@@ -185,6 +178,11 @@ def fit_series(labrig: Labrig) -> Times:
     return labrig.fit(series)
 
 
+def process_again(labrig: Labrig) -> Times:
+    """Process the run with another number of states."""
+    return labrig.timed("process", "last", "--states", 1)
+
+
 ROWS = (
     Row("runs list, no run", lambda labrig: labrig.timed("runs", "list"),
         lambda labrig: (labrig.folder / "runs").mkdir()),
@@ -192,15 +190,12 @@ ROWS = (
     Row("plan decay", lambda labrig: labrig.timed("plan", "decay", "--rig", "sim")),
     Row("run decay", lambda labrig: labrig.timed("run", "decay", "--rig", "sim")),
     Row("fit of a decay", fit_series, make_series),
-    Row(f"process a decay of {PATCHES} patches", process_last, record_many_patches, rounds=1),
-    Row(f"process again a decay of {PATCHES} patches",
-        lambda labrig: labrig.timed("process", "last", "--states", 2),
-        processed(record_many_patches)),
-    Row("process 21 megapixels, each of 40 frames", process_last, record_large_frames,
+    Row(f"process {PATCHES} patches", process_last, record_many_patches, rounds=1),
+    Row(f"process {PATCHES} patches again", process_again, record_many_patches, rounds=1),
+    Row(f"process {FRAMES} frames of 21 megapixels", process_last, record_large_frames,
         one_core=False, rounds=1),
-    Row("process again 21 megapixels, each of 40 frames",
-        lambda labrig: labrig.timed("process", "last", "--states", 1),
-        processed(record_large_frames), one_core=False),
+    Row(f"process {FRAMES} frames of 21 megapixels again", process_again, record_large_frames,
+        one_core=False, rounds=1),
     Row("process a phosphor", process_last, record_phosphor, rounds=1),
 )  # fmt: skip
 
@@ -216,26 +211,25 @@ def main() -> None:
     contenders = {name: python for name, python in pythons.items() if python}
     cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
     print(f"{'wall (CPU) time':50}" + "".join(f"{name:>20}" for name in contenders))
-    for row in ROWS:
-        if row.name not in asked.rows:
-            continue
-        allowed = frozenset(sorted(cores)[-1:] if row.one_core else cores)
-        least: dict[str, list[Times]] = {name: [] for name in contenders}
-        with tempfile.TemporaryDirectory() as scratch:
-            labrigs = {}
-            for name, python in contenders.items():
-                folder = Path(scratch) / name
-                folder.mkdir()
-                labrigs[name] = Labrig(python, folder, allowed)
-                row.prepare(labrigs[name])
+    with tempfile.TemporaryDirectory() as scratch:
+        folders: dict[object, Path] = {}
+        for row in (row for row in ROWS if row.name in asked.rows):
+            allowed = frozenset(sorted(cores)[-1:] if row.one_core else cores)
+            if row.prepare not in folders:
+                folders[row.prepare] = Path(scratch) / str(len(folders))
+                for name, python in contenders.items():
+                    (folders[row.prepare] / name).mkdir(parents=True)
+                    row.prepare(Labrig(python, folders[row.prepare] / name, allowed))
+            all_times: dict[str, list[Times]] = {name: [] for name in contenders}
             for _ in range(min(asked.rounds, row.rounds)):
-                for name, labrig in labrigs.items():
-                    least[name].append(row.run(labrig))
-        texts = (
-            f"{_text(min(t.wall_s for t in times))} ({_text(min(t.cpu_s for t in times))})"
-            for times in least.values()
-        )
-        print(f"{row.name:50}" + "".join(f"{text:>20}" for text in texts), flush=True)
+                for name, python in contenders.items():
+                    labrig = Labrig(python, folders[row.prepare] / name, allowed)
+                    all_times[name].append(row.run(labrig))
+            texts = (
+                f"{_text(min(t.wall_s for t in times))} ({_text(min(t.cpu_s for t in times))})"
+                for times in all_times.values()
+            )
+            print(f"{row.name:50}" + "".join(f"{text:>20}" for text in texts), flush=True)
 
 
 def _text(seconds: float) -> str:
