@@ -1,5 +1,6 @@
 """The fit of one series: common to a run's processing and `labrig fit decay`."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ from labrig.results import Series
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
 TYPICAL_FLICKER = 0.007
-#: Significance in σ of some amplitude from which a decay is detected.
+#: Significance in σ of some amplitude, or of their sum, from which a decay is detected.
 SEEN_SIGMA = 3.0
 
 
@@ -84,10 +85,24 @@ def fit_series(
         correlation=usable.correlation,
         offset_correlation=usable.dark_correlation,
     )
-    if all(state.amplitude < SEEN_SIGMA * state.amplitude_sigma for state in fit.states):
+    if not _is_seen(fit):
         raise FitError(
             "expected a decay, got nothing that stands out of the noise by "
             f"{SEEN_SIGMA:g} σ; did the lamp light, is the region on the sample, is the exposure "
             "long enough?"
         )
     return fit
+
+
+def _is_seen(fit: DecayFit) -> bool:
+    """Whether an amplitude is significant, or the sum of all: nearly equal rates share theirs."""
+    amplitudes = [state.amplitude for state in fit.states]
+    sigmas = [state.amplitude_sigma for state in fit.states]
+    of_amplitudes = slice(1, 2 * len(amplitudes), 2)
+    variance = float(fit.covariance[of_amplitudes, of_amplitudes].sum())
+    return any(
+        amplitude >= SEEN_SIGMA * sigma
+        for amplitude, sigma in zip(
+            [*amplitudes, sum(amplitudes)], [*sigmas, math.sqrt(max(variance, 0.0))], strict=True
+        )
+    )
