@@ -10,7 +10,7 @@ from labrig.errors import DiskError
 #: of the pictures in the report, for the next processing.
 RECORDS_PER_FRAME_BYTES = 5_000
 RESULTS_PER_PATCH_BYTES = 2_000_000
-PICTURES_BYTES = 8_000_000
+PICTURES_BYTES = 10_000_000
 
 
 @dataclass(frozen=True)
