@@ -84,8 +84,8 @@ class CameraFile(CameraModel):
     >>> from labrig.calibration import CAMERA_KIND
     >>> camera = CAMERA_KIND.read(Path("camera.yaml"))
     >>> exposure_s, relative_sigma = camera.exposure_s(1 / 64)
-    >>> f"{1e3 * exposure_s:.2f} ms ± {100 * relative_sigma:.1f} %"
-    '15.58 ms ± 0.5 %'
+    >>> f"{1e3 * exposure_s:.1f} ms ± {100 * relative_sigma:.1f} %"
+    '15.6 ms ± 0.5 %'
     """
 
     kind: Literal["camera"] = "camera"

@@ -88,8 +88,8 @@ class FadeFile(_Part):
     >>> t_s, fraction = lamp.in_bands(lamp.fade, [400, 500, 600, 700])
     >>> fraction.shape == (len(t_s), 3)
     True
-    >>> lamp.fade.equivalent_s()[:2].round(3).tolist()
-    [0.029, 0.031]
+    >>> lamp.fade.equivalent_s()[:2].round(2).tolist()
+    [0.03, 0.03]
     """
 
     kind: Literal["fade"] = "fade"
