@@ -165,6 +165,23 @@ def test_figures_are_drawn_into_a_pdf_on_demand(labrig: Labrig, finished: Path) 
     one_line(labrig("figures", finished), 2, "expected a run with a result")
 
 
+def test_a_complete_run_is_not_resumed_but_processed_if_it_was_not(
+    labrig: Labrig, finished: Path
+) -> None:
+    result = finished / "result" / "result.json"
+    changed_ns = result.stat().st_mtime_ns
+    ended = labrig("resume", finished)
+    assert (ended.code, ended.run_folder) == (0, finished)
+    (line,) = ended.err.splitlines()
+    assert line.startswith("nothing to resume: all units are complete")
+    assert result.stat().st_mtime_ns == changed_ns
+    shutil.rmtree(finished / "result")
+    ended = labrig("resume", finished)
+    assert ended.code == 0
+    assert "warning" not in ended.err
+    assert result.is_file()
+
+
 def test_processing_otherwise(labrig: Labrig, finished: Path) -> None:
     ended = labrig(
         "process", finished, "--roi", "36,24,24,16", "--exclude", "3", "--states", "2", "--json"
