@@ -320,8 +320,8 @@ def _kept_summary(folder: RunFolder, units: Sequence[Unit]) -> str:
     record = folder.read()
     if not record.attempts:
         return "nothing was recorded"
-    done = len(record.completed())
+    done, plural = len(record.completed()), " is" if len(units) == 1 else "s are"
     return (
-        f"{done} of {len(units)} units are complete and kept; go on with: "
+        f"{done} of {len(units)} unit{plural} complete and kept; go on with: "
         f"labrig resume {folder.path}"
     )

@@ -9,6 +9,7 @@ import typer
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
+from labrig.cli.protocol import protocol_path
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
 
@@ -147,12 +148,9 @@ def resume(
 
 
 def _prepared(protocol: str, rig: str | None, runs: Path) -> "Recording":
-    from labrig import resources
     from labrig.recording import Recording
 
-    recording = Recording.prepare(
-        resources.find("protocols", "protocol", protocol), rig_path(rig), runs
-    )
+    recording = Recording.prepare(protocol_path(protocol), rig_path(rig), runs)
     for note in recording.notes():
         typer.echo(f"note: {note}", err=True)
     return recording
