@@ -45,6 +45,8 @@ COMES_BACK_S = 300.0
 LOOK_PERIOD_S = 2.0
 #: Number of lost devices in one unit at which the run ends.
 MAX_LOSSES = 3
+#: Difference from which a clock counts as set back; times are rounded, and kept exact by NTP.
+CLOCK_STEP_S = 1.0
 #: Largest number of files named in a warning.
 MAX_NAMED = 4
 
@@ -82,7 +84,7 @@ def execute(
             observer.warn(f"the unit {unit} was cut off and is done again")
         for oddity in _oddities(folder, record):
             observer.warn(oddity)
-        if record.last_time > bench.clock.wall():
+        if record.last_time > bench.clock.wall() + CLOCK_STEP_S:
             observer.warn(
                 "the clock of this PC was set back since the run began: times of day in its "
                 "journal go back, durations are right"
@@ -318,8 +320,8 @@ def _kept_summary(folder: RunFolder, units: Sequence[Unit]) -> str:
     record = folder.read()
     if not record.attempts:
         return "nothing was recorded"
-    done = len(record.completed())
+    done, plural = len(record.completed()), " is" if len(units) == 1 else "s are"
     return (
-        f"{done} of {len(units)} units are complete and kept; go on with: "
+        f"{done} of {len(units)} unit{plural} complete and kept; go on with: "
         f"labrig resume {folder.path}"
     )

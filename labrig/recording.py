@@ -16,7 +16,7 @@ from labrig.acquire import (
 )
 from labrig.bench import open_bench, with_frame_size
 from labrig.bench_optics import require_optics
-from labrig.errors import DiskError, UsageError
+from labrig.errors import DiskError, ProtocolError, UsageError
 from labrig.execution import Watch, execute
 from labrig.record import RunFolder, RunSize, read_run, size_text
 from labrig.run_log import run_log
@@ -49,7 +49,7 @@ class Recording:
         planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
         protocol = requested.suited_to(rig)
         require_optics(rig)
-        run_plan = plan(protocol, rig, str(rig_path))
+        run_plan = _planned(protocol, protocol_path, rig, rig_path)
         _require_free_disk(runs, run_plan.size())
         return cls(protocol, rig, rig_path, runs, run_plan)
 
@@ -110,7 +110,7 @@ def resume_run(path: Path, watch: Watch) -> Path:
     if (path / "journal.jsonl").exists():
         record = read_run(path)
         last_time, done = record.last_time, frozenset(record.completed())
-    run_plan = plan(protocol, rig, str(path / "rig.yaml"))
+    run_plan = _planned(protocol, path / "protocol.yaml", rig, path / "rig.yaml")
     _require_free_disk(path, run_plan.size(done))
     with (
         open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as bench,
@@ -119,6 +119,16 @@ def resume_run(path: Path, watch: Watch) -> Path:
     ):
         execute(folder, protocol, bench, run_plan, watch)
     return path
+
+
+def _planned(protocol: ProtocolModel, path: Path, rig: RigFile, rig_path: Path) -> Plan:
+    """Lay out the plan; what in the protocol makes it impossible is named with the file's path."""
+    try:
+        return plan(protocol, rig, str(rig_path))
+    except ProtocolError as error:
+        if str(rig_path) not in str(error):
+            error.args = (f"{path}: {error}",)
+        raise
 
 
 def _require_free_disk(folder: Path, size: RunSize) -> None:

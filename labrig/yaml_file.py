@@ -18,6 +18,7 @@ from yaml.composer import Composer
 
 from labrig.errors import UsageError
 from labrig.input_file import read_text
+from labrig.model_errors import is_rule, lacks_item, place, refusal
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -179,6 +180,8 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
         # libyaml counts the end of the text as a line of its own.
         place = "" if mark is None else f", line {min(mark.line, text.count(chr(10))) + 1}"
         problem = " ".join(str(error.problem or error.context).split())
+        if mark is not None and _is_indented_by_tab(text, mark.line):
+            problem = "expected spaces before the first word, got a tab; YAML indents with spaces"
         raise UsageError(f"{source}{place}: {problem}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise UsageError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
@@ -187,6 +190,13 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
             f"{source}: expected 'key: value' lines, got {' '.join(_kind(content).split())}"
         )
     return content
+
+
+def _is_indented_by_tab(text: str, line: int) -> bool:
+    """Return whether a line, counted from 0, has a tab before its first word."""
+    lines = text.split("\n")
+    begin = lines[line] if line < len(lines) else ""
+    return "\t" in begin[: len(begin) - len(begin.lstrip())]
 
 
 def write_yaml(path: Path, model: BaseModel) -> None:
@@ -216,7 +226,7 @@ def validate(content: Mapping[str, Any], model: type[ModelT], source: str) -> Mo
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise UsageError(f"{source}: {_first_problem(error, model)}") from None
+        raise UsageError(f"{source}: {_first_problem(error, model, content)}") from None
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
@@ -225,21 +235,25 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known))}"
 
 
-def _first_problem(error: ValidationError, model: type[BaseModel]) -> str:
+def _first_problem(
+    error: ValidationError, model: type[BaseModel], content: Mapping[str, Any]
+) -> str:
     problems = error.errors(include_url=False)
     # A misspelt key usually makes a required one missing, too: name the misspelt one.
     problem = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
-    place = ".".join(str(part) for part in problem["loc"])
+    where = place(problem, content)
+    key = ".".join(map(str, where))
     if problem["type"] == "extra_forbidden":
         keys = list(_sibling_keys(model, problem["loc"]))
-        return f"unknown key '{_shortened(place)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
-    if problem["type"] == "missing":
-        return f"the key '{place}' is missing; it is required"
-    message = problem["msg"].removeprefix("Value error, ")
+        return f"unknown key '{_shortened(key)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
+    if problem["type"] == "missing" and not lacks_item(problem):
+        return f"the key '{key}' is missing; it is required"
+    alike = [each for each in problems if place(each, content) == where]
+    message = refusal(problem, alike)
     # A rule of several keys names their values itself.
-    is_rule = problem["type"] == "value_error" and _is_block(problem["input"])
-    received = "" if "got " in message or is_rule else f", got {_kind(problem['input'])}"
-    return f"{place}: {message}{received}" if place else f"{message}{received}"
+    names_values = is_rule(problem) and _is_block(problem["input"])
+    received = "" if "got " in message or names_values else f", got {_kind(problem['input'])}"
+    return f"{_shortened(key)}: {message}{received}" if key else f"{message}{received}"
 
 
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> Iterator[str]:

@@ -35,10 +35,15 @@ def test_what_lies_in_the_frame_is_in_it_as_pixels(
     ],
 )  # fmt: skip
 def test_what_is_no_region_is_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="x,y,width,height"):
+    with pytest.raises(UsageError, match=r"x, ?y, ?width, ?height"):
         parse_region(text)
 
 
+def test_fractions_that_leave_the_frame_are_told_as_in_a_protocol() -> None:
+    with pytest.raises(UsageError, match=r"inside of the frame.*end at 1.4 of its width"):
+        parse_region("0.9,0.9,0.5,0.5")
+
+
 def test_a_region_outside_is_refused() -> None:
-    with pytest.raises(UsageError, match="leaves the frame of 96 x 64"):
+    with pytest.raises(UsageError, match="leaves the frame of 96 × 64"):
         region_pixels((90, 0, 10, 10), 96, 64)

@@ -167,7 +167,8 @@ class Relay:
         self._board = board
         self._commands = commands
         self._name = name
-        self._commanded_on = False
+        #: State confirmed last, as far as the board confirms; None if it is unknown.
+        self._last_on: bool | None = None
 
     @property
     def off(self) -> Exchange:
@@ -192,8 +193,9 @@ class Relay:
         UnclearAnswerError
             The board refuses, or the relay does not read as it was switched.
         """
-        self._commanded_on = on
+        self._last_on = None
         self._board.do(self._commands.on if on else self._commands.off)
+        self._last_on = on
         if self.reads_back and self.is_on() != on:
             state, opposite = ("on", "off") if on else ("off", "on")
             raise UnclearAnswerError(
@@ -202,10 +204,13 @@ class Relay:
             )
 
     def is_on(self) -> bool:
-        """Return the state that the board reports, else the one commanded last."""
+        """Return the state that the board reports, else the one commanded last.
+
+        After a command that failed the relay may be on, and counts as on.
+        """
         query = self._commands.state
         if query is None:
-            return self._commanded_on
+            return self._last_on is not False
         return self._board.ask(query.send, [query.on, query.off]) == query.on
 
 

@@ -6,9 +6,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from labrig.errors import ProtocolError, UsageError
-from labrig.region import Region, region_pixels
-
-_REGION_METADATA = get_args(Region)[1:]
+from labrig.region import LEAST_PIXELS, IsRegion, Region, region_pixels
 
 
 def regions_in(model: BaseModel) -> dict[str, Region]:
@@ -28,14 +26,14 @@ def regions_in(model: BaseModel) -> dict[str, Region]:
 def _names_regions(annotation: tuple[Any, ...]) -> bool:
     """Return whether a type is a region or holds some; an annotated one has its metadata behind."""
     return any(
-        part in _REGION_METADATA or _names_regions(get_args(part))
+        isinstance(part, IsRegion) or _names_regions(get_args(part))
         for part in annotation
         if part is not None
     )
 
 
 def require_inside(regions: Mapping[str, Region], frame_pixels: tuple[int, int]) -> None:
-    """Refuse regions that extend beyond a frame.
+    """Refuse regions that extend beyond a frame, or have too few pixels to estimate their noise.
 
     Parameters
     ----------
@@ -47,10 +45,16 @@ def require_inside(regions: Mapping[str, Region], frame_pixels: tuple[int, int])
     Raises
     ------
     ProtocolError
-        A region is not inside; the message names its key and the size of the frame.
+        A region is not inside, or too small; the message names its key and the frame's size.
     """
     for key, region in regions.items():
         try:
-            region_pixels(region, *frame_pixels)
+            _, _, width, height = region_pixels(region, *frame_pixels)
         except UsageError as error:
             raise ProtocolError(f"{key}: {error}") from None
+        if min(width, height) < LEAST_PIXELS:
+            raise ProtocolError(
+                f"{key}: expected a region of at least {LEAST_PIXELS} × {LEAST_PIXELS} pixels, got "
+                f"{width} × {height} of a frame of {frame_pixels[0]} × {frame_pixels[1]}; from "
+                "fewer the noise cannot be estimated"
+            )

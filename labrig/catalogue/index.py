@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Self
@@ -22,6 +23,14 @@ FILE = ".runs-index"
 PROTOCOL = "protocol.yaml"
 #: Files on which every run's summary depends; the fits in its result are added to them.
 FILES = (PROTOCOL, "made.txt", "journal.jsonl", "result")
+#: Modules whose code decides what a summary says.
+_MODULES = (
+    "catalogue/index.py",
+    "catalogue/run_summary.py",
+    "catalogue/summarising.py",
+    "results/fitted_decay.py",
+    "results/measured.py",
+)
 #: Age from which another change of a file shows in its time: file systems count by up to 2 s.
 SETTLED_S = 3.0
 
@@ -139,5 +148,15 @@ def _write_index(runs: Path, entries: Mapping[str, _Entry]) -> None:
 
 
 def _checksum(content: bytes) -> bytes:
-    """Return a checksum that also differs from one version of labrig to the next."""
-    return b"%08x" % crc32(content, crc32(version("labrig").encode()))
+    """Return a checksum that also differs from one code of the summaries to the next."""
+    return b"%08x" % crc32(content, _code_checksum())
+
+
+@cache
+def _code_checksum() -> int:
+    """Return the checksum of the code that makes summaries and of the version of labrig."""
+    package = Path(__file__).parents[1]
+    checksum = crc32(version("labrig").encode())
+    for module in _MODULES:
+        checksum = crc32((package / module).read_bytes(), checksum)
+    return checksum

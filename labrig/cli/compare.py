@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.completion import complete_run
+
 if TYPE_CHECKING:
     from labrig.compare import RunComparison
     from labrig.fit import DecayFit
@@ -14,7 +16,10 @@ if TYPE_CHECKING:
 
 def compare(
     run: Annotated[
-        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+        Path,
+        typer.Argument(
+            help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
+        ),
     ],
     material: Annotated[
         list[str] | None,

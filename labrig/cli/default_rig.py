@@ -40,12 +40,19 @@ class DefaultRig:
     ----------
     name
         Name of a shipped rig, or path of a file.
-    source
-        Where it was chosen, in words.
+    is_of_environment
+        Whether the environment variable names it, rather than `labrig rig use`.
     """
 
     name: str
-    source: str
+    is_of_environment: bool
+
+    @property
+    def source(self) -> str:
+        """Where it was chosen, in words."""
+        if self.is_of_environment:
+            return f"the environment variable {VARIABLE}"
+        return "'labrig rig use'"
 
     def path(self) -> Path:
         """Return the path of the rig's file.
@@ -60,16 +67,25 @@ class DefaultRig:
         try:
             return resources.find("config", "rig", self.name)
         except UsageError as error:
+            remedy = (
+                f"set it to another rig or unset it ({VARIABLE})"
+                if self.is_of_environment
+                else "choose another one (labrig rig use FILE)"
+            )
             raise UsageError(
-                f"{error}; it is the default rig, by {self.source}: choose another one "
-                "(labrig rig use FILE), or give --rig"
+                f"{error}; it is the default rig, by {self.source}: {remedy}, or give --rig"
             ) from None
 
 
 def default_rig() -> DefaultRig | None:
     """Return the default rig, None if there is none."""
     if name := os.environ.get(VARIABLE):
-        return DefaultRig(name, f"the environment variable {VARIABLE}")
+        return DefaultRig(name, is_of_environment=True)
+    return _chosen_rig()
+
+
+def _chosen_rig() -> DefaultRig | None:
+    """Return the rig of `labrig rig use`, None if there is none."""
     choice = _choice_file()
     try:
         name = choice.read_text(encoding="utf-8").strip()
@@ -80,7 +96,7 @@ def default_rig() -> DefaultRig | None:
             f"{choice}: the default rig cannot be read ({error}); choose it again: "
             "labrig rig use FILE"
         ) from None
-    return DefaultRig(name, "'labrig rig use'") if name else None
+    return DefaultRig(name, is_of_environment=False) if name else None
 
 
 def rig_path(rig: str | None) -> Path:
@@ -128,6 +144,13 @@ def use(
     elif rig is not None:
         _choose(rig)
     default = default_rig()
+    if (forget or rig is not None) and default is not None and default.is_of_environment:
+        chosen = _chosen_rig()
+        choice = "is forgotten" if chosen is None else f"is now {chosen.name}"
+        typer.echo(
+            f"the choice of 'labrig rig use' {choice}; {default.source} has priority as long as it "
+            "is set:"
+        )
     if default is None:
         typer.echo("there is no default rig; choose one: labrig rig use ./my-rig.yaml")
         return

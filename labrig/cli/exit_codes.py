@@ -75,7 +75,9 @@ def _run(arguments: Sequence[str]) -> int:
     except SystemExit as ending:  # Typer's own answer to a pipe without a reader
         raise BrokenPipeError from ending
     except TyperException as error:
-        return _print_error(f"{error.format_message()} (see labrig --help)", 2)
+        context = getattr(error, "ctx", None)
+        command_path = "labrig" if context is None else context.command_path
+        return _print_error(f"{error.format_message()} (see {command_path} --help)", 2)
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise

@@ -5,10 +5,15 @@ from typing import Annotated
 
 import typer
 
+from labrig.cli.completion import complete_run
+
 
 def figures(
     run: Annotated[
-        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+        Path,
+        typer.Argument(
+            help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
+        ),
     ],
     out: Annotated[
         Path | None,

@@ -9,6 +9,7 @@ from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
 from labrig.acquire import CAMERA, Plan, Step, shutter_text
+from labrig.cli.wording import counted, measurement
 from labrig.quantity import duration_text
 from labrig.record import PERSON, size_text
 
@@ -56,14 +57,15 @@ def summary(recording: "Recording", free_bytes: int) -> list[str]:
     """Return lab time, steps by hand, frames and disk space of a plan, one line each."""
     plan, rig, size = recording.plan, recording.rig, recording.plan.size()
     by_hand = len(plan.manual_steps)
-    hand_text = f"{by_hand} steps" if by_hand else "nothing"
+    hand_text = counted(by_hand, "step") if by_hand else "nothing"
     if by_hand and "changer" in rig.devices:
         hand_text += "; with --yes the rig's changer does them"
+    measured = measurement(recording.protocol.protocol, recording.protocol.sample.name)
     pixels = plan.offers.frame_pixels
     frame_text = "" if pixels is None else f" of {pixels[0]} × {pixels[1]} pixels"
     return [
-        f"{recording.protocol.protocol} of {recording.protocol.sample.name}, on {rig.name}",
-        f"  lab time  at most {duration_text(plan.duration_s)}, {len(plan.units)} units",
+        f"{measured}, on {rig.name}",
+        f"  lab time  at most {duration_text(plan.duration_s)}, {counted(len(plan.units), 'unit')}",
         f"  by hand   {hand_text}",
         f"  frames    at most {plan.frames}{frame_text}",
         f"  disk      about {size_text(size.total_bytes)}, {size_text(free_bytes)} are free",

@@ -1,9 +1,12 @@
 """`labrig process`: from a recorded run to its result."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from labrig.cli.completion import complete_run
 
 if TYPE_CHECKING:
     from labrig.analyse import Overrides
@@ -11,7 +14,10 @@ if TYPE_CHECKING:
 
 def process(
     run: Annotated[
-        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+        Path,
+        typer.Argument(
+            help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
+        ),
     ],
     roi: Annotated[
         list[str] | None,
@@ -77,8 +83,17 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
         return
     for warning in processed.result.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    for line in processed.lines:
-        typer.echo(line)
+    for text in processed.lines:
+        typer.echo(_without_warnings(text, processed.result.warnings))
     for number, line in enumerate(processed.changes):
         typer.echo(f"  {line}" if number else line)
     typer.echo(f"report: {processed.report}")
+
+
+def _without_warnings(text: str, warnings: Sequence[str]) -> str:
+    """Return a summary without those of its lines that repeat a warning."""
+    return "\n".join(
+        line
+        for line in text.splitlines()
+        if not (line.startswith("! ") and any(each.endswith(line[2:]) for each in warnings))
+    )

@@ -11,21 +11,53 @@ from labrig.cli.completion import complete_protocol
 app = typer.Typer(help="The protocols that can be run.")
 
 
+def protocol_path(protocol: str) -> Path:
+    """Return the file of a protocol as given: a shipped name, or a path.
+
+    Raises
+    ------
+    UsageError
+        There is no such file, as of a protocol that a package adds without one.
+    """
+    from labrig import plugins, resources
+    from labrig.errors import UsageError
+
+    try:
+        return resources.find("protocols", "protocol", protocol)
+    except UsageError:
+        if protocol in plugins.names(plugins.PROTOCOLS):
+            raise UsageError(
+                f"the protocol '{protocol}' is of an installed package, which ships no file of it; "
+                f"expected a file of yours with 'protocol: {protocol}' in it, such as "
+                f"./{protocol}.yaml, got its name"
+            ) from None
+        raise
+
+
 @app.command("list")
 def list_protocols() -> None:
-    """List the shipped protocol files and what each of them measures."""
+    """List the shipped protocol files and what each of them measures.
+
+    Protocols of installed packages, which have no shipped file, come last.
+    """
     from rich.console import Console
     from rich.table import Table
 
-    from labrig import resources
+    from labrig import plugins, resources
     from labrig.acquire import read_protocol
 
     table = Table(box=None, pad_edge=False)
     for title in ("file", "protocol", "measures"):
         table.add_column(title, no_wrap=title != "measures")
+    shipped = set()
     for path in resources.names("protocols").values():
         model = read_protocol(path)
+        shipped.add(model.protocol)
         table.add_row(path.stem, model.protocol, _summary(path.read_text(encoding="utf-8")))
+    for name in plugins.names(plugins.PROTOCOLS):
+        if name not in shipped:
+            described = plugins.load(plugins.PROTOCOLS, name, "protocol list").__doc__ or ""
+            table.add_row("–", name, described.strip().partition("\n")[0])
     Console().print(table)
 
 
@@ -74,10 +106,9 @@ def _new_package(name: str, folder: Path) -> None:
 
 
 def _new_file(name: str, path: Path) -> None:
-    from labrig import resources
     from labrig.errors import DiskError, UsageError
 
-    text = resources.find("protocols", "protocol", name).read_text(encoding="utf-8")
+    text = protocol_path(name).read_text(encoding="utf-8")
     try:
         with path.open("x", encoding="utf-8", newline="\n") as new:
             new.write(text)

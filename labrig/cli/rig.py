@@ -1,11 +1,15 @@
 """`labrig rig`: discovery of devices and check of a rig."""
 
+import logging
+import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labrig.cli import default_rig, view
+from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.default_rig import RigArgument, rig_path
 from labrig.errors import DeviceError, ProtocolError
 
@@ -46,6 +50,12 @@ def list_devices(
 @app.command("check")
 def check(
     rig: RigArgument = None,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose", help="Print every command to a device and its answer with the time."
+        ),
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """Connect, identify, look for settings that spoil photometry, exercise gently, leave safe.
@@ -58,11 +68,14 @@ def check(
 
     from labrig.acquire import read_rig_file
     from labrig.bench import open_bench
+    from labrig.run_log import logging_to
     from labrig.setup import check_rig
 
     path = rig_path(rig)
     with open_bench(read_rig_file(path), str(path)) as bench:
-        report = check_rig(bench)
+        handler = logging.StreamHandler(DetachableStream(sys.stderr))
+        with logging_to(handler, bench.clock) if verbose else nullcontext():
+            report = check_rig(bench)
     if json:
         typer.echo(dumps(report.to_json(), ensure_ascii=False))
     else:

@@ -9,6 +9,7 @@ import typer
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
+from labrig.cli.protocol import protocol_path
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
 
@@ -113,14 +114,18 @@ def resume(
     verbose: Verbose = False,
     json: Json = False,
 ) -> None:
-    """Go on with a run that was interrupted: completed units are kept, the rest is done."""
+    """Go on with a run that was interrupted: completed units are kept, the rest is done.
+
+    If only the result is missing, the run is processed.
+    """
     from labrig.acquire import read_rig_file
-    from labrig.catalogue import find_run
+    from labrig.catalogue import find_run, summarise
     from labrig.cli.on_finish import notify_at_end
     from labrig.cli.progress import progress
     from labrig.recording import resume_run
 
     folder = find_run(run, runs)
+    is_processed = summarise(folder).status == "processed"
     path = folder / "rig.yaml"
     rig = read_rig_file(path) if path.is_file() else None
     has_changer = rig is not None and "changer" in rig.devices
@@ -134,20 +139,32 @@ def resume(
         )
         command = None
     with notify_at_end(command) as ending:
-        _finish(resume_run(folder, watch), no_process, json)
+        resume_run(folder, watch)
+        if is_processed:
+            _print_processed(folder, json)
+        else:
+            _finish(folder, no_process, json)
         ending.message = str(folder)
 
 
 def _prepared(protocol: str, rig: str | None, runs: Path) -> "Recording":
-    from labrig import resources
     from labrig.recording import Recording
 
-    recording = Recording.prepare(
-        resources.find("protocols", "protocol", protocol), rig_path(rig), runs
-    )
+    recording = Recording.prepare(protocol_path(protocol), rig_path(rig), runs)
     for note in recording.notes():
         typer.echo(f"note: {note}", err=True)
     return recording
+
+
+def _print_processed(folder: Path, json: bool) -> None:
+    from labrig.results import read_result
+
+    typer.echo(
+        f"nothing to resume: all units are complete; labrig process {folder} fits again", err=True
+    )
+    if json:
+        typer.echo(read_result(folder).to_json())
+    typer.echo(folder)
 
 
 def _finish(folder: Path, no_process: bool, json: bool) -> None:

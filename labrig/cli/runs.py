@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from labrig.cli.completion import complete_protocol, complete_run
+from labrig.cli.wording import counted, measurement
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
@@ -112,8 +113,10 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
         _print_json({**_summary_json(summary), "notes": notes})
         return
     typer.echo(f"{folder}")
-    typer.echo(f"  {summary.protocol} of {summary.sample}, {_when(summary)} UTC, {summary.status}")
-    typer.echo(f"  {_progress(summary)} units, {summary.frames} frames")
+    measured = measurement(summary.protocol, summary.sample)
+    typer.echo(f"  {measured}, {_when(summary)} UTC, {summary.status}")
+    units = "unit" if summary.units == 1 else "units"
+    typer.echo(f"  {_progress(summary)} {units}, {counted(summary.frames, 'frame')}")
     _print_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():

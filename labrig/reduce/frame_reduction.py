@@ -106,8 +106,12 @@ def reduce_groups(
     """
     kept = _kept_reductions(groups, reduction)
     kind = get_type_hints(type(reduction).__call__)["return"]
-    outcomes = [_kept_outcome(kept, group, kind) for group in groups]
-    missing = [number for number, outcome in enumerate(outcomes) if outcome is None]
+    outcomes = {
+        number: outcome
+        for number, group in enumerate(groups)
+        if (outcome := _kept_outcome(kept, group, kind)) is not None
+    }
+    missing = [number for number in range(len(groups)) if number not in outcomes]
     try:
         texts = _texts([groups[number] for number in missing], reduction)
         for number, text in zip(missing, texts, strict=True):
@@ -117,7 +121,7 @@ def reduce_groups(
     finally:
         for folder_reductions in kept.values():
             folder_reductions.write()
-    return [outcome for outcome in outcomes if outcome is not None]
+    return [outcomes[number] for number in range(len(groups))]
 
 
 def _kept_reductions(

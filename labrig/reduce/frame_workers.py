@@ -99,6 +99,12 @@ def texts_from_workers(
         executor.shutdown()
 
 
+def _import_path() -> str:
+    """Return where this process imports from, without its working folder ('')."""
+    folders = (entry for entry in sys.path if isinstance(entry, str) and entry)
+    return os.pathsep.join(folders)
+
+
 def _result(future: "Future[str]") -> str:
     while not future.done():
         wait([future], _CHECK_INTERVAL_S)
@@ -113,7 +119,7 @@ class _Worker:
             [sys.executable, "-P", "-m", "labrig.reduce.worker_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            env={**os.environ, "PYTHONPATH": _import_path()},
             # Ctrl-C is for the process that asks.
             start_new_session=os.name != "nt",
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),

@@ -160,7 +160,12 @@ def n_states_reason(fit: FittedDecay) -> str:
                 f"Chance alone gains as much in χ² with p = {_p_value(more.f_p_value)}."
             )
     if not sentences:
-        sentences.append("No other number of states was tried or supported by the data.")
+        others = [_states_text(number) for number in candidates if number != fit.n_states]
+        sentences.append(
+            f"The data do not support {' or '.join(others)}, which were asked for."
+            if others
+            else "No other number of states was tried."
+        )
     elif more is None:
         sentences.append("More were not asked for, or the data do not support them.")
     if fit.better_model is not None:

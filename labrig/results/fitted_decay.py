@@ -334,8 +334,12 @@ class FittedDecay:
             pairs = zip(self.repeats, self.levels, strict=True)
             lines.append(f"levels   {', '.join(f'{name} {level:.4f}' for name, level in pairs)}")
         if self.flicker or self.flicker_sigma:
-            percent = with_uncertainty(100 * self.flicker, 100 * self.flicker_sigma)
-            lines.append(f"flicker  {percent} %")
+            percent = (
+                with_uncertainty(100 * self.flicker, 100 * self.flicker_sigma)
+                if self.flicker_sigma
+                else f"{100 * self.flicker:.2g}"
+            )
+            lines.append(f"flicker  {percent} %{'' if self.flicker_sigma else ' (held)'}")
         if self.scatter is not None:
             lines += wrap(f"σ        {self.scatter}", LINE_WIDTH, subsequent_indent=" " * 9)
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")

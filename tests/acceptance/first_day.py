@@ -110,7 +110,10 @@ MISTAKES = (
     protocol_mistake("an ISO the camera lacks", DECAY + "camera: {iso: 450}\n", "400"),
     protocol_mistake("four states", DECAY + "states: 4\n", "1, 2, 3|auto"),
     Mistake(
-        "a protocol whose devices the rig lacks", "plan excitation --rig sim", "sim-phosphor|lacks"
+        "a protocol whose calibration the rig lacks",
+        "plan excitation --rig sim",
+        "irradiance.*--optics",
+        0,
     ),
     Mistake(
         "a shipped protocol on the other shipped rig",
@@ -198,7 +201,8 @@ def answer(labrig: str, mistake: Mistake) -> Answer:
         shutil.rmtree(folder)
     errors = [line for line in done.stderr.splitlines() if line.startswith("labrig: ")]
     unexpected = [line for line in done.stderr.splitlines() if "Traceback" in line]
-    line = errors[-1] if done.returncode and errors else " ".join(done.stdout.split())
+    printed = " ".join(f"{done.stderr} {done.stdout}".split())
+    line = errors[-1] if done.returncode and errors else printed
     return Answer(line, done.returncode, duration_s, len(errors) + len(unexpected))
 
 

@@ -6,7 +6,9 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
+from zlib import crc32
 
 import pytest
 from filelock import FileLock
@@ -46,6 +48,16 @@ def settle(runs: Path) -> None:
         status = path.stat()
         an_hour_ns = 3600 * 10**9
         os.utime(path, ns=(status.st_atime_ns - an_hour_ns, status.st_mtime_ns - an_hour_ns))
+
+
+def as_other_code_wrote_it(run: Path) -> None:
+    """Replace the index by one whose summaries lack what they have now, by an older code."""
+    index = run.parent / INDEX
+    entries = json.loads(index.read_bytes().split(b"\n", 1)[1])
+    for entry in entries.values():
+        entry["content"]["of_another_code"] = entry["content"].pop("status")
+    content = json.dumps(entries).encode()
+    index.write_bytes(b"%08x\n" % crc32(content, crc32(version("labrig").encode())) + content)
 
 
 def statuses(runs: Path) -> list[str]:
@@ -139,6 +151,7 @@ def rename_sample(run: Path) -> None:
         lambda run: (run.parent / INDEX).write_bytes(b"\0" * 100),
         lambda run: (run.parent / INDEX).write_bytes((run.parent / INDEX).read_bytes()[:-9]),
         lambda run: (run.parent / INDEX).unlink(),
+        as_other_code_wrote_it,
     ],
 )
 def test_the_index_never_lies(tmp_path: Path, change: Callable[[Path], object]) -> None:

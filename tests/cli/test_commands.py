@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from socket import gethostname
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 import yaml
 
+from labrig import plugins
 from labrig.record import RunLock, read_run
 from labrig.results import DecayResult, read_result
 from tests.conftest import Ended
@@ -104,9 +106,17 @@ def test_a_duplicate_key_is_named_with_its_line(labrig: Labrig, tmp_path: Path) 
     one_line(labrig("plan", path, "--rig", "sim"), 2, "line 3", "'every' stands twice")
 
 
-@pytest.mark.parametrize("arguments", [["frobnicate"], ["run"], ["plan", "decay", "--rgi", "sim"]])
-def test_wrong_usage(labrig: Labrig, arguments: list[str]) -> None:
-    one_line(labrig(*arguments), 2, "see labrig --help")
+@pytest.mark.parametrize(
+    ("arguments", "command"),
+    [
+        (["frobnicate"], "labrig"),
+        (["run"], "labrig run"),
+        (["plan", "decay", "--rgi", "sim"], "labrig plan"),
+        (["rig", "use", "--bad"], "labrig rig use"),
+    ],
+)
+def test_wrong_usage(labrig: Labrig, arguments: list[str], command: str) -> None:
+    one_line(labrig(*arguments), 2, f"(see {command} --help)")
 
 
 @pytest.mark.parametrize("command", [["resume"], ["process"]])
@@ -165,6 +175,23 @@ def test_figures_are_drawn_into_a_pdf_on_demand(labrig: Labrig, finished: Path) 
     one_line(labrig("figures", finished), 2, "expected a run with a result")
 
 
+def test_a_complete_run_is_not_resumed_but_processed_if_it_was_not(
+    labrig: Labrig, finished: Path
+) -> None:
+    result = finished / "result" / "result.json"
+    changed_ns = result.stat().st_mtime_ns
+    ended = labrig("resume", finished)
+    assert (ended.code, ended.run_folder) == (0, finished)
+    (line,) = ended.err.splitlines()
+    assert line.startswith("nothing to resume: all units are complete")
+    assert result.stat().st_mtime_ns == changed_ns
+    shutil.rmtree(finished / "result")
+    ended = labrig("resume", finished)
+    assert ended.code == 0
+    assert "warning" not in ended.err
+    assert result.is_file()
+
+
 def test_processing_otherwise(labrig: Labrig, finished: Path) -> None:
     ended = labrig(
         "process", finished, "--roi", "36,24,24,16", "--exclude", "3", "--states", "2", "--json"
@@ -176,6 +203,10 @@ def test_processing_otherwise(labrig: Labrig, finished: Path) -> None:
         if "excluded" in line
     ]
     assert excluded == [], "frame 3 is a dark frame, not part of the series"
+    asked = labrig("process", finished, "--states", "3")
+    (told,) = [line for line in asked.err.splitlines() if "states were asked for" in line]
+    assert told.removeprefix("warning: ") not in asked.out, "once is enough"
+    assert "flicker  " in asked.out
     frame = read_run(finished).frames("decay")[2].path.name
     assert labrig("process", finished, "--exclude", frame).code == 0
     assert f"{frame},decay-1,sample,excluded" in (finished / "result" / "series.csv").read_text()
@@ -240,6 +271,17 @@ def test_what_cannot_be_reduced_is_exit_code_4(labrig: Labrig, tmp_path: Path) -
     one_line(labrig("fit", "decay", tmp_path / "series.csv"), 4, "series.csv")
     (tmp_path / "short.csv").write_text("t_s,G\n0,1\n")
     one_line(labrig("fit", "decay", tmp_path / "short.csv"), 4)
+
+
+def test_a_protocol_of_a_package_is_listed_and_needs_a_file_of_ones_own(
+    labrig: Labrig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry = plugins._registry()
+    decay = EntryPoint("lamp_drift", registry[plugins.PROTOCOLS]["decay"].value, plugins.PROTOCOLS)
+    extended = {**registry, plugins.PROTOCOLS: {**registry[plugins.PROTOCOLS], "lamp_drift": decay}}
+    monkeypatch.setattr(plugins, "_registry", lambda: extended)
+    assert "lamp_drift" in labrig("protocol", "list").out
+    one_line(labrig("plan", "lamp_drift", "--rig", "sim"), 2, "installed", "lamp_drift.yaml")
 
 
 def test_what_there_is_is_listed(labrig: Labrig) -> None:

@@ -82,7 +82,24 @@ def test_a_default_that_is_gone_is_one_line(
     (settings / "rig.txt").write_bytes(b"\xff\xfe")
     refused(labrig("plan", make_protocol()), "rig.txt", "labrig rig use FILE")
     monkeypatch.setenv("LABRIG_RIG", "simm")
-    refused(labrig("plan", make_protocol()), "did you mean 'sim'?", "LABRIG_RIG")
+    ended = labrig("plan", make_protocol())
+    refused(ended, "did you mean 'sim'?", "LABRIG_RIG", "unset it")
+    assert "rig use" not in ended.err, "which the variable would overrule"
+
+
+def test_a_choice_that_the_environment_overrules_is_kept_and_told(
+    labrig: Labrig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LABRIG_RIG", "sim")
+    told = labrig("rig", "use", "sim-phosphor").out
+    assert "sim-phosphor" in told
+    assert "LABRIG_RIG has priority" in told
+    assert told.splitlines()[-1].startswith("sim, ")
+    forgotten = labrig("rig", "use", "--forget").out
+    assert "forgotten" in forgotten
+    assert "LABRIG_RIG has priority" in forgotten
+    monkeypatch.delenv("LABRIG_RIG")
+    assert "no default rig" in labrig("rig", "use").out
 
 
 def test_what_is_no_rig_is_not_chosen(labrig: Labrig, tmp_path: Path, settings: Path) -> None:

@@ -37,6 +37,7 @@ def test_a_good_rig_is_measured_and_fine(labrig: Labrig, make_rig: Make) -> None
     assert (ended.code, ended.err) == (0, "")
     for said in ("Numato", "5D Mark II", "switch on, read back", "frame_time", "safe state"):
         assert said in ended.out
+    assert "from the Numato board" in labrig("rig", "check", make_rig(), "--verbose").err
 
 
 def test_its_numbers_are_the_simulated_devices_own(labrig: Labrig, make_rig: Make) -> None:

@@ -114,6 +114,20 @@ def test_a_mute_board_is_sent_its_bytes_and_reported() -> None:
     assert port.script == []
 
 
+def test_a_relay_counts_as_on_until_its_board_confirms_that_it_is_off() -> None:
+    keys = {"on": {"send": "1", "answer": "A"}, "off": {"send": "0", "answer": "B"}}
+    driver, port = lamp(keys, [(b"0\n", b"B\n"), (b"0\n", b"?\n"), (b"0\n", b"B\n")])
+    assert driver.is_on(), "nobody knows"
+    driver.off()
+    assert not driver.is_on()
+    with pytest.raises(UnclearAnswerError):
+        driver.off()
+    assert driver.is_on()
+    driver.off()
+    assert not driver.is_on()
+    assert port.script == []
+
+
 def test_a_board_that_confirms_only_is_said_so() -> None:
     driver, _ = lamp({"on": {"send": "1", "answer": "A"}, "off": {"send": "0", "answer": "B"}}, [])
     (finding,) = driver.findings()

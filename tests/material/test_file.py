@@ -129,7 +129,7 @@ WHOLE = {
             "states: [{k_r_per_s: 0.1, reradiation: [1, 2], reradiation_sigma: [1]}]",
             "expected 2 values in 'reradiation_sigma' as in 'reradiation', got 1",
         ),
-        ("states: []", "at least 1 item"),
+        ("states: []", "at least 1 value"),
         ("bands_nm: [500, 400, 600]", "rising wavelengths in 'bands_nm'"),
         ("bands_nm: null", "expected 0 values"),
         ("irradiance_norm: null", "expected 'irradiance_norm' beside states.0.k_e_per_s"),

@@ -47,6 +47,23 @@ class KillItself:
         return 0.0
 
 
+@dataclass(frozen=True)
+class Nothing:
+    """A reduction that finds nothing."""
+
+    def __call__(self, frames: Iterator[RawFrame]) -> None:
+        for _ in frames:
+            pass
+
+
+@dataclass(frozen=True)
+class ImportPath:
+    """A reduction that tells where its process imports from."""
+
+    def __call__(self, frames: Iterator[RawFrame]) -> tuple[str, ...]:
+        return tuple(map(str, sys.path))
+
+
 @pytest.fixture
 def run(tmp_path: Path, write_dng: WriteDng) -> Sequence[SeriesFrame]:
     """Frames in a run folder, with their checksums."""
@@ -123,6 +140,23 @@ def test_workers_reduce_to_the_last_bit_as_this_process(run: Sequence[SeriesFram
     reduction: Reduction[Any] = MeasureRegions((MIDDLE, (0.0, 0.0, 1.0, 1.0)), hot)
     here = [reduced_text(group, reduction) for group in paths]
     assert list(texts_from_workers(paths, reduction, 2)) == here
+
+
+def test_a_worker_imports_from_where_this_process_does_and_not_from_the_working_folder(
+    run: Sequence[SeriesFrame], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    elsewhere = tmp_path / "modules"
+    elsewhere.mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", ["", elsewhere, str(elsewhere), *sys.path])
+    (text,) = texts_from_workers([(run[0].path,)], ImportPath(), 1)
+    folders = decoded(text, tuple[str, ...])
+    assert str(elsewhere) in folders
+    assert {"", ".", str(tmp_path)}.isdisjoint(folders)
+
+
+def test_there_is_an_outcome_for_every_group(run: Sequence[SeriesFrame]) -> None:
+    assert reduce_frames(run, Nothing()) == [None] * len(run)
 
 
 def test_a_damaged_frame_is_the_same_error_from_a_worker(run: Sequence[SeriesFrame]) -> None:

@@ -297,7 +297,7 @@ class TestCommand:
         [
             (["--protocol", "none.yaml"], "none.yaml: no such protocol file"),
             (["--protocol", "decay"], "copy a shipped one first"),
-            (["--port", "70000"], "see labrig --help"),
+            (["--port", "70000"], "see labrig rig view --help"),
         ],
     )
     def test_wrong_usage(self, labrig: Callable[..., Ended], more: list[str], said: str) -> None:

@@ -91,7 +91,7 @@ def test_faults_keep_to_the_wall_when_a_room_is_opened_later() -> None:
     ("text", "said"),
     [
         ("sampel: blue-paint", "did you mean 'sample'?"),
-        ("sample: []", "at least 1 item"),
+        ("sample: []", "at least 1 value"),
         ("sample: [{materal: bottle}]", "did you mean 'material'?"),
         ("{sample: bottle, faults: [lamp_ded]}", "did you mean 'lamp_dead'?"),
         ("{sample: bottle, faults: [lamp_dead: {att: 5 s}]}", "did you mean 'at'?"),
