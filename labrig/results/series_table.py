@@ -218,11 +218,15 @@ def _series(table: Table, columns: Columns) -> list[Series]:
         return tuple("" if column is None else row[column] for row in table.rows)
 
     channels = columns.channels
+    values = np.stack([numbers(channel.column, None) for channel in channels], axis=1)
+    given = np.stack([numbers(channel.sigma, math.nan) for channel in channels], axis=1)
+    relative = np.array([channel.sigma_is_relative for channel in channels])
+    scale = np.array([channel.sigma_scale for channel in channels])
     series = Series(
         t_s=numbers(columns.time, None) * columns.unit_s,
         exposure_s=numbers(columns.exposure, 0.0),
-        values=np.stack([numbers(channel.column, None) for channel in channels], axis=1),
-        sigma=np.stack([numbers(channel.sigma, math.nan) for channel in channels], axis=1),
+        values=values,
+        sigma=given * scale * np.where(relative, np.abs(values), 1.0),
         dark_sigma=np.full(len(channels), math.nan),
         channels=tuple(channel.name for channel in channels),
         iso=numbers(columns.reserved.get("iso"), math.nan),

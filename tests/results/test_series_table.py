@@ -226,3 +226,44 @@ def test_a_real_decay_in_somebodys_table(shared_data: Path) -> None:
     luminescence = shared_data / "decay" / "cran_luminescence"
     for path in sorted(luminescence.glob("*.csv")):
         assert read_series(path)[0].channels == ("counts",)
+
+
+@pytest.mark.parametrize(
+    ("header", "sigma"),
+    [
+        ("t / s,I / V,σ / mV", [0.001, 0.001]),
+        ("t / s,I (mV),I_sigma (µV)", [0.001, 0.001]),
+        ("t,I / V,Error (%)", [0.1, 0.05]),
+        ("t,I / %,Error (%)", [1.0, 1.0]),
+        ("t,I / V,σ(I)", [1.0, 1.0]),
+        ("t,I [mcd/m²],± [cd/m^2]", [1000.0, 1000.0]),
+        ("t,I,σ\ns,V,mV", [0.001, 0.001]),
+    ],
+)
+def test_sigma_comes_in_the_unit_of_the_values(header: str, sigma: list[float]) -> None:
+    (series,) = parse_series(f"{header}\n0,10,1\n1,5,1\n", "table")
+    assert series.sigma[:, 0] == pytest.approx(sigma)
+
+
+@pytest.mark.parametrize("unit", ["A", "MV/s", "counts"])
+def test_sigma_in_a_unit_of_another_quantity_is_refused_with_both_units(unit: str) -> None:
+    with pytest.raises(UsageError, match=f"'mV'.*'{unit}'"):
+        parse_series(f"t,I / mV,Error / {unit}\n0,10,1\n1,5,1\n", "table")
+
+
+@pytest.mark.parametrize(
+    ("head", "line"),
+    [
+        ("t,I\n0,OVER\n1,OVER\n", 2),
+        ("t,I,note\n0,OVER,a\n1,,b\n", 2),
+        ("Gain,5\n\nI,t\nOVER,0\n9,1\n", 4),
+        ("t,I\ns,V\n0,-\n", 3),
+        ("# cloud\n0,OVER\n", 2),
+        ("t / s   I / V\n0  OVER\n", 2),
+    ],
+)
+def test_rows_without_a_value_at_the_head_are_refused_with_their_line(head: str, line: int) -> None:
+    rows = "".join(f"{9 - k},{k}\n" if "I,t" in head else f"{k},{9 - k}\n" for k in range(2, 8))
+    text = head + (rows if "," in head else rows.replace(",", " "))
+    with pytest.raises(UsageError, match=rf"^x: line {line}: .*number"):
+        parse_series(text, "x")
