@@ -38,6 +38,8 @@ class Evidence:
         Numbers of states and other models that were tried.
     better_model
         Alternative model that fits clearly better than exponentials, if there is one.
+    all_needed
+        Whether the data refute one state fewer.
     asked, max_states, n_fixed
         Requested number of states, largest number and number of fixed rates.
     """
@@ -48,6 +50,7 @@ class Evidence:
     candidates: tuple[Candidate, ...]
     alternative_models: tuple[AlternativeModel, ...]
     better_model: AlternativeModel | None
+    all_needed: bool
     asked: int | None
     max_states: int
     n_fixed: int
@@ -148,7 +151,9 @@ def warnings_about(
         fit.n_states,
         f"{advice}, and check background and times (labrig fit decay --offset, --origin, --from)",
     )
-    warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
+    free_offset = bool(np.isinf(series.offset_sigma).any())
+    if not free_offset:
+        warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     low, high = series.log_rate_bounds
     return warnings + state_warnings(
@@ -156,6 +161,8 @@ def warnings_about(
         log_rate_covariance,
         series.span_s,
         (float(np.exp(low)) / series.span_s, float(np.exp(high)) / series.span_s),
+        evidence.all_needed,
+        free_offset,
     )
 
 
