@@ -99,6 +99,20 @@ class Columns:
     reserved: dict[str, int]
     value_unit: str
 
+    def describe(self, names: Sequence[str]) -> str:
+        """Return in words which columns are times, values and σ, by name or else by number."""
+
+        def text(columns: Sequence[int]) -> str:
+            return ", ".join(
+                " ".join(names[column].split()) if names else f"column {column + 1}"
+                for column in columns
+            )
+
+        sigmas = [channel.sigma for channel in self.channels if channel.sigma is not None]
+        values = [channel.column for channel in self.channels]
+        sigma = f"σ {text(sigmas)}" if sigmas else "no σ"
+        return f"time {text([self.time])}; values {text(values)}; {sigma}"
+
 
 def find_columns(table: Table, layout: TableLayout) -> Columns:
     """Return the roles of the columns by their names and the user's answers."""

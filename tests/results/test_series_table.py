@@ -95,14 +95,14 @@ REFUSED: list[tuple[str, type[LabrigError], str]] = [
     ("", DataError, "no rows"),
     ("# nothing\n\n", DataError, "no rows"),
     ("t,counts\n", DataError, "a header without rows"),
-    ("t,counts\n0,1\n1,nan\n", DataError, "line 3: expected a finite number for 'counts'"),
-    ("t,counts\n0,1\n1e999,1\n", DataError, "line 3: expected a finite number for 't'"),
+    ("t,counts\n0,1\n1,nan\n", UsageError, "line 3: expected a finite number for 'counts'"),
+    ("t,counts\n0,1\n1e999,1\n", UsageError, "line 3: expected a finite number for 't'"),
     ("t,counts\n0,1\n#\n1,many\n", UsageError, "line 4: .* got 'many'"),
     ("t,counts\n0,1_0\n", UsageError, "line 2: .* got '1_0'"),
     ("t;counts\n0;1,5\n1;many\n", UsageError, "line 3: .* decimal comma .* got 'many'"),
-    ("t,R,G\n0,1,2\n1,2,3\n2,,4\n", DataError, "line 4: expected a number for 'R', got nothing"),
+    ("t,R,G\n0,1,2\n1,2,3\n2,,4\n", UsageError, "line 4: expected a number for 'R', got nothing"),
     ("t,counts\n0,1\n1,2,3\n", UsageError, "line 3: expected 2 columns .* got 3"),
-    ("t,R,G\n0,1,2\n1,2\n2,3,4\n", DataError, "line 3: expected a number for 'G'"),
+    ("t,R,G\n0,1,2\n1,2\n2,3,4\n", UsageError, "line 3: expected a number for 'G'"),
     ("wl,counts\n420,1\n", UsageError, "a column of times .* got wl, counts; .* '--time NAME'"),
     ("t,frame\n0,a\n", UsageError, "a column of values is missing"),
     ("t,time_s,R\n0,0,1\n", UsageError, "one of the columns t, time_s"),
@@ -267,3 +267,36 @@ def test_rows_without_a_value_at_the_head_are_refused_with_their_line(head: str,
     text = head + (rows if "," in head else rows.replace(",", " "))
     with pytest.raises(UsageError, match=rf"^x: line {line}: .*number"):
         parse_series(text, "x")
+
+
+@pytest.mark.parametrize(
+    ("clock", "t_s"),
+    [
+        (["12:00:05", "12:00:06.5", "12:01:05"], [0, 1.5, 60]),
+        (["23:59:58", "0:00:01", "00:01:00"], [0, 3, 62]),
+        (["2026-11-01 23:00:00", "2026-11-02 00:00:00", "2026-11-03T00:00:00"], [0, 3600, 90000]),
+    ],
+)
+@pytest.mark.parametrize("columns", [1, 2])
+def test_times_of_day_are_counted_from_the_first_row(
+    clock: list[str], t_s: list[float], columns: int
+) -> None:
+    rows = [f"{time};{';'.join(['5'] * columns)}" for time in clock]
+    (series,) = parse_series("\n".join([f"time;{';'.join('AB'[:columns])}", *rows]), "x")
+    assert series.t_s.tolist() == t_s
+    assert series.values.tolist() == [[5] * columns] * 3
+
+
+@pytest.mark.parametrize("time", ["12:05", "25 h", "2026-11-01 12:00:01"])
+def test_times_of_day_of_several_kinds_are_refused(time: str) -> None:
+    with pytest.raises(UsageError, match="expected a number"):
+        parse_series(f"time;A\n12:00:00;1\n{time};1\n12:00:02;1\n", "x")
+
+
+def test_a_run_folder_is_answered_with_its_series(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected a table, got a folder"):
+        read_series(tmp_path)
+    (tmp_path / "result").mkdir()
+    (tmp_path / "result" / "series.csv").touch()
+    with pytest.raises(UsageError, match=r"result.series\.csv"):
+        read_series(tmp_path)

@@ -3,16 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc, ndtr
+from scipy.special import chdtr, chdtrc, fdtrc, ndtr
 
 from labrig.fit.decay.states import APART_SIGMAS, ILL_DETERMINED, sigmas_apart
 from labrig.fit.least_squares import FloatArray
+from labrig.number_format import rounded
 from labrig.results import DecayState
 
 #: Significance level of each misfit test.
 MISFIT_LEVEL = 5e-4
 #: Number of frames below which the order of residuals is not tested.
 FEWEST_FOR_ORDER = 8
+#: Reduced χ² below which σ is doubted: half the scatter that it says, if not by chance.
+TOO_SMALL_CHI2 = 0.25
 #: Ratio to the slowest rate searched below which a rate is at that bound.
 NEAR_BOUND = 1.001
 BELOW_ZERO_SIGMAS = 5.0
@@ -86,6 +89,23 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
             "each channel, or fit the channels one by one"
         )
     return warnings
+
+
+def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> list[str]:
+    """Return a warning if the values lie much closer to the fit than σ says."""
+    if dof < 1 or chi2 >= TOO_SMALL_CHI2 * dof or chdtr(dof, chi2) > MISFIT_LEVEL:
+        return []
+    times = rounded(float(np.sqrt(dof / chi2)), 2) if chi2 > 0 else "∞"
+    closer = f"the values lie {times} times closer to the fit than σ says"
+    if sigma_from_scatter:
+        return [
+            f"{closer}: their scatter is below what the curve resolves against which σ was "
+            "measured, and every σ given here is an upper bound; give the values' σ if it is known"
+        ]
+    return [
+        f"{closer}: σ is too large, or another quantity; check its column and its unit, or leave "
+        "it out, and it is taken from the scatter"
+    ]
 
 
 def _outlier_warnings(misfit: Misfit) -> list[str]:

@@ -183,8 +183,8 @@ def _numbers_of_states(
 
     if frames < parameters(fewest):
         raise FitError(
-            f"expected at least {parameters(fewest)} frames for {fewest} state(s), got {frames}; "
-            "record more frames or ask for fewer states"
+            f"expected values at {parameters(fewest)} times or more for {fewest} state(s), got "
+            f"{frames}; record more{' or ask for fewer states' if fewest > 1 else ''}"
         )
     # Choosing takes frames to spare.
     affordable = [n for n in range(fewest, most + 1) if n == fewest or frames > parameters(n) + 1]

@@ -11,6 +11,7 @@ from labrig.fit.decay.diagnostics import (
     misfit_warnings,
     offset_warnings,
     rise_in_sigmas,
+    small_chi2_warnings,
     state_warnings,
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
@@ -84,8 +85,8 @@ def refuse_if_constant(fit: StatesFit, data: WhitenedSeries) -> None:
     if fit.n_states == fit.n_free == 1 and fit.log_rates[0] < slowest + AT_BOUND:
         raise FitError(
             "expected a signal that decays, got one that is constant within its noise for "
-            f"{data.series.span_s:.4g} s; was the sample charged, is it the dark level or stray "
-            "light that is seen? Else record longer"
+            f"{data.series.span_s:.4g} s; was the sample charged, is it a background that was "
+            "measured? Else record longer"
         )
 
 
@@ -114,12 +115,12 @@ def warnings_about(
     if fit.dof(data) <= 0:
         warnings.append(
             "there are no more values than parameters: nothing is left to test the fit with; "
-            "record more frames"
+            "record more"
         )
     if evidence.noise_dof < FEWEST_NOISE_DOF and evidence.scatter:
         warnings.append(
             f"σ was taken from the scatter of {max(evidence.noise_dof, 0):.0f} values to spare: "
-            "give each value's σ in a column sigma, or record more frames"
+            "give each value's σ in a column sigma, or record more"
         )
     elif evidence.noise_dof < FEWEST_NOISE_DOF:
         warnings.append(
@@ -146,11 +147,16 @@ def warnings_about(
         if fit.n_states < evidence.max_states
         else "look for another law of decay"
     )
-    warnings += misfit_warnings(
-        _misfit(data, fit, evidence),
-        fit.n_states,
-        f"{advice}, and check background and times (labrig fit decay --offset, --origin, --from)",
-    )
+    closer = small_chi2_warnings(joint.chi2, fit.dof(data), evidence.scatter is not None)
+    warnings += closer
+    # The order of residuals that are far smaller than any scatter is that of rounding errors.
+    if not (closer and evidence.scatter):
+        warnings += misfit_warnings(
+            _misfit(data, fit, evidence),
+            fit.n_states,
+            f"{advice}, and check background and times "
+            "(labrig fit decay --offset, --origin, --from)",
+        )
     free_offset = bool(np.isinf(series.offset_sigma).any())
     if not free_offset:
         warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))

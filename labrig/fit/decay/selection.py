@@ -1,9 +1,9 @@
 """Selection of the number of states.
 
 One more state is accepted only if both the Bayesian information criterion and an F-test favour it,
-and if the rates are distinct and determined, unless fewer states are refuted. The F-test's denominator is the frames' own scatter
-along the signal, so that neither an underestimated σ nor common-mode flicker of the channels
-produces a spurious state.
+and if the rates are distinct and determined, unless fewer states are refuted. The F-test's
+denominator is the frames' own scatter along the signal, so that neither an underestimated σ nor
+common-mode flicker of the channels produces a spurious state.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,8 @@ F_TEST_LEVEL = 0.002
 CREEPING_GAIN, GOOD_REDUCED_CHI2 = 4.0, 1.5
 #: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
-#: Gain in BIC from which a further state is accepted though its rate is ill-determined: odds of e^5 = 150 : 1 against fewer states.
+#: Gain in BIC from which a further state is accepted though its rate is ill-determined: odds of
+#: e^5 = 150 : 1 against fewer states.
 REFUTING_BIC = 10.0
 
 
