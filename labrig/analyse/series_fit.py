@@ -88,7 +88,7 @@ def fit_series(
     if not _is_seen(fit):
         raise FitError(
             "expected a decay, got nothing that stands out of the noise by "
-            f"{SEEN_SIGMA:g} σ; did the lamp light, is the region on the sample, is the exposure "
+            f"{SEEN_SIGMA:g} σ; was the sample charged, is it its light that was measured, and for "
             "long enough?"
         )
     return fit

@@ -10,7 +10,7 @@ from labrig.analyse.series_fit import fit_series
 from labrig.errors import FitError, UsageError
 from labrig.fit import DecayFit
 from labrig.quantity import FRACTION, parse
-from labrig.results import FloatArray, Series, TableLayout, join_series, read_series
+from labrig.results import FloatArray, Series, TableLayout, join_series, read_described_series
 
 #: Least counts in a Poisson weight, since fewer would weigh a point too much.
 MIN_COUNTS = 5.0
@@ -77,11 +77,14 @@ class FittedTable:
         Fitted rows, their times counted from lamp off, with the σ that the fit used.
     fit
         Fitted decay.
+    columns
+        Columns of the table that were taken as times, values and σ, in words.
     """
 
     region: str
     series: Series
     fit: DecayFit
+    columns: str
 
 
 def fit_table(
@@ -108,10 +111,10 @@ def fit_table(
     Raises
     ------
     UsageError
-        An option is malformed, no point is left, or the table is malformed or can be read in two
-        ways.
+        An option is malformed, no point is left, or the table is malformed, has cells without a
+        number, or can be read in two ways.
     DataError
-        The table has values that are missing or not finite.
+        The table has no rows, or a σ that is not above zero.
     FitError
         The data do not allow a fit.
 
@@ -125,7 +128,8 @@ def fit_table(
     """
     options, layout = options or TableFitOptions(), layout or TableLayout()
     fits = []
-    for series in _join_regions(read_series(path, layout)):
+    parts, columns = read_described_series(path, layout)
+    for series in _join_regions(parts):
         _require_sigma_or_one_channel(path, series, options)
         part = _from_origin(path, series, options)
         _refuse_rise(path, part, options)
@@ -135,10 +139,13 @@ def fit_table(
         # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
         if np.isnan(part.sigma).all() and options.flicker == "auto":
             flicker = 0.0
-        fit = fit_series(part, options.states, options.offset_sigma, flicker)
+        try:
+            fit = fit_series(part, options.states, options.offset_sigma, flicker)
+        except FitError as error:
+            raise FitError(f"{path}: {error}") from None
         sigma = part.sigma.copy()
         sigma[part.usable] = fit.sigma
-        fits.append(FittedTable(part.region, replace(part, sigma=sigma), fit))
+        fits.append(FittedTable(part.region, replace(part, sigma=sigma), fit, columns))
     return fits
 
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from labrig.errors import UsageError
+
 app = typer.Typer(help="Fit data from any source.")
 
 
@@ -68,8 +70,12 @@ def decay(
     from labrig.analyse import TableFitOptions, fit_table
     from labrig.results import TableLayout
 
+    if out is not None:
+        _require_folder(out)
     options = TableFitOptions(states, offset, flicker, weights, origin, start)
     fitted = fit_table(table, options, TableLayout(time, column, time_unit, decimal))
+    if not json:
+        typer.echo(f"columns  {fitted[0].columns}")
     for part in fitted:
         fit = part.fit
         typer.echo(fit.to_json() if json else f"{part.region}\n{fit}".strip())
@@ -81,3 +87,10 @@ def decay(
             for line in processed.changes:
                 typer.echo(line)
             typer.echo(f"report: {processed.report}")
+
+
+def _require_folder(path: Path) -> None:
+    """Refuse, before anything is fitted, a path at which no folder can be made."""
+    nearest = next(place for place in (path, *path.parents) if place.exists())
+    if not nearest.is_dir():
+        raise UsageError(f"--out: expected a folder, got the file {nearest}; give another path")

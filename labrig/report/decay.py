@@ -17,7 +17,7 @@ from labrig.report.decay_figures import (
     values_below_axis,
     visible_parts,
 )
-from labrig.report.methods import REFERENCES, UNKNOWN, methods
+from labrig.report.methods import REFERENCES, UNKNOWN, UNKNOWN_OF_A_TABLE, methods
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.report_model import (
     DECAY_ASSUMPTIONS,
@@ -292,7 +292,7 @@ def decay_sections(
         content={
             "methods": methods(report, sensor, late),
             "references": REFERENCES,
-            "unknown": UNKNOWN,
+            "unknown": UNKNOWN if report.frames else UNKNOWN_OF_A_TABLE,
         },
     )
     assumptions = DECAY_ASSUMPTIONS if report.frames else TABLE_ASSUMPTIONS

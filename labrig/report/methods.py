@@ -207,6 +207,12 @@ UNKNOWN = (
     "the lens and the camera's distance",
     "the sample's temperature",
 )
+#: The same of a decay in another program's table.
+UNKNOWN_OF_A_TABLE = (
+    "the instrument and its settings",
+    "how the sample was charged",
+    "the sample's temperature",
+)
 #: Names of the libraries in papers, with their references.
 _SOFTWARE = {"numpy": "NumPy {} [2]", "scipy": "SciPy {} [3]", "libraw": "LibRaw {}"}
 
@@ -262,6 +268,11 @@ def methods(report: DecayReport, sensor: Sensor | None, late: LatenessStatistics
 def _model(report: DecayReport) -> str:
     """Return the sentence on the decay model."""
     channel = "" if len(report.patches[0].series.channels) == 1 else " in channel c"
+    if not any(patch.series.exposure_s.any() for patch in report.patches):
+        return (
+            f"The signal{channel} at the time t after lamp off was modelled, after Nalbach et al. "
+            "[1], as a sum of n exponential decays of momentary values, T → 0:"
+        )
     return (
         f"The signal{channel} of an exposure from t to t + T after lamp off was modelled, after "
         "Nalbach et al. [1], as a sum of n exponential decays, each averaged over the exposure:"
@@ -271,7 +282,7 @@ def _model(report: DecayReport) -> str:
 def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     """Yield the sentences on the fit."""
     offset = (
-        "an offset b_c, constrained by the uncertainty of the dark level"
+        f"an offset b_c{', constrained by the uncertainty of the dark level' * bool(report.frames)}"
         if any(any(fit.offsets_sigma) for fit in fits)
         else "no offset, b_c = 0"
     )
@@ -292,8 +303,12 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     yield f"The weights follow {noise}{_flicker(fits)}."
     states = [str(number) for number in sorted({fit.n_states for fit in fits})]
     number = f"n = {states[0]}" if len(states) == 1 else f"n = {' or '.join(states)} by patch"
-    if report.states is not None:
+    if report.states is not None and states == [str(report.states)]:
         yield f"The number of states was set to {report.states}."
+    elif report.states is not None:
+        yield (
+            f"The number of states was set to {report.states}, of which the data support {number}."
+        )
     else:
         yield (
             f"The number of states, {number}, was chosen by the Bayesian information criterion "
@@ -320,7 +335,10 @@ def _software(report: DecayReport) -> Iterator[str]:
     """Yield the sentence on the software and its versions."""
     versions = dict(report.about.libraries)
     libraries = [
-        text.format(versions[name]) for name, text in _SOFTWARE.items() if name in versions
+        text.format(versions[name])
+        for name, text in _SOFTWARE.items()
+        # LibRaw reads frames, which a table has not.
+        if name in versions and (report.frames or name != "libraw")
     ]
     with_libraries = f" with {listed(libraries)}" if libraries else ""
     version = report.about.labrig_version

@@ -95,8 +95,12 @@ def quality_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
     return [*rows, Row("Reduced χ²", "", (chi2,))]
 
 
-def reradiance_rows(fit: FittedDecay) -> list[Row]:
-    """Return rows of Λᵢ = aᵢ/kᵢ in each channel, assuming that every state was full: rᵢ(0) = 1."""
+def reradiance_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
+    """Return rows of Λᵢ = aᵢ/kᵢ in each channel, assuming that every state was full: rᵢ(0) = 1.
+
+    `unit` is that of the amplitudes; Λ has it times s.
+    """
+    reradiance_unit = unit.removesuffix("/s") if unit.endswith("/s") else f"{unit} s".strip()
     rows = []
     for name, weight, weight_sigma in zip(
         fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True
@@ -115,7 +119,7 @@ def reradiance_rows(fit: FittedDecay) -> list[Row]:
             )
             value = weight * amplitude / rate
             values.append((value, value * math.sqrt(max(relative2, 0.0))))
-        rows.append(Row(f"Λ in {name}", "DN", _value_texts(values)))
+        rows.append(Row(f"Λ in {name}", reradiance_unit, _value_texts(values)))
     return rows
 
 

@@ -114,6 +114,7 @@ from .series import (
 from .series_table import (
     join_series as join_series,
     parse_series as parse_series,
+    read_described_series as read_described_series,
     read_series as read_series,
 )
 from .table_columns import (

@@ -46,6 +46,7 @@ _WITH_UNIT = tuple(
     re.compile(pattern)
     for pattern in (
         r"(?P<name>.*\S)\s*[(\[]\s*(?P<unit>[^()\[\]]*?)\s*[)\]]",
+        r"(?P<name>.*?\S)\s+/\s+(?P<unit>\S.*)",
         r"(?P<name>.*\S)\s*/\s*(?P<unit>\S.*)",
         r"(?P<name>.*\S)\s*,?\s+in\s+(?P<unit>\S+)",
     )

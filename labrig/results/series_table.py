@@ -11,6 +11,7 @@ import numpy as np
 
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.input_file import read_table_text
+from labrig.results.clock_times import seconds_from_first
 from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 from labrig.results.table_columns import (
@@ -63,6 +64,8 @@ def join_series(parts: Sequence[Series]) -> Series:
 
 
 _FROM_THE_TABLE = TableLayout()
+#: Remedy for a cell without a number.
+_DELETE = "delete the row"
 
 
 def read_series(
@@ -72,7 +75,8 @@ def read_series(
 
     The columns are separated by tabs, semicolons, commas or blanks; numbers have a decimal point or
     a decimal comma. `#` begins a comment, and lines above the table are skipped. Columns are
-    recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`),
+    recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`; times
+    of day, `12:00:05`, are counted from the first row),
     uncertainties (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
     and those of series.csv (region, unit, flag and the like). Every other column of numbers is a
     channel, except one that only the first row fills: some programs put the settings of a
@@ -94,9 +98,10 @@ def read_series(
     Raises
     ------
     UsageError
-        The file does not exist, is not such a table, or can be read in two ways.
+        The file does not exist, is not such a table, can be read in two ways, or a number is
+        missing or not finite.
     DataError
-        A number is not finite, a value is missing, or there are no rows.
+        There are no rows, or a σ is not above zero.
 
     Examples
     --------
@@ -109,7 +114,43 @@ def read_series(
     1.06 s: 8894 DN/s
     6.06 s: 4806 DN/s
     """
-    return parse_series(read_table_text(Path(path)), str(path), layout)
+    return read_described_series(path, layout)[0]
+
+
+def read_described_series(
+    path: str | os.PathLike[str], layout: TableLayout = _FROM_THE_TABLE
+) -> tuple[list[Series], str]:
+    """Read the series in a table, and say in a few words which column was taken for what.
+
+    Parameters
+    ----------
+    path, layout
+        Those of `read_series`.
+
+    Returns
+    -------
+    series : list of Series
+        The series in order of appearance.
+    columns : str
+        Columns of times, values and σ.
+
+    Raises
+    ------
+    UsageError, DataError
+        Those of `read_series`.
+
+    Examples
+    --------
+    >>> from labrig.results import read_described_series
+    >>> read_described_series("series.csv")[1]
+    'time t_s; values R, G, B; σ R_sigma, G_sigma, B_sigma'
+    """
+    folder = Path(path)
+    if folder.is_dir():
+        table = folder / "result" / "series.csv"
+        advice = f"fit '{table}'" if table.is_file() else "give the path of a table in it"
+        raise UsageError(f"{folder}: expected a table, got a folder; {advice}")
+    return _parse(read_table_text(folder), str(path), layout)
 
 
 def parse_series(text: str, source: str, layout: TableLayout = _FROM_THE_TABLE) -> list[Series]:
@@ -132,9 +173,10 @@ def parse_series(text: str, source: str, layout: TableLayout = _FROM_THE_TABLE) 
     Raises
     ------
     UsageError
-        The text is not such a table, or can be read in two ways.
+        The text is not such a table, can be read in two ways, or a number is missing or not
+        finite.
     DataError
-        A number is not finite, a value is missing, or there are no rows.
+        There are no rows, or a σ is not above zero.
 
     Examples
     --------
@@ -147,13 +189,20 @@ def parse_series(text: str, source: str, layout: TableLayout = _FROM_THE_TABLE) 
     >>> series.t_s.tolist(), series.values[:, 0].tolist(), series.sigma[:, 0].tolist()
     ([30.0, 60.0, 120.0], [100.0, 61.0, 22.0], [2.0, 1.6, 1.0])
     """
+    return _parse(text, source, layout)[0]
+
+
+def _parse(text: str, source: str, layout: TableLayout) -> tuple[list[Series], str]:
+    """Return the series in a text, and the roles of its columns in words."""
     try:
         table = _own_table(text)
         if table is not None:
-            return _series(table, _own_columns(table))
-        decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
-        table = parse_table(text, decimal)
-        return _series(table, find_columns(table, layout))
+            columns = _own_columns(table)
+        else:
+            decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
+            table = parse_table(text, decimal)
+            columns = find_columns(table, layout)
+        return _series(table, columns), columns.describe(table.names)
     except LabrigError as error:
         # In one line, though a cell may hold a form feed or another of Unicode's line ends.
         raise type(error)(f"{source}: {' '.join(str(error).split())}") from None
@@ -218,11 +267,15 @@ def _series(table: Table, columns: Columns) -> list[Series]:
         return tuple("" if column is None else row[column] for row in table.rows)
 
     channels = columns.channels
+    values = np.stack([numbers(channel.column, None) for channel in channels], axis=1)
+    given = np.stack([numbers(channel.sigma, math.nan) for channel in channels], axis=1)
+    relative = np.array([channel.sigma_is_relative for channel in channels])
+    scale = np.array([channel.sigma_scale for channel in channels])
     series = Series(
-        t_s=numbers(columns.time, None) * columns.unit_s,
+        t_s=_times_s(table, columns),
         exposure_s=numbers(columns.exposure, 0.0),
-        values=np.stack([numbers(channel.column, None) for channel in channels], axis=1),
-        sigma=np.stack([numbers(channel.sigma, math.nan) for channel in channels], axis=1),
+        values=values,
+        sigma=given * scale * np.where(relative, np.abs(values), 1.0),
         dark_sigma=np.full(len(channels), math.nan),
         channels=tuple(channel.name for channel in channels),
         iso=numbers(columns.reserved.get("iso"), math.nan),
@@ -238,6 +291,14 @@ def _series(table: Table, columns: Columns) -> list[Series]:
     return [series.take(np.array(rows), region) for (region, _), rows in groups.items()]
 
 
+def _times_s(table: Table, columns: Columns) -> FloatArray:
+    """Return the times in seconds; times of day from the first row."""
+    clock_s = seconds_from_first([row[columns.time] for row in table.rows])
+    if clock_s is not None:
+        return clock_s
+    return _numbers(table, columns.time, None) * columns.unit_s
+
+
 def _numbers(table: Table, column: int, empty: float | None) -> FloatArray:
     """Return the cells of a column as numbers, blank ones as `empty` (None forbids them)."""
     name = column_names(table)[column]
@@ -247,18 +308,21 @@ def _numbers(table: Table, column: int, empty: float | None) -> FloatArray:
         cell = row[column].strip()
         if not cell:
             if empty is None:
-                raise DataError(f"line {line}: expected a number for '{name}', got nothing")
+                raise UsageError(
+                    f"line {line}: expected a number for '{name}', got nothing; {_DELETE}"
+                )
             values[index] = empty
             continue
         number = table.number(cell)
         if number is None:
+            remedy = "write all times as numbers, or all as hh:mm:ss" if ":" in cell else _DELETE
             raise UsageError(
-                f"line {line}: expected a number with a decimal {mark} for '{name}', got '{cell}'"
+                f"line {line}: expected a number with a decimal {mark} for '{name}', got '{cell}'; "
+                f"{remedy}"
             )
         if not math.isfinite(number):
-            raise DataError(
-                f"line {line}: expected a finite number for '{name}', got '{cell}'; "
-                "leave the row out"
+            raise UsageError(
+                f"line {line}: expected a finite number for '{name}', got '{cell}'; {_DELETE}"
             )
         values[index] = number
     return values

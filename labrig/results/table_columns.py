@@ -17,6 +17,7 @@ from labrig.results.column_names import (
     time_unit_s,
 )
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
+from labrig.results.sigma_unit import sigma_scale
 from labrig.results.table_text import DECIMAL_MARKS, EXPECTED, Table
 
 _EXPOSURES = frozenset({EXPOSURE, "exposure"})
@@ -54,11 +55,23 @@ class TableLayout:
 
 @dataclass(frozen=True)
 class Channel:
-    """Column of values, its name, and the column of its uncertainty, None without one."""
+    """Column of values and that of their uncertainty.
+
+    Attributes
+    ----------
+    name, column
+        Name of the values, and their column.
+    sigma
+        Column of uncertainties; None without one.
+    sigma_scale, sigma_is_relative
+        Factor from that column to σ in the unit of the values, or to σ over the value.
+    """
 
     name: str
     column: int
     sigma: int | None
+    sigma_scale: float = 1.0
+    sigma_is_relative: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,6 +99,20 @@ class Columns:
     reserved: dict[str, int]
     value_unit: str
 
+    def describe(self, names: Sequence[str]) -> str:
+        """Return in words which columns are times, values and σ, by name or else by number."""
+
+        def text(columns: Sequence[int]) -> str:
+            return ", ".join(
+                " ".join(names[column].split()) if names else f"column {column + 1}"
+                for column in columns
+            )
+
+        sigmas = [channel.sigma for channel in self.channels if channel.sigma is not None]
+        values = [channel.column for channel in self.channels]
+        sigma = f"σ {text(sigmas)}" if sigmas else "no σ"
+        return f"time {text([self.time])}; values {text(values)}; {sigma}"
+
 
 def find_columns(table: Table, layout: TableLayout) -> Columns:
     """Return the roles of the columns by their names and the user's answers."""
@@ -112,13 +139,15 @@ def find_columns(table: Table, layout: TableLayout) -> Columns:
     if not signals:
         raise UsageError(f"{EXPECTED}, got {', '.join(names)}; a column of values is missing")
     channels = tuple(
-        Channel(_channel_name(names, column, signals), column, sigmas.get(column))
+        Channel(
+            _channel_name(names, column, signals),
+            column,
+            sigmas.get(column),
+            *_sigma_scale(table, names, column, sigmas.get(column)),
+        )
         for column in signals
     )
-    value_units = {
-        split_unit(names[column])[1] or (table.units[column] if column < len(table.units) else "")
-        for column in signals
-    }
+    value_units = {_unit(table, names, column) for column in signals}
     value_unit = value_units.pop() if len(value_units) == 1 else ""
     return Columns(time, unit_s, exposure, channels, reserved, value_unit)
 
@@ -212,6 +241,25 @@ def _sigmas(names: Sequence[str], values: Sequence[int], layout: TableLayout) ->
                 )
             sigmas[owners[0]] = column
     return sigmas
+
+
+def _sigma_scale(
+    table: Table, names: Sequence[str], column: int, sigma: int | None
+) -> tuple[float, bool]:
+    """Return the factor from a column of uncertainties to σ, and whether σ is relative."""
+    if sigma is None:
+        return 1.0, False
+    unit, value_unit = _unit(table, names, sigma), _unit(table, names, column)
+    # The brackets of `σ (I)` hold the name of the values.
+    if unit.lower() in (names[column].lower(), split_unit(names[column])[0].lower()):
+        unit = ""
+    return sigma_scale(unit, value_unit, names[sigma])
+
+
+def _unit(table: Table, names: Sequence[str], column: int) -> str:
+    """Return the unit in the name of a column, or in a line of units below the names."""
+    below = table.units[column] if column < len(table.units) else ""
+    return split_unit(names[column])[1] or below
 
 
 def _owner_left_of(

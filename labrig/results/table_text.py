@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from labrig.errors import DataError, UsageError
-from labrig.results.column_names import is_time, time_unit_s
+from labrig.results.column_names import ABSCISSA, is_time, time_unit_s
 
 COMMENT = "#"
 EXPECTED = "expected a table with a column of times and one of values"
@@ -142,6 +142,7 @@ def parse_table(text: str, decimal: str | None = None) -> Table:
         first = 0 if form.count_numbers(rows[0]) == len(rows[0]) else 1
         names: tuple[str, ...] = tuple(rows[0]) if first else ()
     else:
+        first = _first_incomplete_row(rows, first, form, content)
         comments = [line for line in lines[: content[first][0] - 1] if COMMENT in line[:1]]
         names, units = _head(rows, first, form, content, comments)
     if first == len(rows):
@@ -212,6 +213,39 @@ def _first_row(rows: Sequence[Row], form: _Format) -> int | None:
         if len(above) == len(row) and not form.count_numbers(above):
             return index
     return None
+
+
+def _first_incomplete_row(
+    rows: Sequence[Row], first: int, form: _Format, content: Sequence[tuple[int, str]]
+) -> int:
+    """Return the index of the first row above row `first` that has a time but no value.
+
+    Such rows begin below the names: an instrument wrote `OVER`, or nothing, for its first values.
+    Without any there it is `first`, and lines with numbers above are about the measurement.
+    """
+    width = len(rows[first])
+    head = first - 1
+    while head >= 0 and form.count_numbers(rows[head]):
+        head -= 1
+    between = rows[head + 1 : first]
+    times = [0]
+    if head >= 0:
+        # A line of units may stand between the names and the rows.
+        times = [
+            column
+            for index in range(head, max(head - 2, -1), -1)
+            for column, name in enumerate(_names(rows[index], content[index][1], width, form))
+            if is_time(name) or name.lower() == ABSCISSA
+        ]
+    elif form.delimiter is None or any(len(row) != width for row in between):
+        return first
+    is_row = [
+        len(times) > 0
+        and len(row) > times[0]
+        and parse_number(row[times[0]], form.decimal) is not None
+        for row in between
+    ]
+    return head + 1 if all(is_row) else first
 
 
 def _head(

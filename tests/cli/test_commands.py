@@ -245,7 +245,7 @@ def test_a_second_process_of_a_run_is_told_who_has_it(labrig: Labrig, finished: 
 
 def test_a_series_without_light_is_kept_and_reported(labrig: Labrig, finished: Path) -> None:
     ended = labrig("process", finished, "--roi", "1,1,80,4")  # the cloth beside the sample
-    one_line(ended, 4, "did the lamp light", "the run is kept")
+    one_line(ended, 4, "was the sample charged", "the run is kept")
     assert (finished / "result" / "report.html").exists()
 
 
@@ -268,7 +268,7 @@ def test_what_cannot_be_reduced_is_exit_code_4(labrig: Labrig, tmp_path: Path) -
     one_line(labrig("frame", tmp_path / "photo.cr2"), 4, "photo.cr2")
     one_line(labrig("frame", tmp_path / "none.cr2"), 2, "none.cr2")
     (tmp_path / "series.csv").write_text("t_s,G\n0,1\n1,nan\n2,3\n")
-    one_line(labrig("fit", "decay", tmp_path / "series.csv"), 4, "series.csv")
+    one_line(labrig("fit", "decay", tmp_path / "series.csv"), 2, "series.csv", "delete the row")
     (tmp_path / "short.csv").write_text("t_s,G\n0,1\n")
     one_line(labrig("fit", "decay", tmp_path / "short.csv"), 4)
 
@@ -385,6 +385,32 @@ def test_a_table_has_page_figures_and_result_as_a_run_has(
     other = labrig("fit", "decay", table, "--out", tmp_path / "out", "--from", "6")
     assert "options from_s" in other.out
     assert (tmp_path / "out" / "result-1" / "fit.json").is_file()
+
+
+def test_the_columns_of_a_table_without_names_are_told(
+    labrig: Callable[..., Ended], tmp_path: Path
+) -> None:
+    rows = [f"{t},{100 * np.exp(-t / 20)},{60 * np.exp(-t / 20)}" for t in range(0, 80, 2)]
+    (tmp_path / "table.csv").write_text("\n".join(rows))
+    ended = labrig("fit", "decay", tmp_path / "table.csv")
+    assert ended.out.splitlines()[0] == "columns  time column 1; values column 2; σ column 3"
+    assert "σ is too large" in ended.out
+    (tmp_path / "out").touch()
+    refused = labrig("fit", "decay", tmp_path / "table.csv", "--out", tmp_path / "out")
+    one_line(refused, 2, "--out: expected a folder")
+    assert refused.out == ""
+
+
+def test_the_page_of_a_table_tells_nothing_of_a_camera(
+    labrig: Callable[..., Ended], tmp_path: Path
+) -> None:
+    rows = [f"{t},{100 * np.exp(-t / 20)}" for t in range(0, 80, 2)]
+    (tmp_path / "table.csv").write_text("\n".join(["t,Current / nA", *rows]))
+    assert labrig("fit", "decay", tmp_path / "table.csv", "--out", tmp_path / "out").code == 0
+    page = (tmp_path / "out" / "result" / "report.html").read_text(encoding="utf-8")
+    assert "nA s" in page
+    for word in ("DN", "LibRaw", "the lens and", "averaged over the exposure"):
+        assert word not in page
 
 
 OPEN_TABLES = [

@@ -186,7 +186,7 @@ GOOD = np.exp(-0.05 * T)
         ((T, np.where(T > 50, np.nan, GOOD), 0.1), "expected finite values"),
         ((np.full(37, 3.0), GOOD, 0.1), "record a decay"),
         ((T - 10, GOOD, 0.1), "when the lamp went off"),
-        ((T[:1], GOOD[:1], 0.1), "two or more frames"),
+        ((T[:1], GOOD[:1], 0.1), "two or more values"),
         ((T, GOOD[:-1], 0.1), "one row per frame"),
         ((T, GOOD, 0.0), "expected σ > 0"),
         ((T, GOOD, np.ones(5)), "one σ per value"),
@@ -201,7 +201,7 @@ def test_impossible_data_are_refused(arguments: tuple[Any, Any, Any], message: s
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"n_states": 2, "t_s": T[:3], "values": GOOD[:3]}, "at least 4 frames for 2"),
+        ({"n_states": 2, "t_s": T[:3], "values": GOOD[:3]}, "values at 4 times or more for 2"),
         ({"n_states": 0}, "expected 1 states or more"),
         ({"n_states": 9}, "at most 8 states"),
         ({"n_states": 1, "fixed_rates": [0.1, 0.2]}, "expected 2 states or more"),
@@ -226,7 +226,7 @@ def test_impossible_wishes_are_refused(options: dict[str, Any], message: str) ->
 def test_noise_alone_is_no_decay() -> None:
     values = np.full((37, 3), -0.1)
     values[20] = 0.05
-    with pytest.raises(FitError, match="did the lamp light"):
+    with pytest.raises(FitError, match="was the sample charged"):
         fit_decay(T, values, 0.1, channels="RGB", flicker=None)
 
 

@@ -233,3 +233,20 @@ def test_repeats_reach_levels_of_their_own(n_channels: int) -> None:
     assert all(fit.n_states == 2 and not fit.warnings for fit in fits)
     assert 0.6 < np.std(_pulls(fits, DOUBLE)) < 1.4
     assert "levels   first 1.0" in str(fits[0])
+
+
+@pytest.mark.parametrize("asked", [None, 2])
+def test_two_states_that_fewer_do_not_describe_are_kept_beside_a_free_offset(
+    asked: int | None,
+) -> None:
+    """Truth 0.08 and 0.01 /s on 80 s: one state is refuted, the other's σ is wide."""
+    t_s = np.linspace(0, 80, 60)
+    noise = 0.01 * np.random.default_rng(1).normal(size=len(t_s))
+    values = np.exp(-0.08 * t_s) + 0.5 * np.exp(-0.01 * t_s) + noise
+    fit = fit_decay(t_s, values, 0.01, offset_sigma=np.inf, n_states=asked)
+    fast, slow = fit.states
+    assert abs(fast.k_r_per_s - 0.08) < 2 * fast.k_r_sigma_per_s
+    assert abs(slow.k_r_per_s - 0.01) < 2 * slow.k_r_sigma_per_s
+    assert fit.reduced_chi2 < 1.5
+    assert not any("fewer (" in text or "--states" in text for text in fit.warnings)
+    assert any("--offset zero" in text for text in fit.warnings)

@@ -79,3 +79,11 @@ def test_a_few_values_without_sigma_leave_the_rate_open() -> None:
 def test_flicker_needs_sigma() -> None:
     with pytest.raises(FitError, match="to tell flicker from other noise"):
         fit_decay(T_S, np.exp(-0.03 * T_S), None, flicker=0.007)
+
+
+def test_exact_values_are_no_misfit_and_their_sigma_an_upper_bound() -> None:
+    t_s = np.linspace(0, 200, 100)
+    fit = fit_decay(t_s, np.exp(-0.05 * t_s), None)
+    assert fit.states[0].k_r_per_s == pytest.approx(0.05, rel=1e-9)
+    (warning,) = fit.warnings
+    assert "upper bound" in warning

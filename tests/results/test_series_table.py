@@ -95,14 +95,14 @@ REFUSED: list[tuple[str, type[LabrigError], str]] = [
     ("", DataError, "no rows"),
     ("# nothing\n\n", DataError, "no rows"),
     ("t,counts\n", DataError, "a header without rows"),
-    ("t,counts\n0,1\n1,nan\n", DataError, "line 3: expected a finite number for 'counts'"),
-    ("t,counts\n0,1\n1e999,1\n", DataError, "line 3: expected a finite number for 't'"),
+    ("t,counts\n0,1\n1,nan\n", UsageError, "line 3: expected a finite number for 'counts'"),
+    ("t,counts\n0,1\n1e999,1\n", UsageError, "line 3: expected a finite number for 't'"),
     ("t,counts\n0,1\n#\n1,many\n", UsageError, "line 4: .* got 'many'"),
     ("t,counts\n0,1_0\n", UsageError, "line 2: .* got '1_0'"),
     ("t;counts\n0;1,5\n1;many\n", UsageError, "line 3: .* decimal comma .* got 'many'"),
-    ("t,R,G\n0,1,2\n1,2,3\n2,,4\n", DataError, "line 4: expected a number for 'R', got nothing"),
+    ("t,R,G\n0,1,2\n1,2,3\n2,,4\n", UsageError, "line 4: expected a number for 'R', got nothing"),
     ("t,counts\n0,1\n1,2,3\n", UsageError, "line 3: expected 2 columns .* got 3"),
-    ("t,R,G\n0,1,2\n1,2\n2,3,4\n", DataError, "line 3: expected a number for 'G'"),
+    ("t,R,G\n0,1,2\n1,2\n2,3,4\n", UsageError, "line 3: expected a number for 'G'"),
     ("wl,counts\n420,1\n", UsageError, "a column of times .* got wl, counts; .* '--time NAME'"),
     ("t,frame\n0,a\n", UsageError, "a column of values is missing"),
     ("t,time_s,R\n0,0,1\n", UsageError, "one of the columns t, time_s"),
@@ -226,3 +226,77 @@ def test_a_real_decay_in_somebodys_table(shared_data: Path) -> None:
     luminescence = shared_data / "decay" / "cran_luminescence"
     for path in sorted(luminescence.glob("*.csv")):
         assert read_series(path)[0].channels == ("counts",)
+
+
+@pytest.mark.parametrize(
+    ("header", "sigma"),
+    [
+        ("t / s,I / V,σ / mV", [0.001, 0.001]),
+        ("t / s,I (mV),I_sigma (µV)", [0.001, 0.001]),
+        ("t,I / V,Error (%)", [0.1, 0.05]),
+        ("t,I / %,Error (%)", [1.0, 1.0]),
+        ("t,I / V,σ(I)", [1.0, 1.0]),
+        ("t,I [mcd/m²],± [cd/m^2]", [1000.0, 1000.0]),
+        ("t,I,σ\ns,V,mV", [0.001, 0.001]),
+    ],
+)
+def test_sigma_comes_in_the_unit_of_the_values(header: str, sigma: list[float]) -> None:
+    (series,) = parse_series(f"{header}\n0,10,1\n1,5,1\n", "table")
+    assert series.sigma[:, 0] == pytest.approx(sigma)
+
+
+@pytest.mark.parametrize("unit", ["A", "MV/s", "counts"])
+def test_sigma_in_a_unit_of_another_quantity_is_refused_with_both_units(unit: str) -> None:
+    with pytest.raises(UsageError, match=f"'mV'.*'{unit}'"):
+        parse_series(f"t,I / mV,Error / {unit}\n0,10,1\n1,5,1\n", "table")
+
+
+@pytest.mark.parametrize(
+    ("head", "line"),
+    [
+        ("t,I\n0,OVER\n1,OVER\n", 2),
+        ("t,I,note\n0,OVER,a\n1,,b\n", 2),
+        ("Gain,5\n\nI,t\nOVER,0\n9,1\n", 4),
+        ("t,I\ns,V\n0,-\n", 3),
+        ("# cloud\n0,OVER\n", 2),
+        ("t / s   I / V\n0  OVER\n", 2),
+    ],
+)
+def test_rows_without_a_value_at_the_head_are_refused_with_their_line(head: str, line: int) -> None:
+    rows = "".join(f"{9 - k},{k}\n" if "I,t" in head else f"{k},{9 - k}\n" for k in range(2, 8))
+    text = head + (rows if "," in head else rows.replace(",", " "))
+    with pytest.raises(UsageError, match=rf"^x: line {line}: .*number"):
+        parse_series(text, "x")
+
+
+@pytest.mark.parametrize(
+    ("clock", "t_s"),
+    [
+        (["12:00:05", "12:00:06.5", "12:01:05"], [0, 1.5, 60]),
+        (["23:59:58", "0:00:01", "00:01:00"], [0, 3, 62]),
+        (["2026-11-01 23:00:00", "2026-11-02 00:00:00", "2026-11-03T00:00:00"], [0, 3600, 90000]),
+    ],
+)
+@pytest.mark.parametrize("columns", [1, 2])
+def test_times_of_day_are_counted_from_the_first_row(
+    clock: list[str], t_s: list[float], columns: int
+) -> None:
+    rows = [f"{time};{';'.join(['5'] * columns)}" for time in clock]
+    (series,) = parse_series("\n".join([f"time;{';'.join('AB'[:columns])}", *rows]), "x")
+    assert series.t_s.tolist() == t_s
+    assert series.values.tolist() == [[5] * columns] * 3
+
+
+@pytest.mark.parametrize("time", ["12:05", "25 h", "2026-11-01 12:00:01"])
+def test_times_of_day_of_several_kinds_are_refused(time: str) -> None:
+    with pytest.raises(UsageError, match="expected a number"):
+        parse_series(f"time;A\n12:00:00;1\n{time};1\n12:00:02;1\n", "x")
+
+
+def test_a_run_folder_is_answered_with_its_series(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected a table, got a folder"):
+        read_series(tmp_path)
+    (tmp_path / "result").mkdir()
+    (tmp_path / "result" / "series.csv").touch()
+    with pytest.raises(UsageError, match=r"result.series\.csv"):
+        read_series(tmp_path)

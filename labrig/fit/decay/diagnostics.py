@@ -3,17 +3,21 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc, ndtr
+from scipy.special import chdtr, chdtrc, fdtrc, ndtr
 
-from labrig.fit.decay.states import APART_SIGMAS, sigmas_apart
+from labrig.fit.decay.states import APART_SIGMAS, ILL_DETERMINED, sigmas_apart
 from labrig.fit.least_squares import FloatArray
+from labrig.number_format import rounded
 from labrig.results import DecayState
 
 #: Significance level of each misfit test.
 MISFIT_LEVEL = 5e-4
 #: Number of frames below which the order of residuals is not tested.
 FEWEST_FOR_ORDER = 8
-ILL_DETERMINED = 0.3
+#: Reduced χ² below which σ is doubted: half the scatter that it says, if not by chance.
+TOO_SMALL_CHI2 = 0.25
+#: Ratio to the slowest rate searched below which a rate is at that bound.
+NEAR_BOUND = 1.001
 BELOW_ZERO_SIGMAS = 5.0
 OFFSET_SIGMAS = 4.0
 #: Distance of an outlier from the curve in robust standard deviations of the frames.
@@ -87,6 +91,23 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
     return warnings
 
 
+def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> list[str]:
+    """Return a warning if the values lie much closer to the fit than σ says."""
+    if dof < 1 or chi2 >= TOO_SMALL_CHI2 * dof or chdtr(dof, chi2) > MISFIT_LEVEL:
+        return []
+    times = rounded(float(np.sqrt(dof / chi2)), 2) if chi2 > 0 else "∞"
+    closer = f"the values lie {times} times closer to the fit than σ says"
+    if sigma_from_scatter:
+        return [
+            f"{closer}: their scatter is below what the curve resolves against which σ was "
+            "measured, and every σ given here is an upper bound; give the values' σ if it is known"
+        ]
+    return [
+        f"{closer}: σ is too large, or another quantity; check its column and its unit, or leave "
+        "it out, and it is taken from the scatter"
+    ]
+
+
 def _outlier_warnings(misfit: Misfit) -> list[str]:
     """Return a warning for each frame that is far from the curve compared with the others."""
     size = np.abs(misfit.frames)
@@ -135,6 +156,8 @@ def state_warnings(
     log_rate_covariance: FloatArray,
     span_s: float,
     rate_bounds_per_s: tuple[float, float],
+    all_needed: bool,
+    free_offset: bool,
 ) -> list[str]:
     """Return warnings about rates that the data do not constrain.
 
@@ -148,8 +171,13 @@ def state_warnings(
         Time from the first frame to the last in seconds.
     rate_bounds_per_s
         Slowest and fastest rate searched, in 1/s.
+    all_needed
+        Whether the data refute one state fewer.
+    free_offset
+        Whether a constant without prior was fitted.
     """
     warnings = []
+    more_light = "take more light" if all_needed else "ask for fewer states or take more light"
     sigma = np.sqrt(np.diag(log_rate_covariance))
     slowest, fastest = rate_bounds_per_s
     lifetime_s = 1 / states[-1].k_r_per_s
@@ -157,10 +185,12 @@ def state_warnings(
         rate = f"k{number} = {state.k_r_per_s:.3g} /s"
         if state.k_r_sigma_per_s == 0:
             continue
-        if state.k_r_per_s < 1.001 * slowest:
+        if state.k_r_per_s < NEAR_BOUND * slowest:
             warnings.append(
-                f"{rate} is the slowest rate {span_s:.4g} s can tell from a constant: subtract the "
-                "dark level, fit an offset (labrig fit decay --offset) or record longer"
+                f"{rate} is the slowest rate {span_s:.4g} s can tell from a constant: "
+                + ("" if free_offset else "subtract the dark level, fit an offset ")
+                + ("" if free_offset else "(labrig fit decay --offset) or ")
+                + "record longer"
             )
         elif state.k_r_per_s > 0.999 * fastest:
             warnings.append(
@@ -171,16 +201,24 @@ def state_warnings(
             long_lived = number == len(states) and lifetime_s > span_s
             warnings.append(
                 f"{rate} is known to {100 * sigma[number - 1]:.0f} % only: "
-                + ("record longer" if long_lived else "ask for fewer states or take more light")
+                + ("record longer" if long_lived else more_light)
             )
     log_rates = np.log([state.k_r_per_s for state in states])
     for number, apart in enumerate(sigmas_apart(log_rates, log_rate_covariance), start=1):
-        if apart < APART_SIGMAS:
-            warnings.append(
-                f"k{number} and k{number + 1} cannot be distinguished: ask for one state fewer "
-                f"(--states {len(states) - 1})"
+        is_constant = states[number].k_r_per_s < NEAR_BOUND * slowest
+        if apart < APART_SIGMAS and not (all_needed and is_constant):
+            advice = (
+                "fewer states do not describe this decay: record longer, or take more light"
+                if all_needed
+                else f"ask for one state fewer (--states {len(states) - 1})"
             )
+            warnings.append(f"k{number} and k{number + 1} cannot be distinguished: {advice}")
     is_fixed = states[-1].k_r_sigma_per_s == 0
+    if free_offset and not is_fixed and sigma[-1] > ILL_DETERMINED:
+        warnings.append(
+            "the free offset and the slowest state can hardly be told apart: give the offset "
+            "(labrig fit decay --offset zero, or the σ of what was subtracted) or record longer"
+        )
     if lifetime_s > span_s and not is_fixed and sigma[-1] <= ILL_DETERMINED:
         warnings.append(
             f"the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s recorded: "

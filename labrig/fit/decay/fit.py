@@ -11,7 +11,7 @@ from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
 from labrig.fit.decay.result import DecayFit, assemble
 from labrig.fit.decay.scatter import with_scatter_sigma
-from labrig.fit.decay.selection import CLEAR_BIC, bic, choose_states
+from labrig.fit.decay.selection import CLEAR_BIC, bic, choose_states, is_needed
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
@@ -131,6 +131,7 @@ def fit_decay(
     alternative_models = _alternatives(data, chosen)
     best = min(alternative_models, key=lambda alternative: alternative.bic)
     is_better = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
+    all_needed = is_needed(data, chosen, tried, noise_dof)
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     refuse_if_constant(chosen, data)
     return assemble(
@@ -143,6 +144,7 @@ def fit_decay(
             candidates=tuple(tried),
             alternative_models=alternative_models,
             better_model=best if is_better else None,
+            all_needed=all_needed,
             asked=n_states,
             max_states=max_states,
             n_fixed=len(fixed),
@@ -181,8 +183,8 @@ def _numbers_of_states(
 
     if frames < parameters(fewest):
         raise FitError(
-            f"expected at least {parameters(fewest)} frames for {fewest} state(s), got {frames}; "
-            "record more frames or ask for fewer states"
+            f"expected values at {parameters(fewest)} times or more for {fewest} state(s), got "
+            f"{frames}; record more{' or ask for fewer states' if fewest > 1 else ''}"
         )
     # Choosing takes frames to spare.
     affordable = [n for n in range(fewest, most + 1) if n == fewest or frames > parameters(n) + 1]

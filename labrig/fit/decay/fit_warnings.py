@@ -11,6 +11,7 @@ from labrig.fit.decay.diagnostics import (
     misfit_warnings,
     offset_warnings,
     rise_in_sigmas,
+    small_chi2_warnings,
     state_warnings,
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
@@ -38,6 +39,8 @@ class Evidence:
         Numbers of states and other models that were tried.
     better_model
         Alternative model that fits clearly better than exponentials, if there is one.
+    all_needed
+        Whether the data refute one state fewer.
     asked, max_states, n_fixed
         Requested number of states, largest number and number of fixed rates.
     """
@@ -48,6 +51,7 @@ class Evidence:
     candidates: tuple[Candidate, ...]
     alternative_models: tuple[AlternativeModel, ...]
     better_model: AlternativeModel | None
+    all_needed: bool
     asked: int | None
     max_states: int
     n_fixed: int
@@ -81,8 +85,8 @@ def refuse_if_constant(fit: StatesFit, data: WhitenedSeries) -> None:
     if fit.n_states == fit.n_free == 1 and fit.log_rates[0] < slowest + AT_BOUND:
         raise FitError(
             "expected a signal that decays, got one that is constant within its noise for "
-            f"{data.series.span_s:.4g} s; was the sample charged, is it the dark level or stray "
-            "light that is seen? Else record longer"
+            f"{data.series.span_s:.4g} s; was the sample charged, is it a background that was "
+            "measured? Else record longer"
         )
 
 
@@ -111,12 +115,12 @@ def warnings_about(
     if fit.dof(data) <= 0:
         warnings.append(
             "there are no more values than parameters: nothing is left to test the fit with; "
-            "record more frames"
+            "record more"
         )
     if evidence.noise_dof < FEWEST_NOISE_DOF and evidence.scatter:
         warnings.append(
             f"σ was taken from the scatter of {max(evidence.noise_dof, 0):.0f} values to spare: "
-            "give each value's σ in a column sigma, or record more frames"
+            "give each value's σ in a column sigma, or record more"
         )
     elif evidence.noise_dof < FEWEST_NOISE_DOF:
         warnings.append(
@@ -143,12 +147,19 @@ def warnings_about(
         if fit.n_states < evidence.max_states
         else "look for another law of decay"
     )
-    warnings += misfit_warnings(
-        _misfit(data, fit, evidence),
-        fit.n_states,
-        f"{advice}, and check background and times (labrig fit decay --offset, --origin, --from)",
-    )
-    warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
+    closer = small_chi2_warnings(joint.chi2, fit.dof(data), evidence.scatter is not None)
+    warnings += closer
+    # The order of residuals that are far smaller than any scatter is that of rounding errors.
+    if not (closer and evidence.scatter):
+        warnings += misfit_warnings(
+            _misfit(data, fit, evidence),
+            fit.n_states,
+            f"{advice}, and check background and times "
+            "(labrig fit decay --offset, --origin, --from)",
+        )
+    free_offset = bool(np.isinf(series.offset_sigma).any())
+    if not free_offset:
+        warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     low, high = series.log_rate_bounds
     return warnings + state_warnings(
@@ -156,6 +167,8 @@ def warnings_about(
         log_rate_covariance,
         series.span_s,
         (float(np.exp(low)) / series.span_s, float(np.exp(high)) / series.span_s),
+        evidence.all_needed,
+        free_offset,
     )
 
 

@@ -1,10 +1,12 @@
 """Selection of the number of states.
 
 One more state is accepted only if both the Bayesian information criterion and an F-test favour it,
-and if its rate is distinct from the others'. The F-test's denominator is the frames' own scatter
-along the signal, so that neither an underestimated σ nor common-mode flicker of the channels
-produces a spurious state.
+and if the rates are distinct and determined, unless fewer states are refuted. The F-test's
+denominator is the frames' own scatter along the signal, so that neither an underestimated σ nor
+common-mode flicker of the channels produces a spurious state.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.special import fdtrc
@@ -23,6 +25,9 @@ F_TEST_LEVEL = 0.002
 CREEPING_GAIN, GOOD_REDUCED_CHI2 = 4.0, 1.5
 #: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
+#: Gain in BIC from which a further state is accepted though its rate is ill-determined: odds of
+#: e^5 = 150 : 1 against fewer states.
+REFUTING_BIC = 10.0
 
 
 def bic(data: WhitenedSeries, joint: JointFit) -> float:
@@ -70,16 +75,34 @@ def choose_states(
         tried.append(
             Candidate(n_states, fit.joint.least_squares.reduced_chi2, bic(data, fit.joint), p_value)
         )
-        if p_value is not None and (
-            p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic or not fit.rates_are_distinct
-        ):
-            break
+        if p_value is not None:
+            needed_gain = 0.0 if fit.rates_are_determined else REFUTING_BIC
+            if p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic - needed_gain:
+                break
         chosen = fit
         weights, offsets = fit.joint.weights, fit.joint.offsets
         if fit.joint.least_squares.reduced_chi2 < GOOD_REDUCED_CHI2:
             penalty = 2 * float(np.log(data.independent_data(weights)))
             needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
     return chosen, tried
+
+
+def is_needed(
+    data: WhitenedSeries, fit: StatesFit, candidates: Sequence[Candidate], noise_dof: float
+) -> bool:
+    """Return whether one state fewer is refuted, fitting it if it is not among the candidates."""
+    if fit.n_free < 2:
+        return True
+    fewer_bic = next(
+        (other.bic for other in candidates if other.n_states == fit.n_states - 1), None
+    )
+    if fewer_bic is None:
+        joint = fit.joint
+        fewer = fit_states(data, fit.n_free - 1, fit.fixed, joint.weights, joint.offsets)
+        if fewer is None or f_test(data, fewer.joint, joint, noise_dof) > F_TEST_LEVEL:
+            return False
+        fewer_bic = bic(data, fewer.joint)
+    return fewer_bic - bic(data, fit.joint) > REFUTING_BIC
 
 
 def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: float) -> float:

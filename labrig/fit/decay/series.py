@@ -19,7 +19,7 @@ LARGEST_PHASE = 300.0
 
 NO_DECAY = (
     "expected a signal that decays, got none that a positive exponential describes; "
-    "did the lamp light, is the dark level right, do times count from lamp off?"
+    "was the sample charged, is the background right, do times count from lamp off?"
 )
 
 
@@ -158,7 +158,7 @@ def decay_series(
     """
     t = np.asarray(t_s, dtype=np.float64)
     if t.ndim != 1 or len(t) < 2:
-        raise FitError(f"expected times of two or more frames, got shape {t.shape}; record more")
+        raise FitError(f"expected times of two or more values, got shape {t.shape}; record more")
     y = np.asarray(values, dtype=np.float64)
     y = y[:, None] if y.ndim == 1 else y
     names = tuple(channels)
@@ -192,7 +192,7 @@ def decay_series(
     order = np.argsort(t, kind="stable")
     span = float(t.max() - t.min())
     if span == 0:
-        raise FitError(f"expected frames at several times, got all at {t[0]:g} s; record a decay")
+        raise FitError(f"expected values at several times, got all at {t[0]:g} s; record a decay")
     y = np.where(measured, y, 0.0)
     peak = float(np.abs(y).max())
     if y.max() <= 0:

@@ -45,6 +45,8 @@ NEGLIGIBLE_AMPLITUDE = 1e-9
 MERGED_LOG_RATE = 1e-2
 #: Distance in σ below which two rates are not distinct.
 APART_SIGMAS = 3.0
+#: σ of log k above which a rate is ill-determined.
+ILL_DETERMINED = 0.3
 #: Evaluations and relative step of a candidate, which is only compared by its χ².
 CANDIDATE_ITERATIONS = 100
 CANDIDATE_TOLERANCE = 1e-8
@@ -106,12 +108,17 @@ class StatesFit:
         return covariances_under(series, shape, self.joint, matrices)
 
     @property
-    def rates_are_distinct(self) -> bool:
-        """Whether the free rates differ by more than their uncertainty."""
+    def rates_are_determined(self) -> bool:
+        """Whether the free rates differ by more than their uncertainty, and that is small.
+
+        A rate may be uncertain that would need a longer record: one below 1 per span.
+        """
         free = slice(0, 2 * self.n_free, 2)
+        log_rates = self.joint.shape[free]
         covariance = self.joint.least_squares.covariance[free, free]
-        apart = sigmas_apart(self.joint.shape[free], covariance)
-        return bool((apart >= APART_SIGMAS).all())
+        apart = sigmas_apart(log_rates, covariance)
+        uncertain = np.diag(covariance) > ILL_DETERMINED**2
+        return bool((apart >= APART_SIGMAS).all() and not (uncertain & (log_rates > 0)).any())
 
     @property
     def vanished(self) -> NDArray[np.bool_]:
