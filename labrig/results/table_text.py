@@ -177,7 +177,8 @@ def _find_format(sample: Sequence[tuple[int, str]], decimal: str | None) -> _For
     best = max(
         (_Format(delimiter, mark) for delimiter in _DELIMITERS for mark in marks), key=quality
     )
-    if decimal is None and best.decimal == ",":
+    # Programs separate columns by semicolons where the comma is the decimal mark.
+    if decimal is None and best.decimal == "," and best.delimiter != ";":
         _refuse_thousands(sample, best)
     return best
 

@@ -120,6 +120,12 @@ REFUSED: list[tuple[str, type[LabrigError], str]] = [
 ]
 
 
+def test_between_semicolons_the_comma_is_the_decimal_mark() -> None:
+    (series,) = parse_series("t;I\n0;5,125\n1,500;2,250\n", "x.csv")
+    assert series.t_s.tolist() == [0, 1.5]
+    assert series.values[:, 0].tolist() == [5.125, 2.25]
+
+
 @pytest.mark.parametrize(("text", "kind", "why"), REFUSED)
 def test_refused(text: str, kind: type[LabrigError], why: str) -> None:
     with pytest.raises(LabrigError, match=f"^x.csv: .*{why}") as refusal:
