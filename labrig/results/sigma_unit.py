@@ -42,6 +42,6 @@ def sigma_scale(sigma_unit: str, value_unit: str, name: str) -> tuple[float, boo
                 return factor / value_factor, False
     raise UsageError(
         f"expected uncertainties in the unit of the values, '{value_unit}', or in %, got "
-        f"'{sigma_unit}' in '{name}'; convert them and name their unit in the header, or replace "
-        "them with '--weights counts'"
+        f"'{sigma_unit}' in '{name}'; convert them and write their unit into the header, or delete "
+        "the column: σ is then taken from the scatter"
     )

@@ -413,6 +413,21 @@ def test_the_page_of_a_table_tells_nothing_of_a_camera(
         assert word not in page
 
 
+def test_the_page_tells_how_many_of_the_states_asked_for_there_are(
+    labrig: Callable[..., Ended], tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(5)
+    rows = [f"{t},{100 * np.exp(-t / 20) + rng.normal()}" for t in range(0, 80, 2)]
+    (tmp_path / "table.csv").write_text("\n".join(["t,I", *rows]))
+    labrig("fit", "decay", tmp_path / "table.csv", "--states", "3", "--out", tmp_path / "out")
+    result = read_result(tmp_path / "out")
+    assert isinstance(result, DecayResult)
+    supported = result.fits["table"].n_states
+    assert supported < 3
+    page = (tmp_path / "out" / "result" / "report.html").read_text(encoding="utf-8")
+    assert f"was set to 3, of which the data support n = {supported}" in page
+
+
 OPEN_TABLES = [
     ("t,A,B\n0,9,8\n1,5,4\n2,3,2\n", 2, "--column A"),
     ("wl,counts\n400,9\n410,5\n", 2, "--time NAME"),
