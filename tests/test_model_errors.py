@@ -10,24 +10,41 @@ from hypothesis import given, settings, strategies as st
 from pydantic import BaseModel
 
 from labrig import plugins, resources
-from labrig.acquire import RigFile
+from labrig.acquire import DeviceEntry, RigFile
 from labrig.errors import UsageError
 from labrig.material import Material
+from labrig.sim import Simulation
 from labrig.yaml_file import parse_yaml, read_yaml, validate
 
+Content = dict[str, Any]
 #: Words of pydantic that mean nothing to who writes a file.
 JARGON = re.compile(
     r"Input should|valid |[Tt]uple|instance of|[Dd]ictionary|unable to|parse|literal|validation"
-    r"|items? after|None|dict\b|float|str\b|\bint\b"
+    r"|another value|items? after|None|dict\b|float|str\b|\bint\b"
 )
 DECAY = {"protocol": "decay", "sample": {"name": "paint"}}
-FILES: list[tuple[type[BaseModel], Path]] = [
+CONTENTS: dict[str, list[Content]] = {
+    place: [read_yaml(path) for path in resources.names(place).values()]
+    for place in ("protocols", "config", "config/materials")
+}
+FILES: list[tuple[type[BaseModel], Content]] = [
     *(
-        (plugins.load(plugins.PROTOCOLS, read_yaml(path)["protocol"], "test"), path)
-        for path in resources.names("protocols").values()
+        (plugins.load(plugins.PROTOCOLS, content["protocol"], "test"), content)
+        for content in CONTENTS["protocols"]
     ),
-    *((RigFile, path) for path in resources.names("config").values()),
-    *((Material, path) for path in resources.names("config/materials").values()),
+    *((RigFile, content) for content in CONTENTS["config"]),
+    *((Material, content) for content in CONTENTS["config/materials"]),
+    *(
+        (Simulation, content["simulation"])
+        for content in CONTENTS["config"]
+        if "simulation" in content
+    ),
+    *(
+        (plugins.load(plugins.DRIVERS, entry["driver"], "test").Settings, keys)
+        for content in CONTENTS["config"]
+        for entry in content["devices"].values()
+        if (keys := {key: entry[key] for key in entry if key not in DeviceEntry.model_fields})
+    ),
 ]
 ODD: st.SearchStrategy[Any] = st.sampled_from(
     [None, True, -1, 0, 1, 7, 10**400, -0.5, 0.5, 1e300, "", "x", "40%", "5 s", "-5 s", [], [1],
@@ -66,10 +83,9 @@ def replaced(content: Any, place: tuple[Any, ...], value: Any) -> Any:
 @settings(max_examples=400, deadline=None)
 @given(st.sampled_from(FILES), st.data(), ODD)
 def test_no_refusal_of_a_changed_file_has_pydantics_words(
-    file: tuple[type[BaseModel], Path], data: st.DataObject, value: Any
+    file: tuple[type[BaseModel], Content], data: st.DataObject, value: Any
 ) -> None:
-    model, path = file
-    content = read_yaml(path)
+    model, content = file
     changed = replaced(content, data.draw(st.sampled_from(places(content))), value)
     try:
         validate(changed, model, "mine.yaml")
@@ -148,7 +164,7 @@ def plan_refusal(labrig: Callable[..., Any], tmp_path: Path) -> Callable[[str], 
         ("every: 0.5 s\nexposure: 0.5 s", "every: "),
         ("camera: {iso: 450}", "ISO 450"),
         ("patches: {a: [5000, 100, 50, 50]}", "1404 × 936"),
-        ("patches: {a: [0.5, 0.5, 0.0001, 0.0001]}", "at least 10 × 10 pixels, got 2 × 2"),
+        ("patches: {a: [0.5, 0.5, 0.0001, 0.0001]}", "at least 100 pixels, got 2 × 2"),
     ],
 )
 def test_what_the_rig_cannot_is_named_with_the_file(

@@ -52,9 +52,9 @@ def require_inside(regions: Mapping[str, Region], frame_pixels: tuple[int, int])
             _, _, width, height = region_pixels(region, *frame_pixels)
         except UsageError as error:
             raise ProtocolError(f"{key}: {error}") from None
-        if min(width, height) < LEAST_PIXELS:
+        if width * height < LEAST_PIXELS:
             raise ProtocolError(
-                f"{key}: expected a region of at least {LEAST_PIXELS} × {LEAST_PIXELS} pixels, got "
-                f"{width} × {height} of a frame of {frame_pixels[0]} × {frame_pixels[1]}; from "
-                "fewer the noise cannot be estimated"
+                f"{key}: expected a region of at least {LEAST_PIXELS} pixels, got {width} × "
+                f"{height} of a frame of {frame_pixels[0]} × {frame_pixels[1]}; from fewer the "
+                "noise cannot be estimated"
             )

@@ -78,7 +78,8 @@ class ProtocolModel(BaseModel):
     @classmethod
     def _sample_with_keys(cls, sample: Any) -> Any:
         if not isinstance(sample, (dict, Sample)):
-            raise ValueError("expected keys, such as 'sample: {name: blue-paint}'")
+            received = ", got a list" if isinstance(sample, list) else ""
+            raise ValueError(f"expected keys, such as 'sample: {{name: blue-paint}}'{received}")
         return sample
 
     @abstractmethod

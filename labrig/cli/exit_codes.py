@@ -5,11 +5,15 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from labrig.cli.closed_pipe import DetachableStream
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
+
+if TYPE_CHECKING:
+    from typer.exceptions import TyperException
 
 #: Largest number of characters of a file name in a message.
 MAX_SHOWN = 200
@@ -75,9 +79,7 @@ def _run(arguments: Sequence[str]) -> int:
     except SystemExit as ending:  # Typer's own answer to a pipe without a reader
         raise BrokenPipeError from ending
     except TyperException as error:
-        context = getattr(error, "ctx", None)
-        command_path = "labrig" if context is None else context.command_path
-        return _print_error(f"{error.format_message()} (see {command_path} --help)", 2)
+        return _print_error(_wrong_call(error), 2)
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
@@ -87,6 +89,23 @@ def _run(arguments: Sequence[str]) -> int:
     except Exception as error:
         return _print_error(_fault_message(error), 1)
     return 0
+
+
+def _wrong_call(error: "TyperException") -> str:
+    """Return what is wrong with the arguments, and where the command's own help is."""
+    from pydantic import ValidationError
+
+    from labrig.model_errors import is_rule, refusal
+
+    message = error.format_message()
+    if isinstance(error.__cause__, ValidationError):
+        problems = error.__cause__.errors(include_url=False)
+        received = "" if is_rule(problems[0]) else f", got '{problems[0]['input']}'"
+        reason = f"{refusal(problems[0], problems)}{received}"
+        message = message.replace(problems[0]["msg"], reason)
+    context = getattr(error, "ctx", None)
+    command = "labrig" if context is None else context.command_path
+    return f"{message} (see {command} --help)"
 
 
 def _fault_message(error: Exception) -> str:

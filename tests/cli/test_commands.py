@@ -119,6 +119,16 @@ def test_wrong_usage(labrig: Labrig, arguments: list[str], command: str) -> None
     one_line(labrig(*arguments), 2, f"(see {command} --help)")
 
 
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [("x", "expected a whole number, got 'x'"), ("9", "expected a number of at most 3, got '9'")],
+)
+def test_an_option_of_another_kind_is_told_plainly(
+    labrig: Labrig, value: str, expected: str
+) -> None:
+    one_line(labrig("process", "last", "--states", value), 2, "'--states'", expected)
+
+
 @pytest.mark.parametrize("command", [["resume"], ["process"]])
 def test_what_is_no_run_folder(labrig: Labrig, tmp_path: Path, command: list[str]) -> None:
     one_line(labrig(*command, tmp_path), 2, "expected a run folder")
