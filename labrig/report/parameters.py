@@ -146,6 +146,12 @@ def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
     return rows
 
 
+_NO_MORE = (
+    "One more state was not asked for, or gains nothing: two of the rates merge, or an amplitude "
+    "vanishes."
+)
+
+
 def n_states_reason(fit: FittedDecay) -> str:
     """Return the reason for the number of states in a sentence or two."""
     candidates = {candidate.n_states: candidate for candidate in fit.candidates}
@@ -168,10 +174,10 @@ def n_states_reason(fit: FittedDecay) -> str:
         sentences.append(
             f"The data do not support {' or '.join(others)}, which were asked for."
             if others
-            else "No other number of states was tried."
+            else _NO_MORE
         )
     elif more is None:
-        sentences.append("More were not asked for, or the data do not support them.")
+        sentences.append(_NO_MORE)
     if fit.better_model is not None:
         alternative = fit.better_model
         exponent = plus_minus(alternative.exponent, alternative.exponent_sigma)

@@ -118,7 +118,8 @@ def test_linear_ticks_are_even_few_and_inside(low: float, span: float, most: int
     high = low + span
     values = np.array([value for value, _ in linear_ticks(low, high, most)])
     assert len(values) <= most + 1
-    assert ((values >= low - 1e-6 * span) & (values <= high + 1e-6 * span)).all()
+    rounding = 1e-6 * span + np.spacing(abs(low) + span)
+    assert ((values >= low - rounding) & (values <= high + rounding)).all()
     if span > 1e-6 * abs(low):
         assert len(values) >= most // 3
         np.testing.assert_allclose(np.diff(values, 2), 0, atol=1e-6 * span)

@@ -12,8 +12,8 @@ from tests.results.made import decay_result
 @pytest.mark.parametrize(
     ("tried", "told"),
     [
-        ((), "No other number of states was tried."),
-        ((1,), "No other number of states was tried."),
+        ((), "One more state was not asked for, or gains nothing"),
+        ((1,), "One more state was not asked for, or gains nothing"),
         ((1, 2), "One more state raises BIC"),
         ((3,), "The data do not support 3 states"),
     ],
