@@ -24,6 +24,8 @@ SEEN_DN = 1.0
 #: Time in which every phosphor that was just charged fades by more than two per cent.
 MIN_S = 10.0
 FADED = 0.02
+#: Fraction by which a frame is darker without the lamp: four times the scatter of two exposures.
+DARKER = 0.05
 #: Fading between two checks `LOOK_AGAIN_S` apart, which are made in doubt.
 FADED_IN_DOUBT = 0.05
 LOOK_AGAIN_S = 60.0
@@ -206,7 +208,7 @@ def has_gone_out(under_lamp: Glow, after_lamp_off: Glow) -> bool:
     brightest = int(np.argmax(under_lamp.rate))
     if under_lamp.clips or not under_lamp.seen:
         return not after_lamp_off.clips
-    return bool(after_lamp_off.rate[brightest] < (1 - FADED) * under_lamp.rate[brightest])
+    return bool(after_lamp_off.rate[brightest] < (1 - DARKER) * under_lamp.rate[brightest])
 
 
 def _is_steady(first: Sequence[Glow], last: Sequence[Glow], faded: float) -> bool:

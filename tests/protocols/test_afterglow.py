@@ -114,13 +114,14 @@ def test_a_glow_is_held_against_the_metering(fraction: float, found: Afterglow) 
 
 
 def test_a_lamp_that_has_gone_out_is_darker() -> None:
-    lit, glowing, none = (
+    lit, glowing, none, flickering = (
         seen(lambda _, rate=rate: rate, [0.0], [1 / 512])[0]  # type: ignore[misc]
-        for rate in (LAMP_DN_PER_S, 1e5, 0.0)
+        for rate in (LAMP_DN_PER_S, 1e5, 0.0, 0.97 * LAMP_DN_PER_S)
     )
     assert has_gone_out(lit, glowing)
     assert has_gone_out(lit, none)
     assert not has_gone_out(lit, lit)
+    assert not has_gone_out(lit, flickering)
 
 
 def test_dark_levels_lie_straight_between_those_taken() -> None:
