@@ -274,8 +274,10 @@ def test_a_bulb_that_blows_while_charging_is_seen_in_the_first_frame(
     off_s = moment(metered, "decay-1", "off")
     blown = {"lamp_dead": {"at": f"{off_s - 40} s"}}
     ended = labrig("run", metered, "--rig", rig(blown), "--runs", tmp_path / "runs", "--no-process")
-    assert ended.code == 0, ended.err
     assert "warning: the glow is less than half of what it was before" in ended.err
+    # Nor is there a daylight picture.
+    assert ended.code == 3, ended.err
+    assert "it did not light at all" in ended.err
 
 
 @pytest.mark.parametrize("unit", ["meter", "decay-1", "daylight"])

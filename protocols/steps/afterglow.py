@@ -24,8 +24,9 @@ SEEN_DN = 1.0
 #: Time in which every phosphor that was just charged fades by more than two per cent.
 MIN_S = 10.0
 FADED = 0.02
-#: Fraction by which a frame is darker without the lamp: four times the scatter of two exposures.
-DARKER = 0.05
+#: Fraction by which a frame is darker without the lamp: more than two exposures scatter, and more
+#: than a glow without any lamp fades from one to the other.
+DARKER = 0.2
 #: Fading between two checks `LOOK_AGAIN_S` apart, which are made in doubt.
 FADED_IN_DOUBT = 0.05
 LOOK_AGAIN_S = 60.0
