@@ -36,20 +36,24 @@ class LedSwitches:
     def __init__(
         self, board: str, switches: Mapping[str, Switch], resynchronise: Callable[[], None]
     ) -> None:
-        self._board = board
+        self._board_name = board
         self._switches = dict(switches)
         self._resynchronise = resynchronise
         #: LEDs not read back as off since they were last lit; after connecting, all.
         self._may_be_lit = set(self._switches)
 
+    def channels(self) -> tuple[str, ...]:
+        """Return the names of the LEDs, in the rig file's order."""
+        return tuple(self._switches)
+
     def light(self, channel: str) -> None:
-        """Switch off all LEDs that may be lit, then switch on one; all are read back."""
+        """Switch off all LEDs that may be lit, then switch on one; read back where possible."""
         self.dark()
         self._may_be_lit.add(channel)
         self._switches[channel].switch(on=True)
 
     def dark(self) -> None:
-        """Switch off all LEDs that may be lit, each even if another one fails; read all back."""
+        """Switch off all LEDs that may be lit, each even if another one fails."""
         failure: DeviceError | None = None
         for channel in [name for name in self._switches if name in self._may_be_lit]:
             try:
@@ -63,7 +67,7 @@ class LedSwitches:
             raise failure
 
     def channel_on(self) -> str | None:
-        """Return the name of the LED that is on.
+        """Return the LED that is on, as reported by the board, else as commanded last.
 
         Raises
         ------
@@ -73,7 +77,7 @@ class LedSwitches:
         names = [name for name, switch in self._switches.items() if switch.is_on()]
         if len(names) > 1:
             raise DeviceError(
-                f"{self._board}: {' and '.join(names)} are lit at once; something else has "
+                f"{self._board_name}: {' and '.join(names)} are lit at once; something else has "
                 "switched them: leave the board to labrig while it measures"
             )
         return names[0] if names else None
@@ -83,3 +87,6 @@ class LedSwitches:
         self._resynchronise()
         self._may_be_lit = set(self._switches)
         self.dark()
+
+    def disconnect(self) -> None:
+        """Do nothing: the port belongs to the connections, which close it."""

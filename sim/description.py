@@ -1,4 +1,4 @@
-"""What a simulated room says of its camera's frames before it is opened."""
+"""Size of a simulated camera's frames, before its room is opened."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a file's model refuses is told in plain words: where, what was expected, what came."""
+"""Refusals of a file's model are plain words: where, what was expected, what came."""
 
 import re
 from collections.abc import Callable

@@ -44,7 +44,7 @@ def test_a_run_ends_at_once_and_goes_on_when_the_region_is_corrected(
     make_protocol: Make,
     tmp_path: Path,
 ) -> None:
-    """As on a real bench, whose rig file does not tell the size of a frame."""
+    """Make a bench as a real one, whose rig file does not tell the size of a frame."""
     rig = make_rig(faults=[{"relays_unplugged": {"at": "30 s"}}])
     assert labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs").code == 3
     (folder,) = (tmp_path / "runs").iterdir()

@@ -26,7 +26,7 @@ class _Relay:
         return self.board.is_on(self.number)
 
 
-class NumatoLedBank:
+class NumatoLedBank(LedSwitches):
     """Several relays of one Numato board, each switching an LED.
 
     Parameters
@@ -63,16 +63,12 @@ class NumatoLedBank:
         self._relays = settings.relays
         self._board = Board(address, connections)
         relays = {name: _Relay(self._board, relay) for name, relay in self._relays.items()}
-        self._leds = LedSwitches(self._board.name, relays, self._board.resynchronise)
+        super().__init__(self._board.name, relays, self._board.resynchronise)
 
     @classmethod
     def declared_channels(cls, settings: Settings) -> tuple[str, ...]:
         """Return the names of the LEDs, for plans."""
         return tuple(settings.relays)
-
-    def channels(self) -> tuple[str, ...]:
-        """Return the names of the LEDs, in the rig file's order."""
-        return tuple(self._relays)
 
     def reads_back(self) -> bool:
         """Return True: every Numato board reports the states of its relays."""
@@ -82,28 +78,3 @@ class NumatoLedBank:
         """Return maker, firmware version and id of the board, and the names of the LEDs."""
         leds = ", ".join(f"{name} on relay {relay}" for name, relay in self._relays.items())
         return f"Numato relay board, {self._board.identity()}, LEDs {leds}"
-
-    def light(self, channel: str) -> None:
-        """Switch off all LEDs that may be lit, then switch on one; all are read back."""
-        self._leds.light(channel)
-
-    def dark(self) -> None:
-        """Switch off all LEDs that may be lit, each even if another one fails; read all back."""
-        self._leds.dark()
-
-    def channel_on(self) -> str | None:
-        """Return the name of the LED that the board reads as on.
-
-        Raises
-        ------
-        DeviceError
-            Several LEDs are on.
-        """
-        return self._leds.channel_on()
-
-    def make_safe(self) -> None:
-        """Resynchronise the line, then switch all LEDs off, whatever their states before."""
-        self._leds.make_safe()
-
-    def disconnect(self) -> None:
-        """Do nothing: the port belongs to the connections, which close it."""

@@ -15,7 +15,7 @@ from .wire_text import wire_text
 Name = Annotated[str, Field(min_length=1)]
 
 
-class SerialLedBank:
+class SerialLedBank(LedSwitches):
     """Several relays of a board whose commands are in the rig file, each switching an LED.
 
     Parameters
@@ -52,18 +52,12 @@ class SerialLedBank:
             name: Relay(self._board, commands, name) for name, commands in settings.channels.items()
         }
         off = [relay.off for relay in self._relays.values()]
-        self._leds = LedSwitches(
-            self._board.name, self._relays, lambda: self._board.resynchronise(off)
-        )
+        super().__init__(self._board.name, self._relays, lambda: self._board.resynchronise(off))
 
     @classmethod
     def declared_channels(cls, settings: Settings) -> tuple[str, ...]:
         """Return the names of the LEDs, for plans."""
         return tuple(settings.channels)
-
-    def channels(self) -> tuple[str, ...]:
-        """Return the names of the LEDs, in the rig file's order."""
-        return tuple(self._relays)
 
     def reads_back(self) -> bool:
         """Return whether the rig file has a query for the state of every LED."""
@@ -77,31 +71,6 @@ class SerialLedBank:
         """Return whether anything but the camera can verify that the LEDs were switched."""
         return findings(self._relays.values())
 
-    def light(self, channel: str) -> None:
-        """Switch off all LEDs that may be lit, then switch on one; read back where possible."""
-        self._leds.light(channel)
-
-    def dark(self) -> None:
-        """Switch off all LEDs that may be lit, each even if another one fails."""
-        self._leds.dark()
-
-    def channel_on(self) -> str | None:
-        """Return the LED that is on, as reported by the board, else as commanded last.
-
-        Raises
-        ------
-        DeviceError
-            Several LEDs are on.
-        """
-        return self._leds.channel_on()
-
     def heartbeat(self) -> None:
         """Restart the board's watchdog, if the rig file says how."""
         self._board.keep_alive()
-
-    def make_safe(self) -> None:
-        """Resynchronise the line, then switch all LEDs off, whatever their states before."""
-        self._leds.make_safe()
-
-    def disconnect(self) -> None:
-        """Do nothing: the port belongs to the connections, which close it."""

@@ -1,4 +1,4 @@
-"""What a shell may complete: names of protocols, rigs, materials and runs.
+"""Completion by the shell: names of protocols, rigs, materials and runs.
 
 No file is opened, since a person waits for the answer; an unreadable folder has no names.
 """

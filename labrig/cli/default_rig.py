@@ -49,7 +49,7 @@ class DefaultRig:
 
     @property
     def source(self) -> str:
-        """Where it was chosen, in words."""
+        """Description of where it was chosen."""
         if self.is_of_environment:
             return f"the environment variable {VARIABLE}"
         return "'labrig rig use'"

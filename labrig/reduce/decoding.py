@@ -12,7 +12,7 @@ Reduced_co = TypeVar("Reduced_co", covariant=True)
 
 
 class Reduction(Protocol[Reduced_co]):
-    """What is to be made of frames: a frozen dataclass that can be imported by its name.
+    """A reduction of frames: a frozen dataclass that can be imported by its name.
 
     Its fields are all that the outcome depends on besides the frames. They and the outcome, whose
     type is annotated, are values as `labrig.reduce.codec` describes them.

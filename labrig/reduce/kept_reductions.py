@@ -1,4 +1,4 @@
-"""What was reduced from the frames of a run, kept in the run folder for the next time.
+"""Reductions of the frames of a run, kept in the run folder for the next time.
 
 Each reduction, with its arguments, has a file of its own in the folder `cache`. A file that is
 damaged counts as missing; all of them may be deleted without loss. Files that other code made, such
@@ -27,7 +27,7 @@ _MODULES = ("labrig.nonnegative", "labrig.region", "labrig.optics.camera_model")
 
 
 class KeptReductions:
-    """What one reduction made of the frames of one run.
+    """Outcomes of one reduction for the frames of one run.
 
     Parameters
     ----------

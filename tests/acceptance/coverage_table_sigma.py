@@ -1,4 +1,4 @@
-"""What σ is worth in fits of tables without σ: of values and of rates, over many seeds.
+"""Coverage of σ in fits of tables without σ: of values and of rates, over many seeds.
 
     python -m tests.acceptance.coverage_table_sigma [--seeds 75] [--jobs 1]
 
@@ -115,7 +115,7 @@ def coverage(decay: Decay, noise: Noise, n_values: int, seeds: range) -> Coverag
 
 
 def line(case: tuple[str, str, int], seeds: range) -> str:
-    """What is printed of a case."""
+    """Return the printed line of a case."""
     decay, noise, n_values = case
     found = coverage(DECAYS[decay], NOISES[noise], n_values, seeds)
     rms = ", ".join(f"{value:.2f}" for value in found.rms_pulls)

@@ -160,7 +160,7 @@ MISTAKES = (
 
 @dataclass(frozen=True)
 class Answer:
-    """What labrig printed last, its exit code, and how long it took."""
+    """Last line that labrig printed, its exit code, and the time that it took."""
 
     line: str
     exit_code: int

@@ -1,4 +1,4 @@
-"""How long people wait for labrig; with another labrig's times in the same run, turn by turn.
+"""Waiting times of labrig; with another labrig's times in the same run, turn by turn.
 
     python -m tests.acceptance.quickness [--before PYTHON] [--rounds 3] [--rows NAME ...]
 

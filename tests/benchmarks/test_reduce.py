@@ -94,7 +94,7 @@ def test_a_run(dng: tuple[str, bytes], against: Against, tmp_path: Path) -> None
 
 
 def test_a_run_again(mosaic: Mosaic, against: Against, tmp_path: Path) -> None:
-    """What is left to do when a run is fitted again: checksums are trusted, numbers are kept."""
+    """A run is fitted again: checksums are trusted, numbers are kept."""
     (tmp_path / "frames").mkdir()
     records = []
     for number in range(MANY):

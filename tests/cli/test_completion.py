@@ -1,4 +1,4 @@
-"""What a shell completes, asked as a shell asks."""
+"""Completion, asked for as a shell asks."""
 
 import os
 import subprocess

@@ -40,7 +40,7 @@ class MeanLevel:
 
 @dataclass(frozen=True)
 class KillItself:
-    """What the system does to a process that takes too much memory."""
+    """A reduction that ends as a process that takes too much memory."""
 
     def __call__(self, frames: Iterator[RawFrame]) -> float:
         os.kill(os.getpid(), signal.SIGKILL)

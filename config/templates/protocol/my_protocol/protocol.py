@@ -1,4 +1,4 @@
-"""What is done on the bench: a charge, and photographs of the glow after it."""
+"""The steps on the bench: a charge, and photographs of the glow after it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
