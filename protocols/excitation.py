@@ -37,7 +37,7 @@ from .steps.camera_settings import (
 )
 from .steps.charge_times import FloatArray, most_informative_s, still_grows
 from .steps.darkness import levels
-from .steps.exposure_metering import DecayMeter, FrameCache, MeteringFrame, Schedule
+from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
 from .steps.glow import dark_frames
 from .steps.patch_names import FilterPatches
 from .steps.sample_pose import charge, check_visible, face_camera, face_lamp, lights_out
@@ -261,16 +261,19 @@ class ExcitationUnit:
     """Common part of all units."""
 
     protocol: ExcitationSettings
-    frame_cache: FrameCache
+
+    def measure(self, frame: FrameRecord) -> MeteringFrame:
+        """Measure a frame in every place of the strip."""
+        return measure_frame(frame, self.protocol.strip())
 
     def darks(self, session: Session) -> list[MeteringFrame]:
         """Return one measured dark frame of each shutter time."""
         frames = {frame.exposure_s: frame for frame in session.frames(FrameRole.DARK)}
-        return [self.frame_cache.measure_frame(frame) for frame in frames.values()]
+        return [self.measure(frame) for frame in frames.values()]
 
     def rates(self, frame: FrameRecord, darks: Sequence[MeteringFrame]) -> FloatArray:
         """Return the brightest channel's rate along the strip in DN/s, shape (patches, places)."""
-        measured = self.frame_cache.measure_frame(frame)
+        measured = self.measure(frame)
         above_dark_dn = levels(measured) - dark_level(darks, frame.exposure_s)
         return np.asarray(above_dark_dn.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
 
@@ -412,9 +415,9 @@ class _ChargeUnit(ExcitationUnit):
 
         def decide() -> Schedule:
             reference_s, frames = self._reference_charge(session, role)
-            schedule = DecayMeter(
-                [self.frame_cache.measure_frame(frame) for frame in frames]
-            ).schedule(times_s, offers, longest_s, EXPOSURES_GROW, session.warn)
+            schedule = DecayMeter([self.measure(frame) for frame in frames]).schedule(
+                times_s, offers, longest_s, EXPOSURES_GROW, session.warn
+            )
             shorter = max(charge_s / reference_s / HEADROOM, 1.0)
             exposures_s = [
                 offers.exposure_at_most(exposure_s / shorter) for exposure_s in schedule.exposures_s
@@ -535,12 +538,11 @@ class Excitation(ExcitationSettings):
 
     def units(self) -> Sequence[Unit]:
         """Return darks, then metering and charges through the filter, then the same without it."""
-        frame_cache = FrameCache(self.strip())
         return [
-            DarkUnit(self, frame_cache),
-            StripMeter(self, frame_cache),
-            *(DoublingUnit(self, frame_cache, number) for number in range(1, self.at_most + 1)),
-            *(RefiningUnit(self, frame_cache, number) for number in range(1, self.refine + 1)),
-            DirectMeter(self, frame_cache),
-            *(DirectUnit(self, frame_cache, number) for number in range(1, len(self.direct) + 1)),
+            DarkUnit(self),
+            StripMeter(self),
+            *(DoublingUnit(self, number) for number in range(1, self.at_most + 1)),
+            *(RefiningUnit(self, number) for number in range(1, self.refine + 1)),
+            DirectMeter(self),
+            *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
         ]

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Self
 
@@ -63,7 +64,12 @@ class MeteringFrame:
 
 
 def measure_frame(frame: FrameRecord, regions: Sequence[Region]) -> MeteringFrame:
-    """Measure a frame in every region."""
+    """Measure a frame in every region, once however many decisions need it."""
+    return _measure_frame(frame, tuple(regions))
+
+
+@lru_cache(maxsize=1000)
+def _measure_frame(frame: FrameRecord, regions: tuple[Region, ...]) -> MeteringFrame:
     raw = read_raw(frame.path)
     return MeteringFrame(
         frame.start_time, frame.exposure_s, [measure(raw, region) for region in regions]
@@ -165,23 +171,3 @@ class DecayMeter:
             rates[is_early] = log_rate[0] + slope * (times_s[is_early] - reading_s[0])
         fullest = max(self._readings, key=lambda reading: reading.mean_dn)
         return np.exp(rates) * fullest.peak_dn / fullest.mean_dn
-
-
-@dataclass(frozen=True)
-class FrameCache:
-    """Measurements of frames, always in the same regions.
-
-    Attributes
-    ----------
-    regions
-        Regions to measure.
-    """
-
-    regions: Sequence[Region]
-    _measured: dict[Path, MeteringFrame] = field(default_factory=dict, repr=False, compare=False)
-
-    def measure_frame(self, frame: FrameRecord) -> MeteringFrame:
-        """Return the measurement of a frame."""
-        if frame.path not in self._measured:
-            self._measured[frame.path] = measure_frame(frame, self.regions)
-        return self._measured[frame.path]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from .afterglow import (
     has_gone_out,
 )
 from .darkness import DARK, Darkness, darkness, levels
-from .exposure_metering import FrameCache, MeteringFrame
+from .exposure_metering import MeteringFrame, measure_frame
 
 #: Time by which a lamp has gone dark; a halogen lamp takes a third of it.
 LAMP_GONE_S = 1.0
@@ -255,12 +254,8 @@ class SanityChecks:
 
     def _measure(self, frame: FrameRecord) -> MeteringFrame:
         """Return the measurement of a frame, with the background last if there is one."""
-        return self._frame_cache.measure_frame(frame)
-
-    @cached_property
-    def _frame_cache(self) -> FrameCache:
         background = [] if self.background is None else [self.background]
-        return FrameCache([*self.patches, *background])
+        return measure_frame(frame, [*self.patches, *background])
 
 
 def _first_of_each_exposure(frames: Sequence[FrameRecord]) -> list[FrameRecord]:
