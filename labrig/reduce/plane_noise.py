@@ -202,10 +202,10 @@ def _robust_variance(magnitude: Floats) -> Floats:
 
 
 def _median(values: Floats) -> Floats:
-    """Return the median along the last axis, five times as fast as `np.median` for few values."""
+    """Return the median along the last axis, several times as fast as `np.median` for few values."""
     low, high = (values.shape[-1] - 1) // 2, values.shape[-1] // 2
-    parted = np.partition(values, (low, high), axis=-1)
-    return np.asarray((parted[..., low] + parted[..., high]) / 2)
+    rising = np.sort(values, axis=-1)
+    return np.asarray((rising[..., low] + rising[..., high]) / 2)
 
 
 def _photon_line(level: Floats, variance: Floats) -> NoiseModel:
@@ -251,8 +251,9 @@ def _autocovariance(tiles: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
     flat = tiles.reshape(len(tiles), -1)
     flat = flat - flat.mean(axis=1, keepdims=True)
     residual = flat - (flat @ basis) @ basis.T
-    limit = 5 * np.sqrt(_robust_variance(np.abs(residual)) + ROUNDING_VARIANCE)
-    clean = np.all(np.abs(residual) <= limit[:, np.newaxis], axis=1)
+    magnitude = np.abs(residual)
+    limit = 5 * np.sqrt(_robust_variance(magnitude) + ROUNDING_VARIANCE)
+    clean = magnitude.max(axis=1) <= limit
     square = residual.reshape(-1, TILE, TILE)
     products = [
         np.einsum("nyx,nyx->n", a, b) / (a.shape[1] * a.shape[2]) for a, b in _lagged_pairs(square)
