@@ -192,15 +192,19 @@ def _shot_noise(expected: Float32Array, rng: np.random.Generator) -> Float32Arra
     For many electrons by Cornish and Fisher's expansion, λ + √(λ − 1/18) z + (z² − 1)/6, which has
     the mean, the variance and the third moment of the Poisson distribution.
     """
+    is_bright = expected >= MANY_ELECTRONS
+    if is_bright.all():
+        return _many(expected, rng)
+    if not is_bright.any():
+        return _few(expected.reshape(-1), rng).reshape(expected.shape)
     arrived: Float32Array = np.empty_like(expected)
-    for is_meant, draw in ((expected >= MANY_ELECTRONS, _many), (expected < MANY_ELECTRONS, _few)):
-        if is_meant.any():
-            arrived[is_meant] = draw(expected[is_meant], rng)
+    arrived[is_bright] = _many(expected[is_bright], rng)
+    arrived[~is_bright] = _few(expected[~is_bright], rng)
     return arrived
 
 
 def _many(expected: Float32Array, rng: np.random.Generator) -> Float32Array:
-    """Return numbers of electrons that are expected to be many, shape (n,)."""
+    """Return numbers of electrons that are expected to be many."""
     z = _standard_normal(expected.shape, rng)
     arrived: Float32Array = np.sqrt(expected - np.float32(1 / 18))
     arrived *= z
@@ -227,8 +231,10 @@ def _few(expected: Float32Array, rng: np.random.Generator) -> Float32Array:
     in all pixels at once that have more electrons than were counted so far.
     """
     arrived: Float32Array = np.zeros_like(expected)
-    probability: Float32Array = np.exp(-expected)
-    beyond: Float32Array = rng.random(expected.shape, dtype=np.float32) - probability
+    probability: Float32Array = -expected
+    np.exp(probability, out=probability)
+    beyond: Float32Array = rng.random(expected.shape, dtype=np.float32)
+    beyond -= probability
     more = pixels = np.flatnonzero(beyond >= 0)
     electrons = 0
     while more.size and probability.max() > NEVER:
