@@ -202,7 +202,7 @@ def _robust_variance(magnitude: Floats) -> Floats:
 
 
 def _median(values: Floats) -> Floats:
-    """Return the median along the last axis, several times as fast as `np.median` for few values."""
+    """Return the median along the last axis, faster than `np.median` for few values."""
     low, high = (values.shape[-1] - 1) // 2, values.shape[-1] // 2
     rising = np.sort(values, axis=-1)
     return np.asarray((rising[..., low] + rising[..., high]) / 2)
