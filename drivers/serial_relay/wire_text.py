@@ -46,7 +46,7 @@ def wire_text(text: str) -> WireText:
         return WireText(characters.encode("latin-1"), is_hex=False)
     except UnicodeEncodeError as error:
         raise ValueError(
-            f"expected characters that are one byte each, got '{characters[error.start]}'; write "
+            f"expected characters that are one byte each, got {characters[error.start]!r}; write "
             r"its bytes as the board expects them, such as \xC2\xB5"
         ) from None
 
