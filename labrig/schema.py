@@ -16,7 +16,7 @@ from pydantic_core import SchemaError, SchemaSerializer, core_schema
 from labrig import plugins
 from labrig.acquire import ROLES, DeviceEntry, RigFile
 from labrig.errors import UsageError
-from labrig.material import Material
+from labrig.material import FluorescentMaterial, Material
 from labrig.yaml_file import did_you_mean
 
 KINDS = ("protocol", "rig", "material")
@@ -32,8 +32,12 @@ def schema(kind: str) -> dict[str, Any]:
     """
     if kind not in KINDS:
         raise UsageError(f"there is no schema of '{kind}'; {did_you_mean(kind, KINDS)}")
-    makers: dict[str, Callable[[], Any]] = {"protocol": _protocol, "rig": _rig}
-    model = makers[kind]() if kind in makers else Material
+    makers: dict[str, Callable[[], Any]] = {
+        "protocol": _protocol,
+        "rig": _rig,
+        "material": lambda: _one_of("kind", [Material, FluorescentMaterial]),
+    }
+    model = makers[kind]()
     json_schema = TypeAdapter(model).json_schema(by_alias=True, schema_generator=_Described)
     _describe_in_markdown(json_schema)
     return {"$schema": _Described.schema_dialect, **json_schema, "title": f"labrig {kind}"}

@@ -1,10 +1,20 @@
 """`labrig fit`: fits of data from any source."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
+from labrig.cli.matrices import (
+    LIGHTS,
+    Corrected,
+    Entry,
+    File,
+    Lights,
+    Pixel,
+    read_matrix,
+    with_sigma,
+)
 from labrig.errors import UsageError
 
 app = typer.Typer(help="Fit data from any source.")
@@ -87,6 +97,79 @@ def decay(
             for line in processed.changes:
                 typer.echo(line)
             typer.echo(f"report: {processed.report}")
+
+
+@app.command("mixture")
+def mixture(
+    file: File,
+    components: Annotated[
+        str, typer.Option("--components", help="Number of components, or 'auto' (by BIC).")
+    ] = "auto",
+    scale: Annotated[
+        str,
+        typer.Option(
+            "--scale",
+            help="'integral': as much re-radiation as measured; 'least-squares': least error.",
+        ),
+    ] = "integral",
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            "--threshold",
+            help="Least value per band that counts as re-radiation; without it, by the noise: one "
+            "in twenty of what is kept is noise.",
+        ),
+    ] = None,
+    entry: Entry = None,
+    pixel: Pixel = None,
+    corrected: Corrected = False,
+    light: Lights = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for fit.json and the figure.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print fit.json.")] = False,
+) -> None:
+    """A mixture of normal densities that stands for a re-radiation matrix (Hua et al., 2021).
+
+    The colours of the mixture, with the measured reflectance, are compared with those of the
+    matrix.
+    """
+    import json
+
+    from labrig.fit import fit_mixture
+    from labrig.material import compare_colours
+    from labrig.optics import read_light
+    from labrig.report import describe_mixture, draw_mixture
+
+    number = _components(components)
+    if scale not in ("integral", "least-squares"):
+        raise UsageError(f"--scale: expected 'integral' or 'least-squares', got '{scale}'")
+    if out is not None:
+        _require_folder(out)
+    lights = [read_light(name) for name in light or LIGHTS]
+    matrix = with_sigma(read_matrix(file, entry, pixel), corrected)
+    fit = fit_mixture(matrix, number, scale, threshold)  # type: ignore[arg-type]
+    smooth = fit.mixture.to_matrix(
+        matrix.input_nm, matrix.output_nm, reflectance=matrix.reflectance, name=matrix.name
+    )
+    colours = compare_colours(smooth, matrix, lights)
+    content = {**fit.to_dict(), "colours": [colour.to_dict() for colour in colours]}
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    typer.echo(text if as_json else describe_mixture(matrix.name, fit, colours))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "fit.json").write_text(text + "\n", encoding="utf-8")
+        draw_mixture(matrix, smooth, fit, out / "mixture.svg")
+        if not as_json:
+            typer.echo(f"written: {out / 'fit.json'}, {out / 'mixture.svg'}")
+
+
+def _components(text: str) -> "int | Literal['auto']":
+    if text == "auto":
+        return "auto"
+    if not text.isdecimal() or int(text) == 0:
+        raise UsageError(f"--components: expected a number from 1 on, or 'auto', got '{text}'")
+    return int(text)
 
 
 def _require_folder(path: Path) -> None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.compare.colorimetry import FloatArray, Viewing, delta_e, lab
 from labrig.compare.nalbach2017 import DELTA_E, emission
+from labrig.compare.viewing import FloatArray, Viewing
 from labrig.errors import DataError, UsageError
 from labrig.material import Material, phi1
-from labrig.optics import CameraResponse, Spectrum
+from labrig.optics import CameraResponse, Spectrum, delta_e, lab
 from labrig.report import Table, exposure_middles_s
 from labrig.results import Series
 

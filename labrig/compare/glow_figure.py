@@ -9,8 +9,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from labrig import colour_science
-from labrig.compare.colorimetry import FloatArray
 from labrig.compare.glow import GlowComparison
+from labrig.compare.viewing import FloatArray
 from labrig.number_format import rounded
 from labrig.report import (
     EDGE_PT,

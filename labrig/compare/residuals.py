@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.compare.colorimetry import FloatArray
 from labrig.compare.nalbach2017 import LAST_RESIDUALS, RESIDUALS
+from labrig.compare.viewing import FloatArray
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
 from labrig.report import Table

@@ -9,7 +9,6 @@ import numpy as np
 from labrig.acquire import read_rig_file
 from labrig.bench_optics import calibration, camera_curves
 from labrig.calibration import LVF_KIND
-from labrig.compare.colorimetry import DEFAULT_WHITE, FloatArray, viewing
 from labrig.compare.glow import GlowComparison, compare_glow, glow_of, in_colour, predicted_by
 from labrig.compare.nalbach2017 import TABLE_1, emission, emission_grid
 from labrig.compare.residuals import (
@@ -21,6 +20,7 @@ from labrig.compare.residuals import (
     residuals,
 )
 from labrig.compare.three_channels import ThreeChannels, three_channels
+from labrig.compare.viewing import DEFAULT_WHITE, FloatArray, viewing
 from labrig.errors import DataError, UsageError
 from labrig.fit import DecayFit
 from labrig.material import Material, MaterialComparison, compare_materials, read_material

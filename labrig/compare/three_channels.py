@@ -10,18 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.compare.colorimetry import (
+from labrig.compare.viewing import DEFAULT_WHITE, FloatArray
+from labrig.errors import DataError
+from labrig.optics import (
     CIE_2015,
-    DEFAULT_WHITE,
-    FloatArray,
+    CameraResponse,
     Observer,
+    Spectrum,
     delta_e,
     lab,
     observer,
     white_xyz,
 )
-from labrig.errors import DataError
-from labrig.optics import CameraResponse, Spectrum
 from labrig.report import Table
 
 

@@ -1,37 +1,8 @@
-"""Materials: their file, the rate equation and the comparison of two materials."""
+"""Materials: their files, rate equations, re-radiation matrices, comparison of two materials.
 
-from labrig.material.comparison import MaterialComparison, Pair, compare_materials
-from labrig.material.file import (
-    IrradianceNorm,
-    Material,
-    Provenance,
-    Spectrum,
-    State,
-    read_material,
-    write_material,
-)
-from labrig.material.rates import (
-    concentration,
-    exponential_means,
-    phi1,
-    phi2,
-    relaxation_with_slopes,
-)
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "IrradianceNorm",
-    "Material",
-    "MaterialComparison",
-    "Pair",
-    "Provenance",
-    "Spectrum",
-    "State",
-    "compare_materials",
-    "concentration",
-    "exponential_means",
-    "phi1",
-    "phi2",
-    "read_material",
-    "relaxation_with_slopes",
-    "write_material",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

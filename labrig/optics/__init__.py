@@ -14,6 +14,16 @@ from labrig.optics.camera_model import (
     f_number_text,
     rho_squared,
 )
+from labrig.optics.colorimetry import (
+    CIE_1931,
+    CIE_2015,
+    Observer,
+    delta_e,
+    illuminant,
+    lab,
+    observer,
+    white_xyz,
+)
 from labrig.optics.curve_file import (
     Curve,
     CurveFile,
@@ -21,6 +31,7 @@ from labrig.optics.curve_file import (
     read_spectrum,
     read_transmittance,
 )
+from labrig.optics.lights import is_narrow, read_light
 from labrig.optics.lvf import (
     NOMINAL_FWHM_NM,
     Bands,
@@ -42,6 +53,8 @@ from labrig.optics.strip import SLICES, Strip
 
 __all__ = [
     "CHANNELS",
+    "CIE_1931",
+    "CIE_2015",
     "NOMINAL_FWHM_NM",
     "SLICES",
     "Bands",
@@ -52,24 +65,32 @@ __all__ = [
     "Factor",
     "Flat",
     "Lvf",
+    "Observer",
     "Spectrum",
     "Strip",
     "Transmittance",
     "WavelengthMap",
     "band_integrals",
     "band_means",
+    "delta_e",
     "edges_from_centres",
     "f_number_text",
     "hat_functions",
+    "illuminant",
+    "is_narrow",
+    "lab",
     "nominal_lvf",
+    "observer",
     "peak_shape",
     "quadrature",
     "read_camera",
     "read_checked_curves",
     "read_curve_file",
+    "read_light",
     "read_monochrome_camera",
     "read_spectrum",
     "read_transmittance",
     "rho_squared",
     "signal_through",
+    "white_xyz",
 ]

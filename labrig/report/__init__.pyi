@@ -3,6 +3,9 @@ from .colours import (
     css_colour as css_colour,
     into_gamut as into_gamut,
 )
+from .contact_sheet import (
+    draw_contact_sheet as draw_contact_sheet,
+)
 from .curve_sketch import (
     describe_curves as describe_curves,
     draw_curves as draw_curves,
@@ -32,13 +35,27 @@ from .figures_pdf import (
 )
 from .material_tables import (
     comparison_table as comparison_table,
+    describe_phosphor as describe_phosphor,
+)
+from .mixture import (
+    describe_mixture as describe_mixture,
+    difference_lines as difference_lines,
+    draw_mixture as draw_mixture,
 )
 from .page import (
     Report as Report,
     write_report as write_report,
 )
+from .phosphor_picture import (
+    draw_phosphor as draw_phosphor,
+)
 from .renderers import (
     render as render,
+)
+from .reradiation import (
+    describe_reradiation as describe_reradiation,
+    draw_reradiation as draw_reradiation,
+    reradiation_text as reradiation_text,
 )
 from .run_sections import (
     lamp_sections as lamp_sections,

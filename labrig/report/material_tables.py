@@ -26,6 +26,45 @@ def measured_table(material: Material) -> Table:
     return Table(head if len(states) > 1 else ("", "measured"), rows, caption)
 
 
+def describe_phosphor(material: Material) -> str:
+    """Describe a phosphor in lines of text.
+
+    Parameters
+    ----------
+    material
+        A phosphor.
+
+    Returns
+    -------
+    str
+        Its name and origin, then a line for each quantity, with a column for each state.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import describe_phosphor
+    >>> for line in describe_phosphor(labrig.read_material("double-wide")).splitlines()[:4]:
+    ...     print(line)
+    double-wide: phosphor of 2 states
+      source: made for labrig
+                              State 1  State 2
+      k_r / s⁻¹               0.2      0.01
+    """
+    table = measured_table(material)
+    states = f"{len(material.states)} state" + ("s" if len(material.states) > 1 else "")
+    lines = [f"{material.name}: phosphor of {states}"]
+    if material.provenance is not None:
+        lines.append(f"  source: {material.provenance.source}")
+    rows = [table.head, *table.rows] if len(material.states) > 1 else list(table.rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines += [
+        "  "
+        + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    return "\n".join([*lines, table.caption])
+
+
 def comparison_table(comparison: MaterialComparison) -> Table:
     """Return the table of the comparison of two materials, for the report and the terminal.
 

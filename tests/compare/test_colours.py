@@ -8,14 +8,22 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 from labrig.compare import three_channels
-from labrig.compare.colorimetry import CIE_1931, CIE_2015, observer, viewing, white_xyz
 from labrig.compare.glow import compare_glow
 from labrig.compare.nalbach2017 import TABLE_1, emission
 from labrig.compare.residuals import equally_weighted, fits_by_states, residuals
 from labrig.compare.spectra_figure import spectra_figure
+from labrig.compare.viewing import viewing
 from labrig.errors import DataError, UsageError
 from labrig.material import read_material
-from labrig.optics import CameraResponse, Spectrum, read_camera
+from labrig.optics import (
+    CIE_1931,
+    CIE_2015,
+    CameraResponse,
+    Spectrum,
+    observer,
+    read_camera,
+    white_xyz,
+)
 from labrig.report.figure_style import figure_style
 from tests.report.made import AMPLITUDES, RATES, WEIGHTS, decay_series
 

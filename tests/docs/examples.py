@@ -1,14 +1,17 @@
 """The folder in which the examples of docstrings and of the manual run.
 
 It holds what a bench has after its first measurements: `runs/decay`, a run of the simulated bench
-with its results; `material.yaml` and `series.csv` from it; `frame.dng`, one of its frames; and the
-calibrations `camera.yaml`, `lvf.yaml`, `fade.yaml`, `blank.yaml` and `irradiance.yaml`.
+with its results; `material.yaml` and `series.csv` from it; `frame.dng`, one of its frames; the
+calibrations `camera.yaml`, `lvf.yaml`, `fade.yaml`, `blank.yaml` and `irradiance.yaml`; and
+`paper.csv`, the re-radiation matrix of a fluorescent paper.
 """
 
 import shutil
 from pathlib import Path
 
+from labrig.material import write_reradiation
 from labrig.process import process_run
+from tests.material.reradiation.formats.matrices import two_dyes
 
 TESTS = Path(__file__).parents[1]
 RUN = TESTS / "recordings/decay/run"
@@ -26,3 +29,4 @@ def make_examples(folder: Path) -> None:
     for path in CALIBRATIONS.glob("*/*.yaml"):
         if path.stem in {"camera", "lvf", "fade", "blank", "irradiance"}:
             shutil.copy(path, folder)
+    write_reradiation(folder / "paper.csv", two_dyes(noise=0.0))

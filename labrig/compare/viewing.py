@@ -1,4 +1,4 @@
-"""CIELAB with a given white point, and colour differences (colour-science)."""
+"""Conversion of photographs to CIELAB with a given white point."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -8,86 +8,17 @@ from numpy.typing import NDArray
 
 from labrig import colour_science
 from labrig.errors import UsageError
-from labrig.optics import CameraResponse
+from labrig.optics import CIE_1931, CameraResponse, observer, white_xyz
 from labrig.report import camera_to_xyz
-from labrig.yaml_file import did_you_mean
 
 FloatArray = NDArray[np.float64]
 
-CIE_1931 = "CIE 1931 2 Degree Standard Observer"
-CIE_2015 = "CIE 2015 2 Degree Standard Observer"
 #: White of the screens on which comparisons are viewed.
 DEFAULT_WHITE = "D65"
 
 #: `all`: one factor for all photographs of a patch, as with one exposure; `each`: one factor for
 #: every photograph, as if each had an exposure of its own.
 Normalisation = Literal["all", "each"]
-
-
-@dataclass(frozen=True, eq=False)
-class Observer:
-    """A standard observer.
-
-    Attributes
-    ----------
-    name
-        Name of the observer in colour-science.
-    wavelength_nm
-        Wavelengths in steps of 1 nm, shape (n,).
-    functions
-        Colour-matching functions x̄, ȳ, z̄, shape (n, 3).
-    """
-
-    name: str
-    wavelength_nm: FloatArray
-    functions: FloatArray
-
-
-def observer(name: str) -> Observer:
-    """Return a standard observer of colour-science by name."""
-    colour = colour_science.load()
-    table = colour.MSDS_CMFS[name]
-    return Observer(name, np.asarray(table.wavelengths), np.asarray(table.values))
-
-
-def white_xyz(name: str, standard_observer: Observer) -> FloatArray:
-    """Return X, Y, Z of an illuminant such as `D65`, shape (3,), with Y = 1.
-
-    Raises
-    ------
-    UsageError
-        If there is no such illuminant.
-    """
-    colour = colour_science.load()
-    names = {key: key for key in colour.SDS_ILLUMINANTS if "_" not in key}
-    if name not in names:
-        raise UsageError(
-            f"--white: expected the name of a CIE illuminant, got '{name}'; "
-            f"{did_you_mean(name, list(names))}"
-        )
-    light = colour.SDS_ILLUMINANTS[name]
-    power = np.interp(
-        standard_observer.wavelength_nm, light.wavelengths, light.values, left=0.0, right=0.0
-    )
-    xyz = power @ standard_observer.functions
-    return np.asarray(xyz / xyz[1])
-
-
-def lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
-    """Return CIELAB of X, Y, Z, shape (…, 3), both on the scale on which `white` has Y = 1."""
-    colour = colour_science.load()
-    return np.asarray(colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white)))
-
-
-def delta_e(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return CIEDE2000 between two CIELAB arrays of shape (…, 3), shape (…).
-
-    References
-    ----------
-    Sharma, Wu, Dalal, "The CIEDE2000 color-difference formula" (2005).
-    """
-    colour = colour_science.load()
-    return np.asarray(colour.difference.delta_E_CIE2000(first, second))
 
 
 @dataclass(frozen=True, eq=False)

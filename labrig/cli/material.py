@@ -1,0 +1,201 @@
+"""`labrig material`: material files and measured re-radiation matrices."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labrig.cli.matrices import (
+    LIGHTS,
+    YAML,
+    Corrected,
+    Entry,
+    File,
+    Lights,
+    Pixel,
+    read_any,
+    read_matrix,
+    with_sigma,
+)
+
+app = typer.Typer(help="Materials: show, convert, light and compare them.", no_args_is_help=True)
+
+
+@app.command("show")
+def show(
+    file: File,
+    entry: Entry = None,
+    pixel: Pixel = None,
+    corrected: Corrected = False,
+    light: Lights = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="File for a figure (.png, .svg, .pdf).")
+    ] = None,
+) -> None:
+    """What a material is: its numbers, its colours, and a picture."""
+    from labrig.material import Material, physical_warnings
+    from labrig.optics import read_light
+    from labrig.report import (
+        describe_phosphor,
+        describe_reradiation,
+        draw_phosphor,
+        draw_reradiation,
+    )
+
+    material = read_any(file, entry, pixel)
+    if isinstance(material, Material):
+        typer.echo(describe_phosphor(material))
+        if picture is not None:
+            draw_phosphor(material, picture)
+            typer.echo(f"drawn into {picture}")
+        return
+    material = with_sigma(material, corrected)
+    for warning in physical_warnings(material):
+        typer.echo(f"warning: {warning}", err=True)
+    lights = [read_light(name) for name in light or LIGHTS]
+    typer.echo(describe_reradiation(material, lights))
+    if picture is not None:
+        draw_reradiation(material, lights, picture)
+        typer.echo(f"drawn into {picture}")
+
+
+@app.command("convert")
+def convert(
+    file: File,
+    out: Annotated[
+        Path,
+        typer.Argument(
+            help="File to write: .csv, .ark or .exr; .yaml writes a material file and the matrix "
+            "beside it."
+        ),
+    ],
+    entry: Entry = None,
+    pixel: Pixel = None,
+    corrected: Corrected = False,
+) -> None:
+    """Write a re-radiation matrix in another format."""
+    from labrig.material import write_fluorescent, write_reradiation
+
+    matrix = read_matrix(file, entry, pixel)
+    if corrected:
+        matrix = with_sigma(matrix, corrected)
+    if out.suffix in YAML:
+        write_fluorescent(out, matrix)
+    else:
+        write_reradiation(out, matrix)
+    typer.echo(f"written: {out}")
+
+
+@app.command("apply")
+def apply(
+    file: File,
+    light: Annotated[
+        str,
+        typer.Option(
+            "--light",
+            help="A CIE illuminant such as D65, a narrow light such as 450nm, or a file with a "
+            "spectrum.",
+        ),
+    ],
+    entry: Entry = None,
+    pixel: Pixel = None,
+    corrected: Corrected = False,
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file to write.")] = None,
+) -> None:
+    """The light that comes back from a material under a light, as CSV.
+
+    In the unit of the irradiance; of a perfect white all of it would be reflected.
+    """
+    from labrig.optics import read_light
+
+    matrix = with_sigma(read_matrix(file, entry, pixel), corrected)
+    seen = matrix.under(read_light(light))
+    columns = {
+        "wavelength_nm": seen.total.wavelength_nm,
+        "reflected": seen.reflected.value,
+        "reradiated": seen.reradiated.value,
+        "total": seen.total.value,
+    }
+    if seen.total.sigma is not None:
+        columns["total_sigma"] = seen.total.sigma
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    _write_lines(lines, out)
+
+
+@app.command("compare")
+def compare(
+    file: File,
+    reference: File,
+    corrected: Corrected = False,
+    light: Lights = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """How far the colours of a fluorescent material are from those of a reference.
+
+    The white of ΔE2000 is a perfect white under the light; under a narrow light, where a
+    fluorescent material is far brighter than any white, that of a screen (D65), with the reference
+    at half its luminance.
+    """
+    from labrig.material import compare_colours
+    from labrig.optics import read_light
+    from labrig.report import difference_lines
+
+    ours, theirs = (with_sigma(read_matrix(path), corrected) for path in (file, reference))
+    differences = compare_colours(ours, theirs, [read_light(name) for name in light or LIGHTS])
+    if as_json:
+        rows = [one.to_dict() for one in differences]
+        typer.echo(json.dumps(rows, indent=1))
+        return
+    for line in difference_lines(differences):
+        typer.echo(line)
+
+
+@app.command("list")
+def list_materials(
+    folder: Annotated[Path, typer.Argument(help="Folder of re-radiation matrices.")],
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="File for a sheet of all (.png, .svg, .pdf).")
+    ] = None,
+) -> None:
+    """The fluorescent materials in a folder, a line each, and on one sheet.
+
+    Files that cannot be used are named with the reason, and left out.
+    """
+    from labrig.errors import DataError, UsageError
+    from labrig.material import matrix_files, physical_warnings, read_reradiation
+    from labrig.optics import read_light
+    from labrig.report import draw_contact_sheet, reradiation_text
+
+    matrices = []
+    for path in matrix_files(folder):
+        try:
+            matrix = with_sigma(read_reradiation(path), corrected=False)
+            remarks = physical_warnings(matrix)
+        except (UsageError, DataError) as error:
+            typer.echo(f"left out: {error}", err=True)
+            continue
+        matrices.append(matrix)
+        for remark in remarks:
+            typer.echo(f"warning: {remark}", err=True)
+        typer.echo(f"{path.name:20} {matrix.name:32} {reradiation_text(matrix)}")
+    if not matrices:
+        raise UsageError(f"{folder}: expected files of re-radiation matrices, got none of use")
+    if picture is not None:
+        draw_contact_sheet(matrices, read_light("D65"), picture)
+        typer.echo(f"drawn into {picture}")
+
+
+def _write_lines(lines: list[str], out: Path | None) -> None:
+    from labrig.errors import UsageError
+
+    if out is None:
+        for line in lines:
+            typer.echo(line)
+        return
+    try:
+        out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{out}: cannot be written ({error.strerror})") from None
+    typer.echo(f"written: {out}")

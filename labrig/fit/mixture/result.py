@@ -1,0 +1,120 @@
+"""The result of a fit of a mixture to a re-radiation matrix."""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from labrig.material import ReradiationMixture
+
+
+@dataclass(frozen=True)
+class MixtureCandidate:
+    """A fit with some number of components.
+
+    Attributes
+    ----------
+    components
+        Number K of components.
+    masked_mse
+        As `MixtureFit.masked_mse`, by least squares.
+    bic
+        Bayesian information criterion M ln(masked_mse) + 6 K ln M of the M entries above the
+        threshold; those that were set to zero are no data.
+    """
+
+    components: int
+    masked_mse: float
+    bic: float
+
+
+@dataclass(frozen=True, eq=False)
+class MixtureFit:
+    """A mixture that stands for a re-radiation matrix.
+
+    Attributes
+    ----------
+    mixture
+        The mixture.
+    scaling
+        "integral" if the mixture re-radiates as much as the entries above the threshold,
+        "least-squares" if its scale minimises the error.
+    threshold
+        Least value per band that counted as re-radiation.
+    false_discovery_rate
+        Rate by which that was found; None if the threshold was given.
+    kept_entries, entries
+        Number of entries above the threshold, and of all measured ones with λ_o > λ_i.
+    masked_mse
+        Mean squared error, per band, of all measured entries with λ_o > λ_i, those below the
+        threshold taken as 0.
+    likelihood_mse
+        The same before refinement, of expectation maximisation alone.
+    band_nm
+        Width of the output bands in nm; 1 if they differ.
+    iterations, refinement_iterations
+        Number of iterations of expectation maximisation and of the refinement.
+    converged
+        Whether the refinement reached a minimum.
+    selection
+        How the number of components was found: "bic" or "given".
+    candidates
+        The numbers of components that were tried.
+    """
+
+    mixture: ReradiationMixture
+    scaling: str
+    threshold: float
+    false_discovery_rate: float | None
+    kept_entries: int
+    entries: int
+    masked_mse: float
+    likelihood_mse: float
+    band_nm: float
+    iterations: int
+    refinement_iterations: int
+    converged: bool
+    selection: str
+    candidates: tuple[MixtureCandidate, ...]
+
+    @property
+    def components(self) -> int:
+        """Number of components."""
+        return len(self.mixture.weights)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of `fit.json`.
+
+        Its `scale` is that of a band: re-radiation in an output band of `band_nm` is `scale` times
+        the density in 1/nm² on the Stokes side.
+        """
+        mixture = self.mixture
+        return {
+            "scale": mixture.scale * self.band_nm,
+            "band_nm": self.band_nm,
+            "components": [
+                {
+                    "weight": float(weight),
+                    "mean": mean.tolist(),
+                    "covariance": covariance.tolist(),
+                }
+                for weight, mean, covariance in zip(
+                    mixture.weights, mixture.mean_nm, mixture.covariance_nm2, strict=True
+                )
+            ],
+            "scaling": self.scaling,
+            "threshold": self.threshold,
+            "false_discovery_rate": self.false_discovery_rate,
+            "kept_entries": self.kept_entries,
+            "entries": self.entries,
+            "masked_mse": self.masked_mse,
+            "likelihood_mse": self.likelihood_mse,
+            "iterations": self.iterations,
+            "refinement_iterations": self.refinement_iterations,
+            "converged": self.converged,
+            "selection": self.selection,
+            "candidates": [asdict(candidate) for candidate in self.candidates],
+        }
+
+    def to_json(self) -> str:
+        """Return the text of `fit.json`."""
+        return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)

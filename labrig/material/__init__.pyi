@@ -1,0 +1,49 @@
+from .comparison import (
+    MaterialComparison as MaterialComparison,
+    Pair as Pair,
+    compare_materials as compare_materials,
+)
+from .file import (
+    IrradianceNorm as IrradianceNorm,
+    Material as Material,
+    Provenance as Provenance,
+    Spectrum as Spectrum,
+    State as State,
+    read_material as read_material,
+    write_material as write_material,
+)
+from .fluorescent import (
+    FluorescentMaterial as FluorescentMaterial,
+    read_fluorescent as read_fluorescent,
+    write_fluorescent as write_fluorescent,
+)
+from .rates import (
+    concentration as concentration,
+    exponential_means as exponential_means,
+    phi1 as phi1,
+    phi2 as phi2,
+    relaxation_with_slopes as relaxation_with_slopes,
+)
+from .reradiation import (
+    Appearance as Appearance,
+    ColourDifference as ColourDifference,
+    ConditionalDensity as ConditionalDensity,
+    InstrumentNoise as InstrumentNoise,
+    ReradiationMatrix as ReradiationMatrix,
+    ReradiationMixture as ReradiationMixture,
+    SeenSpectrum as SeenSpectrum,
+    SpectralImage as SpectralImage,
+    appearance as appearance,
+    compare_colours as compare_colours,
+    corrected as corrected,
+    instrument_noise as instrument_noise,
+    matrix_files as matrix_files,
+    physical_warnings as physical_warnings,
+    read_reradiation as read_reradiation,
+    read_spectral_image as read_spectral_image,
+    reradiates as reradiates,
+    with_sigma as with_sigma,
+    without_offset as without_offset,
+    without_spill as without_spill,
+    write_reradiation as write_reradiation,
+)

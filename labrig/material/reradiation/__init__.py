@@ -1,0 +1,69 @@
+"""Re-radiation matrices of fluorescent surfaces: files, colours, uncertainties."""
+
+from labrig.material.reradiation.appearance import (
+    Appearance,
+    ColourDifference,
+    appearance,
+    compare_colours,
+)
+from labrig.material.reradiation.checks import (
+    physical_warnings,
+)
+from labrig.material.reradiation.conditional import (
+    ConditionalDensity,
+)
+from labrig.material.reradiation.correction import (
+    corrected,
+)
+from labrig.material.reradiation.evidence import (
+    reradiates,
+)
+from labrig.material.reradiation.formats import (
+    SpectralImage,
+    matrix_files,
+    read_reradiation,
+    read_spectral_image,
+    write_reradiation,
+)
+from labrig.material.reradiation.matrix import (
+    ReradiationMatrix,
+    SeenSpectrum,
+)
+from labrig.material.reradiation.mixture import (
+    ReradiationMixture,
+)
+from labrig.material.reradiation.noise import (
+    InstrumentNoise,
+    instrument_noise,
+    with_sigma,
+)
+from labrig.material.reradiation.offset import (
+    without_offset,
+)
+from labrig.material.reradiation.spill import (
+    without_spill,
+)
+
+__all__ = [
+    "Appearance",
+    "ColourDifference",
+    "ConditionalDensity",
+    "InstrumentNoise",
+    "ReradiationMatrix",
+    "ReradiationMixture",
+    "SeenSpectrum",
+    "SpectralImage",
+    "appearance",
+    "compare_colours",
+    "corrected",
+    "instrument_noise",
+    "matrix_files",
+    "physical_warnings",
+    "read_reradiation",
+    "read_spectral_image",
+    "reradiates",
+    "with_sigma",
+    "without_offset",
+    "without_spill",
+    "write_reradiation",
+]

@@ -1,0 +1,56 @@
+"""Whether a measured surface re-radiates at all."""
+
+import numpy as np
+
+from labrig.errors import DataError
+from labrig.material.reradiation.matrix import ReradiationMatrix
+
+#: Significance of an entry, and of those beside it: noise has stripes along the output, since one
+#: dark reading serves a whole column, but never three columns side by side.
+CLEAR_SIGMAS, BESIDE_SIGMAS = 5.0, 3.0
+#: Entries nearer to the diagonal than this many bands hold light that passes both monochromators.
+CLEAR_BANDS = 1.5
+
+
+def reradiates(matrix: ReradiationMatrix) -> bool:
+    """Return whether a surface re-radiates more than its noise.
+
+    Parameters
+    ----------
+    matrix
+        A matrix with σ of its re-radiation.
+
+    Returns
+    -------
+    bool
+        Whether some entry is 5 σ above zero, and both entries beside it, of the neighbouring input
+        bands, are 3 σ above zero.
+
+    Raises
+    ------
+    DataError
+        The re-radiation has no σ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.material import ReradiationMatrix, reradiates, with_sigma
+    >>> nm = np.arange(400.0, 701.0, 10.0)
+    >>> values = 0.5 * np.eye(31) + 1e-3 * np.random.default_rng(1).standard_normal((31, 31))
+    >>> before = with_sigma(ReradiationMatrix.from_bands("", nm, nm, values))
+    >>> values[12, 3:8] += 0.02
+    >>> reradiates(before), reradiates(with_sigma(ReradiationMatrix.from_bands("", nm, nm, values)))
+    (False, True)
+    """
+    sigma = matrix.reradiation_sigma
+    if sigma is None:
+        raise DataError(
+            f"expected σ of the re-radiation of {matrix.name!r}, got none: estimate it first"
+        )
+    distance = matrix.output_nm[:, np.newaxis] - matrix.input_nm
+    width = (matrix.output_width_nm[:, np.newaxis] + matrix.input_width_nm) / 2
+    used = (distance > CLEAR_BANDS * width) & (sigma > 0) & np.isfinite(matrix.reradiation)
+    pulls = np.divide(matrix.reradiation, sigma, out=np.zeros_like(sigma), where=used)
+    middle, left, right = pulls[:, 1:-1], pulls[:, :-2], pulls[:, 2:]
+    clear = (middle > CLEAR_SIGMAS) & (np.minimum(left, right) > BESIDE_SIGMAS)
+    return bool(clear.any())

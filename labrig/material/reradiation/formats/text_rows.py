@@ -1,0 +1,108 @@
+"""Lines and numbers of text formats; every message names the line."""
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from labrig.material.reradiation.matrix import FloatArray
+
+#: Range of wavelengths in nm, which excludes tables in µm or in Hz.
+PLAUSIBLE_NM = (100.0, 20_000.0)
+#: Largest magnitude of a fraction that is no fault of the file.
+LARGEST_FRACTION = 2.0
+#: Characters of a line that a message repeats.
+_SHOWN = 30
+
+
+class Line(NamedTuple):
+    """A line of a file, with its number from 1."""
+
+    number: int
+    text: str
+
+
+def filled_lines(text: str) -> list[Line]:
+    """Return the lines that are not blank, whatever ends them."""
+    lines = re.split(r"\r+\n|\n|\r", text)
+    return [Line(k, line.strip()) for k, line in enumerate(lines, start=1) if line.strip()]
+
+
+def shown(text: str) -> str:
+    """Return the beginning of a text in quotation marks, on one line."""
+    plain = " ".join(text.split())
+    return f"'{plain[:_SHOWN]}…'" if len(plain) > _SHOWN else f"'{plain}'"
+
+
+def number(cell: str, line_number: int) -> float:
+    """Return the finite number in a cell.
+
+    Raises
+    ------
+    ValueError
+        It is no number, or not finite.
+    """
+    try:
+        # Python reads 1_000 as a number.
+        value = float(cell.replace("_", "?"))
+    except ValueError:
+        raise ValueError(f"line {line_number}: expected a number, got {shown(cell)}") from None
+    if not math.isfinite(value):
+        raise ValueError(f"line {line_number}: expected a finite number, got {shown(cell)}")
+    return value
+
+
+def numbers(cells: Iterable[str], line_number: int) -> list[float]:
+    """Return the finite numbers in cells."""
+    return [number(cell, line_number) for cell in cells]
+
+
+def numbers_or_nan(cells: Iterable[str], line_number: int) -> list[float]:
+    """Return the finite numbers in cells, NaN of empty ones."""
+    return [number(cell, line_number) if cell else math.nan for cell in cells]
+
+
+def wavelengths(cells: Sequence[str], line_number: int) -> FloatArray:
+    """Return the wavelengths in nm that stand in cells."""
+    nm = np.array(numbers(cells, line_number))
+    check_wavelengths(nm, f"line {line_number}: ")
+    return nm
+
+
+def check_wavelengths(nm: FloatArray, place: str = "") -> None:
+    """Raise ValueError if there is one wavelength, or they do not rise or are no nm."""
+    low, high = PLAUSIBLE_NM
+    if len(nm) < 2:
+        raise ValueError(f"{place}expected two or more wavelengths, got {len(nm)}")
+    if (nm < low).any() or (nm > high).any():
+        raise ValueError(
+            f"{place}expected wavelengths from {low:g} to {high:g} nm, "
+            f"got {nm.min():g} to {nm.max():g}"
+        )
+    if (np.diff(nm) <= 0).any():
+        at = int(np.argmax(np.diff(nm) <= 0))
+        raise ValueError(
+            f"{place}expected wavelengths that rise, got {nm[at + 1]:g} after {nm[at]:g} nm"
+        )
+
+
+def check_fractions(values: Sequence[float], place: str) -> None:
+    """Raise ValueError if a fraction per band is absurd; NaN is none."""
+    absurd = next((value for value in values if abs(value) > LARGEST_FRACTION), None)
+    if absurd is not None:
+        raise ValueError(
+            f"{place}: expected fractions, got {absurd:g}, which is above "
+            f"{LARGEST_FRACTION:g} in magnitude"
+        )
+
+
+def one_line(name: str) -> str:
+    """Return a name with single blanks in between, as text formats hold it."""
+    return " ".join(name.split())
+
+
+def number_text(value: float) -> str:
+    """Return the shortest text that is read back as the same number, nothing for NaN."""
+    return "" if math.isnan(value) else repr(float(value))

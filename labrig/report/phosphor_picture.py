@@ -1,0 +1,97 @@
+"""A phosphor as a picture: excitation and re-radiation of each state over wavelength."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labrig.errors import UsageError
+from labrig.material import Material
+from labrig.number_format import rounded
+from labrig.report.curve_sketch import PICTURES
+from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
+
+# matplotlib is slow to load.
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def draw_phosphor(material: Material, path: Path) -> None:
+    """Draw excitation rates, re-radiation and emission spectrum of a phosphor.
+
+    Parameters
+    ----------
+    material
+        A phosphor with excitation rates or re-radiation in bands, or with a spectrum.
+    path
+        Path of the picture, which ends in `.png`, `.svg` or `.pdf`.
+
+    Raises
+    ------
+    UsageError
+        There is nothing to draw, the file name is not that of a picture, or the file cannot be
+        written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.report import draw_phosphor
+    >>> draw_phosphor(labrig.read_material("blue-paint"), Path("blue-paint.svg"))
+    """
+    from matplotlib.figure import Figure
+
+    if path.suffix.lower() not in PICTURES:
+        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    panels = [
+        (name, label)
+        for name, label in (
+            ("k_e_per_s", "excitation rate k_e / s⁻¹"),
+            ("reradiation", "re-radiation Λ, relative"),
+        )
+        if any(getattr(state, name) is not None for state in material.states)
+    ]
+    if not panels:
+        raise UsageError(
+            f"{material.name}: expected excitation rates or re-radiation to draw, got decay rates "
+            "only"
+        )
+    with figure_style():
+        figure = Figure(figsize=(4.5 * len(panels), 3.4), layout="constrained")
+        figure.suptitle(material.name, color=INK)
+        for axes, (name, label) in zip(
+            np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True
+        ):
+            _draw_bands(axes, material, name)
+            axes.set(xlabel="wavelength / nm")
+            axes.set_title(label, fontsize="medium", color=INK)
+        try:
+            figure.savefig(path, dpi=150)
+        except OSError as error:
+            raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
+    """Draw one quantity of every state as steps with ± 1 σ."""
+    edges_nm = np.array(material.bands_nm)
+    states = sorted(material.states, key=lambda state: -state.k_r_per_s)
+    for state, colour in zip(states, OTHER_CHANNELS, strict=False):
+        values, sigmas = getattr(state, name), getattr(state, f"{name}_sigma")
+        if values is None:
+            continue
+        axes.stairs(
+            values, edges_nm, color=colour, linewidth=1.4,
+            label=f"1/k_r = {rounded(1 / state.k_r_per_s, 3)} s",
+        )  # fmt: skip
+        if sigmas is not None:
+            middles_nm = (edges_nm[1:] + edges_nm[:-1]) / 2
+            axes.errorbar(middles_nm, values, sigmas, color=colour, linestyle="", capsize=2)
+    if name == "reradiation" and material.spectrum is not None:
+        spectrum = material.spectrum
+        top = max(max(getattr(state, name) or (0.0,)) for state in states)
+        axes.plot(
+            spectrum.wavelength_nm, top * np.array(spectrum.value), color=INK, linewidth=0.9,
+            linestyle="--", label="spectrum, scaled",
+        )  # fmt: skip
+    axes.set_ylim(bottom=0)
+    axes.legend(frameon=False, fontsize="small")

@@ -1,0 +1,299 @@
+"""Mixtures fitted to re-radiation matrices."""
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from numpy.testing import assert_allclose
+from scipy.stats import skewnorm
+
+from labrig.errors import DataError, UsageError
+from labrig.fit import MixtureFit, fit_mixture
+from labrig.material import ReradiationMatrix, ReradiationMixture
+
+INPUT_NM = np.arange(300.0, 781.0, 10.0)
+OUTPUT_NM = np.arange(380.0, 781.0, 10.0)
+IS_STOKES = OUTPUT_NM[:, np.newaxis] > INPUT_NM
+BISPECTRAL = Path(__file__).parents[3] / "shared" / "data" / "bispectral"
+shared_data = pytest.mark.shared_data
+needs_bispectral = pytest.mark.skipif(
+    not BISPECTRAL.is_dir(), reason="no ../shared/data beside the checkout"
+)
+#: Threshold of physics.md's reference for the Post-Its, and its errors by K.
+POSTIT_THRESHOLD = 0.004
+POSTIT_MSE = {
+    "yellow": {1: 9.0e-6, 2: 4.3e-6, 3: 2.7e-6, 6: 2.1e-6},
+    "green": {1: 7.0e-6, 2: 3.4e-6, 3: 2.4e-6, 6: 2.1e-6},
+}
+
+
+def dye(peak_nm: float, emission_nm: float, strength: float) -> np.ndarray:
+    """A dye as real ones are: steep towards the other spectrum, with a tail away from it."""
+    excitation = skewnorm.pdf(INPUT_NM, -4, peak_nm + 20, 60)
+    emission = skewnorm.pdf(OUTPUT_NM, 4, emission_nm - 15, 45)
+    values = np.outer(emission / emission.sum(), excitation / excitation.max())
+    return np.where(IS_STOKES, strength * values, 0.0)
+
+
+def one_dye() -> np.ndarray:
+    return dye(460, 515, 0.3)
+
+
+def two_dyes() -> np.ndarray:
+    return np.asarray(dye(370, 440, 0.25) + dye(520, 590, 0.2))
+
+
+def measured(truth: np.ndarray, seed: int, with_sigma: bool = True) -> ReradiationMatrix:
+    """Noise that falls with the wavelength of the input, and spill beside the reflectance."""
+    sigma = np.broadcast_to(np.geomspace(4e-3, 4e-4, len(INPUT_NM)), truth.shape)
+    noise = sigma * np.random.default_rng(seed).standard_normal(truth.shape)
+    distance = np.abs(OUTPUT_NM[:, np.newaxis] - INPUT_NM)
+    mirror = np.where(distance == 0, 0.5, np.where(distance == 10, 2e-4, 0.0))
+    return ReradiationMatrix.from_bands(
+        "paper", INPUT_NM, OUTPUT_NM, truth + mirror + noise, sigma if with_sigma else None
+    )
+
+
+def bands(mixture: ReradiationMixture) -> np.ndarray:
+    """Re-radiation per band, as the definition says."""
+    density = mixture.density(INPUT_NM, OUTPUT_NM[:, np.newaxis])
+    return np.where(IS_STOKES, 10 * mixture.scale * density, 0.0)
+
+
+def thresholded(matrix: ReradiationMatrix, threshold: float) -> np.ndarray:
+    values = np.where(IS_STOKES, 10 * matrix.reradiation, 0.0)
+    return np.where(values >= threshold, values, 0.0)
+
+
+def error(mixture: ReradiationMixture, values: np.ndarray) -> float:
+    return float(((bands(mixture) - values)[IS_STOKES] ** 2).mean())
+
+
+def two_components(seed: int) -> ReradiationMixture:
+    """Components as wide as those of dyes, on the Stokes side."""
+    rng = np.random.default_rng(seed)
+    sd = rng.uniform(15, 30, (2, 2))
+    ab = rng.uniform(-0.5, 0.5, 2) * sd.prod(axis=1)
+    mean = np.array([[380.0, 480], [480, 600]]) + rng.uniform(-15, 15, (2, 2))
+    covariance = [[[s**2, c], [c, t**2]] for (s, t), c in zip(sd, ab, strict=True)]
+    return ReradiationMixture(30.0, np.array([0.6, 0.4]), mean, np.array(covariance))
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_a_mixture_is_found_again(seed: int) -> None:
+    truth = two_components(seed)
+    fit = fit_mixture(truth.to_matrix(INPUT_NM, OUTPUT_NM), 2, "least-squares", 1e-12)
+    assert fit.converged
+    assert_allclose(fit.mixture.scale, truth.scale, rtol=1e-5)
+    assert_allclose(fit.mixture.weights, truth.weights, rtol=1e-5)
+    assert_allclose(fit.mixture.mean_nm, truth.mean_nm, rtol=1e-5)
+    assert_allclose(fit.mixture.covariance_nm2, truth.covariance_nm2, rtol=1e-3, atol=0.1)
+
+
+@pytest.mark.parametrize(("truth", "seed"), [(one_dye, 11), (two_dyes, 12)])
+@pytest.mark.parametrize("scaling", ["integral", "least-squares"])
+def test_the_error_is_that_of_the_thresholded_entries(
+    truth: Callable[[], np.ndarray], seed: int, scaling: str
+) -> None:
+    matrix = measured(truth(), seed)
+    fit = fit_mixture(matrix, 3, scaling, 0.004)  # type: ignore[arg-type]
+    wanted = thresholded(matrix, 0.004)
+    assert fit.entries == 1148
+    assert fit.kept_entries == (wanted > 0).sum()
+    assert_allclose(fit.masked_mse, error(fit.mixture, wanted), rtol=1e-9)
+    if scaling == "integral":
+        assert_allclose(bands(fit.mixture).sum(), wanted.sum(), rtol=1e-9)
+    assert fit.masked_mse < fit.likelihood_mse
+
+
+def test_no_small_change_of_the_refined_mixture_lessens_the_error() -> None:
+    matrix = measured(one_dye(), 13)
+    fit = fit_mixture(matrix, 2, "least-squares", 0.004)
+    wanted, found = thresholded(matrix, 0.004), fit.mixture
+
+    def changed(scale: float, weight: float, mean: np.ndarray, sd: np.ndarray) -> float:
+        weights = found.weights + np.array([weight, -weight])
+        return error(
+            ReradiationMixture(
+                found.scale * scale,
+                weights,
+                found.mean_nm + mean,
+                found.covariance_nm2 * sd[:, :, np.newaxis] * sd[:, np.newaxis],
+            ),
+            wanted,
+        )
+
+    least = error(found, wanted)
+    no_shift, no_stretch = np.zeros((2, 2)), np.ones((2, 2))
+    for sign in (-1, 1):
+        assert changed(1 + sign * 1e-3, 0, no_shift, no_stretch) > least
+        assert changed(1, sign * 1e-3, no_shift, no_stretch) > least
+        for index in np.ndindex(2, 2):
+            shift, stretch = no_shift.copy(), no_stretch.copy()
+            shift[index], stretch[index] = sign * 0.1, 1 + sign * 1e-3
+            assert changed(1, 0, shift, no_stretch) > least
+            assert changed(1, 0, no_shift, stretch) > least
+
+
+@pytest.mark.parametrize(("truth", "seed"), [(one_dye, 14), (two_dyes, 15)])
+def test_a_mixture_is_nearer_to_the_truth_than_the_noisy_entries(
+    truth: Callable[[], np.ndarray], seed: int
+) -> None:
+    matrix = measured(truth(), seed)
+    fit = fit_mixture(matrix, 4)
+    assert fit.false_discovery_rate == 0.05
+    raw = ((10 * matrix.reradiation - truth())[IS_STOKES] ** 2).mean()
+    assert error(fit.mixture, truth()) < raw / 3
+    # The threshold takes the faint tails from the light.
+    assert_allclose(bands(fit.mixture).sum(), truth().sum(), rtol=0.15)
+
+
+@pytest.mark.parametrize("seed", [24, 25])
+def test_more_components_have_less_error(seed: int) -> None:
+    matrix = measured(two_dyes(), seed)
+    errors = [one.masked_mse for one in fit_mixture(matrix).candidates]
+    assert (np.diff(errors) < 0).all()
+
+
+def test_of_the_kept_entries_one_in_twenty_is_noise() -> None:
+    strong = np.zeros((len(OUTPUT_NM), len(INPUT_NM)))
+    strong[10:24, 2:16] = np.where(IS_STOKES[10:24, 2:16], 1.0, 0.0)
+    count = int((strong > 0).sum())
+    sigma = np.full(strong.shape, 0.02)
+    false = []
+    for seed in range(120):
+        noise = sigma * np.random.default_rng(1500 + seed).standard_normal(strong.shape)
+        matrix = ReradiationMatrix.from_bands("", INPUT_NM, OUTPUT_NM, strong + noise, sigma)
+        kept = fit_mixture(matrix, 1).kept_entries
+        false.append((kept - count) / kept)
+    # A σ that is 20 % too large halves this, one that is too small doubles it.
+    assert_allclose(np.mean(false), 0.05 * (1148 - count) / 1148, rtol=0.15)
+
+
+@pytest.mark.parametrize(("truth", "seed"), [(one_dye, 16), (two_dyes, 17)])
+def test_the_number_of_components_is_that_of_the_least_bic(
+    truth: Callable[[], np.ndarray], seed: int
+) -> None:
+    fit = fit_mixture(measured(truth(), seed))
+    least = min(fit.candidates, key=lambda candidate: candidate.bic)
+    assert fit.selection == "bic"
+    assert fit.components == least.components > 1
+    assert [one.components for one in fit.candidates] == list(range(1, len(fit.candidates) + 1))
+
+
+def test_two_normal_densities_under_noise_are_two_components() -> None:
+    matrix = measured(bands(two_components(18)), 18, with_sigma=False)
+    assert fit_mixture(matrix, threshold=0.004).components == 2
+
+
+def test_unequal_bands_count_by_their_width() -> None:
+    truth = two_components(19)
+    output_nm = np.concatenate([np.arange(380.0, 560, 10), np.arange(560.0, 781, 5)])
+    matrix = truth.to_matrix(INPUT_NM, output_nm)
+    fit = fit_mixture(matrix, 2, threshold=1e-12)
+    assert_allclose(fit.mixture.mean_nm, truth.mean_nm, rtol=1e-5)
+    assert_allclose(fit.mixture.scale, truth.scale, rtol=1e-5)
+    assert fit.band_nm == 1
+
+
+def test_what_was_not_measured_is_left_out() -> None:
+    truth = two_components(20)
+    whole = truth.to_matrix(INPUT_NM, OUTPUT_NM)
+    table = np.where(INPUT_NM == 400, np.nan, whole.reradiation)
+    matrix = ReradiationMatrix("", INPUT_NM, OUTPUT_NM, whole.reflectance, table)
+    fit = fit_mixture(matrix, 2, threshold=1e-12)
+    assert fit.entries == 1148 - int((OUTPUT_NM > 400).sum())
+    assert_allclose(fit.mixture.mean_nm, truth.mean_nm, rtol=1e-5)
+
+
+def test_the_same_matrix_gives_the_same_text() -> None:
+    texts = [fit_mixture(measured(two_dyes(), 21), 2).to_json() for _ in range(2)]
+    assert texts[0] == texts[1]
+
+
+def test_json_says_the_mixture_per_band() -> None:
+    fit = fit_mixture(measured(two_dyes(), 22), 3)
+    content = json.loads(fit.to_json())
+    keys = {"weight", "mean", "covariance"}
+    assert {"scale", "components", "threshold", "masked_mse"} <= set(content)
+    assert [set(component) for component in content["components"]] == [keys] * 3
+    assert_allclose(sum(component["weight"] for component in content["components"]), 1)
+    parts = [np.array([component[key] for component in content["components"]]) for key in keys]
+    read = ReradiationMixture(1.0, **dict(zip(names(keys), parts, strict=True)))
+    density = np.where(IS_STOKES, read.density(INPUT_NM, OUTPUT_NM[:, np.newaxis]), 0)
+    assert_allclose(content["scale"] * density, bands(fit.mixture), rtol=1e-9)
+
+
+def names(keys: set[str]) -> list[str]:
+    return [
+        {"weight": "weights", "mean": "mean_nm", "covariance": "covariance_nm2"}[key]
+        for key in keys
+    ]
+
+
+@pytest.mark.parametrize(
+    ("components", "threshold", "kind", "message"),
+    [
+        (0, 0.004, UsageError, "expected 1 to"),
+        (500, 0.004, UsageError, "components for"),
+        (3, 10.0, DataError, "above the noise"),
+        (3, 0.0, UsageError, "threshold above 0"),
+        (3, float("nan"), UsageError, "threshold above 0"),
+        (3, None, UsageError, "σ of the re-radiation or a threshold"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_in_one_line(
+    components: int, threshold: float | None, kind: type[Exception], message: str
+) -> None:
+    matrix = measured(one_dye(), 23, with_sigma=False)
+    with pytest.raises(kind, match=message) as caught:
+        fit_mixture(matrix, components, threshold=threshold)
+    assert "\n" not in str(caught.value)
+
+
+def postit(colour: str) -> ReradiationMatrix:
+    path = BISPECTRAL / "art_postit" / f"fluorescent_{colour}.csv"
+    with path.open(encoding="utf-8") as file:
+        rows = list(csv.reader(file))[1:]
+    values = np.array([row[1:] for row in rows], dtype=np.float64)
+    return ReradiationMatrix.from_bands(colour, INPUT_NM, OUTPUT_NM, values)
+
+
+def bfc(path: Path) -> ReradiationMatrix:
+    lines = path.read_text(encoding="iso-8859-1").splitlines()
+    first = next(number for number, line in enumerate(lines) if line.startswith("r:c"))
+    values = np.array([line.split()[1:] for line in lines[first + 1 :] if line[:1].isdigit()])
+    return ReradiationMatrix.from_bands(
+        path.stem, INPUT_NM, OUTPUT_NM, values.astype(np.float64)
+    )  # fmt: skip
+
+
+@shared_data
+@needs_bispectral
+@pytest.mark.parametrize("colour", ["yellow", "green"])
+def test_postits_have_at_most_the_reference_error(colour: str) -> None:
+    matrix = postit(colour)
+    fits: dict[int, MixtureFit] = {}
+    for components, reference in POSTIT_MSE[colour].items():
+        fit = fit_mixture(matrix, components, threshold=POSTIT_THRESHOLD)
+        assert fit.likelihood_mse <= reference
+        fits[components] = fit
+    assert fits[3].masked_mse <= POSTIT_MSE[colour][3] / 2
+    wanted = thresholded(matrix, POSTIT_THRESHOLD)
+    assert_allclose(fits[3].masked_mse, error(fits[3].mixture, wanted), rtol=1e-9)
+
+
+@shared_data
+@needs_bispectral
+def test_measured_materials_are_four_components_to_a_millionth() -> None:
+    matrices = (bfc(path) for path in sorted((BISPECTRAL / "rit_bfc450").glob("*.BFC")))
+    glowing = [one for one in matrices if one.reradiated_fraction.max() > 0.1]
+    assert len(glowing) == 44
+    # Every fourth, for time.
+    errors = [fit_mixture(one, 4, threshold=POSTIT_THRESHOLD).masked_mse for one in glowing[::4]]
+    assert np.median(errors) <= 1.1e-6
