@@ -9,8 +9,8 @@ import numpy as np
 from labrig.errors import UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
-from labrig.report.curve_sketch import PICTURES
 from labrig.report.figure_style import INK, MUTED, figure_style
+from labrig.report.picture_file import require_picture, save_picture
 from labrig.report.reradiation import TOLD_NM, screen_colour
 
 # matplotlib is slow to load.
@@ -55,8 +55,7 @@ def draw_contact_sheet(matrices: Sequence[ReradiationMatrix], light: Spectrum, p
     """
     from matplotlib.figure import Figure
 
-    if path.suffix.lower() not in PICTURES:
-        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    require_picture(path)
     if not matrices:
         raise UsageError("expected at least one material for the sheet, got none")
     columns = min(COLUMNS, len(matrices))
@@ -74,10 +73,7 @@ def draw_contact_sheet(matrices: Sequence[ReradiationMatrix], light: Spectrum, p
             f"maximum, {LEAST_TOP:g} per {TOLD_NM:g} nm at least; colour under {light.name}"
         )
         figure.supxlabel(caption, fontsize="small", color=MUTED)
-        try:
-            figure.savefig(path, dpi=120)
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
+        save_picture(figure, path)
 
 
 def _draw_cell(axes: "Axes", matrix: ReradiationMatrix, light: Spectrum) -> None:

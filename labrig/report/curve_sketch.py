@@ -4,19 +4,18 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import UsageError
 from labrig.optics import (
     Curve,
     CurveFile,
     band_means,
 )
+from labrig.report.picture_file import require_picture, save_picture
 
 #: Bars of 0 to 8 eighths of the height of a line of text.
 BARS = " ▁▂▃▄▅▆▇█"
 COLUMNS = 48
 #: Largest number of curves that are described; a catalogue has hundreds.
 MAX_CURVES = 12
-PICTURES = (".png", ".svg", ".pdf")
 _COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 
 
@@ -96,8 +95,7 @@ def draw_curves(file: CurveFile, path: Path) -> None:
     """
     from matplotlib.figure import Figure  # slow to load
 
-    if path.suffix.lower() not in PICTURES:
-        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    require_picture(path)
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     axes = figure.subplots()
     for name, curve in file.curves.items():
@@ -108,7 +106,4 @@ def draw_curves(file: CurveFile, path: Path) -> None:
     axes.set(xlabel="Wavelength / nm", title=file.title)
     if 1 < len(file.curves) <= MAX_CURVES:
         axes.legend(frameon=False)
-    try:
-        figure.savefig(path, dpi=150)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
+    save_picture(figure, path)

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
 from labrig.fit import MixtureFit
 from labrig.material import ColourDifference, ReradiationMatrix
 from labrig.number_format import rounded
-from labrig.report.curve_sketch import PICTURES
 from labrig.report.figure_style import INK, MUTED, figure_style
+from labrig.report.picture_file import require_picture, save_picture
 from labrig.report.reradiation import COLUMN_COLOURS, TOLD_NM, strongest_columns
 
 # matplotlib is slow to load.
@@ -152,8 +151,7 @@ def draw_mixture(
     """
     from matplotlib.figure import Figure
 
-    if path.suffix.lower() not in PICTURES:
-        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    require_picture(path)
     with figure_style():
         figure = Figure(figsize=(9.0, 7.2), layout="constrained")
         figure.suptitle(matrix.name, color=INK)
@@ -170,10 +168,7 @@ def draw_mixture(
             difference, matrix, stokes - model, "measured less mixture", (-apart, apart), "RdBu_r"
         )
         _draw_emission(emission, matrix, smooth)
-        try:
-            figure.savefig(path, dpi=150)
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
+        save_picture(figure, path)
 
 
 def _draw_heat(

@@ -8,8 +8,8 @@ import numpy as np
 from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.number_format import rounded
-from labrig.report.curve_sketch import PICTURES
 from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
+from labrig.report.picture_file import require_picture, save_picture
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -41,8 +41,7 @@ def draw_phosphor(material: Material, path: Path) -> None:
     """
     from matplotlib.figure import Figure
 
-    if path.suffix.lower() not in PICTURES:
-        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    require_picture(path)
     panels = [
         (name, label)
         for name, label in (
@@ -65,10 +64,7 @@ def draw_phosphor(material: Material, path: Path) -> None:
             _draw_bands(axes, material, name)
             axes.set(xlabel="wavelength / nm")
             axes.set_title(label, fontsize="medium", color=INK)
-        try:
-            figure.savefig(path, dpi=150)
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
+        save_picture(figure, path)
 
 
 def _draw_bands(axes: "Axes", material: Material, name: str) -> None:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError, UsageError
+from labrig.errors import DataError
 from labrig.material import Appearance, ReradiationMatrix, appearance, reradiates
 from labrig.number_format import plus_minus, rounded
 from labrig.optics import Spectrum, edges_from_centres, is_narrow
 from labrig.report.colours import XYZ_TO_SRGB, css_colour, into_gamut
-from labrig.report.curve_sketch import PICTURES
 from labrig.report.figure_style import INK, MUTED, RULE, figure_style
+from labrig.report.picture_file import require_picture, save_picture
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -214,14 +214,10 @@ def draw_reradiation(matrix: ReradiationMatrix, lights: Sequence[Spectrum], path
     >>> matrix = ReradiationMatrix.from_bands("paper", nm, nm, values)
     >>> draw_reradiation(matrix, [read_light("D65")], Path("paper.svg"))
     """
-    if path.suffix.lower() not in PICTURES:
-        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    require_picture(path)
     with figure_style():
         figure = _figure(matrix, lights)
-        try:
-            figure.savefig(path, dpi=150)
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
+        save_picture(figure, path)
 
 
 def _figure(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) -> "Figure":

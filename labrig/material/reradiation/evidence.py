@@ -2,14 +2,12 @@
 
 import numpy as np
 
-from labrig.errors import DataError
 from labrig.material.reradiation.matrix import ReradiationMatrix
+from labrig.material.reradiation.noise import CLEAR_BANDS, required_sigma
 
 #: Significance of an entry, and of those beside it: noise has stripes along the output, since one
 #: dark reading serves a whole column, but never three columns side by side.
 CLEAR_SIGMAS, BESIDE_SIGMAS = 5.0, 3.0
-#: Entries nearer to the diagonal than this many bands hold light that passes both monochromators.
-CLEAR_BANDS = 1.5
 
 
 def reradiates(matrix: ReradiationMatrix) -> bool:
@@ -42,11 +40,7 @@ def reradiates(matrix: ReradiationMatrix) -> bool:
     >>> reradiates(before), reradiates(with_sigma(ReradiationMatrix.from_bands("", nm, nm, values)))
     (False, True)
     """
-    sigma = matrix.reradiation_sigma
-    if sigma is None:
-        raise DataError(
-            f"expected σ of the re-radiation of {matrix.name!r}, got none: estimate it first"
-        )
+    sigma = required_sigma(matrix)
     distance = matrix.output_nm[:, np.newaxis] - matrix.input_nm
     width = (matrix.output_width_nm[:, np.newaxis] + matrix.input_width_nm) / 2
     used = (distance > CLEAR_BANDS * width) & (sigma > 0) & np.isfinite(matrix.reradiation)

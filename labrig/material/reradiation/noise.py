@@ -186,6 +186,15 @@ def with_sigma(
     )
 
 
+def required_sigma(matrix: ReradiationMatrix) -> FloatArray:
+    """Return σ of the re-radiation; raise DataError if it is not known."""
+    if matrix.reradiation_sigma is None:
+        raise DataError(
+            f"expected σ of the re-radiation of {matrix.name!r}, got none: estimate it first"
+        )
+    return matrix.reradiation_sigma
+
+
 def clear_anti_stokes(matrix: ReradiationMatrix) -> BoolArray:
     """Return which entries are noise: two or more bands on the anti-Stokes side, (n, m)."""
     values = _band_values(matrix)

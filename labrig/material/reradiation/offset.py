@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.errors import DataError
 from labrig.material.reradiation.matrix import ReradiationMatrix
-from labrig.material.reradiation.noise import clear_anti_stokes
+from labrig.material.reradiation.noise import clear_anti_stokes, required_sigma
 
 #: Anti-Stokes entries from which an offset is known well enough.
 FEWEST_ENTRIES = 3
@@ -58,11 +57,7 @@ def without_offset(matrix: ReradiationMatrix) -> ReradiationMatrix:
     >>> f"{tile.reradiated_fraction[20]:.2f}, {clean.reradiated_fraction[20]:.2f}"
     '0.03, -0.01'
     """
-    sigma = matrix.reradiation_sigma
-    if sigma is None:
-        raise DataError(
-            f"expected σ of the re-radiation of {matrix.name!r}, got none: estimate it first"
-        )
+    sigma = required_sigma(matrix)
     used = clear_anti_stokes(matrix) & (sigma > 0)
     counts = used.sum(axis=0)
     pulls = np.divide(matrix.reradiation, sigma, out=np.zeros_like(sigma), where=used)
