@@ -1,6 +1,7 @@
 """Formatting of numbers in reports, rounded according to their uncertainty."""
 
 import math
+from collections.abc import Sequence
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: Smallest value written without a power of ten.
@@ -47,6 +48,15 @@ def rounded(value: float, digits: int = 4) -> str:
         return text.replace("-", "−")
     mantissa = f"{value / 10.0**exponent:.{digits - 1}f}".rstrip("0").rstrip(".")
     return f"{mantissa.replace('-', '−')} × {power_of_ten(exponent)}"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a table for a terminal, each column as wide as its widest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
 
 
 def exposure_text(exposure_s: float) -> str:

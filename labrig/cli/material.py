@@ -33,7 +33,7 @@ def show(
         Path | None, typer.Option("--picture", help="File for a figure (.png, .svg, .pdf).")
     ] = None,
 ) -> None:
-    """What a material is: its numbers, its colours, and a picture."""
+    """Show a material: its numbers, its colours, and a picture."""
     from labrig.material import Material, physical_warnings
     from labrig.optics import read_light
     from labrig.report import (
@@ -132,7 +132,7 @@ def compare(
     light: Lights = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
-    """How far the colours of a fluorescent material are from those of a reference.
+    """Compare the colours of a fluorescent material with those of a reference.
 
     The white of ΔE2000 is a perfect white under the light; under a narrow light, where a
     fluorescent material is far brighter than any white, that of a screen (D65), with the reference

@@ -8,7 +8,7 @@ import typer
 if TYPE_CHECKING:
     from labrig.material import Material, ReradiationMatrix
 
-#: Lights under which colours are told unless others are asked for.
+#: Lights under which colours are described unless others are asked for.
 LIGHTS = ("D65", "A", "450nm")
 YAML = (".yaml", ".yml")
 

@@ -10,8 +10,9 @@ from labrig.errors import UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
 from labrig.report.figure_style import INK, MUTED, figure_style
+from labrig.report.heat_map import BAND_NM, draw_heat, largest, shown_values
 from labrig.report.picture_file import require_picture, save_picture
-from labrig.report.reradiation import TOLD_NM, screen_colour
+from labrig.report.reradiation import screen_colour
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def draw_contact_sheet(matrices: Sequence[ReradiationMatrix], light: Spectrum, p
             axes.set_axis_off()
         caption = (
             "re-radiation by incident (across) and returning wavelength (up), each to its own "
-            f"maximum, {LEAST_TOP:g} per {TOLD_NM:g} nm at least; colour under {light.name}"
+            f"maximum, {LEAST_TOP:g} per {BAND_NM:g} nm at least; colour under {light.name}"
         )
         figure.supxlabel(caption, fontsize="small", color=MUTED)
         save_picture(figure, path)
@@ -80,17 +81,13 @@ def _draw_cell(axes: "Axes", matrix: ReradiationMatrix, light: Spectrum) -> None
     """Draw the matrix above the diagonal, and the colour below."""
     from matplotlib.patches import Polygon
 
-    stokes = np.where(matrix.is_stokes, matrix.reradiation, np.nan)
-    top = float(np.nanmax(stokes)) if np.isfinite(stokes).any() else 0.0
+    values = shown_values(matrix)
     left, right = matrix.input_edges_nm[[0, -1]]
     bottom, high = matrix.output_edges_nm[[0, -1]]
     start, end = max(left, bottom), min(right, high)
     corners = [(start, start), (end, end), (right, bottom), (start, bottom)]
     axes.add_patch(Polygon(corners, facecolor=screen_colour(matrix, light), linewidth=0))
-    axes.pcolormesh(
-        matrix.input_edges_nm, matrix.output_edges_nm, stokes, cmap="magma_r", vmin=0.0,
-        vmax=max(top, LEAST_TOP / TOLD_NM), rasterized=True,
-    )  # fmt: skip
+    draw_heat(axes, matrix, values, (0.0, max(largest(values), LEAST_TOP)))
     axes.set(xticks=[], yticks=[], xlim=(left, right), ylim=(bottom, high))
     name = matrix.name if len(matrix.name) <= NAME_CHARACTERS else matrix.name[:19] + "…"
     fraction = 100 * max(float(matrix.reradiated_fraction.max()), 0.0)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from labrig.material import Material, MaterialComparison, State
-from labrig.number_format import plus_minus, rounded
+from labrig.number_format import aligned, plus_minus, rounded
 from labrig.report.sections import Table
 
 UNKNOWN = "–"
@@ -56,12 +56,7 @@ def describe_phosphor(material: Material) -> str:
     if material.provenance is not None:
         lines.append(f"  source: {material.provenance.source}")
     rows = [table.head, *table.rows] if len(material.states) > 1 else list(table.rows)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines += [
-        "  "
-        + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
+    lines += [f"  {line}" for line in aligned(rows)]
     return "\n".join([*lines, table.caption])
 
 

@@ -9,10 +9,17 @@ from numpy.typing import NDArray
 
 from labrig.fit import MixtureFit
 from labrig.material import ColourDifference, ReradiationMatrix
-from labrig.number_format import rounded
+from labrig.number_format import aligned, rounded
 from labrig.report.figure_style import INK, MUTED, figure_style
+from labrig.report.heat_map import (
+    BAND_NM,
+    draw_heat,
+    label_heat,
+    largest,
+    shown_values,
+)
 from labrig.report.picture_file import require_picture, save_picture
-from labrig.report.reradiation import COLUMN_COLOURS, TOLD_NM, strongest_columns
+from labrig.report.reradiation import COLUMN_COLOURS, strongest_columns
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -64,11 +71,8 @@ def describe_mixture(name: str, fit: MixtureFit, differences: Sequence[ColourDif
                 f"{covariance[0, 1] / sd.prod():+.2f}",
             )
         )
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [f"{name}: {fit.components} component{plural}, {chosen}"]
-    for row in rows:
-        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
-        lines.append(f"  {'  '.join(cells)}".rstrip())
+    lines += [f"  {line}" for line in aligned(rows)]
     rate = (
         "given"
         if fit.false_discovery_rate is None
@@ -156,9 +160,8 @@ def draw_mixture(
         figure = Figure(figsize=(9.0, 7.2), layout="constrained")
         figure.suptitle(matrix.name, color=INK)
         (measured, mixed), (difference, emission) = figure.subplots(2, 2)
-        stokes = np.where(matrix.is_stokes, TOLD_NM * matrix.reradiation, np.nan)
-        model = np.where(matrix.is_stokes, TOLD_NM * smooth.reradiation, np.nan)
-        top = max(float(np.nanmax(stokes)), float(np.nanmax(model)), 1e-12)
+        stokes, model = shown_values(matrix), shown_values(smooth)
+        top = max(largest(stokes), largest(model), 1e-12)
         _draw_heat(measured, matrix, stokes, "measured, per 10 nm", (0.0, top), "magma_r")
         _draw_heat(mixed, matrix, model, "mixture, per 10 nm", (0.0, top), "magma_r")
         for mean, covariance in zip(fit.mixture.mean_nm, fit.mixture.covariance_nm2, strict=True):
@@ -179,18 +182,9 @@ def _draw_heat(
     limits: tuple[float, float],
     colours: str,
 ) -> None:
-    axes.set_facecolor("#eceff1")
-    mesh = axes.pcolormesh(
-        matrix.input_edges_nm, matrix.output_edges_nm, values, cmap=colours, vmin=limits[0],
-        vmax=limits[1], rasterized=True,
-    )  # fmt: skip
-    axes.set(
-        xlabel="incident wavelength / nm",
-        ylabel="returning wavelength / nm",
-        xlim=matrix.input_edges_nm[[0, -1]],
-        ylim=matrix.output_edges_nm[[0, -1]],
-    )
-    axes.set_title(title, fontsize="medium", color=INK)
+    mesh = draw_heat(axes, matrix, values, limits, colours)
+    axes.set(xlim=matrix.input_edges_nm[[0, -1]], ylim=matrix.output_edges_nm[[0, -1]])
+    label_heat(axes, title)
     axes.figure.colorbar(mesh, ax=axes)
 
 
@@ -200,9 +194,9 @@ def _draw_emission(axes: "Axes", matrix: ReradiationMatrix, smooth: ReradiationM
         shown = matrix.is_stokes[:, column]
         nm = matrix.output_nm[shown]
         label = f"{matrix.input_nm[column]:g} nm"
-        axes.plot(nm, TOLD_NM * smooth.reradiation[shown, column], color=colour, label=label)
+        axes.plot(nm, BAND_NM * smooth.reradiation[shown, column], color=colour, label=label)
         axes.plot(
-            nm, TOLD_NM * matrix.reradiation[shown, column], "o", color=colour, markersize=2.5
+            nm, BAND_NM * matrix.reradiation[shown, column], "o", color=colour, markersize=2.5
         )
     axes.set(xlabel="returning wavelength / nm")
     axes.set_title("per 10 nm, by incident wavelength", fontsize="medium", color=INK)

@@ -13,6 +13,13 @@ from labrig.number_format import plus_minus, rounded
 from labrig.optics import Spectrum, edges_from_centres, is_narrow
 from labrig.report.colours import XYZ_TO_SRGB, css_colour, into_gamut
 from labrig.report.figure_style import INK, MUTED, RULE, figure_style
+from labrig.report.heat_map import (
+    BAND_NM,
+    draw_heat,
+    label_heat,
+    largest,
+    shown_values,
+)
 from labrig.report.picture_file import require_picture, save_picture
 
 # matplotlib is slow to load.
@@ -24,8 +31,6 @@ FloatArray = NDArray[np.float64]
 
 #: X, Y, Z of a screen's white, D65.
 SCREEN_WHITE = np.array([0.95047, 1.0, 1.08883])
-#: Width of the bands in nm for which re-radiation is told, as in the instruments' files.
-TOLD_NM = 10.0
 #: Colours of the emission spectra that are drawn, and the least distance of excitations in nm.
 COLUMN_COLOURS = ("#3b1f7a", "#2b62c9", "#0f8f8a", "#6aa32d", "#d98b00")
 APART_NM = 20.0
@@ -39,7 +44,7 @@ def describe_reradiation(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) 
     matrix
         Its reflectance and re-radiation.
     lights
-        Lights under which its colour is told.
+        Lights under which its colour is described.
 
     Returns
     -------
@@ -158,7 +163,7 @@ def reradiation_text(matrix: ReradiationMatrix) -> str:
         else plus_minus(100 * float(fraction[most]), 100 * float(sigma[most]))
     )
     return (
-        f"strongest {rounded(float(TOLD_NM * stokes[out, into]), 3)} per {TOLD_NM:g} nm, {where}; "
+        f"strongest {rounded(float(BAND_NM * stokes[out, into]), 3)} per {BAND_NM:g} nm, {where}; "
         f"up to {share} % of {matrix.input_nm[most]:g} nm{rest}"
     )
 
@@ -225,9 +230,8 @@ def _figure(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) -> "Figure":
 
     figure = Figure(figsize=(9.0, 6.2 if lights else 5.2), layout="constrained")
     figure.suptitle(matrix.name, color=INK)
-    rows = figure.add_gridspec(
-        3 if lights else 2, 2, height_ratios=[1, 1, 0.4][: 3 if lights else 2]
-    )
+    heights = [1.0, 1.0, 0.4] if lights else [1.0, 1.0]
+    rows = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     _draw_matrix(figure.add_subplot(rows[:2, 0]), matrix)
     _draw_emission(figure.add_subplot(rows[0, 1]), matrix)
     _draw_reflectance(figure.add_subplot(rows[1, 1]), matrix)
@@ -238,18 +242,13 @@ def _figure(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) -> "Figure":
 
 def _draw_matrix(axes: "Axes", matrix: ReradiationMatrix) -> None:
     """Draw re-radiation by wavelength of input and output, with what was not measured in grey."""
-    told = TOLD_NM * np.where(matrix.is_stokes, matrix.reradiation, np.nan)
-    top = float(np.nanmax(told)) if np.isfinite(told).any() else 0.0
-    axes.set_facecolor("#eceff1")
-    mesh = axes.pcolormesh(
-        matrix.input_edges_nm, matrix.output_edges_nm, told, cmap="magma_r", vmin=0.0,
-        vmax=top if top > 0 else 1.0, rasterized=True,
-    )  # fmt: skip
+    values = shown_values(matrix)
+    top = largest(values)
+    mesh = draw_heat(axes, matrix, values, (0.0, top if top > 0 else 1.0))
     low = max(matrix.input_edges_nm[0], matrix.output_edges_nm[0])
     high = min(matrix.input_edges_nm[-1], matrix.output_edges_nm[-1])
     axes.plot([low, high], [low, high], color=MUTED, linewidth=0.8)
-    axes.set(xlabel="incident wavelength / nm", ylabel="returning wavelength / nm")
-    axes.set_title("re-radiation per 10 nm", fontsize="medium", color=INK)
+    label_heat(axes, "re-radiation per 10 nm")
     axes.figure.colorbar(mesh, ax=axes, location="bottom", shrink=0.9, aspect=30)
 
 
@@ -258,7 +257,7 @@ def _draw_emission(axes: "Axes", matrix: ReradiationMatrix) -> None:
     for colour, column in zip(COLUMN_COLOURS, strongest_columns(matrix), strict=False):
         shown = matrix.is_stokes[:, column]
         axes.plot(
-            matrix.output_nm[shown], TOLD_NM * matrix.reradiation[shown, column], linewidth=1.3,
+            matrix.output_nm[shown], BAND_NM * matrix.reradiation[shown, column], linewidth=1.3,
             color=colour, label=f"{matrix.input_nm[column]:g} nm",
         )  # fmt: skip
     axes.axhline(0.0, color=RULE, linewidth=0.8, zorder=0)

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from textwrap import wrap
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from labrig.errors import DataError, FitError
 from labrig.material import exponential_means
+from labrig.number_format import aligned
 from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text, write_json
 
@@ -324,7 +325,7 @@ class FittedDecay:
             ]
             for number, state in enumerate(self.states, start=1)
         ]
-        lines = _table([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
+        lines = aligned([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
         lines.append(
             f"weights  {self._values_text(self.channel_weights, self.channel_weights_sigma)}"
         )
@@ -533,11 +534,3 @@ def _by_channel_order(
 def _number_or(value: float | None, unknown: float = math.inf) -> float:
     """Return the number of a JSON value, whose null stands for infinity or another `unknown`."""
     return unknown if value is None else float(value)
-
-
-def _table(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]

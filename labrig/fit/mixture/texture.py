@@ -15,6 +15,7 @@ from scipy.special import ndtri
 from labrig.errors import UsageError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.mixture.expectation_maximisation import maximise_likelihood
+from labrig.fit.mixture.fit import LEAST_SD_BANDS
 from labrig.fit.mixture.gaussians import AnyFloatArray, Gaussians, monomials_of, product
 from labrig.material import ReradiationMatrix, ReradiationMixture
 
@@ -25,7 +26,6 @@ CHUNK = 256
 MAX_ITERATIONS, TOLERANCE = 25, 1e-4
 #: Unit of wavelengths in nm, in which single precision resolves all moments.
 UNIT_NM = 50.0
-LEAST_SD_BANDS = 0.5
 #: Part of a texel's variance that each of several components starts with.
 START_VARIANCE = 0.4
 

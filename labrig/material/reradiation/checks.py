@@ -1,4 +1,4 @@
-"""What no surface can do, and what few surfaces do."""
+"""Limits of what surfaces can do, and of what most of them do."""
 
 import numpy as np
 

@@ -1,9 +1,9 @@
-"""Whether a measured surface re-radiates at all."""
+"""Decision whether a measured surface re-radiates at all."""
 
 import numpy as np
 
 from labrig.material.reradiation.matrix import ReradiationMatrix
-from labrig.material.reradiation.noise import CLEAR_BANDS, required_sigma
+from labrig.material.reradiation.noise import near_diagonal, required_sigma
 
 #: Significance of an entry, and of those beside it: noise has stripes along the output, since one
 #: dark reading serves a whole column, but never three columns side by side.
@@ -41,9 +41,8 @@ def reradiates(matrix: ReradiationMatrix) -> bool:
     (False, True)
     """
     sigma = required_sigma(matrix)
-    distance = matrix.output_nm[:, np.newaxis] - matrix.input_nm
-    width = (matrix.output_width_nm[:, np.newaxis] + matrix.input_width_nm) / 2
-    used = (distance > CLEAR_BANDS * width) & (sigma > 0) & np.isfinite(matrix.reradiation)
+    used = matrix.is_stokes & ~near_diagonal(matrix)
+    used &= (sigma > 0) & np.isfinite(matrix.reradiation)
     pulls = np.divide(matrix.reradiation, sigma, out=np.zeros_like(sigma), where=used)
     middle, left, right = pulls[:, 1:-1], pulls[:, :-2], pulls[:, 2:]
     clear = (middle > CLEAR_SIGMAS) & (np.minimum(left, right) > BESIDE_SIGMAS)

@@ -167,7 +167,7 @@ class ReradiationMatrix:
             Its reflectance is NaN in output bands without an input band of the same wavelength.
             Re-radiation within a band cannot be told from reflectance and counts as that.
         """
-        same = np.abs(output_nm[:, np.newaxis] - input_nm) < SAME_NM
+        same = are_same_bands(output_nm, input_nm)
         width = np.diff(edges_from_centres(output_nm))[:, np.newaxis]
 
         def apart(table: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -190,7 +190,7 @@ class ReradiationMatrix:
         ValueError
             An output band that reflects has no input band of the same wavelength.
         """
-        same = np.abs(self.output_nm[:, np.newaxis] - self.input_nm) < SAME_NM
+        same = are_same_bands(self.output_nm, self.input_nm)
         measured = ~np.isnan(self.reflectance)
         if not same[measured].any(axis=1).all():
             raise ValueError("expected an input band at every wavelength of the reflectance")
@@ -231,7 +231,8 @@ class ReradiationMatrix:
         As a radiance factor over that of a perfect white: at 45°/0° it is no energy balance, and
         real surfaces exceed 1.
         """
-        return self._stokes_sum(self.reradiation)
+        terms = np.where(self.is_stokes, np.nan_to_num(self.reradiation), 0.0)
+        return np.asarray(self.output_width_nm @ terms)
 
     @property
     def reradiated_fraction_sigma(self) -> FloatArray | None:
@@ -363,9 +364,10 @@ class ReradiationMatrix:
             correlation,
         )
 
-    def _stokes_sum(self, table: FloatArray) -> FloatArray:
-        terms = np.where(self.is_stokes, np.nan_to_num(table), 0.0)
-        return np.asarray(self.output_width_nm @ terms)
+
+def are_same_bands(output_nm: FloatArray, input_nm: FloatArray) -> BoolArray:
+    """Return whether a band of output and one of input have the same centre, shape (n, m)."""
+    return np.asarray(np.abs(output_nm[:, np.newaxis] - input_nm) < SAME_NM)
 
 
 def _overlaps_nm(old_edges_nm: FloatArray, new_edges_nm: FloatArray) -> FloatArray:

@@ -123,7 +123,7 @@ class ReradiationMixture:
         Returns
         -------
         ReradiationMatrix
-            Of bands whose centres are on the Stokes side; 0 elsewhere.
+            Re-radiation in bands whose centres are on the Stokes side, 0 elsewhere.
         """
         inputs, outputs = (np.asarray(nm, dtype=np.float64) for nm in (input_nm, output_nm))
         unknown = np.full(len(outputs), np.nan)

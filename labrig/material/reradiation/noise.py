@@ -101,7 +101,7 @@ def instrument_noise(samples: Sequence[ReradiationMatrix]) -> InstrumentNoise:
         if not _same_bands(sample, first):
             raise ValueError(f"expected the bands of {first.name!r} in {sample.name!r}, too")
     values = np.array([_band_values(sample) for sample in samples])
-    used = ~_near_diagonal(first) & np.isfinite(values)
+    used = ~near_diagonal(first) & np.isfinite(values)
     used &= np.abs(values) <= _clip_limit(values, used)
     squares, counts = np.where(used, values**2, 0.0).sum(axis=0), used.sum(axis=0)
     if (counts.sum(axis=0) == 0).any():
@@ -198,7 +198,7 @@ def required_sigma(matrix: ReradiationMatrix) -> FloatArray:
 def clear_anti_stokes(matrix: ReradiationMatrix) -> BoolArray:
     """Return which entries are noise: two or more bands on the anti-Stokes side, (n, m)."""
     values = _band_values(matrix)
-    used = ~matrix.is_stokes & ~_near_diagonal(matrix) & np.isfinite(values)
+    used = ~matrix.is_stokes & ~near_diagonal(matrix) & np.isfinite(values)
     return used & (np.abs(values) <= _clip_limit(values, used))
 
 
@@ -304,8 +304,8 @@ def _clip_limit(values: FloatArray, used: BoolArray) -> FloatArray:
     return limit
 
 
-def _near_diagonal(matrix: ReradiationMatrix) -> BoolArray:
-    """Whether output and input are one band or neighbours, shape (n, m)."""
+def near_diagonal(matrix: ReradiationMatrix) -> BoolArray:
+    """Return where output and input are one band or neighbours, shape (n, m)."""
     distance = np.abs(matrix.output_nm[:, np.newaxis] - matrix.input_nm)
     width = (matrix.output_width_nm[:, np.newaxis] + matrix.input_width_nm) / 2
     return np.asarray(distance < CLEAR_BANDS * width)

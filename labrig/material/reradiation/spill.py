@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.material.reradiation.matrix import SAME_NM, FloatArray, ReradiationMatrix
+from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix, are_same_bands
+from labrig.material.reradiation.noise import SIGMA_OF_MEDIAN
 
 #: Both parts above the diagonal over those below, on a BFC-450: -0.52 and -0.60 on 196 measurements
 #: of tiles, -0.48 and -0.66 at wavelengths without re-radiation of 97 other samples.
@@ -26,8 +27,6 @@ END_SCATTER = 0.8
 FEWEST_PAIRS = 8
 #: Residuals beyond this many of their σ have less weight in the fit (P. J. Huber, 1964).
 HUBER_SIGMAS = 1.345
-#: Normal σ over the median of the absolute values.
-SIGMA_OF_MEDIAN = 1.4826
 TINY = np.finfo(float).tiny
 ITERATIONS = 20
 
@@ -85,7 +84,7 @@ def without_spill(matrix: ReradiationMatrix) -> ReradiationMatrix:
 
 def _neighbours(matrix: ReradiationMatrix) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the places, in output and in input, of bands whose next ones are the same, too."""
-    same = np.abs(matrix.output_nm[:, np.newaxis] - matrix.input_nm) < SAME_NM
+    same = are_same_bands(matrix.output_nm, matrix.input_nm)
     row, column = np.nonzero(same[:-1, :-1] & same[1:, 1:])
     return row, column
 

@@ -1,9 +1,9 @@
-"""What formats of fractions per band can hold of a matrix."""
+"""Content of a matrix that formats of fractions per band can hold."""
 
 import numpy as np
 
 from labrig.material.reradiation.formats.text_rows import check_fractions, check_wavelengths
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix
+from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix, are_same_bands
 
 
 def band_fractions(matrix: ReradiationMatrix) -> FloatArray:
@@ -17,7 +17,7 @@ def band_fractions(matrix: ReradiationMatrix) -> FloatArray:
     check_wavelengths(matrix.input_nm)
     check_wavelengths(matrix.output_nm)
     check_is_absolute(matrix)
-    has_input = np.isclose(matrix.output_nm[:, np.newaxis], matrix.input_nm, rtol=0, atol=1e-6)
+    has_input = are_same_bands(matrix.output_nm, matrix.input_nm)
     if np.isnan(matrix.reflectance[has_input.any(axis=1)]).any():
         raise ValueError("some reflectance was not measured, which the format cannot say; use CSV")
     fractions = matrix.to_bands()

@@ -27,7 +27,7 @@ from labrig.material.reradiation.formats.text_rows import (
     shown,
     wavelengths,
 )
-from labrig.material.reradiation.matrix import SAME_NM, FloatArray, ReradiationMatrix
+from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix, are_same_bands
 from labrig.optics import edges_from_centres
 
 PER_BAND = "per band"
@@ -159,7 +159,7 @@ def _matrix(name: str, unit: str, values: _Table, sigmas: _Table | None) -> Rera
     width_nm = np.diff(edges_from_centres(output_nm))[:, np.newaxis]
     sigma = sigmas.entries if sigmas is not None and len(sigmas.input_nm) else None
     if values.reflectance is None and unit != "relative":
-        same = np.abs(output_nm[:, np.newaxis] - input_nm) < SAME_NM
+        same = are_same_bands(output_nm, input_nm)
         to_band = np.where(same, 1.0, 1.0 if unit == PER_BAND else width_nm)
         sigma = None if sigma is None else sigma * to_band
         return ReradiationMatrix.from_bands(
