@@ -103,15 +103,26 @@ def decay(
 def mixture(
     file: File,
     components: Annotated[
-        str, typer.Option("--components", help="Number of components, or 'auto' (by BIC).")
+        str, typer.Option("--components", help="Number of components, or 'auto'.")
     ] = "auto",
     scale: Annotated[
         str,
         typer.Option(
             "--scale",
-            help="'integral': as much re-radiation as measured; 'least-squares': least error.",
+            help="'integral': as much re-radiation as measured; 'least-squares': least error; "
+            "'colour': least mean ΔE2000 under the lights.",
         ),
     ] = "integral",
+    select: Annotated[
+        str,
+        typer.Option(
+            "--select", help="How 'auto' finds the number: 'bic' or 'cross-validation' (slower)."
+        ),
+    ] = "bic",
+    skewed: Annotated[
+        bool,
+        typer.Option("--skewed", help="Skewed components: eight numbers each instead of six."),
+    ] = False,
     threshold: Annotated[
         float | None,
         typer.Option(
@@ -142,13 +153,21 @@ def mixture(
     from labrig.report import describe_mixture, draw_mixture
 
     number = _components(components)
-    if scale not in ("integral", "least-squares"):
-        raise UsageError(f"--scale: expected 'integral' or 'least-squares', got '{scale}'")
+    _require_one_of("--scale", scale, ("integral", "least-squares", "colour"))
+    _require_one_of("--select", select, ("bic", "cross-validation"))
     if out is not None:
         _require_folder(out)
     lights = [read_light(name) for name in light or LIGHTS]
     matrix = with_sigma(read_matrix(file, entry, pixel), corrected)
-    fit = fit_mixture(matrix, number, scale, threshold)  # type: ignore[arg-type]
+    fit = fit_mixture(
+        matrix,
+        number,
+        scale,  # type: ignore[arg-type]
+        threshold,
+        selection=select,  # type: ignore[arg-type]
+        skewed=skewed,
+        lights=lights,
+    )
     smooth = fit.mixture.to_matrix(
         matrix.input_nm, matrix.output_nm, reflectance=matrix.reflectance, name=matrix.name
     )
@@ -162,6 +181,12 @@ def mixture(
         draw_mixture(matrix, smooth, fit, out / "mixture.svg")
         if not as_json:
             typer.echo(f"written: {out / 'fit.json'}, {out / 'mixture.svg'}")
+
+
+def _require_one_of(option: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        quoted = ", ".join(f"'{choice}'" for choice in choices)
+        raise UsageError(f"{option}: expected one of {quoted}, got '{value}'")
 
 
 def _components(text: str) -> "int | Literal['auto']":

@@ -3,6 +3,7 @@
 from labrig.fit.decay import DecayFit, fit_decay
 from labrig.fit.least_squares import EPSILON, FloatArray, LeastSquaresFit, least_squares
 from labrig.fit.mixture import (
+    HeldOutError,
     MixtureCandidate,
     MixtureFit,
     MixtureTexture,
@@ -14,6 +15,7 @@ __all__ = [
     "EPSILON",
     "DecayFit",
     "FloatArray",
+    "HeldOutError",
     "LeastSquaresFit",
     "MixtureCandidate",
     "MixtureFit",

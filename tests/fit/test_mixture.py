@@ -3,6 +3,7 @@
 import csv
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from scipy.stats import skewnorm
 
 from labrig.errors import DataError, UsageError
 from labrig.fit import MixtureFit, fit_mixture
-from labrig.material import ReradiationMatrix, ReradiationMixture
+from labrig.material import ReradiationMatrix, ReradiationMixture, compare_colours
+from labrig.optics import read_light
 
 INPUT_NM = np.arange(300.0, 781.0, 10.0)
 OUTPUT_NM = np.arange(380.0, 781.0, 10.0)
@@ -189,6 +191,81 @@ def test_the_number_of_components_is_that_of_the_least_bic(
 def test_two_normal_densities_under_noise_are_two_components() -> None:
     matrix = measured(bands(two_components(18)), 18, with_sigma=False)
     assert fit_mixture(matrix, threshold=0.004).components == 2
+
+
+@pytest.mark.parametrize(("truth", "seed"), [(one_dye, 26), (two_dyes, 27)])
+def test_cross_validation_takes_the_least_number_within_a_standard_error(
+    truth: Callable[[], np.ndarray], seed: int
+) -> None:
+    matrix = measured(truth(), seed)
+    fit = fit_mixture(matrix, selection="cross-validation")
+    held_out = [row.held_out for row in fit.candidates]
+    least = min((error for error in held_out if error is not None), key=lambda error: error.mse)
+    within = [error is not None and error.mse <= least.mse + least.standard_error
+              for error in held_out]  # fmt: skip
+    assert fit.selection == "cross-validation"
+    assert fit.components == 1 + within.index(True) > 1
+    chosen = held_out[fit.components - 1]
+    assert chosen is not None
+    # Entries that the fit has not seen are predicted as well as noise and scatter allow.
+    assert fit.masked_mse < chosen.mse < 3 * fit.masked_mse
+
+
+def test_cross_validation_finds_the_number_of_normal_densities() -> None:
+    matrix = measured(bands(two_components(28)), 28, with_sigma=False)
+    fit = fit_mixture(matrix, threshold=0.004, selection="cross-validation")
+    assert fit.components == 2
+
+
+@pytest.mark.parametrize(("truth", "seed"), [(one_dye, 29), (two_dyes, 30)])
+def test_colours_set_the_scale(truth: Callable[[], np.ndarray], seed: int) -> None:
+    matrix = measured(truth(), seed)
+    lights = [read_light("D65"), read_light("A")]
+
+    def mean_delta_e(mixture: ReradiationMixture, factor: float = 1.0) -> float:
+        smooth = replace(mixture, scale=factor * mixture.scale).to_matrix(
+            INPUT_NM, OUTPUT_NM, reflectance=matrix.reflectance
+        )
+        return float(np.mean([each.delta_e for each in compare_colours(smooth, matrix, lights)]))
+
+    by_integral = fit_mixture(matrix, 2)
+    fit = fit_mixture(matrix, 2, "colour", lights=lights)
+    assert fit.lights == ("D65", "A")
+    assert_allclose(fit.mixture.mean_nm, by_integral.mixture.mean_nm)
+    best = mean_delta_e(fit.mixture)
+    assert best <= mean_delta_e(by_integral.mixture) + 1e-6
+    assert all(mean_delta_e(fit.mixture, factor) >= best for factor in (0.8, 0.99, 1.01, 1.25))
+
+
+def test_colours_need_lights_and_a_surface_that_can_be_seen() -> None:
+    matrix = measured(one_dye(), 31)
+    with pytest.raises(UsageError, match="expected lights"):
+        fit_mixture(matrix, 2, "colour")
+    black = ReradiationMatrix("", INPUT_NM, OUTPUT_NM, np.zeros(41), matrix.reradiation)
+    with pytest.raises(DataError, match="can be seen under 620nm"):
+        fit_mixture(
+            replace(black, reradiation=np.where(INPUT_NM < 500, black.reradiation, 0.0)),
+            2,
+            "colour",
+            1e-3,
+            lights=[read_light("620nm")],
+        )
+
+
+def test_skewed_components_are_found_again_and_said() -> None:
+    truth = replace(two_components(32), skew=np.array([[-0.5, 0.4], [0.3, 0.6]]))
+    fit = fit_mixture(truth.to_matrix(INPUT_NM, OUTPUT_NM), 2, "least-squares", 1e-9, skewed=True)
+    assert_allclose(fit.mixture.skews, truth.skews, atol=1e-3)
+    assert_allclose(fit.mixture.mean_nm, truth.mean_nm, rtol=1e-4)
+    said = json.loads(fit.to_json())["components"]
+    assert_allclose([component["skew"] for component in said], fit.mixture.skews)
+
+
+@pytest.mark.parametrize("seed", [33, 34])
+def test_skewed_components_follow_a_dye_better_than_normal_ones(seed: int) -> None:
+    matrix = measured(one_dye(), seed)
+    normal, skewed = (fit_mixture(matrix, 2, skewed=skewed) for skewed in (False, True))
+    assert error(skewed.mixture, one_dye()) < 0.8 * error(normal.mixture, one_dye())
 
 
 def test_unequal_bands_count_by_their_width() -> None:

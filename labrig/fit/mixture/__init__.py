@@ -1,7 +1,14 @@
 """Mixtures of normal densities that stand for re-radiation matrices."""
 
 from labrig.fit.mixture.fit import fit_mixture
-from labrig.fit.mixture.result import MixtureCandidate, MixtureFit
+from labrig.fit.mixture.result import HeldOutError, MixtureCandidate, MixtureFit
 from labrig.fit.mixture.texture import MixtureTexture, fit_mixture_texture
 
-__all__ = ["MixtureCandidate", "MixtureFit", "MixtureTexture", "fit_mixture", "fit_mixture_texture"]
+__all__ = [
+    "HeldOutError",
+    "MixtureCandidate",
+    "MixtureFit",
+    "MixtureTexture",
+    "fit_mixture",
+    "fit_mixture_texture",
+]

@@ -87,6 +87,18 @@ class StokesEntries:
         """Monomials of `points`, shape (6, N)."""
         return np.asarray(monomials_of(*self.points))
 
+    def where(self, chosen: NDArray[np.bool_]) -> "StokesEntries":
+        """Return some of the entries."""
+        return StokesEntries(
+            self.input_nm[chosen],
+            self.output_nm[chosen],
+            self.input_width_nm[chosen],
+            self.output_width_nm[chosen],
+            self.value[chosen],
+            self.is_kept[chosen],
+            self.threshold,
+        )
+
 
 def stokes_entries(matrix: ReradiationMatrix, threshold: float | None) -> StokesEntries:
     """Return the entries of a matrix, thresholded.

@@ -1,59 +1,32 @@
 """Fit of a mixture to a re-radiation matrix.
 
-Entries above the noise, then weighted expectation maximisation from several starts, then least
-squares from the best of them (Hua et al., *A compact representation for fluorescent spectral data*,
-EGSR 2021, section 5; its last step is the scale).
+Entries above the noise, then components with the least squared error, then the scale (Hua et al.,
+*A compact representation for fluorescent spectral data*, EGSR 2021, section 5).
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from itertools import islice
 from typing import Literal
 
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.fit.least_squares import FloatArray, LeastSquaresFit
+from labrig.fit.mixture.candidate import Candidate, candidates
+from labrig.fit.mixture.cross_validation import held_out_errors
 from labrig.fit.mixture.entries import FALSE_DISCOVERY_RATE, StokesEntries, stokes_entries
-from labrig.fit.mixture.expectation_maximisation import LikelihoodFit, maximise_likelihood
-from labrig.fit.mixture.gaussians import Gaussians
-from labrig.fit.mixture.refinement import PARAMETERS, refined
-from labrig.fit.mixture.result import MixtureCandidate, MixtureFit
-from labrig.fit.mixture.starts import scattered_starts, with_one_more
-from labrig.material import ReradiationMatrix, ReradiationMixture
+from labrig.fit.mixture.refinement import PARAMETERS
+from labrig.fit.mixture.result import HeldOutError, MixtureCandidate, MixtureFit
+from labrig.fit.mixture.scaling import Scaling, masked_mse, with_colours, with_integral
+from labrig.fit.mixture.skewed_refinement import PARAMETERS as SKEWED_PARAMETERS
+from labrig.material import ReradiationMatrix
+from labrig.optics import Spectrum
 
-Scaling = Literal["integral", "least-squares"]
+Selection = Literal["bic", "cross-validation"]
 
-#: Starts of expectation maximisation by light and by its square, which noise far from the dye
-#: hardly draws, and how many of the best of either are refined.
-STARTS, REFINED_STARTS = 8, 1
-MAX_ITERATIONS = 100
-#: Gain in mean log-likelihood at which expectation maximisation ends.
-TOLERANCE = 1e-4
-#: Least σ of a component in bands: a narrower one could hide between their centres.
-LEAST_SD_BANDS = 0.5
 #: Largest number of components that "auto" tries.
 MOST_COMPONENTS = 6
 #: Numbers of components in a row without a lower BIC after which "auto" ends.
 PATIENCE = 2
-
-
-@dataclass(frozen=True, eq=False)
-class _Start:
-    """A mixture with the scale of the integral, and its masked error."""
-
-    gaussians: Gaussians
-    scale: float
-    error: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Candidate:
-    """A refined mixture in the units of the entries, with free scale."""
-
-    gaussians: Gaussians
-    scale: float
-    likelihood_mse: float
-    iterations: int
-    least_squares: LeastSquaresFit
 
 
 def fit_mixture(
@@ -61,6 +34,10 @@ def fit_mixture(
     components: int | Literal["auto"] = "auto",
     scaling: Scaling = "integral",
     threshold: float | None = None,
+    *,
+    selection: Selection = "bic",
+    skewed: bool = False,
+    lights: Sequence[Spectrum] = (),
 ) -> MixtureFit:
     """Fit a mixture of normal densities to the re-radiation of a matrix.
 
@@ -73,13 +50,22 @@ def fit_mixture(
         The matrix. Its σ, where it is known, tells which entries are above the noise; the others
         are taken as 0.
     components
-        Number of components; "auto" takes that of the least Bayesian information criterion.
+        Number of components; "auto" takes that which `selection` prefers.
     scaling
         "integral" keeps the amount of light, and so the brightness, "least-squares" has the least
-        error (equations 4 and 5 of the paper).
+        error (equations 4 and 5 of the paper), "colour" the least mean ΔE2000 under
+        `lights`.
     threshold
         Least value per band that is more than noise. Without it, entries are kept of which 5 % are
         expected to be noise.
+    selection
+        "bic" takes the number of the least Bayesian information criterion; "cross-validation" the
+        least number whose error at entries left out of the fit is within one standard error of the
+        least such error.
+    skewed
+        Whether each component may be skewed in input and output: two more parameters each.
+    lights
+        Lights whose colours set the scale if `scaling` is "colour".
 
     Returns
     -------
@@ -106,139 +92,84 @@ def fit_mixture(
     >>> fit.mixture.mean_nm.round(3).tolist(), round(fit.mixture.scale, 3)
     ([[460.0, 520.0]], 20.0)
     """
+    parameters = SKEWED_PARAMETERS if skewed else PARAMETERS
     entries = stokes_entries(matrix, threshold)
     kept = int(entries.is_kept.sum())
-    most = min(kept, len(entries.value) // PARAMETERS)
-    if components != "auto" and not 1 <= components <= most:
+    most = min(kept, len(entries.value) // parameters)
+    if components == "auto":
+        most = max(min(MOST_COMPONENTS, kept // parameters), 1)
+        fits, table = _selected(entries, most, parameters, selection, skewed)
+    elif 1 <= components <= most:
+        fits = [next(candidates(entries, components, skewed))]
+        table = [_scored(entries, fits[0], parameters)]
+    else:
         raise UsageError(
             f"expected 1 to {most} components for {kept} entries above the threshold, "
             f"got {components}"
         )
-    last = max(min(MOST_COMPONENTS, kept // PARAMETERS), 1) if components == "auto" else components
-    best: tuple[MixtureCandidate, _Candidate] | None = None
-    tried: list[MixtureCandidate] = []
-    first = 1 if components == "auto" else components
-    before = _greedy(entries, first - 1)
-    for number in range(first, last + 1):
-        found = _fit_candidate(entries, number, *before)
-        before = found.gaussians, found.scale
-        mse = _masked_mse(entries, found.gaussians, found.scale)
-        bic = kept * float(np.log(max(mse, np.finfo(np.float64).tiny)))
-        tried.append(MixtureCandidate(number, mse, bic + PARAMETERS * number * float(np.log(kept))))
-        if best is None or tried[-1].bic < best[0].bic:
-            best = tried[-1], found
-        elif len(tried) - 1 - tried.index(best[0]) >= PATIENCE:
-            break
-    assert best is not None
-    found = best[1]
-    scale = found.scale
-    if scaling == "integral":
-        scale = _integral_scale(entries, found.gaussians)
-    widths = matrix.output_width_nm
+    best = fits[_preferred(table, selection)]
+    mixture = best.mixture
+    if scaling != "least-squares":
+        mixture = with_integral(entries, mixture)
+    if scaling == "colour":
+        mixture = with_colours(matrix, mixture, lights)
+    widths_nm = matrix.output_width_nm
     return MixtureFit(
-        mixture=_in_nm(entries, found.gaussians, scale),
+        mixture=mixture,
         scaling=scaling,
+        lights=tuple(light.name for light in lights) if scaling == "colour" else (),
         threshold=entries.threshold,
         false_discovery_rate=FALSE_DISCOVERY_RATE if threshold is None else None,
         kept_entries=kept,
         entries=len(entries.value),
-        masked_mse=_masked_mse(entries, found.gaussians, scale),
-        likelihood_mse=found.likelihood_mse,
-        band_nm=float(widths[0]) if np.allclose(widths, widths[0]) else 1.0,
-        iterations=found.iterations,
-        refinement_iterations=found.least_squares.iterations,
-        converged=found.least_squares.converged,
-        selection="bic" if components == "auto" else "given",
-        candidates=tuple(tried),
+        masked_mse=masked_mse(entries, mixture),
+        likelihood_mse=best.likelihood_mse,
+        band_nm=float(widths_nm[0]) if np.allclose(widths_nm, widths_nm[0]) else 1.0,
+        iterations=best.iterations,
+        refinement_iterations=best.refinement_iterations,
+        converged=best.converged,
+        selection=selection if components == "auto" else "given",
+        candidates=tuple(table),
     )
 
 
-def _fit_candidate(
-    entries: StokesEntries, components: int, before: Gaussians, before_scale: float
-) -> _Candidate:
-    """Fit some number of components, given a mixture with one less."""
-    least_sd = _least_sd(entries)
-    likely = _likely(entries, entries.mass, components, least_sd)
-    peaked = _likely(entries, entries.mass * entries.value, components, least_sd)
-    by_likelihood = _by_error(entries, likely.gaussians)
-    by_peaks = _by_error(entries, _square_root(peaked.gaussians))
-    starts = [
-        with_one_more(entries, before, before_scale),
-        *((start.gaussians, start.scale) for start in by_likelihood[:REFINED_STARTS]),
-        *((start.gaussians, start.scale) for start in by_peaks[:REFINED_STARTS]),
-    ]
-    tries = [refined(entries, *start, least_sd, is_final=False) for start in starts]
-    gaussians, scale, tried = min(tries, key=lambda one: one[2].chi2)
-    gaussians, scale, fit = refined(entries, gaussians, scale, least_sd, is_final=True)
-    fit = replace(fit, iterations=tried.iterations + fit.iterations)
-    error = by_likelihood[0].error
-    return _Candidate(gaussians, scale, error, likely.iterations, fit)
+def _selected(
+    entries: StokesEntries, most: int, parameters: int, selection: Selection, skewed: bool
+) -> tuple[list[Candidate], list[MixtureCandidate]]:
+    """Return fits of 1 component and more, as many as the choice among them needs."""
+    held_out: Sequence[HeldOutError | None] = [None] * most
+    if selection == "cross-validation":
+        held_out = held_out_errors(entries, most, skewed)
+    fits: list[Candidate] = []
+    table: list[MixtureCandidate] = []
+    for fit, error in zip(islice(candidates(entries, 1, skewed), most), held_out, strict=True):
+        fits.append(fit)
+        table.append(_scored(entries, fit, parameters, error))
+        if selection == "bic" and len(table) - 1 - _preferred(table, selection) >= PATIENCE:
+            break
+    return fits, table
 
 
-def _greedy(entries: StokesEntries, components: int) -> tuple[Gaussians, float]:
-    """Return a mixture to which one component after the other was added, and its scale."""
-    gaussians, scale = Gaussians(np.empty((1, 0)), np.empty((1, 0, 2)), np.empty((1, 0, 3))), 0.0
-    for _ in range(components):
-        start = with_one_more(entries, gaussians, scale)
-        gaussians, scale, _ = refined(entries, *start, _least_sd(entries), is_final=False)
-    return gaussians, scale
-
-
-def _least_sd(entries: StokesEntries) -> float:
-    return LEAST_SD_BANDS * entries.band_nm / entries.unit_nm
-
-
-def _likely(
-    entries: StokesEntries, mass: FloatArray, components: int, least_sd: float
-) -> LikelihoodFit:
-    kept = entries.is_kept
-    return maximise_likelihood(
-        entries.monomials[:, kept],
-        mass[np.newaxis, kept],
-        scattered_starts(entries.points[:, kept], mass[kept], components, STARTS),
-        least_sd**2,
-        MAX_ITERATIONS,
-        TOLERANCE,
+def _scored(
+    entries: StokesEntries, fit: Candidate, parameters: int, held_out: HeldOutError | None = None
+) -> MixtureCandidate:
+    kept = int(entries.is_kept.sum())
+    components = len(fit.mixture.weights)
+    mse = masked_mse(entries, fit.mixture)
+    misfit = kept * float(np.log(max(mse, np.finfo(np.float64).tiny)))
+    return MixtureCandidate(
+        components,
+        mse,
+        misfit + parameters * components * float(np.log(kept)),
+        held_out,
     )
 
 
-def _square_root(squares: Gaussians) -> Gaussians:
-    """Return the mixtures of which each component's square is one of `squares`."""
-    aa, ab, bb = np.moveaxis(squares.covariance, -1, 0)
-    weights = np.sqrt(squares.weights * np.sqrt(aa * bb - ab * ab))
-    return Gaussians(
-        weights / weights.sum(axis=-1, keepdims=True), squares.mean, 2 * squares.covariance
-    )
-
-
-def _by_error(entries: StokesEntries, starts: Gaussians) -> list[_Start]:
-    """Return the mixtures one by one, the one of the least error first."""
-    each = [starts[[index]] for index in range(len(starts.weights))]
-    scales = [_integral_scale(entries, one) for one in each]
-    errors = [_masked_mse(entries, one, scale) for one, scale in zip(each, scales, strict=True)]
-    found = [_Start(*start) for start in zip(each, scales, errors, strict=True)]
-    return sorted(found, key=lambda start: start.error)
-
-
-def _integral_scale(entries: StokesEntries, gaussians: Gaussians) -> float:
-    """Return the scale that keeps the light in all entries (equation 5)."""
-    light = gaussians.density(entries.monomials)[0] * entries.relative_width
-    return float(entries.mass.sum() / (light @ entries.input_width_nm))
-
-
-def _masked_mse(entries: StokesEntries, gaussians: Gaussians, scale: float) -> float:
-    model = scale * gaussians.density(entries.monomials)[0] * entries.relative_width
-    return float(((model - entries.value) ** 2).mean())
-
-
-def _in_nm(entries: StokesEntries, gaussians: Gaussians, scale: float) -> ReradiationMixture:
-    unit = entries.unit_nm
-    aa, ab, bb = gaussians.covariance[0].T * unit**2
-    order = np.argsort(-gaussians.weights[0])
-    covariance = np.stack([np.stack([aa, ab], -1), np.stack([ab, bb], -1)], -2)
-    return ReradiationMixture(
-        scale * unit**2 / float(entries.output_width_nm.mean()),
-        gaussians.weights[0][order] / gaussians.weights[0].sum(),
-        (entries.origin_nm + gaussians.mean[0] * unit)[order],
-        covariance[order],
-    )
+def _preferred(table: Sequence[MixtureCandidate], selection: Selection) -> int:
+    """Return the place of the number of components that is chosen."""
+    held_out = [row.held_out for row in table if row.held_out is not None]
+    if selection == "bic" or not held_out:
+        return min(range(len(table)), key=lambda place: table[place].bic)
+    least = min(held_out, key=lambda error: error.mse)
+    limit = least.mse + least.standard_error
+    return next(place for place, error in enumerate(held_out) if error.mse <= limit)

@@ -8,6 +8,22 @@ from labrig.material import ReradiationMixture
 
 
 @dataclass(frozen=True)
+class HeldOutError:
+    """Error of a mixture at entries that it was not fitted to.
+
+    Attributes
+    ----------
+    mse
+        Mean squared error per band.
+    standard_error
+        Its standard error, from the scatter among the folds.
+    """
+
+    mse: float
+    standard_error: float
+
+
+@dataclass(frozen=True)
 class MixtureCandidate:
     """A fit with some number of components.
 
@@ -18,13 +34,17 @@ class MixtureCandidate:
     masked_mse
         As `MixtureFit.masked_mse`, by least squares.
     bic
-        Bayesian information criterion M ln(masked_mse) + 6 K ln M of the M entries above the
-        threshold; those that were set to zero are no data.
+        Bayesian information criterion M ln(masked_mse) + P K ln M of the M entries above the
+        threshold, P = 6 (8 if skewed); entries that were set to zero are no data.
+    held_out
+        Error at entries that were left out of the fit, by five-fold cross-validation; None without
+        it.
     """
 
     components: int
     masked_mse: float
     bic: float
+    held_out: HeldOutError | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +57,9 @@ class MixtureFit:
         The mixture.
     scaling
         "integral" if the mixture re-radiates as much as the entries above the threshold,
-        "least-squares" if its scale minimises the error.
+        "least-squares" if its scale minimises the error, "colour" if it minimises ΔE2000.
+    lights
+        Names of the lights under which it does; none otherwise.
     threshold
         Least value per band that counted as re-radiation.
     false_discovery_rate
@@ -56,13 +78,14 @@ class MixtureFit:
     converged
         Whether the refinement reached a minimum.
     selection
-        How the number of components was found: "bic" or "given".
+        How the number of components was found: "bic", "cross-validation" or "given".
     candidates
         The numbers of components that were tried.
     """
 
     mixture: ReradiationMixture
     scaling: str
+    lights: tuple[str, ...]
     threshold: float
     false_discovery_rate: float | None
     kept_entries: int
@@ -96,12 +119,18 @@ class MixtureFit:
                     "weight": float(weight),
                     "mean": mean.tolist(),
                     "covariance": covariance.tolist(),
+                    **({} if mixture.skew is None else {"skew": skew.tolist()}),
                 }
-                for weight, mean, covariance in zip(
-                    mixture.weights, mixture.mean_nm, mixture.covariance_nm2, strict=True
+                for weight, mean, covariance, skew in zip(
+                    mixture.weights,
+                    mixture.mean_nm,
+                    mixture.covariance_nm2,
+                    mixture.skews,
+                    strict=True,
                 )
             ],
             "scaling": self.scaling,
+            "lights": list(self.lights),
             "threshold": self.threshold,
             "false_discovery_rate": self.false_discovery_rate,
             "kept_entries": self.kept_entries,

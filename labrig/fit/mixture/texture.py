@@ -14,8 +14,8 @@ from scipy.special import ndtri
 
 from labrig.errors import UsageError
 from labrig.fit.least_squares import FloatArray
+from labrig.fit.mixture.candidate import LEAST_SD_BANDS
 from labrig.fit.mixture.expectation_maximisation import maximise_likelihood
-from labrig.fit.mixture.fit import LEAST_SD_BANDS
 from labrig.fit.mixture.gaussians import AnyFloatArray, Gaussians, monomials_of, product
 from labrig.material import ReradiationMatrix, ReradiationMixture
 

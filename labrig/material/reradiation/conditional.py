@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erfcx, log_ndtr, log_softmax, ndtri_exp, softmax
 
+from labrig.material.reradiation.margin import Margin
+
 FloatArray = NDArray[np.float64]
 
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
@@ -31,14 +33,10 @@ class ConditionalDensity:
     ----------
     weights
         Weights of the components of the joint density, shape (K,).
-    given_mean_nm, given_sd_nm
-        Mean and standard deviation of each component in the given wavelength in nm, shape (K,).
-    mean_nm
-        Mean of each component in the other wavelength in nm, shape (K,).
-    slope
-        Rise of that mean with the given wavelength, shape (K,).
-    sd_nm
-        Standard deviation of each component in the other wavelength, given one, in nm, shape (K,).
+    given, other
+        The components in the given and in the other wavelength, K each.
+    correlation
+        Correlation of their normal variates, shape (K,).
     is_output
         Whether the density is that of the output given the input, above it, or that of the input
         given the output, below it.
@@ -57,29 +55,28 @@ class ConditionalDensity:
     """
 
     weights: FloatArray
-    given_mean_nm: FloatArray
-    given_sd_nm: FloatArray
-    mean_nm: FloatArray
-    slope: FloatArray
-    sd_nm: FloatArray
+    given: Margin
+    other: Margin
+    correlation: FloatArray
     is_output: bool
 
     def pdf(self, wavelength_nm: ArrayLike, given_nm: ArrayLike) -> FloatArray:
         """Return the density in 1/nm, which is 0 beyond the Stokes side and integrates to 1."""
-        excess_nm, given = self._stokes_shift(wavelength_nm, given_nm)
+        shift_nm, given = self._stokes_shift(wavelength_nm, given_nm)
         log_mass, cut = self._components(given)
-        log_density = _log_density(cut, np.maximum(excess_nm, 0.0)[..., np.newaxis] / self.sd_nm)
-        log_share = log_softmax(log_mass, axis=-1)
-        density = np.exp(log_share + log_density - np.log(self.sd_nm)).sum(axis=-1)
-        return np.asarray(np.where(excess_nm > 0, density, 0.0))
+        place = given + self._side * shift_nm
+        log_density = _log_density(cut, self._excess(given, shift_nm))
+        log_rate = self.other.log_rate(place[..., np.newaxis]) - np.log(self._sd)
+        density = np.exp(log_softmax(log_mass, axis=-1) + log_density + log_rate).sum(axis=-1)
+        return np.asarray(np.where(shift_nm > 0, density, 0.0))
 
     def cdf(self, wavelength_nm: ArrayLike, given_nm: ArrayLike) -> FloatArray:
         """Return the probability of a wavelength of at most `wavelength_nm`."""
-        excess_nm, given = self._stokes_shift(wavelength_nm, given_nm)
+        shift_nm, given = self._stokes_shift(wavelength_nm, given_nm)
         log_mass, cut = self._components(given)
-        log_tail = _log_tail(cut, np.maximum(excess_nm, 0.0)[..., np.newaxis] / self.sd_nm)
+        log_tail = _log_tail(cut, self._excess(given, shift_nm))
         farther = np.minimum(np.exp(log_softmax(log_mass, axis=-1) + log_tail).sum(axis=-1), 1.0)
-        beyond = np.where(excess_nm > 0, farther, 1.0)
+        beyond = np.where(shift_nm > 0, farther, 1.0)
         return np.asarray(1 - beyond if self.is_output else beyond)
 
     def sample(self, given_nm: ArrayLike, rng: np.random.Generator) -> FloatArray:
@@ -107,15 +104,25 @@ class ConditionalDensity:
         cut_of_chosen = np.take_along_axis(cut, chosen[..., np.newaxis], axis=-1)[..., 0]
         # An exponential variate is −log of a uniform one, and exact in the far tail.
         excess = _excess(cut_of_chosen, -rng.standard_exponential(given.shape))
-        excess_nm = excess * self.sd_nm[chosen]
-        if self.is_output:
-            return np.asarray(np.maximum(given + excess_nm, np.nextafter(given, np.inf)))
-        return np.asarray(np.minimum(given - excess_nm, np.nextafter(given, -np.inf)))
+        rise = self._side * self._sd[chosen] * excess
+        drawn = given + self.other.chosen(chosen).wavelength_rise(given, rise)
+        beyond = np.nextafter(given, self._side * np.inf)
+        return np.asarray((np.maximum if self.is_output else np.minimum)(drawn, beyond))
 
     def integral(self, given_nm: ArrayLike) -> FloatArray:
         """Return the integral in 1/nm of the joint density over the Stokes side, given one."""
         log_mass, _ = self._components(np.asarray(given_nm, dtype=np.float64))
         return np.asarray(np.exp(log_mass).sum(axis=-1))
+
+    @property
+    def _side(self) -> int:
+        """Sign of the other wavelength less the given one on the Stokes side."""
+        return 1 if self.is_output else -1
+
+    @property
+    def _sd(self) -> FloatArray:
+        """Standard deviation of the other variate, given one, shape (K,)."""
+        return np.sqrt((1 - self.correlation) * (1 + self.correlation))
 
     def _stokes_shift(
         self, wavelength_nm: ArrayLike, given_nm: ArrayLike
@@ -123,19 +130,22 @@ class ConditionalDensity:
         wavelength, given = np.broadcast_arrays(
             np.asarray(wavelength_nm, dtype=np.float64), np.asarray(given_nm, dtype=np.float64)
         )
-        return wavelength - given if self.is_output else given - wavelength, given
+        return self._side * (wavelength - given), given
+
+    def _excess(self, given_nm: FloatArray, shift_nm: FloatArray) -> FloatArray:
+        """Return how far beyond its cut each component's variate is, in its σ, shape (…, K)."""
+        rise_nm = self._side * np.maximum(shift_nm, 0.0)
+        rise = self.other.variate_rise(given_nm[..., np.newaxis], rise_nm[..., np.newaxis])
+        return np.asarray(self._side * rise / self._sd)
 
     def _components(self, given_nm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the log of each component's integral, and where in its σ it is cut off, (…, K)."""
-        off = given_nm[..., np.newaxis] - self.given_mean_nm
-        z = off / self.given_sd_nm
-        mean_nm = self.mean_nm + self.slope * off
-        cut = (given_nm[..., np.newaxis] - mean_nm) / self.sd_nm
-        if not self.is_output:
-            cut = -cut
+        at = given_nm[..., np.newaxis]
+        u = self.given.variate(at)
+        cut = self._side * (self.other.variate(at) - self.correlation * u) / self._sd
         with np.errstate(divide="ignore"):
             log_weights = np.log(self.weights)
-        log_mass = log_weights - 0.5 * z * z - np.log(self.given_sd_nm) - LOG_SQRT_2PI
+        log_mass = log_weights - 0.5 * u * u - LOG_SQRT_2PI + self.given.log_rate(at)
         return log_mass + log_ndtr(-cut), cut
 
 

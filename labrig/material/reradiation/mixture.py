@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.material.reradiation.conditional import ConditionalDensity
+from labrig.material.reradiation.margin import Margin
 from labrig.material.reradiation.matrix import SAME_NM, ReradiationMatrix
 
 FloatArray = NDArray[np.float64]
@@ -34,9 +35,13 @@ class ReradiationMixture:
     weights
         Weights of the components, at least 0, that sum to 1, shape (K,).
     mean_nm
-        Means [input, output] in nm, shape (K, 2).
+        Means [input, output] in nm, medians of skewed components, shape (K, 2).
     covariance_nm2
-        Positive definite covariances of [input, output] in nm², shape (K, 2, 2).
+        Positive definite covariances of [input, output] in nm², shape (K, 2, 2); of skewed
+        components those of the normal density that is like them at their medians.
+    skew
+        Skew of each component in [input, output], shape (K, 2): half the logarithm of the ratio of
+        its widths far above and far below the median. Not given: 0, normal densities.
 
     Raises
     ------
@@ -60,6 +65,7 @@ class ReradiationMixture:
     weights: FloatArray
     mean_nm: FloatArray
     covariance_nm2: FloatArray
+    skew: FloatArray | None = None
 
     def __post_init__(self) -> None:
         count = len(self.weights) if self.weights.ndim == 1 else 0
@@ -69,7 +75,10 @@ class ReradiationMixture:
                 "expected weights, means and covariances of shapes (K,), (K, 2) and (K, 2, 2), "
                 f"got {shapes[0]}, {shapes[1]} and {shapes[2]}"
             )
-        for numbers in (self.scale, self.weights, self.mean_nm, self.covariance_nm2):
+        if self.skew is not None and self.skew.shape != (count, 2):
+            raise ValueError(f"expected skews of shape ({count}, 2), got {self.skew.shape}")
+        numbers_of = (self.scale, self.weights, self.mean_nm, self.covariance_nm2, self.skews)
+        for numbers in numbers_of:
             if not np.isfinite(numbers).all():
                 raise ValueError("expected finite numbers in the mixture")
         if self.scale < 0 or (self.weights < 0).any():
@@ -83,13 +92,14 @@ class ReradiationMixture:
     def density(self, input_nm: ArrayLike, output_nm: ArrayLike) -> FloatArray:
         """Return p(λ_i, λ_o) in 1/nm² of wavelengths that broadcast against each other."""
         inputs, outputs = (np.asarray(nm, dtype=np.float64) for nm in (input_nm, output_nm))
-        x = inputs[..., np.newaxis] - self.mean_nm[:, 0]
-        y = outputs[..., np.newaxis] - self.mean_nm[:, 1]
-        (aa, ab), (_, bb) = np.moveaxis(self.covariance_nm2, 0, -1)
-        determinant = aa * bb - ab * ab
-        distance2 = (bb * x * x - 2 * ab * x * y + aa * y * y) / determinant
-        peak = self.weights / (2 * np.pi * np.sqrt(determinant))
-        return np.asarray((peak * np.exp(-0.5 * distance2)).sum(axis=-1))
+        u, v = inputs[..., np.newaxis], outputs[..., np.newaxis]
+        by_input, by_output = self._margin(0), self._margin(1)
+        log_rates = by_input.log_rate(u) + by_output.log_rate(v)
+        u, v = by_input.variate(u), by_output.variate(v)
+        unexplained = (1 - self.correlation) * (1 + self.correlation)
+        distance2 = u * u + (v - self.correlation * u) ** 2 / unexplained
+        peak = self.weights / (2 * np.pi * np.sqrt(unexplained))
+        return np.asarray((peak * np.exp(log_rates - 0.5 * distance2)).sum(axis=-1))
 
     def reradiation(self, input_nm: ArrayLike, output_nm: ArrayLike) -> FloatArray:
         """Return Φ in 1/nm of output of wavelengths that broadcast against each other."""
@@ -149,17 +159,26 @@ class ReradiationMixture:
         """Density of the input, given the output: p(λ_i | λ_o)."""
         return self._conditional(given=1)
 
+    @property
+    def skews(self) -> FloatArray:
+        """Skew of each component in [input, output], 0 of normal densities, shape (K, 2)."""
+        return np.zeros_like(self.mean_nm) if self.skew is None else self.skew
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of input and output of each component, shape (K,)."""
+        variances = np.diagonal(self.covariance_nm2, axis1=1, axis2=2)
+        return np.asarray(self.covariance_nm2[:, 0, 1] / np.sqrt(variances.prod(axis=1)))
+
+    def _margin(self, axis: int) -> Margin:
+        sd_nm = np.sqrt(self.covariance_nm2[:, axis, axis])
+        return Margin(self.mean_nm[:, axis], sd_nm, self.skews[:, axis])
+
     def _conditional(self, given: int) -> ConditionalDensity:
-        other = 1 - given
-        variance = self.covariance_nm2[:, given, given]
-        slope = self.covariance_nm2[:, 0, 1] / variance
-        remaining = self.covariance_nm2[:, other, other] - slope * self.covariance_nm2[:, 0, 1]
         return ConditionalDensity(
             self.weights,
-            self.mean_nm[:, given],
-            np.sqrt(variance),
-            self.mean_nm[:, other],
-            slope,
-            np.sqrt(remaining),
+            self._margin(given),
+            self._margin(1 - given),
+            self.correlation,
             is_output=given == 0,
         )

@@ -1,0 +1,155 @@
+"""A mixture of some number of components with the least squared error.
+
+Weighted expectation maximisation from several starts, then least squares from the best of them:
+the likelihood weighs the faint tails of a dye like its peak, the squared error does not.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.mixture.entries import StokesEntries
+from labrig.fit.mixture.expectation_maximisation import LikelihoodFit, maximise_likelihood
+from labrig.fit.mixture.gaussians import Gaussians
+from labrig.fit.mixture.refinement import refined
+from labrig.fit.mixture.scaling import masked_mse, with_integral
+from labrig.fit.mixture.skewed_refinement import refined_skewed
+from labrig.fit.mixture.starts import scattered_starts, with_one_more
+from labrig.material import ReradiationMixture
+
+#: Starts of expectation maximisation by light and by its square, which noise far from the dye
+#: hardly draws, and how many of the best of either are refined.
+STARTS, REFINED_STARTS = 8, 1
+MAX_ITERATIONS = 100
+#: Gain in mean log-likelihood at which expectation maximisation ends.
+TOLERANCE = 1e-4
+#: Least σ of a component in bands: a narrower one could hide between their centres.
+LEAST_SD_BANDS = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A refined mixture, with the scale of the least squared error.
+
+    Attributes
+    ----------
+    mixture
+        The mixture.
+    likelihood_mse
+        Masked error of expectation maximisation alone.
+    iterations, refinement_iterations, converged
+        Course of expectation maximisation and of the refinement.
+    """
+
+    mixture: ReradiationMixture
+    likelihood_mse: float
+    iterations: int
+    refinement_iterations: int
+    converged: bool
+
+
+def candidates(
+    entries: StokesEntries, first: int, skewed: bool, is_final: bool = True
+) -> Iterator[Candidate]:
+    """Yield the mixtures of `first` components, of one more, and so on without end.
+
+    Without `is_final` they are only as near to the minimum as tells how good they are.
+    """
+    least_sd = LEAST_SD_BANDS * entries.band_nm / entries.unit_nm
+    gaussians, scale = _greedy(entries, first - 1, least_sd)
+    components = first
+    while True:
+        likely, starts = _starts(entries, components, least_sd)
+        starts.append(with_one_more(entries, gaussians, scale))
+        tries = [refined(entries, *start, least_sd, is_final=False) for start in starts]
+        gaussians, scale, tried = min(tries, key=lambda attempt: attempt[2].chi2)
+        fit, spent = tried, tried.iterations
+        if is_final:
+            gaussians, scale, fit = refined(entries, gaussians, scale, least_sd, is_final)
+            spent += fit.iterations
+        likely_mixture = with_integral(entries, _in_nm(entries, starts[0][0], 1.0))
+        mixture = _in_nm(entries, gaussians, scale)
+        if skewed:
+            medians, amount, skew, fit = refined_skewed(
+                entries, gaussians, scale, least_sd, is_final
+            )
+            mixture = _in_nm(entries, medians, amount, skew)
+            spent += fit.iterations
+        yield Candidate(
+            mixture,
+            masked_mse(entries, likely_mixture),
+            likely.iterations,
+            spent,
+            fit.converged,
+        )
+        components += 1
+
+
+def _greedy(entries: StokesEntries, components: int, least_sd: float) -> tuple[Gaussians, float]:
+    """Return a mixture to which one component after the other was added, and its scale."""
+    gaussians, scale = Gaussians(np.empty((1, 0)), np.empty((1, 0, 2)), np.empty((1, 0, 3))), 0.0
+    for _ in range(components):
+        start = with_one_more(entries, gaussians, scale)
+        gaussians, scale, _ = refined(entries, *start, least_sd, is_final=False)
+    return gaussians, scale
+
+
+def _starts(
+    entries: StokesEntries, components: int, least_sd: float
+) -> tuple[LikelihoodFit, list[tuple[Gaussians, float]]]:
+    """Return mixtures of greatest likelihood with their scales, the best of all first."""
+    likely = _likely(entries, entries.mass, components, least_sd)
+    peaked = _likely(entries, entries.mass * entries.value, components, least_sd)
+    by_light = _by_error(entries, likely.gaussians)
+    by_peaks = _by_error(entries, _square_root(peaked.gaussians))
+    return likely, [*by_light[:REFINED_STARTS], *by_peaks[:REFINED_STARTS]]
+
+
+def _likely(
+    entries: StokesEntries, mass: FloatArray, components: int, least_sd: float
+) -> LikelihoodFit:
+    kept = entries.is_kept
+    return maximise_likelihood(
+        entries.monomials[:, kept],
+        mass[np.newaxis, kept],
+        scattered_starts(entries.points[:, kept], mass[kept], components, STARTS),
+        least_sd**2,
+        MAX_ITERATIONS,
+        TOLERANCE,
+    )
+
+
+def _square_root(squares: Gaussians) -> Gaussians:
+    """Return the mixtures of which each component's square is one of `squares`."""
+    aa, ab, bb = np.moveaxis(squares.covariance, -1, 0)
+    weights = np.sqrt(squares.weights * np.sqrt(aa * bb - ab * ab))
+    return Gaussians(
+        weights / weights.sum(axis=-1, keepdims=True), squares.mean, 2 * squares.covariance
+    )
+
+
+def _by_error(entries: StokesEntries, starts: Gaussians) -> list[tuple[Gaussians, float]]:
+    """Return the mixtures one by one with the scale of the integral, the least error first."""
+    model = starts.density(entries.monomials) * entries.relative_width
+    scales = entries.mass.sum() / (model @ entries.input_width_nm)
+    errors = ((scales[:, np.newaxis] * model - entries.value) ** 2).mean(axis=-1)
+    order = np.argsort(errors, kind="stable")
+    return [(starts[[index]], float(scales[index])) for index in order]
+
+
+def _in_nm(
+    entries: StokesEntries, gaussians: Gaussians, scale: float, skew: FloatArray | None = None
+) -> ReradiationMixture:
+    unit = entries.unit_nm
+    aa, ab, bb = gaussians.covariance[0].T * unit**2
+    order = np.argsort(-gaussians.weights[0], kind="stable")
+    covariance = np.stack([np.stack([aa, ab], -1), np.stack([ab, bb], -1)], -2)
+    return ReradiationMixture(
+        scale * unit**2 / float(entries.output_width_nm.mean()),
+        gaussians.weights[0][order] / gaussians.weights[0].sum(),
+        (entries.origin_nm + gaussians.mean[0] * unit)[order],
+        covariance[order],
+        None if skew is None else skew[order],
+    )
