@@ -62,18 +62,34 @@ class LedSettings(Part):
         Relay that switches the LED, of the Numato board, or of the Arduino if that switches the
         lamp; relay 0 is the lamp's.
     centre
-        Centre wavelength of the LED's band, in nm.
+        Wavelength of the strongest light of the cold LED, in nm.
     fwhm
         Full width at half maximum of the LED's band, in nm.
+    asymmetry
+        Width of the side of long wavelengths over that of the other.
+    spectrum
+        File with the LED's measured spectrum in two columns, wavelength_nm and a relative value,
+        instead of `centre`, `fwhm` and `asymmetry`. Null: by these.
     level
-        Irradiance of the LED as a fraction of the warm lamp's, over all wavelengths, for example
+        Irradiance of the cold LED as a fraction of the warm lamp's visible light, for example
         `10 %`.
+    droop
+        Fraction of the light that is lost when the LED has become warm, for example `3 %`.
+    shift_nm
+        Shift of the warm LED's spectrum to longer wavelengths, in nm.
+    warm_up
+        Time constant with which the lit LED warms, and cools again, for example `20 s`.
     """
 
-    relay: Annotated[int, Field(ge=1, le=7)]
+    relay: Annotated[int, Field(ge=1, le=31)]
     centre: Nanometres
     fwhm: Annotated[float, Field(ge=5, le=200)] = 25.0
+    asymmetry: Annotated[float, Field(ge=0.2, le=5)] = 1.0
+    spectrum: str | None = None
     level: Annotated[Fraction, Field(gt=0)] = 0.1
+    droop: Annotated[Fraction, Field(ge=0, lt=1)] = 0.0
+    shift_nm: Annotated[float, Field(ge=-20, le=20)] = 0.0
+    warm_up: Annotated[DurationS, Field(gt=0)] = 20.0
 
 
 class ServoBoardSettings(Part):

@@ -22,7 +22,7 @@ GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
 
 
 def reflectances(card: Card, grey: float) -> FloatArray:
-    """Return reflectances of all surfaces of a card, shape (surfaces, 160) on `WAVELENGTH_NM`.
+    """Return reflectances of all surfaces of a card, shape (surfaces, wavelengths).
 
     Surface 0 is outside of the card, and 0. A grey card, or a blank of the same, is surface 1; of a
     ColorChecker, row by row, 1 to 24, its frame is 25.
@@ -57,7 +57,7 @@ def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
 
 
 def _colorchecker() -> FloatArray:
-    """Return BabelColor's means over 30 ColorCheckers, shape (24, 160), constant at the ends."""
+    """Return BabelColor's means over 30 ColorCheckers, constant at the ends, (24, wavelengths)."""
     import colour  # takes seconds to load
 
     patches = colour.SDS_COLOURCHECKERS["BabelColor Average"].values()

@@ -13,7 +13,7 @@ from labrig.errors import UsageError
 from labrig.yaml_file import did_you_mean
 
 from .arrangement import USUAL_LAMP_M, Arrangements
-from .lamp import WAVELENGTH_NM
+from .lamp import IS_VISIBLE, WAVELENGTH_NM
 
 FloatArray = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class Filters:
         )
 
     def transmission(self, name: str | None) -> FloatArray:
-        """Return the filter's transmittance, shape (160,) on `WAVELENGTH_NM`; no filter: 1."""
+        """Return the filter's transmittance, shape (wavelengths,); no filter: 1."""
         if name is not None and name not in self._transmissions:
             self._transmissions[name] = self._really(name)
         return self._transmissions[name]
@@ -84,8 +84,9 @@ class Filters:
         if not self._bent:
             return curve
         rng = np.random.default_rng([self._seed, zlib.crc32(name.encode())])
-        factor = CubicSpline(KNOTS_NM, rng.standard_normal(len(KNOTS_NM)))(WAVELENGTH_NM)
-        factor /= np.sqrt(np.mean(factor**2))
+        knots = CubicSpline(KNOTS_NM, rng.standard_normal(len(KNOTS_NM)))
+        factor = knots(WAVELENGTH_NM.clip(KNOTS_NM[0]))
+        factor /= np.sqrt(np.mean(factor[IS_VISIBLE] ** 2))
         bent: FloatArray = np.clip(curve * (1 + self._bent * factor), 0.0, 1.0)
         return bent
 

@@ -41,10 +41,12 @@ RESISTANCE_EXPONENT = 1.2
 #: Time after a switch until the filament has settled to the last digits.
 SETTLED_S = 3.0
 
-#: Cells of the wavelength grid: 380–780 nm; borders of Table 1's bands are borders of cells.
+#: Cells of the wavelength grid: 300–780 nm; borders of Table 1's bands are borders of cells.
 CELL_NM = 2.5
-CELL_EDGES_NM: FloatArray = np.linspace(380.0, 780.0, 161)
+CELL_EDGES_NM: FloatArray = np.linspace(300.0, 780.0, 193)
 WAVELENGTH_NM: FloatArray = CELL_EDGES_NM[:-1] + CELL_NM / 2
+#: Where an amount of light is "that of the lamp", whatever ultraviolet comes with it.
+IS_VISIBLE: NDArray[np.bool_] = WAVELENGTH_NM > 380.0
 
 #: Temperatures at so many times interpolate a settling filament to a part in 10¹².
 SETTLING_TIMES = 1001
@@ -70,7 +72,7 @@ def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (..., 160)
+    ndarray, shape (..., wavelengths)
         Spectrum at every temperature, on `WAVELENGTH_NM`.
     """
     each_k = np.asarray(temperature_k)[..., None]
@@ -81,6 +83,8 @@ def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
 
 #: Spectrum of the burning lamp.
 BURNING_SPECTRUM: FloatArray = filament_spectrum(BURNING_K)
+#: Its visible light.
+BURNING_LIGHT = float(BURNING_SPECTRUM[IS_VISIBLE].sum())
 
 
 def _warming_k_per_s(temperature_k: float, powered: bool) -> float:
@@ -201,7 +205,7 @@ class Lamp:
         return cold and not self.corners(start_s, end_s)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Return the relative spectral irradiance at the sample on the grid, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., wavelengths)."""
         temperature_k = self.temperature_k(time_s)
         if np.all(temperature_k == BURNING_K):
             spectrum = BURNING_SPECTRUM
@@ -215,7 +219,7 @@ class Lamp:
         return light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """Return ∫ irradiance dt over an interval, shape (160,)."""
+        """Return ∫ irradiance dt over an interval, shape (wavelengths,)."""
         total = np.zeros_like(WAVELENGTH_NM)
         for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
             if not self.dark(begin_s, stop_s):

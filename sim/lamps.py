@@ -22,7 +22,7 @@ class FilteredLamps:
     halogen, mercury
         Lamps, of which one is fed at a time; a filament still fades after it was switched off.
     filters
-        Begin in seconds and transmittance, shape (160,), of each filter; the first from 0 on.
+        Begin in seconds and transmittance (wavelengths,) of each filter; the first from 0 on.
     leds
         LEDs, whose light does not pass the filter.
     """
@@ -60,7 +60,7 @@ class FilteredLamps:
         return all(light.dark(start_s, end_s) for light in lights)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Return the relative spectral irradiance at the sample, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., wavelengths)."""
         light = self.halogen.irradiance(time_s)
         if self.mercury.was_on:
             light = light + self.mercury.irradiance(time_s)
@@ -68,7 +68,7 @@ class FilteredLamps:
         return light + self.leds.irradiance(time_s) if self.leds.were_lit else light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """Return ∫ irradiance dt over an interval, shape (160,)."""
+        """Return ∫ irradiance dt over an interval, shape (wavelengths,)."""
         changes = [since_s for since_s, _ in self.filters if start_s < since_s < end_s]
         total = np.zeros_like(self.filters[0][1])
         for begin_s, stop_s in pairwise([start_s, *changes, end_s]):

@@ -1,26 +1,43 @@
-"""A bank of LEDs: narrow bands, switched at once by their relays."""
+"""A bank of LEDs: narrow bands, switched at once by their relays, that droop as they warm."""
 
 import math
 from bisect import bisect_right
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .bench_settings import LedSettings
-from .lamp import BURNING_SPECTRUM, WAVELENGTH_NM
+from .filters import read_curve
+from .lamp import BURNING_LIGHT, WAVELENGTH_NM
 
 FloatArray = NDArray[np.float64]
 
-FWHM_OVER_SIGMA = 2 * math.sqrt(2 * math.log(2))
+#: Full width at half maximum of Ohno's shape with width 1.
+OHNO_FWHM = 0.9215
 
 
-def led_spectrum(led: LedSettings) -> FloatArray:
-    """Return a lit LED's irradiance, relative as a `Lamp`'s, shape (160,) on `WAVELENGTH_NM`."""
-    shape = np.exp(-(((WAVELENGTH_NM - led.centre) / led.fwhm * FWHM_OVER_SIGMA) ** 2) / 2)
-    spectrum: FloatArray = led.level * BURNING_SPECTRUM.sum() / shape.sum() * shape
+def led_spectrum(led: LedSettings, shift_nm: float = 0.0) -> FloatArray:
+    """Return a lit, cold LED's irradiance, relative as a `Lamp`'s, shape (wavelengths,).
+
+    Its shape is that of Y. Ohno, *Spectral design considerations for white LED color rendering*
+    (Optical Engineering 44, 2005), each side with its own width: narrower at the top than a normal
+    curve, and with wider wings.
+    """
+    if led.spectrum is not None:
+        curve = read_curve(Path(led.spectrum))
+        shape = np.interp(WAVELENGTH_NM - shift_nm, WAVELENGTH_NM, curve)
+    else:
+        off_nm = WAVELENGTH_NM - led.centre - shift_nm
+        short_nm = 2 * led.fwhm / OHNO_FWHM / (1 + led.asymmetry)
+        width_nm = np.where(off_nm < 0, short_nm, short_nm * led.asymmetry)
+        peak = np.exp(-((off_nm / width_nm) ** 2))
+        shape = (peak + 2 * peak**5) / 3
+    spectrum: FloatArray = led.level * BURNING_LIGHT / shape.sum() * shape
     return spectrum
 
 
@@ -28,6 +45,7 @@ def led_spectrum(led: LedSettings) -> FloatArray:
 class Leds:
     """The bank with its history; values never change. Times are seconds of the room's clock.
 
+    The light of an LED goes from that of a cold one to that of a warm one as 1 − exp(−t/warm_up).
     Several LEDs may be lit together: preventing that is up to the driver.
 
     Attributes
@@ -77,26 +95,56 @@ class Leds:
         return not any(self.states[self._place(at_s)][1] for at_s in times_s)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Return the relative spectral irradiance at the sample, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., wavelengths)."""
+        times_s = np.asarray(time_s, dtype=np.float64)
         since_s = [at_s for at_s, _ in self.states]
-        irradiance: FloatArray = self._light[np.searchsorted(since_s, time_s, side="right") - 1]
-        return irradiance
+        place = np.searchsorted(since_s, times_s, side="right") - 1
+        light = np.zeros((*times_s.shape, len(WAVELENGTH_NM)))
+        for state in np.unique(place):
+            here = place == state
+            for led, start, cold, warm in self._lit(int(state)):
+                gone_s = times_s[here] - since_s[state]
+                warmth = 1 - (1 - start) * np.exp(-gone_s / led.warm_up)
+                light[here] += cold + warmth[..., np.newaxis] * (warm - cold)
+        return light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """Return ∫ irradiance dt over an interval, shape (160,)."""
-        edges_s = [start_s, *self.corners(start_s, end_s), end_s]
-        places = [self._place(begin_s) for begin_s in edges_s[:-1]]
-        exposure: FloatArray = np.diff(edges_s) @ self._light[places]
-        return exposure
+        """Return ∫ irradiance dt over an interval, shape (wavelengths,)."""
+        total = np.zeros_like(WAVELENGTH_NM)
+        for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            state = self._place(begin_s)
+            since_s, lasting_s = self.states[state][0], stop_s - begin_s
+            for led, start, cold, warm in self._lit(state):
+                cooler = [math.exp((since_s - at_s) / led.warm_up) for at_s in (begin_s, stop_s)]
+                warmth_s = lasting_s - (1 - start) * led.warm_up * (cooler[0] - cooler[1])
+                total += lasting_s * cold + warmth_s * (warm - cold)
+        return total
 
     def _place(self, time_s: float) -> int:
         return bisect_right(self.states, time_s, key=lambda state: state[0]) - 1
 
+    def _lit(self, state: int) -> Iterator[tuple[LedSettings, float, FloatArray, FloatArray]]:
+        """Yield the LEDs of a state: warmth at its begin, light of the cold and of the warm one."""
+        for led in self.bank:
+            if led.relay in self.states[state][1]:
+                yield led, self._warmth[state][led.relay], *self._spectra[led.relay]
+
     @cached_property
-    def _light(self) -> FloatArray:
-        """Return the irradiance of every state, shape (states, 160)."""
-        spectra = {led.relay: led_spectrum(led) for led in self.bank}
-        dark = np.zeros_like(WAVELENGTH_NM)
-        return np.array(
-            [sum((spectra[relay] for relay in relays), dark) for _, relays in self.states]
-        )
+    def _spectra(self) -> dict[int, tuple[FloatArray, FloatArray]]:
+        """Light of each LED when cold and when warm."""
+        return {
+            led.relay: (led_spectrum(led), (1 - led.droop) * led_spectrum(led, led.shift_nm))
+            for led in self.bank
+        }
+
+    @cached_property
+    def _warmth(self) -> list[dict[int, float]]:
+        """Warmth of each LED at the begin of each state, from 0 to 1."""
+        warmth = [{led.relay: 0.0 for led in self.bank}]
+        for (since_s, relays), (until_s, _) in pairwise(self.states):
+            warmth.append({})
+            for led in self.bank:
+                goal = float(led.relay in relays)
+                remains = math.exp((since_s - until_s) / led.warm_up)
+                warmth[-1][led.relay] = goal + (warmth[-2][led.relay] - goal) * remains
+        return warmth

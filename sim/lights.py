@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from .door import Door
 from .faults import FaultTime
-from .lamp import BURNING_K, PANEL_FADING_S, WAVELENGTH_NM, Lamp, filament_spectrum, nodes
+from .lamp import (
+    BURNING_K,
+    BURNING_LIGHT,
+    PANEL_FADING_S,
+    WAVELENGTH_NM,
+    Lamp,
+    filament_spectrum,
+    nodes,
+)
 from .lamps import FilteredLamps
 
 FloatArray = NDArray[np.float64]
@@ -29,7 +37,7 @@ LEAK_PEAKS = ((452.0, 10.0, 1.0), (560.0, 52.0, 0.9))
 
 @dataclass(frozen=True)
 class VisibleLight:
-    """∫ irradiance × visible fraction dt, which the camera sees by reflection, each shape (160,).
+    """∫ irradiance × visible fraction dt that the camera sees reflected, each (wavelengths,).
 
     Attributes
     ----------
@@ -58,7 +66,7 @@ class Stray:
     ----------
     fault_times
         Times at which the light is on.
-    spectrum : ndarray, shape (160,)
+    spectrum : ndarray, shape (wavelengths,)
         Irradiance on `WAVELENGTH_NM`, relative as a `Lamp`'s.
     """
 
@@ -101,7 +109,7 @@ class Lights:
         return not any(stray.is_on(at_s) for stray in self._strays for at_s in middles)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Return the relative spectral irradiance at the sample on the grid, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., wavelengths)."""
         light = self.lamp.irradiance(time_s)
         if self._doors:
             arriving = _at(time_s, lambda at_s: self._unshielded(at_s) * self._facing_lamp(at_s))
@@ -115,7 +123,7 @@ class Lights:
         return 1.0 if self.door is None else self.door.openness(time_s)
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """Return ∫ irradiance dt over an interval without doors, shape (160,)."""
+        """Return ∫ irradiance dt over an interval without doors, shape (wavelengths,)."""
         lamp = self.lamp.exposure(start_s, end_s)
         return lamp + self._stray(start_s, end_s, lambda _: 1.0)
 
@@ -160,7 +168,7 @@ class Lights:
         return 1.0 if self.shield is None else self.shield.openness(time_s)
 
     def _lamp(self, start_s: float, end_s: float, fractions: Sequence[UnitFraction]) -> FloatArray:
-        """Return ∫ shares of the lamp dt, shape (shares, 160)."""
+        """Return ∫ shares of the lamp dt, shape (shares, wavelengths)."""
         total = np.zeros((len(fractions), len(WAVELENGTH_NM)))
         for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
             if self.lamp.dark(begin_s, stop_s):
@@ -175,7 +183,7 @@ class Lights:
         return total
 
     def _stray(self, start_s: float, end_s: float, fraction: UnitFraction) -> FloatArray:
-        """Return ∫ share of the light from all directions dt, shape (160,)."""
+        """Return ∫ share of the light from all directions dt, shape (wavelengths,)."""
         total = np.zeros_like(WAVELENGTH_NM)
         strays = self._strays
         if not strays:
@@ -202,7 +210,7 @@ def _at(time_s: float | FloatArray, fraction: UnitFraction) -> FloatArray:
 
 
 def room_light_spectrum() -> FloatArray:
-    """Return the spectrum of the room light, incandescent, too, shape (160,)."""
+    """Return the spectrum of the room light, incandescent, too, shape (wavelengths,)."""
     spectrum: FloatArray = ROOM_LIGHT * filament_spectrum(BURNING_K)
     return spectrum
 
@@ -214,4 +222,4 @@ def leak(level: float, fault_times: Sequence[FaultTime]) -> Stray:
         for at_nm, wide_nm, height in LEAK_PEAKS
     ]
     shape: FloatArray = np.sum(peaks, axis=0)
-    return Stray(fault_times, level * filament_spectrum(BURNING_K).sum() / shape.sum() * shape)
+    return Stray(fault_times, level * BURNING_LIGHT / shape.sum() * shape)

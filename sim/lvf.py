@@ -70,7 +70,7 @@ class Lvf:
 
         Returns
         -------
-        ndarray, shape (1 + PIECES, 160)
+        ndarray, shape (1 + PIECES, wavelengths)
             Transmittance on `WAVELENGTH_NM`.
         """
         rising, falling = self._rising, self._rising[::-1]

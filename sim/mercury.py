@@ -34,7 +34,7 @@ WARM_UP_S = 45.0
 
 
 def line_spectrum() -> FloatArray:
-    """Return the warm lamp's irradiance, relative as a `Lamp`'s, shape (160,) on `WAVELENGTH_NM`.
+    """Return the warm lamp's irradiance, relative as a `Lamp`'s, shape (wavelengths,).
 
     Each line is shared by the two cells about it so that its centroid is exact.
     """
@@ -90,11 +90,11 @@ class Mercury:
         return [at_s for at_s, _ in self.switches if start_s < at_s < end_s]
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Return the relative spectral irradiance at the sample, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., wavelengths)."""
         return np.multiply.outer(np.vectorize(self._gain, otypes=[float])(time_s), line_spectrum())
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """Return ∫ irradiance dt over an interval, shape (160,)."""
+        """Return ∫ irradiance dt over an interval, shape (wavelengths,)."""
         corners = [start_s, *self.corners(start_s, end_s), end_s]
         total_s = 0.0
         for begin_s, stop_s in pairwise(corners):

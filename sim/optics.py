@@ -16,7 +16,7 @@ from labrig import resources
 from labrig.errors import UsageError
 from labrig.material import Material
 
-from .lamp import CELL_NM, WAVELENGTH_NM
+from .lamp import CELL_NM, IS_VISIBLE, WAVELENGTH_NM
 from .phosphor import band_cells
 
 FloatArray = NDArray[np.float64]
@@ -52,7 +52,7 @@ FOCAL_MM = 75.0
 
 @dataclass(frozen=True)
 class CameraCurves:
-    """Spectral sensitivity, shape (3, 160) on `WAVELENGTH_NM`, relative; rows R, G, B."""
+    """Spectral sensitivity, shape (3, wavelengths) on `WAVELENGTH_NM`, relative; rows R, G, B."""
 
     sensitivity: FloatArray
 
@@ -103,13 +103,14 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
     peak = curve.max()
     goal = rng.uniform(*DISAGREEMENT_RMS)
     factor, added = CubicSpline(KNOTS_NM, rng.standard_normal((2, len(KNOTS_NM))), axis=1)(
-        WAVELENGTH_NM
+        WAVELENGTH_NM.clip(KNOTS_NM[0])
     )
     visible = (WAVELENGTH_NM > 400.0) & (WAVELENGTH_NM < 700.0)
 
     def normalised(strength: float) -> FloatArray:
         bent = curve / peak * np.exp(strength * factor) + strength * ADDED * added
-        positive: FloatArray = np.maximum(bent, 0.0)
+        # No ultraviolet passes the lens.
+        positive: FloatArray = np.where(IS_VISIBLE, np.maximum(bent, 0.0), 0.0)
         return positive / float(positive.max())
 
     def excess(strength: float) -> float:

@@ -65,7 +65,7 @@ class Light(Protocol):
         """Return whether there is no light at all from `start_s` to `end_s`."""
 
     def irradiance(self, time_s: FloatArray) -> FloatArray:
-        """Return the relative spectral irradiance at every time, shape (times, 160)."""
+        """Return the relative spectral irradiance at every time, shape (times, wavelengths)."""
 
 
 @dataclass(frozen=True)

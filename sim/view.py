@@ -101,7 +101,7 @@ class View:
         return float(1 - self._simulation.anisotropy * (1 - np.cos(np.radians(tilt_deg))))
 
     def _passed(self, place: LvfPlace, turned: bool) -> FloatArray:
-        """Return the transmittance of the pieces of the strip there, shape (pieces, 160)."""
+        """Return the transmittance of the pieces of the strip there, (pieces, wavelengths)."""
         settings = self._simulation.lvf
         assert settings is not None
         assert self._lvf is not None

@@ -7,7 +7,7 @@ import pytest
 
 from labrig.errors import UsageError
 from labrig.sim.bench_settings import LedSettings
-from labrig.sim.lamp import BURNING_SPECTRUM, WAVELENGTH_NM, Lamp
+from labrig.sim.lamp import BURNING_LIGHT, WAVELENGTH_NM, Lamp
 from labrig.sim.lamps import FilteredLamps
 from labrig.sim.leds import Leds, led_spectrum
 from labrig.sim.mercury import Mercury
@@ -26,7 +26,7 @@ def test_a_band_has_its_middle_its_width_and_its_light(led: LedSettings) -> None
     assert np.average(WAVELENGTH_NM, weights=spectrum) == pytest.approx(led.centre, abs=0.1)
     half = WAVELENGTH_NM[spectrum > spectrum.max() / 2]
     assert half[-1] - half[0] == pytest.approx(led.fwhm, abs=2.6)
-    assert spectrum.sum() == pytest.approx(led.level * BURNING_SPECTRUM.sum())
+    assert spectrum.sum() == pytest.approx(led.level * BURNING_LIGHT)
 
 
 def test_light_is_there_from_switch_to_switch() -> None:

@@ -1,0 +1,86 @@
+"""What the samples do to light at once: reflect it, re-radiate it, and mirror a part of it.
+
+A fluorescent sample's matrix is known on the bands of an instrument. Between their centres the room
+takes it as bilinear, below the diagonal as 0.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from labrig.material import Material, ReradiationMatrix
+
+from .lamp import CELL_NM, WAVELENGTH_NM
+
+FloatArray = NDArray[np.float64]
+
+#: Reflectance of a sample of which only the glow is known.
+SAMPLE_REFLECTANCE = 0.5
+
+
+class Surfaces:
+    """The surfaces of all samples.
+
+    Parameters
+    ----------
+    materials
+        Material of every sample.
+    gloss
+        Fraction of the light that they mirror into the camera.
+    """
+
+    def __init__(self, materials: Sequence[Material | ReradiationMatrix], gloss: float) -> None:
+        self._gloss = gloss
+        self._reflectance = np.array([_reflectance(material) for material in materials])
+        self._reradiation = {
+            number: reradiation_on_grid(material)
+            for number, material in enumerate(materials, start=1)
+            if isinstance(material, ReradiationMatrix)
+        }
+
+    def thrown_back(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
+        """Return the light that comes back, as from a white of reflectance 1.
+
+        Parameters
+        ----------
+        light
+            Light on all cells, shape (wavelengths,), or on each, shape (cells, wavelengths).
+        patch
+            Sample of every cell, from 1 on; 0 is none, of which nothing comes back.
+
+        Returns
+        -------
+        ndarray
+            Shape (cells, wavelengths).
+        """
+        each = np.broadcast_to(light, (len(patch), light.shape[-1]))
+        nothing = np.zeros((1, light.shape[-1]))
+        reflectance = np.concatenate([nothing, self._reflectance + self._gloss])[patch]
+        back = reflectance * each
+        for number, matrix in self._reradiation.items():
+            cells = patch == number
+            back[cells] += each[cells] @ matrix.T
+        return np.maximum(back, 0.0)
+
+
+def reradiation_on_grid(matrix: ReradiationMatrix) -> FloatArray:
+    """Return re-radiated light in each cell of the grid per light in each, (out, in)."""
+    known = np.nan_to_num(np.where(matrix.is_stokes, matrix.reradiation, 0.0))
+    between = RegularGridInterpolator(
+        (matrix.output_nm, matrix.input_nm), known, bounds_error=False, fill_value=0.0
+    )
+    per_nm = between(tuple(np.meshgrid(WAVELENGTH_NM, WAVELENGTH_NM, indexing="ij")))
+    is_stokes = WAVELENGTH_NM[:, np.newaxis] > WAVELENGTH_NM
+    return np.asarray(np.where(is_stokes, CELL_NM * per_nm, 0.0))
+
+
+def _reflectance(material: Material | ReradiationMatrix) -> FloatArray:
+    if isinstance(material, Material):
+        return np.full_like(WAVELENGTH_NM, SAMPLE_REFLECTANCE)
+    measured = ~np.isnan(material.reflectance)
+    if not measured.any():
+        return np.zeros_like(WAVELENGTH_NM)
+    curve = np.interp(WAVELENGTH_NM, material.output_nm[measured], material.reflectance[measured])
+    return np.maximum(curve, 0.0)
