@@ -1,0 +1,321 @@
+"""Figures of a mixture beside the re-radiation matrix for which it stands."""
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labrig.fit import FloatArray, MixtureFit
+from labrig.material import ReradiationMatrix
+from labrig.report.chart import (
+    Axis,
+    Chart,
+    ErrorBars,
+    Line,
+    Margins,
+    Mark,
+    Panel,
+    Points,
+    linear_axis,
+    logarithmic_axis,
+)
+from labrig.report.figure_style import (
+    DASHED,
+    INK,
+    LEFT_PT,
+    MUTED,
+    OTHER_CHANNELS,
+    PAPER,
+    RULE,
+    SHADE,
+)
+from labrig.report.heat_map import BAND_NM, draw_heat, largest, shown_values
+from labrig.report.mixture import FittedMatrix
+from labrig.report.reradiation_spectra import (
+    MatrixSpectrum,
+    emission_spectra,
+    excitation_spectra,
+    limits,
+    spectra_chart,
+)
+from labrig.report.sections import Picture
+
+# matplotlib is slow to load.
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INCIDENT, RETURNING = "Incident wavelength / nm", "Returning wavelength / nm"
+HEAT_HEIGHT_PT, HEIGHT_PT = 330.0, 256.0
+#: Room for the colour bar on the right, and its width.
+BAR_ROOM_PT, BAR_PT = 74.0, 11.0
+#: End of the scale of differences, of the strongest re-radiation.
+APART = 0.25
+#: Unit of the error's axis, per band².
+MSE_UNIT = 1e-6
+ELLIPSE_POINTS = 73
+#: Points of a curve of a density.
+CURVE_POINTS = 401
+
+
+def matrix_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
+    """Return the pictures of the matrix, the mixture, their difference and their columns' sums."""
+    matrix = fitted.matrix
+    measured, mixed = shown_values(matrix), shown_values(fitted.model)
+    top = max(largest(measured), largest(mixed), 1e-12)
+    apart = APART * top
+    draw = partial(_heat_figure, matrix)
+    return (
+        Picture(
+            "measured",
+            partial(draw, measured, (0.0, top), "magma_r", None),
+            f"Measured re-radiation per {BAND_NM:g} nm.",
+        ),
+        Picture(
+            "mixture",
+            partial(draw, mixed, (0.0, top), "magma_r", fitted.fit),
+            f"The mixture, per {BAND_NM:g} nm. Ellipses: 1 σ of each component.",
+        ),
+        Picture(
+            "difference",
+            partial(draw, measured - mixed, (-apart, apart), "RdBu_r", fitted.fit),
+            f"Measured less mixture; the scale ends at {100 * APART:g} % of the strongest "
+            "re-radiation. A stripe along the diagonal is light that spills past both "
+            "monochromators, unless that was corrected.",
+        ),
+        Picture(
+            "fraction",
+            _fraction_chart(fitted),
+            "Fraction of the light of each wavelength that is re-radiated"
+            + _sigma_text(fitted.matrix, "; bars: 1 σ")
+            + ".",
+        ),
+    )
+
+
+def spectra_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
+    """Return the pictures of emission and excitation spectra, and of a density of each."""
+    matrix, model = fitted.matrix, fitted.model
+    bars = _sigma_text(matrix, "; bars: 1 σ")
+    pictures = []
+    for name, of, given, spectra, x_label in (
+        ("emission", "Emission spectra", "incident", emission_spectra(matrix, model), RETURNING),
+        (
+            "excitation",
+            "Excitation spectra",
+            "returning",
+            excitation_spectra(matrix, model),
+            INCIDENT,
+        ),
+    ):
+        if not spectra:
+            continue
+        pictures += [
+            Picture(
+                name,
+                spectra_chart(spectra, x_label),
+                f"{of} at the {given} wavelengths in the legend: measured (points{bars}), and of "
+                "the mixture (lines).",
+            ),
+            _density_picture(fitted, name, spectra, x_label),
+        ]
+    return tuple(pictures)
+
+
+def error_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
+    """Return the pictures of error and criterion against the number of components."""
+    fit = fitted.fit
+    numbers = np.array([tried.components for tried in fit.candidates], dtype=np.float64)
+    if len(numbers) < 2:
+        return ()
+    mse = np.array([tried.masked_mse for tried in fit.candidates]) / MSE_UNIT
+    bic = np.array([tried.bic for tried in fit.candidates])
+    noise = noise_floor(fitted.matrix)
+    about_noise = (
+        ""
+        if noise is None
+        else " Dashed: mean σ² of the measured numbers, of which those below the threshold are "
+        "taken as 0."
+    )
+    return (
+        Picture(
+            "error",
+            _error_chart(numbers, mse, fit, noise),
+            "Mean squared error per band² by the number of components, its scale that of least "
+            "error." + about_noise,
+        ),
+        Picture(
+            "bic",
+            _number_chart(numbers, bic, fit.components, "Bayesian information criterion"),
+            "Bayesian information criterion: the least is best.",
+        ),
+    )
+
+
+def noise_floor(matrix: ReradiationMatrix) -> float | None:
+    """Return the mean σ² per band of the entries on the Stokes side; None if it is not known."""
+    if matrix.reradiation_sigma is None:
+        return None
+    sigma = (matrix.reradiation_sigma * matrix.output_width_nm[:, np.newaxis])[matrix.is_stokes]
+    known = sigma[np.isfinite(sigma)]
+    return float(np.mean(known**2)) if known.any() else None
+
+
+def _sigma_text(matrix: ReradiationMatrix, text: str) -> str:
+    return "" if matrix.reradiation_sigma is None else text
+
+
+def _heat_figure(
+    matrix: ReradiationMatrix,
+    values: FloatArray,
+    ends: tuple[float, float],
+    colours: str,
+    fit: MixtureFit | None,
+) -> "Figure":
+    """Draw values (n, m) on the bands of a matrix, with ellipses of a fit's components."""
+    from labrig.report.figure_style import new_figure, place
+
+    figure = new_figure(HEAT_HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=BAR_ROOM_PT, top=12)
+    axes.grid(visible=False)
+    axes.set_facecolor(SHADE)
+    mesh = draw_heat(axes, matrix, values, ends, colours)
+    axes.set(xlim=matrix.input_edges_nm[[0, -1]], ylim=matrix.output_edges_nm[[0, -1]])
+    axes.set(xlabel=INCIDENT, ylabel=RETURNING)
+    if fit is not None:
+        _draw_ellipses(axes, fit)
+    bar_left = figure.get_figwidth() * 72 - BAR_ROOM_PT + 8
+    beside = place(figure, left=bar_left, bottom=38, right=BAR_ROOM_PT - 8 - BAR_PT, top=12)
+    bar = figure.colorbar(mesh, cax=beside)
+    bar.outline.set_visible(False)
+    beside.grid(visible=False)
+    return figure
+
+
+def _draw_ellipses(axes: "Axes", fit: MixtureFit) -> None:
+    """Draw the ellipse of 1 σ of each component."""
+    angle = np.linspace(0, 2 * np.pi, ELLIPSE_POINTS)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    for mean, covariance in zip(fit.mixture.mean_nm, fit.mixture.covariance_nm2, strict=True):
+        ellipse = mean[:, np.newaxis] + np.linalg.cholesky(covariance) @ circle
+        # A dark line in a light one is seen on any colour.
+        axes.plot(*ellipse, color=PAPER, linewidth=2.4)
+        axes.plot(*ellipse, color=INK, linewidth=1.0)
+
+
+def _fraction_chart(fitted: FittedMatrix) -> Chart:
+    """Return the chart of the fraction that is re-radiated, of each incident wavelength."""
+    matrix, nm = fitted.matrix, fitted.matrix.input_nm
+    fraction, sigma = matrix.reradiated_fraction, matrix.reradiated_fraction_sigma
+    modelled = fitted.model.reradiated_fraction
+    left, right = matrix.input_edges_nm[[0, -1]].tolist()
+    marks: list[Mark] = [Line(RULE, np.array([left, right]), np.zeros(2))]
+    if sigma is not None:
+        marks.append(ErrorBars(INK, nm, fraction, sigma))
+    points, line = Points(INK, nm, fraction, size_pt=2.8), Line(OTHER_CHANNELS[3], nm, modelled)
+    panel = Panel(
+        linear_axis(INCIDENT, left, right),
+        linear_axis("Fraction re-radiated", *limits(fraction, modelled)),
+        (*marks, points, line),
+    )
+    legend = (("measured", points), ("mixture", line))
+    return Chart((panel,), HEAT_HEIGHT_PT, legend=legend)
+
+
+def _density_picture(
+    fitted: FittedMatrix, name: str, spectra: list[MatrixSpectrum], x_label: str
+) -> Picture:
+    """Return the picture of the density of one wavelength, given the other."""
+    strongest = max(spectra, key=lambda spectrum: float(spectrum.value.sum()))
+    mixture, nm = fitted.fit.mixture, strongest.wavelength_nm
+    is_emission = name == "emission"
+    conditional = mixture.output_given_input if is_emission else mixture.input_given_output
+    matrix = fitted.matrix
+    grid_nm, width_nm = (
+        (matrix.output_nm, matrix.output_width_nm)
+        if is_emission
+        else (matrix.input_nm, matrix.input_width_nm)
+    )
+    light = float(strongest.value @ width_nm[np.isin(grid_nm, nm)])
+    density = strongest.value / light
+    edges_nm = matrix.output_edges_nm if is_emission else matrix.input_edges_nm
+    left, right = float(edges_nm[0]), float(edges_nm[-1])
+    curve_nm = np.linspace(left, right, CURVE_POINTS)
+    curve = conditional.pdf(curve_nm, strongest.given_nm)
+    marks: list[Mark] = [Line(RULE, np.array([left, right]), np.zeros(2))]
+    if strongest.sigma is not None:
+        marks.append(ErrorBars(INK, nm, density, strongest.sigma / light))
+    points, line = Points(INK, nm, density, size_pt=2.8), Line(OTHER_CHANNELS[3], curve_nm, curve)
+    panel = Panel(
+        linear_axis(x_label, left, right),
+        linear_axis("Density / nm⁻¹", *limits(density, curve)),
+        (*marks, points, line),
+        Margins(top=46.0),
+    )
+    given, other = ("incident", "returning") if is_emission else ("returning", "incident")
+    return Picture(
+        f"{name}-density",
+        Chart((panel,), 280.0, legend=(("measured, integral 1", points), ("mixture", line))),
+        f"Probability density of the {other} wavelength, given the {given} one of "
+        f"{strongest.given_nm:g} nm, from which wavelengths are drawn.",
+    )
+
+
+def _error_chart(
+    numbers: FloatArray, mse: FloatArray, fit: MixtureFit, noise: float | None
+) -> Chart:
+    """Return the chart of the error against the number of components."""
+    marks, legend = _number_marks(numbers, mse, fit.components)
+    before = Points(
+        OTHER_CHANNELS[3],
+        np.array([float(fit.components)]),
+        np.array([fit.likelihood_mse / MSE_UNIT]),
+        marker="D",
+        size_pt=5.0,
+    )
+    marks += (before,)
+    legend += (("expectation maximisation alone", before),)
+    every = [*mse.tolist(), fit.likelihood_mse / MSE_UNIT]
+    ends = numbers[0] - 0.5, numbers[-1] + 0.5
+    if noise is not None:
+        line = Line(MUTED, np.array(ends), np.full(2, noise / MSE_UNIT), style=DASHED)
+        marks, legend = (line, *marks), (*legend, ("noise", line))
+        every.append(noise / MSE_UNIT)
+    positive = [value for value in every if value > 0] or [1.0]
+    panel = Panel(
+        _number_axis(*ends),
+        logarithmic_axis("Mean squared error / 10⁻⁶", min(positive) / 1.6, max(positive) * 1.6),
+        marks,
+        Margins(top=46.0),
+    )
+    return Chart((panel,), HEIGHT_PT, legend=legend, columns=2)
+
+
+def _number_chart(numbers: FloatArray, values: FloatArray, chosen: int, label: str) -> Chart:
+    """Return the chart of a criterion against the number of components."""
+    marks, legend = _number_marks(numbers, values, chosen)
+    low, high = float(values.min()), float(values.max())
+    room = 0.1 * (high - low) or 1.0
+    axis = _number_axis(numbers[0] - 0.5, numbers[-1] + 0.5)
+    panel = Panel(
+        axis, linear_axis(label, low - room, high + room, most=6), marks, Margins(top=46.0)
+    )
+    return Chart((panel,), HEIGHT_PT, legend=legend)
+
+
+def _number_axis(low: float, high: float) -> Axis:
+    ticks = tuple(
+        (float(number), str(number)) for number in range(round(low + 0.5), round(high + 0.5))
+    )
+    return Axis("Number of components", low, high, ticks)
+
+
+def _number_marks(
+    numbers: FloatArray, values: FloatArray, chosen: int
+) -> tuple[tuple[Mark, ...], tuple[tuple[str, Mark], ...]]:
+    """Return marks and legend of values by the number of components, the chosen one filled."""
+    is_chosen = numbers == chosen
+    line = Line(INK, numbers, values, width_pt=0.8)
+    others = Points(INK, numbers[~is_chosen], values[~is_chosen], face=PAPER, size_pt=5.0)
+    this = Points(INK, numbers[is_chosen], values[is_chosen], size_pt=5.0)
+    return (line, others, this), (("tried", others), ("taken", this))
