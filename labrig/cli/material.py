@@ -109,15 +109,15 @@ def apply(
     from labrig.optics import read_light
 
     matrix = checked(file, read_matrix(file, entry, pixel), corrected)
-    seen = matrix.under(read_light(light))
+    returned = matrix.under(read_light(light))
     columns = {
-        "wavelength_nm": seen.total.wavelength_nm,
-        "reflected": seen.reflected.value,
-        "reradiated": seen.reradiated.value,
-        "total": seen.total.value,
+        "wavelength_nm": returned.total.wavelength_nm,
+        "reflected": returned.reflected.value,
+        "reradiated": returned.reradiated.value,
+        "total": returned.total.value,
     }
-    if seen.total.sigma is not None:
-        columns["total_sigma"] = seen.total.sigma
+    if returned.total.sigma is not None:
+        columns["total_sigma"] = returned.total.sigma
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
     _write_lines(lines, out)
