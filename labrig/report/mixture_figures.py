@@ -1,5 +1,6 @@
 """Figures of a mixture beside the re-radiation matrix for which it stands."""
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from labrig.fit import FloatArray, MixtureFit
 from labrig.material import ReradiationMatrix
+from labrig.number_format import power_of_ten
 from labrig.report.chart import (
     Axis,
     Chart,
@@ -51,8 +53,8 @@ HEAT_HEIGHT_PT, HEIGHT_PT = 330.0, 256.0
 BAR_ROOM_PT, BAR_PT = 74.0, 11.0
 #: End of the scale of differences, of the strongest re-radiation.
 APART = 0.25
-#: Unit of the error's axis, per band².
-MSE_UNIT = 1e-6
+#: Least error on a logarithmic axis.
+LEAST_MSE = 1e-15
 ELLIPSE_POINTS = 73
 #: Points of a curve of a density.
 CURVE_POINTS = 401
@@ -86,8 +88,8 @@ def matrix_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
         Picture(
             "fraction",
             _fraction_chart(fitted),
-            "Fraction of the light of each wavelength that is re-radiated"
-            + _sigma_text(fitted.matrix, "; bars: 1 σ")
+            f"{_fraction_text(matrix)} by incident wavelength"
+            + _sigma_text(matrix, "; bars: 1 σ")
             + ".",
         ),
     )
@@ -128,7 +130,7 @@ def error_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
     numbers = np.array([tried.components for tried in fit.candidates], dtype=np.float64)
     if len(numbers) < 2:
         return ()
-    mse = np.array([tried.masked_mse for tried in fit.candidates]) / MSE_UNIT
+    mse = np.array([tried.masked_mse for tried in fit.candidates])
     bic = np.array([tried.bic for tried in fit.candidates])
     noise = noise_floor(fitted.matrix)
     about_noise = (
@@ -215,11 +217,15 @@ def _fraction_chart(fitted: FittedMatrix) -> Chart:
     points, line = Points(INK, nm, fraction, size_pt=2.8), Line(OTHER_CHANNELS[3], nm, modelled)
     panel = Panel(
         linear_axis(INCIDENT, left, right),
-        linear_axis("Fraction re-radiated", *limits(fraction, modelled)),
+        linear_axis(_fraction_text(matrix), *limits(fraction, modelled)),
         (*marks, points, line),
     )
     legend = (("measured", points), ("mixture", line))
     return Chart((panel,), HEAT_HEIGHT_PT, legend=legend)
+
+
+def _fraction_text(matrix: ReradiationMatrix) -> str:
+    return "Fraction re-radiated" if matrix.unit == "1/nm" else "Re-radiated light, relative"
 
 
 def _density_picture(
@@ -265,26 +271,28 @@ def _error_chart(
     numbers: FloatArray, mse: FloatArray, fit: MixtureFit, noise: float | None
 ) -> Chart:
     """Return the chart of the error against the number of components."""
-    marks, legend = _number_marks(numbers, mse, fit.components)
+    exponent = math.floor(math.log10(max(float(mse.min()), LEAST_MSE)))
+    unit = 10.0**exponent
+    marks, legend = _number_marks(numbers, mse / unit, fit.components)
     before = Points(
         OTHER_CHANNELS[3],
         np.array([float(fit.components)]),
-        np.array([fit.likelihood_mse / MSE_UNIT]),
+        np.array([fit.likelihood_mse / unit]),
         marker="D",
         size_pt=5.0,
     )
     marks += (before,)
     legend += (("expectation maximisation alone", before),)
-    every = [*mse.tolist(), fit.likelihood_mse / MSE_UNIT]
+    every = [*mse.tolist(), fit.likelihood_mse]
     ends = numbers[0] - 0.5, numbers[-1] + 0.5
     if noise is not None:
-        line = Line(MUTED, np.array(ends), np.full(2, noise / MSE_UNIT), style=DASHED)
+        line = Line(MUTED, np.array(ends), np.full(2, noise / unit), style=DASHED)
         marks, legend = (line, *marks), (*legend, ("noise", line))
-        every.append(noise / MSE_UNIT)
-    positive = [value for value in every if value > 0] or [1.0]
+        every.append(noise)
+    low, high = max(min(every), LEAST_MSE) / unit, max(*every, LEAST_MSE) / unit
     panel = Panel(
         _number_axis(*ends),
-        logarithmic_axis("Mean squared error / 10⁻⁶", min(positive) / 1.6, max(positive) * 1.6),
+        logarithmic_axis(f"Mean squared error / {power_of_ten(exponent)}", low / 1.6, high * 1.6),
         marks,
         Margins(top=46.0),
     )

@@ -120,7 +120,9 @@ def test_numbers_of_components_are_compared(fitted: FittedMatrix) -> None:
     assert len(part.tables[0].rows) == len(fitted.fit.candidates) > 1
     (panel,) = chart(part, "error").panels
     noise = next(mark for mark in panel.marks if isinstance(mark, Line))
-    assert noise.y.tolist() == pytest.approx([1e6 * (noise_floor(fitted.matrix) or 0.0)] * 2)
+    assert "10⁻" in panel.y.label
+    unit = 10.0 ** -int(panel.y.label[-1].translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")))
+    assert noise.y.tolist() == pytest.approx([(noise_floor(fitted.matrix) or 0.0) / unit] * 2)
     alone = FittedMatrix(fitted.matrix, fit_mixture(fitted.matrix, 1), LIGHTS)
     part = section(alone, "Number of components")
     assert not part.figures
