@@ -1,6 +1,7 @@
 """`labrig fit`: fits of data from any source."""
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -160,6 +161,10 @@ def mixture(
         return
     from labrig.process import report_mixture
 
+    if number != "auto":
+        # The page compares the number that was asked for with those that "auto" would try.
+        compared = fit_mixture(matrix, "auto", scale, threshold)  # type: ignore[arg-type]
+        fitted = replace(fitted, others=compared.candidates)
     options = {
         "--components": components,
         "--scale": scale,

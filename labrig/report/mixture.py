@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from labrig.fit import MixtureFit
+from labrig.fit import MixtureCandidate, MixtureFit
 from labrig.material import (
     REFERENCE_Y,
     ColourDifference,
@@ -33,11 +33,20 @@ class FittedMatrix:
         The fitted mixture.
     lights
         Irradiances per nm; their colours are of no use if the re-radiation is relative.
+    others
+        Fits with other numbers of components, beside those that the fit itself compared.
     """
 
     matrix: ReradiationMatrix
     fit: MixtureFit
     lights: tuple[Spectrum, ...] = ()
+    others: tuple[MixtureCandidate, ...] = ()
+
+    @property
+    def candidates(self) -> tuple[MixtureCandidate, ...]:
+        """All fits by their number of components, the fit's own where there are two."""
+        by_number = {tried.components: tried for tried in (*self.others, *self.fit.candidates)}
+        return tuple(by_number[number] for number in sorted(by_number))
 
     @cached_property
     def model(self) -> ReradiationMatrix:

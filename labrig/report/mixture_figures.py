@@ -126,12 +126,12 @@ def spectra_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
 
 def error_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
     """Return the pictures of error and criterion against the number of components."""
-    fit = fitted.fit
-    numbers = np.array([tried.components for tried in fit.candidates], dtype=np.float64)
+    fit, candidates = fitted.fit, fitted.candidates
+    numbers = np.array([tried.components for tried in candidates], dtype=np.float64)
     if len(numbers) < 2:
         return ()
-    mse = np.array([tried.masked_mse for tried in fit.candidates])
-    bic = np.array([tried.bic for tried in fit.candidates])
+    mse = np.array([tried.masked_mse for tried in candidates])
+    bic = np.array([tried.bic for tried in candidates])
     noise = noise_floor(fitted.matrix)
     about_noise = (
         ""

@@ -168,9 +168,7 @@ def _spectra(fitted: FittedMatrix) -> Section:
 
 def _numbers(fitted: FittedMatrix) -> Section:
     fit = fitted.fit
-    text = [f"{components_text(fit).capitalize()}, {selection_text(fit)}."]
-    if len(fit.candidates) < 2:
-        text.append("No other number was tried; --components auto compares several.")
+    text = f"{components_text(fit).capitalize()}, {selection_text(fit)}."
     noise = noise_floor(fitted.matrix)
     caption = "MSE: mean squared error per band², with the scale that makes it least."
     if noise is not None:
@@ -179,11 +177,11 @@ def _numbers(fitted: FittedMatrix) -> Section:
         ("components", "MSE", "BIC"),
         tuple(
             (str(tried.components), rounded(tried.masked_mse, 3), rounded(tried.bic, 5))
-            for tried in fit.candidates
+            for tried in fitted.candidates
         ),
         caption,
     )
-    return Section("Number of components", tuple(text), error_pictures(fitted), (table,))
+    return Section("Number of components", (text,), error_pictures(fitted), (table,))
 
 
 def _methods(fitted: FittedMatrix) -> Section:

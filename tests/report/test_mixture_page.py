@@ -126,7 +126,12 @@ def test_numbers_of_components_are_compared(fitted: FittedMatrix) -> None:
     alone = FittedMatrix(fitted.matrix, fit_mixture(fitted.matrix, 1), LIGHTS)
     part = section(alone, "Number of components")
     assert not part.figures
-    assert "--components auto" in part.text[-1]
+    compared = replace(alone, others=fitted.fit.candidates)
+    assert compared.candidates[1:] == fitted.fit.candidates[1:]
+    assert compared.candidates[0] is alone.fit.candidates[0]
+    (panel,) = chart(section(compared, "Number of components"), "bic").panels
+    taken = [mark for mark in panel.marks if isinstance(mark, Points)][-1]
+    assert taken.x.tolist() == [1.0]
 
 
 def test_both_colours_of_a_light_are_on_one_scale(fitted: FittedMatrix) -> None:
