@@ -1,20 +1,20 @@
 """Figures of a mixture beside the re-radiation matrix for which it stands."""
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from labrig.fit import FloatArray, MixtureFit
-from labrig.material import ReradiationMatrix
+from labrig.material import ConditionalDensity, ReradiationMatrix
 from labrig.number_format import power_of_ten
 from labrig.report.chart import (
     Axis,
     Chart,
     ErrorBars,
     Line,
-    Margins,
     Mark,
     Panel,
     Points,
@@ -34,6 +34,8 @@ from labrig.report.figure_style import (
 from labrig.report.heat_map import BAND_NM, draw_heat, largest, shown_values
 from labrig.report.mixture import FittedMatrix
 from labrig.report.reradiation_spectra import (
+    LEGEND_MARGINS,
+    SPECTRA_HEIGHT_PT,
     MatrixSpectrum,
     emission_spectra,
     excitation_spectra,
@@ -89,7 +91,7 @@ def matrix_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
             "fraction",
             _fraction_chart(fitted),
             f"{_fraction_text(matrix)} by incident wavelength"
-            + _sigma_text(matrix, "; bars: 1 σ")
+            + ("" if matrix.reradiation_sigma is None else "; bars: 1 σ")
             + ".",
         ),
     )
@@ -97,31 +99,59 @@ def matrix_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
 
 def spectra_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
     """Return the pictures of emission and excitation spectra, and of a density of each."""
-    matrix, model = fitted.matrix, fitted.model
-    bars = _sigma_text(matrix, "; bars: 1 σ")
-    pictures = []
-    for name, of, given, spectra, x_label in (
-        ("emission", "Emission spectra", "incident", emission_spectra(matrix, model), RETURNING),
-        (
-            "excitation",
-            "Excitation spectra",
-            "returning",
-            excitation_spectra(matrix, model),
-            INCIDENT,
+    matrix, model, mixture = fitted.matrix, fitted.model, fitted.fit.mixture
+    directions = (
+        _Direction(
+            "emission",
+            ("incident", "returning"),
+            tuple(emission_spectra(matrix, model)),
+            matrix.output_edges_nm,
+            mixture.output_given_input,
         ),
-    ):
-        if not spectra:
-            continue
-        pictures += [
-            Picture(
-                name,
-                spectra_chart(spectra, x_label),
-                f"{of} at the {given} wavelengths in the legend: measured (points{bars}), and of "
-                "the mixture (lines).",
-            ),
-            _density_picture(fitted, name, spectra, x_label),
-        ]
-    return tuple(pictures)
+        _Direction(
+            "excitation",
+            ("returning", "incident"),
+            tuple(excitation_spectra(matrix, model)),
+            matrix.input_edges_nm,
+            mixture.input_given_output,
+        ),
+    )
+    return tuple(
+        picture
+        for direction in directions
+        if direction.spectra
+        for picture in (_spectra_picture(direction), _density_picture(direction))
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Direction:
+    """Spectra over one wavelength, given the other.
+
+    Attributes
+    ----------
+    name
+        Of the spectra.
+    wavelengths
+        Names of the given wavelength and of the other.
+    spectra
+        Columns or rows of the matrix.
+    edges_nm
+        Edges of the bands of the other wavelength.
+    conditional
+        Density of the other wavelength.
+    """
+
+    name: str
+    wavelengths: tuple[str, str]
+    spectra: tuple[MatrixSpectrum, ...]
+    edges_nm: FloatArray
+    conditional: ConditionalDensity
+
+    @property
+    def label(self) -> str:
+        """Label of the axis of the other wavelength."""
+        return f"{self.wavelengths[1].capitalize()} wavelength / nm"
 
 
 def error_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
@@ -161,10 +191,6 @@ def noise_floor(matrix: ReradiationMatrix) -> float | None:
     sigma = (matrix.reradiation_sigma * matrix.output_width_nm[:, np.newaxis])[matrix.is_stokes]
     known = sigma[np.isfinite(sigma)]
     return float(np.mean(known**2)) if known.any() else None
-
-
-def _sigma_text(matrix: ReradiationMatrix, text: str) -> str:
-    return "" if matrix.reradiation_sigma is None else text
 
 
 def _heat_figure(
@@ -228,40 +254,40 @@ def _fraction_text(matrix: ReradiationMatrix) -> str:
     return "Fraction re-radiated" if matrix.unit == "1/nm" else "Re-radiated light, relative"
 
 
-def _density_picture(
-    fitted: FittedMatrix, name: str, spectra: list[MatrixSpectrum], x_label: str
-) -> Picture:
-    """Return the picture of the density of one wavelength, given the other."""
-    strongest = max(spectra, key=lambda spectrum: float(spectrum.value.sum()))
-    mixture, nm = fitted.fit.mixture, strongest.wavelength_nm
-    is_emission = name == "emission"
-    conditional = mixture.output_given_input if is_emission else mixture.input_given_output
-    matrix = fitted.matrix
-    grid_nm, width_nm = (
-        (matrix.output_nm, matrix.output_width_nm)
-        if is_emission
-        else (matrix.input_nm, matrix.input_width_nm)
+def _spectra_picture(direction: _Direction) -> Picture:
+    """Return the picture of several spectra, measured and of the mixture."""
+    bars = "" if direction.spectra[0].sigma is None else "; bars: 1 σ"
+    return Picture(
+        direction.name,
+        spectra_chart(direction.spectra, direction.label),
+        f"{direction.name.capitalize()} spectra at the {direction.wavelengths[0]} wavelengths in "
+        f"the legend: measured (points{bars}), and of the mixture (lines).",
     )
-    light = float(strongest.value @ width_nm[np.isin(grid_nm, nm)])
+
+
+def _density_picture(direction: _Direction) -> Picture:
+    """Return the picture of the density of one wavelength, given the other."""
+    given, other = direction.wavelengths
+    strongest = max(direction.spectra, key=lambda spectrum: float(spectrum.value.sum()))
+    nm, light = strongest.wavelength_nm, float(strongest.value @ strongest.width_nm)
     density = strongest.value / light
-    edges_nm = matrix.output_edges_nm if is_emission else matrix.input_edges_nm
-    left, right = float(edges_nm[0]), float(edges_nm[-1])
+    left, right = direction.edges_nm[[0, -1]].tolist()
     curve_nm = np.linspace(left, right, CURVE_POINTS)
-    curve = conditional.pdf(curve_nm, strongest.given_nm)
+    curve = direction.conditional.pdf(curve_nm, strongest.given_nm)
     marks: list[Mark] = [Line(RULE, np.array([left, right]), np.zeros(2))]
     if strongest.sigma is not None:
         marks.append(ErrorBars(INK, nm, density, strongest.sigma / light))
     points, line = Points(INK, nm, density, size_pt=2.8), Line(OTHER_CHANNELS[3], curve_nm, curve)
     panel = Panel(
-        linear_axis(x_label, left, right),
+        linear_axis(direction.label, left, right),
         linear_axis("Density / nm⁻¹", *limits(density, curve)),
         (*marks, points, line),
-        Margins(top=46.0),
+        LEGEND_MARGINS,
     )
-    given, other = ("incident", "returning") if is_emission else ("returning", "incident")
+    legend = (("measured, integral 1", points), ("mixture", line))
     return Picture(
-        f"{name}-density",
-        Chart((panel,), 280.0, legend=(("measured, integral 1", points), ("mixture", line))),
+        f"{direction.name}-density",
+        Chart((panel,), SPECTRA_HEIGHT_PT, legend=legend),
         f"Probability density of the {other} wavelength, given the {given} one of "
         f"{strongest.given_nm:g} nm, from which wavelengths are drawn.",
     )
@@ -294,7 +320,7 @@ def _error_chart(
         _number_axis(*ends),
         logarithmic_axis(f"Mean squared error / {power_of_ten(exponent)}", low / 1.6, high * 1.6),
         marks,
-        Margins(top=46.0),
+        LEGEND_MARGINS,
     )
     return Chart((panel,), HEIGHT_PT, legend=legend, columns=2)
 
@@ -305,9 +331,7 @@ def _number_chart(numbers: FloatArray, values: FloatArray, chosen: int, label: s
     low, high = float(values.min()), float(values.max())
     room = 0.1 * (high - low) or 1.0
     axis = _number_axis(numbers[0] - 0.5, numbers[-1] + 0.5)
-    panel = Panel(
-        axis, linear_axis(label, low - room, high + room, most=6), marks, Margins(top=46.0)
-    )
+    panel = Panel(axis, linear_axis(label, low - room, high + room, most=6), marks, LEGEND_MARGINS)
     return Chart((panel,), HEIGHT_PT, legend=legend)
 
 

@@ -28,10 +28,12 @@ BoolArray = NDArray[np.bool_]
 APART_NM = 40.0
 #: Part of the strongest spectrum below which none is drawn.
 WEAKEST = 0.05
-HEIGHT_PT = 280.0
+SPECTRA_HEIGHT_PT = 280.0
 #: Room above and below the values, of their range.
 ROOM = 0.05
 LEGEND_COLUMNS = 4
+#: Margins of axes below a legend of two rows.
+LEGEND_MARGINS = Margins(top=46.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ class MatrixSpectrum:
         Wavelength in nm of the column or of the row.
     wavelength_nm
         The others, rising: those on the Stokes side that were measured, shape (n,).
+    width_nm
+        Widths of their bands in nm, shape (n,).
     value
         Measured re-radiation, shape (n,).
     sigma
@@ -54,6 +58,7 @@ class MatrixSpectrum:
 
     given_nm: float
     wavelength_nm: FloatArray
+    width_nm: FloatArray
     value: FloatArray
     sigma: FloatArray | None
     model: FloatArray | None
@@ -63,10 +68,10 @@ def emission_spectra(
     matrix: ReradiationMatrix, model: ReradiationMatrix | None = None
 ) -> list[MatrixSpectrum]:
     """Return the columns of the strongest excitations, which are not neighbours."""
-    stokes = matrix.is_stokes
+    stokes, grid = matrix.is_stokes, (matrix.output_nm, matrix.output_width_nm)
     return [
-        _spectrum(matrix, model, np.s_[:, k], stokes[:, k], matrix.input_nm[k], matrix.output_nm)
-        for k in strongest_columns(matrix)
+        _spectrum(matrix, model, np.s_[:, k], stokes[:, k], matrix.input_nm[k], grid)
+        for k in _strongest(matrix.reradiated_fraction, matrix.input_nm)
     ]
 
 
@@ -74,20 +79,16 @@ def excitation_spectra(
     matrix: ReradiationMatrix, model: ReradiationMatrix | None = None
 ) -> list[MatrixSpectrum]:
     """Return the rows of the strongest emissions, which are not neighbours."""
-    stokes = matrix.is_stokes
+    stokes, grid = matrix.is_stokes, (matrix.input_nm, matrix.input_width_nm)
     light = np.where(stokes, np.nan_to_num(matrix.reradiation), 0.0) @ matrix.input_width_nm
     return [
-        _spectrum(matrix, model, np.s_[k], stokes[k], matrix.output_nm[k], matrix.input_nm)
+        _spectrum(matrix, model, np.s_[k], stokes[k], matrix.output_nm[k], grid)
         for k in _strongest(light, matrix.output_nm)
     ]
 
 
-def strongest_columns(matrix: ReradiationMatrix) -> list[int]:
-    """Return the columns of much re-radiation that are not neighbours, by wavelength."""
-    return _strongest(matrix.reradiated_fraction, matrix.input_nm)
-
-
 def _strongest(light: FloatArray, wavelength_nm: FloatArray) -> list[int]:
+    """Return the places of much light that are not neighbours, by wavelength."""
     chosen: list[int] = []
     for index in np.argsort(-light):
         is_far = all(abs(wavelength_nm[index] - wavelength_nm[k]) >= APART_NM for k in chosen)
@@ -102,13 +103,15 @@ def _spectrum(
     place: tuple[slice, int] | int,
     shown: BoolArray,
     given_nm: float,
-    wavelength_nm: FloatArray,
+    grid: tuple[FloatArray, FloatArray],
 ) -> MatrixSpectrum:
+    """Return a column or a row, with the wavelengths and widths in nm of the bands along it."""
     sigma = matrix.reradiation_sigma
     shown = shown & np.isfinite(matrix.reradiation[place])
     return MatrixSpectrum(
         float(given_nm),
-        wavelength_nm[shown],
+        grid[0][shown],
+        grid[1][shown],
         BAND_NM * matrix.reradiation[place][shown],
         None if sigma is None else BAND_NM * sigma[place][shown],
         None if model is None else BAND_NM * model.reradiation[place][shown],
@@ -147,14 +150,14 @@ def spectra_chart(spectra: Sequence[MatrixSpectrum], x_label: str) -> Chart:
         linear_axis(x_label, left, right),
         linear_axis(f"Re-radiation per {BAND_NM:g} nm", *limits(*values)),
         (zero, *(mark for _, mark in labelled)),
-        Margins(top=46.0),
+        LEGEND_MARGINS,
     )
     legend = (
         *((label, mark) for label, mark in labelled if label),
         ("measured", Points(MUTED)),
         ("mixture", Line(MUTED)),
     )
-    return Chart((panel,), HEIGHT_PT, legend=legend, columns=LEGEND_COLUMNS)
+    return Chart((panel,), SPECTRA_HEIGHT_PT, legend=legend, columns=LEGEND_COLUMNS)
 
 
 def limits(*values: FloatArray) -> tuple[float, float]:
