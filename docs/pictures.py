@@ -13,13 +13,16 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from filelock import FileLock
 from selenium.webdriver import Chrome
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from labrig.material import write_reradiation
 from tests.chromium import browser
+from tests.material.reradiation.synthetic import ORANGE, YELLOW, measurement
 
 LABRIG = (sys.executable, "-m", "labrig")
 PICTURES = Path(__file__).parent / "pictures"
@@ -40,6 +43,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch, browser(Path(scratch, "profile")) as chrome:
         page(chrome, (decay / "result/report.html").as_uri(), "report_decay", 2000)
         page(chrome, (phosphor / "result/report.html").as_uri(), "report_phosphor", 1500)
+        mixture(chrome, Path(scratch, "mixture"))
         half = half_done(decay, Path(scratch, "runs"))
         # A run whose folder is locked is under way.
         with FileLock(half / ".lock"), served("watch", str(half), "--no-browser") as address:
@@ -48,6 +52,16 @@ def main() -> None:
         subprocess.run([*LABRIG, "protocol", "new", "decay", str(protocol)], check=True)
         with served("rig", "view", "sim", "--protocol", str(protocol), "--no-browser") as address:
             page(chrome, address, "view", 900, SETTLE_S)
+
+
+def mixture(chrome: Chrome, folder: Path) -> None:
+    """Take a picture of the page of a mixture, of a made-up paper with two dyes."""
+    folder.mkdir()
+    paper = replace(measurement(21, YELLOW, ORANGE).measured, name="made-up paper")
+    write_reradiation(folder / "paper.csv", paper)
+    arguments = ("fit", "mixture", "paper.csv", "--corrected", "--out", ".")
+    subprocess.run([*LABRIG, *arguments], cwd=folder, check=True)
+    page(chrome, (folder / "report.html").as_uri(), "report_mixture", 1190)
 
 
 def page(chrome: Chrome, address: str, name: str, height: int, settle_s: float = 0.5) -> None:

@@ -1,5 +1,8 @@
 """`labrig fit`: fits of data from any source."""
 
+import shlex
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,10 +15,13 @@ from labrig.cli.matrices import (
     File,
     Lights,
     Pixel,
+    checked,
     read_matrix,
-    with_sigma,
 )
-from labrig.errors import UsageError
+from labrig.errors import DataError, UsageError
+
+#: Lights under which a mixture's colours are judged: near ultraviolet asks most of it.
+MIXTURE_LIGHTS = (*LIGHTS, "395nm")
 
 app = typer.Typer(help="Fit data from any source.")
 
@@ -136,7 +142,7 @@ def mixture(
     corrected: Corrected = False,
     light: Lights = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for fit.json and the figure.")
+        Path | None, typer.Option("--out", help="Folder for fit.json, the page and its figures.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print fit.json.")] = False,
 ) -> None:
@@ -145,42 +151,58 @@ def mixture(
     The colours of the mixture, with the measured reflectance, are compared with those of the
     matrix.
     """
-    import json
-
     from labrig.fit import fit_mixture
-    from labrig.material import compare_colours
     from labrig.optics import read_light
-    from labrig.report import describe_mixture, draw_mixture
+    from labrig.report import FittedMatrix, describe_mixture
 
     number = _components(components)
     _require_one_of("--scale", scale, ("integral", "least-squares", "colour"))
     _require_one_of("--select", select, ("bic", "cross-validation"))
     if out is not None:
         _require_folder(out)
-    lights = [read_light(name) for name in light or LIGHTS]
-    matrix = with_sigma(read_matrix(file, entry, pixel), corrected)
-    fit = fit_mixture(
+    names = light or MIXTURE_LIGHTS
+    lights = tuple(read_light(name) for name in names)
+    matrix = checked(file, read_matrix(file, entry, pixel), corrected)
+    fitting = partial(
+        fit_mixture,
         matrix,
-        number,
-        scale,  # type: ignore[arg-type]
-        threshold,
+        scaling=scale,  # type: ignore[arg-type]
+        threshold=threshold,
         selection=select,  # type: ignore[arg-type]
         skewed=skewed,
-        lights=lights,
+        lights=[read_light(name) for name in light or LIGHTS],
     )
-    smooth = fit.mixture.to_matrix(
-        matrix.input_nm, matrix.output_nm, reflectance=matrix.reflectance, name=matrix.name
-    )
-    colours = compare_colours(smooth, matrix, lights)
-    content = {**fit.to_dict(), "colours": [colour.to_dict() for colour in colours]}
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-    typer.echo(text if as_json else describe_mixture(matrix.name, fit, colours))
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "fit.json").write_text(text + "\n", encoding="utf-8")
-        draw_mixture(matrix, smooth, fit, out / "mixture.svg")
-        if not as_json:
-            typer.echo(f"written: {out / 'fit.json'}, {out / 'mixture.svg'}")
+    try:
+        fit = fitting(number)
+    except (UsageError, DataError) as error:
+        raise type(error)(f"{file}: {error}") from None
+    fitted = FittedMatrix(matrix, fit, lights)
+    typer.echo(fitted.to_json() if as_json else describe_mixture(fitted))
+    if out is None:
+        return
+    from labrig.process import report_mixture
+
+    if number != "auto":
+        # The page compares the number that was asked for with those that "auto" would try.
+        fitted = replace(fitted, others=fitting("auto").candidates)
+    options = {
+        "--components": components,
+        "--scale": scale,
+        "--select": select,
+        "--threshold": threshold,
+        "--entry": entry,
+        "--pixel": pixel,
+    }
+    command = ["labrig", "fit", "mixture", file]
+    for option, value in options.items():
+        command += [] if value is None else [option, f"{value}"]
+    command += ["--skewed"] if skewed else []
+    command += ["--corrected"] if corrected else []
+    for name in light or ():
+        command += ["--light", name]
+    report = report_mixture(Path(file), fitted, shlex.join(command), out)
+    if not as_json:
+        typer.echo(f"report: {report}")
 
 
 def _require_one_of(option: str, value: str, choices: tuple[str, ...]) -> None:

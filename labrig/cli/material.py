@@ -8,15 +8,15 @@ import typer
 
 from labrig.cli.matrices import (
     LIGHTS,
-    YAML,
     Corrected,
     Entry,
     File,
     Lights,
     Pixel,
+    checked,
     read_any,
+    read_fractions,
     read_matrix,
-    with_sigma,
 )
 
 app = typer.Typer(help="Materials: show, convert, light and compare them.", no_args_is_help=True)
@@ -34,7 +34,7 @@ def show(
     ] = None,
 ) -> None:
     """Show a material: its numbers, its colours, and a picture."""
-    from labrig.material import Material, physical_warnings
+    from labrig.material import Material
     from labrig.optics import read_light
     from labrig.report import (
         describe_phosphor,
@@ -50,9 +50,7 @@ def show(
             draw_phosphor(material, picture)
             typer.echo(f"drawn into {picture}")
         return
-    material = with_sigma(material, corrected)
-    for warning in physical_warnings(material):
-        typer.echo(f"warning: {warning}", err=True)
+    material = checked(file, material, corrected)
     lights = [read_light(name) for name in light or LIGHTS]
     typer.echo(describe_reradiation(material, lights))
     if picture is not None:
@@ -75,12 +73,13 @@ def convert(
     corrected: Corrected = False,
 ) -> None:
     """Write a re-radiation matrix in another format."""
-    from labrig.material import write_fluorescent, write_reradiation
+    from labrig.material import YAML, write_fluorescent, write_reradiation
 
     matrix = read_matrix(file, entry, pixel)
+    with_sigma = checked(file, matrix, corrected)
     if corrected:
-        matrix = with_sigma(matrix, corrected)
-    if out.suffix in YAML:
+        matrix = with_sigma
+    if out.suffix.lower() in YAML:
         write_fluorescent(out, matrix)
     else:
         write_reradiation(out, matrix)
@@ -109,16 +108,16 @@ def apply(
     """
     from labrig.optics import read_light
 
-    matrix = with_sigma(read_matrix(file, entry, pixel), corrected)
-    seen = matrix.under(read_light(light))
+    matrix = checked(file, read_matrix(file, entry, pixel), corrected)
+    returned = matrix.under(read_light(light))
     columns = {
-        "wavelength_nm": seen.total.wavelength_nm,
-        "reflected": seen.reflected.value,
-        "reradiated": seen.reradiated.value,
-        "total": seen.total.value,
+        "wavelength_nm": returned.total.wavelength_nm,
+        "reflected": returned.reflected.value,
+        "reradiated": returned.reradiated.value,
+        "total": returned.total.value,
     }
-    if seen.total.sigma is not None:
-        columns["total_sigma"] = seen.total.sigma
+    if returned.total.sigma is not None:
+        columns["total_sigma"] = returned.total.sigma
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
     _write_lines(lines, out)
@@ -142,10 +141,11 @@ def compare(
     from labrig.optics import read_light
     from labrig.report import difference_lines
 
-    ours, theirs = (with_sigma(read_matrix(path), corrected) for path in (file, reference))
-    differences = compare_colours(ours, theirs, [read_light(name) for name in light or LIGHTS])
+    lights = [read_light(name) for name in light or LIGHTS]
+    ours, theirs = (checked(path, read_fractions(path), corrected) for path in (file, reference))
+    differences = compare_colours(ours, theirs, lights)
     if as_json:
-        rows = [one.to_dict() for one in differences]
+        rows = [difference.to_dict() for difference in differences]
         typer.echo(json.dumps(rows, indent=1))
         return
     for line in difference_lines(differences):
@@ -164,21 +164,18 @@ def list_materials(
     Files that cannot be used are named with the reason, and left out.
     """
     from labrig.errors import DataError, UsageError
-    from labrig.material import matrix_files, physical_warnings, read_reradiation
+    from labrig.material import matrix_files
     from labrig.optics import read_light
     from labrig.report import draw_contact_sheet, reradiation_text
 
     matrices = []
     for path in matrix_files(folder):
         try:
-            matrix = with_sigma(read_reradiation(path), corrected=False)
-            remarks = physical_warnings(matrix)
+            matrix = checked(path.name, read_matrix(str(path)), is_corrected=False)
         except (UsageError, DataError) as error:
             typer.echo(f"left out: {error}", err=True)
             continue
         matrices.append(matrix)
-        for remark in remarks:
-            typer.echo(f"warning: {remark}", err=True)
         typer.echo(f"{path.name:20} {matrix.name:32} {reradiation_text(matrix)}")
     if not matrices:
         raise UsageError(f"{folder}: expected files of re-radiation matrices, got none of use")
@@ -188,7 +185,7 @@ def list_materials(
 
 
 def _write_lines(lines: list[str], out: Path | None) -> None:
-    from labrig.errors import UsageError
+    from labrig.errors import DiskError
 
     if out is None:
         for line in lines:
@@ -197,5 +194,5 @@ def _write_lines(lines: list[str], out: Path | None) -> None:
     try:
         out.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
-        raise UsageError(f"{out}: cannot be written ({error.strerror})") from None
+        raise DiskError(f"{out}: cannot be written ({error.strerror})") from None
     typer.echo(f"written: {out}")

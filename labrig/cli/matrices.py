@@ -1,6 +1,5 @@
 """Options of commands that read re-radiation matrices, and the reading itself."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,7 +9,6 @@ if TYPE_CHECKING:
 
 #: Lights under which colours are described unless others are asked for.
 LIGHTS = ("D65", "A", "450nm")
-YAML = (".yaml", ".yml")
 
 File = Annotated[
     str,
@@ -43,20 +41,9 @@ Lights = Annotated[
 
 def read_any(file: str, entry: str | None, pixel: str | None) -> "Material | ReradiationMatrix":
     """Read a phosphor or a fluorescent material from any of its files."""
-    from labrig import resources
-    from labrig.errors import UsageError
-    from labrig.material import read_fluorescent, read_material, read_reradiation
-    from labrig.yaml_file import read_yaml
+    from labrig.material import read_any_material
 
-    path = Path(file)
-    if path.suffix and path.suffix.lower() not in YAML:
-        return read_reradiation(path, entry, pixel=_pixel(pixel))
-    for option, value in (("--entry", entry), ("--pixel", pixel)):
-        if value is not None:
-            raise UsageError(f"{option}: expected a file of matrices, got a material file")
-    found = resources.find("config/materials", "material", file)
-    is_fluorescent = read_yaml(found).get("kind") == "fluorescent"
-    return read_fluorescent(found) if is_fluorescent else read_material(found)
+    return read_any_material(file, entry, pixel=_pixel(pixel))
 
 
 def read_matrix(
@@ -72,6 +59,19 @@ def read_matrix(
     return material
 
 
+def read_fractions(file: str) -> "ReradiationMatrix":
+    """Read a fluorescent material in absolute units: a relative one has no colours."""
+    from labrig.errors import UsageError
+
+    matrix = read_matrix(file)
+    if matrix.unit == "relative":
+        raise UsageError(
+            f"{file}: expected fractions of the incident light, got relative re-radiation; give a "
+            "matrix in absolute units"
+        )
+    return matrix
+
+
 def _pixel(text: str | None) -> tuple[int, int] | None:
     from labrig.errors import UsageError
 
@@ -83,16 +83,37 @@ def _pixel(text: str | None) -> tuple[int, int] | None:
     return int(parts[0]), int(parts[1])
 
 
-def with_sigma(matrix: "ReradiationMatrix", corrected: bool) -> "ReradiationMatrix":
-    """Return the matrix with σ as far as it tells it, and corrected if that is asked for."""
-    from labrig import material
-    from labrig.errors import DataError
+def checked(file: str, matrix: "ReradiationMatrix", is_corrected: bool) -> "ReradiationMatrix":
+    """Return a matrix with σ as far as it tells it, and corrected if that is asked for.
 
-    if corrected:
-        return material.corrected(matrix)
+    What no surface can do, beyond that σ, is refused, and what few can is told on standard error.
+    """
+    from labrig.errors import DataError
+    from labrig.material import physical_warnings
+
+    try:
+        matrix = _corrected(matrix) if is_corrected else _with_sigma(matrix)
+        warnings = physical_warnings(matrix)
+    except DataError as error:
+        raise DataError(f"{file}: {error}") from None
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    return matrix
+
+
+def _corrected(matrix: "ReradiationMatrix") -> "ReradiationMatrix":
+    from labrig.material import corrected
+
+    return corrected(matrix)
+
+
+def _with_sigma(matrix: "ReradiationMatrix") -> "ReradiationMatrix":
+    from labrig.errors import DataError
+    from labrig.material import with_sigma
+
     if matrix.reradiation_sigma is not None or matrix.unit == "relative":
         return matrix
     try:
-        return material.with_sigma(matrix)
+        return with_sigma(matrix)
     except DataError:
         return matrix  # without its anti-Stokes side, or made by a computer

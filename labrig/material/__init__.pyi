@@ -1,3 +1,7 @@
+from .any_material import (
+    YAML as YAML,
+    read_any_material as read_any_material,
+)
 from .comparison import (
     MaterialComparison as MaterialComparison,
     Pair as Pair,
@@ -25,8 +29,10 @@ from .rates import (
     relaxation_with_slopes as relaxation_with_slopes,
 )
 from .reradiation import (
+    REFERENCE_Y as REFERENCE_Y,
     Appearance as Appearance,
     ColourDifference as ColourDifference,
+    ColourPair as ColourPair,
     ConditionalDensity as ConditionalDensity,
     InstrumentNoise as InstrumentNoise,
     ReradiationMatrix as ReradiationMatrix,
@@ -34,6 +40,7 @@ from .reradiation import (
     SeenSpectrum as SeenSpectrum,
     SpectralImage as SpectralImage,
     appearance as appearance,
+    colour_pair as colour_pair,
     compare_colours as compare_colours,
     corrected as corrected,
     instrument_noise as instrument_noise,

@@ -67,7 +67,12 @@ def read_fluorescent(path: str | os.PathLike[str]) -> ReradiationMatrix:
     """
     path = Path(path)
     material = read_model(path, FluorescentMaterial)
-    return replace(read_reradiation(path.parent / material.matrix), name=material.name)
+    beside = path.parent / material.matrix
+    if not beside.is_file():
+        raise UsageError(
+            f"{path}: expected its matrix in the file {beside}, got no such file; put it there"
+        )
+    return replace(read_reradiation(beside), name=material.name)
 
 
 def write_fluorescent(

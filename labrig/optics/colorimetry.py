@@ -1,6 +1,12 @@
-"""Standard observers, illuminants, CIELAB and colour differences (colour-science)."""
+"""Standard observers, illuminants, CIELAB and colour differences.
+
+The observer and the illuminants that every command needs, and CIELAB, are labrig's own, since
+colour-science takes more than a second to load; all else is from there.
+"""
 
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +20,13 @@ FloatArray = NDArray[np.float64]
 
 CIE_1931 = "CIE 1931 2 Degree Standard Observer"
 CIE_2015 = "CIE 2015 2 Degree Standard Observer"
+
+#: Table of wavelength in nm and x̄, ȳ, z̄ of `CIE_1931`.
+_OBSERVER = Path(__file__).with_name("cie_1931_observer.csv")
+#: Table of wavelength in nm and the relative power of the illuminants that its head names.
+_ILLUMINANTS = Path(__file__).with_name("cie_illuminants.csv")
+#: Limit of the linear part of CIELAB, and its slope and intercept (CIE 15:2018, equations 8.6).
+_LAB_LIMIT, _LAB_SLOPE, _LAB_INTERCEPT = (6 / 29) ** 3, (29 / 6) ** 2 / 3, 4 / 29
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +68,10 @@ def observer(name: str) -> Observer:
     >>> [float(round(integral)) for integral in functions.sum(axis=0)]
     [107.0, 107.0, 107.0]
     """
-    colour = colour_science.load()
-    table = colour.MSDS_CMFS[name]
+    if name == CIE_1931:
+        table_nm, *functions = np.loadtxt(_OBSERVER, delimiter=",", skiprows=2, unpack=True)
+        return Observer(name, table_nm, np.stack(functions, axis=1))
+    table = colour_science.load().MSDS_CMFS[name]
     return Observer(name, np.asarray(table.wavelengths), np.asarray(table.values))
 
 
@@ -84,6 +99,9 @@ def illuminant(name: str) -> Spectrum:
     >>> float(illuminant("D65").at(560.0))
     100.0
     """
+    shipped = _shipped_illuminants()
+    if name in shipped:
+        return shipped[name]
     colour = colour_science.load()
     names = [key for key in colour.SDS_ILLUMINANTS if "_" not in key]
     if name not in names:
@@ -96,6 +114,16 @@ def illuminant(name: str) -> Spectrum:
         np.asarray(light.wavelengths, dtype=np.float64),
         np.asarray(light.values, dtype=np.float64),
     )
+
+
+@cache
+def _shipped_illuminants() -> dict[str, Spectrum]:
+    """Return the illuminants of labrig's own table, by name."""
+    with _ILLUMINANTS.open(encoding="utf-8") as lines:
+        next(lines)
+        names = next(lines).strip().split(",")[1:]
+        nm, *powers = np.loadtxt(lines, delimiter=",", unpack=True)
+    return {name: Spectrum(name, nm, power) for name, power in zip(names, powers, strict=True)}
 
 
 def white_xyz(name: str, standard_observer: Observer) -> FloatArray:
@@ -144,6 +172,10 @@ def lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
     ndarray
         L*, a*, b*, shape (…, 3).
 
+    References
+    ----------
+    CIE 15:2018, *Colorimetry*, section 8.2.1.
+
     Examples
     --------
     >>> import numpy as np
@@ -152,8 +184,10 @@ def lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
     >>> [round(float(value), 1) + 0 for value in lab(0.2 * white, white)]
     [51.8, 0.0, 0.0]
     """
-    colour = colour_science.load()
-    return np.asarray(colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white)))
+    ratio = xyz / white
+    root = np.where(ratio > _LAB_LIMIT, np.cbrt(ratio), _LAB_SLOPE * ratio + _LAB_INTERCEPT)
+    x, y, z = np.moveaxis(root, -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 
 def delta_e(first: FloatArray, second: FloatArray) -> FloatArray:

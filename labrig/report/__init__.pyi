@@ -38,9 +38,12 @@ from .material_tables import (
     describe_phosphor as describe_phosphor,
 )
 from .mixture import (
+    FittedMatrix as FittedMatrix,
     describe_mixture as describe_mixture,
     difference_lines as difference_lines,
-    draw_mixture as draw_mixture,
+)
+from .mixture_page import (
+    mixture_report as mixture_report,
 )
 from .page import (
     Report as Report,

@@ -29,7 +29,7 @@ def chart_figure(chart: Chart) -> Figure:
         _set_axes(axes, panel, chart)
         # Above the grid, in the order of the chart.
         for number, mark in enumerate(panel.marks, start=2):
-            _draw(axes, mark, number)
+            draw_mark(axes, mark, number)
     if chart.legend:
         legend_above(figure, [_entry(label, mark) for label, mark in chart.legend], chart.columns)
     return figure
@@ -50,7 +50,7 @@ def _set_axes(axes: Axes, panel: Panel, chart: Chart) -> None:
         axes.set_xlabel(panel.x.label, fontsize=chart.label_pt)
 
 
-def _draw(axes: Axes, mark: Mark, order: int) -> None:
+def draw_mark(axes: Axes, mark: Mark, order: int) -> None:
     """Draw a mark, in front of those of lower order."""
     before = len(axes.lines), len(axes.collections)
     if isinstance(mark, Points):

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.number_format import rounded
-from labrig.optics import CameraResponse
+from labrig.optics import CIE_1931, CameraResponse, Observer, observer
 from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
@@ -22,9 +21,6 @@ SECOND_RADIATION_NM_K = 1.438777e7
 XYZ_TO_SRGB = np.array(
     [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
 )
-#: Table of wavelength in nm and x̄, ȳ, z̄. It is also in colour-science, which takes a second to
-#: load.
-_OBSERVER = Path(__file__).with_name("cie_1931_observer.csv")
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,16 +109,19 @@ def camera_to_xyz(camera: CameraResponse) -> FloatArray:
 
 def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
     """Return x̄, ȳ, z̄ of the CIE 1931 2° observer, shape (n, 3); 0 outside of its table."""
-    nm, *columns = _observer().T
+    eye = _eye()
     return np.stack(
-        [np.interp(wavelength_nm, nm, column, left=0.0, right=0.0) for column in columns], axis=1
+        [
+            np.interp(wavelength_nm, eye.wavelength_nm, column, left=0.0, right=0.0)
+            for column in eye.functions.T
+        ],
+        axis=1,
     )
 
 
 @cache
-def _observer() -> FloatArray:
-    """Return the table of the observer, shape (n, 4)."""
-    return np.loadtxt(_OBSERVER, delimiter=",", skiprows=2, encoding="utf-8")
+def _eye() -> Observer:
+    return observer(CIE_1931)
 
 
 def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:

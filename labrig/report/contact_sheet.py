@@ -41,7 +41,9 @@ def draw_contact_sheet(matrices: Sequence[ReradiationMatrix], light: Spectrum, p
     Raises
     ------
     UsageError
-        There is no material, the file name is not that of a picture, or the file cannot be written.
+        There is no material, or the file name is not that of a picture.
+    DiskError
+        The file cannot be written.
 
     Examples
     --------

@@ -80,7 +80,9 @@ def draw_curves(file: CurveFile, path: Path) -> None:
     Raises
     ------
     UsageError
-        If the file name is not that of a picture, or the file cannot be written.
+        If the file name is not that of a picture.
+    DiskError
+        If the file cannot be written.
 
     Examples
     --------

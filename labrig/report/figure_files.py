@@ -36,6 +36,8 @@ _MARKERS = re.compile(
 )
 _COLOUR = re.compile("|".join(VARIABLES))
 _LONGEST_SLUG = 40
+#: Dots per inch of images in a figure, such as a matrix; all else has none.
+_IMAGE_DPI = 200
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ def _matplotlib_body(figure: "Figure") -> str:
     buffer = BytesIO()
     # Without dates and versions the same figures give the same bytes.
     no_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(buffer, format="svg", metadata=no_metadata)
+    figure.savefig(buffer, format="svg", metadata=no_metadata, dpi=_IMAGE_DPI)
     text = buffer.getvalue().decode("utf-8")
     text = text[text.index("<svg") :].strip()
     text = _TAG.sub(lambda tag: _TOO_FINE.sub("", tag[0]), text)

@@ -1,44 +1,82 @@
-"""A mixture beside the re-radiation matrix for which it stands, as text and as a picture."""
+"""A mixture beside the re-radiation matrix for which it stands: as text, and as JSON."""
 
+import json
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.fit import MixtureFit
-from labrig.material import ColourDifference, ReradiationMatrix
-from labrig.number_format import aligned, rounded
-from labrig.report.figure_style import INK, MUTED, figure_style
-from labrig.report.heat_map import (
-    BAND_NM,
-    draw_heat,
-    label_heat,
-    largest,
-    shown_values,
+from labrig.fit import MixtureCandidate, MixtureFit
+from labrig.material import (
+    REFERENCE_Y,
+    ColourDifference,
+    ReradiationMatrix,
+    compare_colours,
 )
-from labrig.report.picture_file import require_picture, save_picture
-from labrig.report.reradiation import COLUMN_COLOURS, strongest_columns
+from labrig.number_format import aligned, rounded
+from labrig.optics import Spectrum
 
-# matplotlib is slow to load.
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-FloatArray = NDArray[np.float64]
+#: How the number of components was found, by `MixtureFit.selection`.
+SELECTIONS = {"given": "as asked for", "bic": "by BIC", "cross-validation": "by cross-validation"}
 
 
-def describe_mixture(name: str, fit: MixtureFit, differences: Sequence[ColourDifference]) -> str:
+@dataclass(frozen=True, eq=False)
+class FittedMatrix:
+    """A matrix, the mixture that stands for it, and lights under which both are compared.
+
+    Attributes
+    ----------
+    matrix
+        The matrix to which the mixture was fitted.
+    fit
+        The fitted mixture.
+    lights
+        Irradiances per nm; their colours are of no use if the re-radiation is relative.
+    others
+        Fits with other numbers of components, beside those that the fit itself compared.
+    """
+
+    matrix: ReradiationMatrix
+    fit: MixtureFit
+    lights: tuple[Spectrum, ...] = ()
+    others: tuple[MixtureCandidate, ...] = ()
+
+    @property
+    def candidates(self) -> tuple[MixtureCandidate, ...]:
+        """All fits by their number of components, the fit's own where there are two."""
+        by_number = {tried.components: tried for tried in (*self.others, *self.fit.candidates)}
+        return tuple(by_number[number] for number in sorted(by_number))
+
+    @cached_property
+    def model(self) -> ReradiationMatrix:
+        """The mixture on the matrix's bands, with the measured reflectance."""
+        matrix = self.matrix
+        return self.fit.mixture.to_matrix(
+            matrix.input_nm, matrix.output_nm, reflectance=matrix.reflectance, name=matrix.name
+        )
+
+    @cached_property
+    def differences(self) -> tuple[ColourDifference, ...]:
+        """How far the mixture's colours are from the matrix's; none of relative re-radiation."""
+        if self.matrix.unit == "relative":
+            return ()
+        return tuple(compare_colours(self.model, self.matrix, self.lights))
+
+    def to_json(self) -> str:
+        """Return the text of `fit.json`: the fit, and under `colours` the differences."""
+        colours = [difference.to_dict() for difference in self.differences]
+        content = {**self.fit.to_dict(), "colours": colours}
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def describe_mixture(fitted: FittedMatrix) -> str:
     """Describe a mixture in lines of text.
 
     Parameters
     ----------
-    name
-        Name of the material.
-    fit
-        The fitted mixture.
-    differences
-        How far the mixture's colours are from the matrix's.
+    fitted
+        The matrix and its mixture.
 
     Returns
     -------
@@ -49,48 +87,86 @@ def describe_mixture(name: str, fit: MixtureFit, differences: Sequence[ColourDif
     --------
     >>> from labrig.fit import fit_mixture
     >>> from labrig.material import read_reradiation
-    >>> from labrig.report import describe_mixture
-    >>> fit = fit_mixture(read_reradiation("paper.csv"), 2, threshold=1e-3)
-    >>> print(describe_mixture("paper", fit, []).splitlines()[0])
-    paper: 2 components, as asked for
+    >>> from labrig.report import FittedMatrix, describe_mixture
+    >>> paper = read_reradiation("paper.csv")
+    >>> fitted = FittedMatrix(paper, fit_mixture(paper, 2, threshold=1e-3))
+    >>> print(describe_mixture(fitted).splitlines()[0])
+    yellow paper: 2 components, as asked for
     """
-    chosen = "as asked for" if fit.selection == "given" else "by BIC"
-    plural = "" if fit.components == 1 else "s"
-    rows = [("weight", "incident / nm", "returning / nm", "σ / nm", "correlation")]
+    fit = fitted.fit
+    lines = [f"{fitted.matrix.name}: {components_text(fit)}, {selection_text(fit)}"]
+    lines += [f"  {line}" for line in aligned([component_head(fit), *component_rows(fit)])]
+    lines += [
+        f"  threshold     {threshold_text(fit)}",
+        f"  masked MSE    {rounded(fit.masked_mse, 3)} per band² (scale by {fit.scaling})",
+    ]
+    if fit.selection == "bic":
+        criteria = (f"{tried.components}: {tried.bic:.0f}" for tried in fit.candidates)
+        lines.append(f"  BIC           {', '.join(criteria)}")
+    if fit.selection == "cross-validation":
+        errors = (f"{number}: {rounded(mse, 3)}" for number, mse in held_out_errors(fit.candidates))
+        lines.append(f"  held-out MSE  {', '.join(errors)}")
+    if not fit.converged:
+        lines.append(f"  {NOT_CONVERGED}")
+    if fitted.differences:
+        lines += [f"  {line}" for line in difference_lines(fitted.differences)]
+    return "\n".join(lines)
+
+
+NOT_CONVERGED = "The refinement ended before it reached a minimum."
+
+
+def component_head(fit: MixtureFit) -> tuple[str, ...]:
+    """Return the heads of the columns of `component_rows`."""
+    head = ("weight", "incident / nm", "returning / nm", "σ / nm", "correlation")
+    return head if fit.mixture.skew is None else (*head, "skew")
+
+
+def held_out_errors(candidates: Sequence[MixtureCandidate]) -> list[tuple[int, float]]:
+    """Return number of components and mean squared error of what was left out of the fit."""
+    return [
+        (tried.components, tried.held_out.mse) for tried in candidates if tried.held_out is not None
+    ]
+
+
+def component_rows(fit: MixtureFit) -> Iterator[tuple[str, ...]]:
+    """Yield weight, means, standard deviations, correlation and skews of each component."""
     mixture = fit.mixture
-    for weight, mean, covariance in zip(
-        mixture.weights, mixture.mean_nm, mixture.covariance_nm2, strict=True
+    for weight, mean, covariance, skew in zip(
+        mixture.weights, mixture.mean_nm, mixture.covariance_nm2, mixture.skews, strict=True
     ):
         sd = np.sqrt(np.diag(covariance))
-        rows.append(
-            (
-                f"{weight:.3f}",
-                f"{mean[0]:.1f}",
-                f"{mean[1]:.1f}",
-                f"{sd[0]:.1f}, {sd[1]:.1f}",
-                f"{covariance[0, 1] / sd.prod():+.2f}",
-            )
+        yield (
+            f"{weight:.3f}",
+            f"{mean[0]:.1f}",
+            f"{mean[1]:.1f}",
+            f"{sd[0]:.1f}, {sd[1]:.1f}",
+            f"{covariance[0, 1] / sd.prod():+.2f}",
+            *(() if mixture.skew is None else (f"{skew[0]:+.2f}, {skew[1]:+.2f}",)),
         )
-    lines = [f"{name}: {fit.components} component{plural}, {chosen}"]
-    lines += [f"  {line}" for line in aligned(rows)]
+
+
+def components_text(fit: MixtureFit) -> str:
+    """Return the number of components."""
+    return f"{fit.components} component{'' if fit.components == 1 else 's'}"
+
+
+def selection_text(fit: MixtureFit) -> str:
+    """Return how the number of components was found."""
+    return SELECTIONS.get(fit.selection, f"by {fit.selection}")
+
+
+def threshold_text(fit: MixtureFit) -> str:
+    """Return the threshold, how it was found and what it keeps."""
     rate = (
         "given"
         if fit.false_discovery_rate is None
         else f"{100 * fit.false_discovery_rate:g} % of what is kept is noise"
     )
-    lines += [
-        f"  threshold     {rounded(fit.threshold, 3)} per band, {rate}; {fit.kept_entries} of "
-        f"{fit.entries} numbers kept",
-        f"  masked MSE    {rounded(fit.masked_mse, 3)} per band² (scale by {fit.scaling})",
-    ]
-    if fit.selection == "bic":
-        tried = ", ".join(f"{one.components}: {one.bic:.0f}" for one in fit.candidates)
-        lines.append(f"  BIC           {tried}")
-    if not fit.converged:
-        lines.append("  The refinement ended before it reached a minimum.")
-    if differences:
-        lines += [f"  {line}" for line in difference_lines(differences)]
-    return "\n".join(lines)
+    return (
+        f"{rounded(fit.threshold, 3)} per band, {rate}; {fit.kept_entries} of {fit.entries} "
+        "numbers kept"
+    )
 
 
 def difference_lines(differences: Sequence[ColourDifference]) -> Iterator[str]:
@@ -116,96 +192,18 @@ def difference_lines(differences: Sequence[ColourDifference]) -> Iterator[str]:
     D65             0.50       1.00%  under the light
     """
     yield f"{'light':12}{'ΔE2000':>8}{'XYZ error':>12}  white"
-    for one in differences:
-        white = "under the light" if one.white == "light" else "D65, the reference at Y = 50 %"
-        yield f"{one.light:12}{one.delta_e:8.2f}{one.xyz_error:12.2%}  {white}"
-
-
-def draw_mixture(
-    matrix: ReradiationMatrix, smooth: ReradiationMatrix, fit: MixtureFit, path: Path
-) -> None:
-    """Draw a matrix, the mixture that stands for it, their difference, and emission spectra.
-
-    Parameters
-    ----------
-    matrix
-        The measured matrix.
-    smooth
-        The mixture on the same bands.
-    fit
-        The fitted mixture, whose components are drawn as ellipses of 1 σ.
-    path
-        Path of the picture, which ends in `.png`, `.svg` or `.pdf`.
-
-    Raises
-    ------
-    UsageError
-        The file name is not that of a picture, or the file cannot be written.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.fit import fit_mixture
-    >>> from labrig.material import read_reradiation
-    >>> from labrig.report import draw_mixture
-    >>> paper = read_reradiation("paper.csv")
-    >>> fit = fit_mixture(paper, 2, threshold=1e-3)
-    >>> smooth = fit.mixture.to_matrix(paper.input_nm, paper.output_nm)
-    >>> draw_mixture(paper, smooth, fit, Path("mixture.svg"))
-    """
-    from matplotlib.figure import Figure
-
-    require_picture(path)
-    with figure_style():
-        figure = Figure(figsize=(9.0, 7.2), layout="constrained")
-        figure.suptitle(matrix.name, color=INK)
-        (measured, mixed), (difference, emission) = figure.subplots(2, 2)
-        stokes, model = shown_values(matrix), shown_values(smooth)
-        top = max(largest(stokes), largest(model), 1e-12)
-        _draw_heat(measured, matrix, stokes, "measured, per 10 nm", (0.0, top), "magma_r")
-        _draw_heat(mixed, matrix, model, "mixture, per 10 nm", (0.0, top), "magma_r")
-        for mean, covariance in zip(fit.mixture.mean_nm, fit.mixture.covariance_nm2, strict=True):
-            mixed.plot(*_ellipse(mean, covariance), color=MUTED, linewidth=1.0)
-        apart = 0.25 * top
-        _draw_heat(
-            difference, matrix, stokes - model, "measured less mixture", (-apart, apart), "RdBu_r"
+    for difference in differences:
+        if np.isnan(difference.xyz_error):
+            yield f"{difference.light:12}{'–':>8}{'–':>12}  the reference is black"
+            continue
+        yield (
+            f"{difference.light:12}{difference.delta_e:8.2f}{difference.xyz_error:12.2%}  "
+            f"{white_text(difference)}"
         )
-        _draw_emission(emission, matrix, smooth)
-        save_picture(figure, path)
 
 
-def _draw_heat(
-    axes: "Axes",
-    matrix: ReradiationMatrix,
-    values: FloatArray,
-    title: str,
-    limits: tuple[float, float],
-    colours: str,
-) -> None:
-    mesh = draw_heat(axes, matrix, values, limits, colours)
-    axes.set(xlim=matrix.input_edges_nm[[0, -1]], ylim=matrix.output_edges_nm[[0, -1]])
-    label_heat(axes, title)
-    axes.figure.colorbar(mesh, ax=axes)
-
-
-def _draw_emission(axes: "Axes", matrix: ReradiationMatrix, smooth: ReradiationMatrix) -> None:
-    """Draw columns of both: measured as points, the mixture as lines."""
-    for colour, column in zip(COLUMN_COLOURS, strongest_columns(matrix), strict=False):
-        shown = matrix.is_stokes[:, column]
-        nm = matrix.output_nm[shown]
-        label = f"{matrix.input_nm[column]:g} nm"
-        axes.plot(nm, BAND_NM * smooth.reradiation[shown, column], color=colour, label=label)
-        axes.plot(
-            nm, BAND_NM * matrix.reradiation[shown, column], "o", color=colour, markersize=2.5
-        )
-    axes.set(xlabel="returning wavelength / nm")
-    axes.set_title("per 10 nm, by incident wavelength", fontsize="medium", color=INK)
-    if axes.lines:
-        axes.legend(frameon=False, fontsize="small")
-
-
-def _ellipse(mean: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the ellipse of 1 σ, shape (2, 73)."""
-    angle = np.linspace(0, 2 * np.pi, 73)
-    circle = np.stack([np.cos(angle), np.sin(angle)])
-    return np.asarray(mean[:, np.newaxis] + np.linalg.cholesky(covariance) @ circle)
+def white_text(difference: ColourDifference) -> str:
+    """Return the white of a colour difference."""
+    if difference.white == "light":
+        return "under the light"
+    return f"D65, the reference at Y = {100 * REFERENCE_Y:g} %"

@@ -29,8 +29,9 @@ def draw_phosphor(material: Material, path: Path) -> None:
     Raises
     ------
     UsageError
-        There is nothing to draw, the file name is not that of a picture, or the file cannot be
-        written.
+        There is nothing to draw, or the file name is not that of a picture.
+    DiskError
+        The file cannot be written.
 
     Examples
     --------

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labrig.errors import UsageError
+from labrig.errors import DiskError, UsageError
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -24,10 +24,10 @@ def save_picture(figure: "Figure", path: Path) -> None:
 
     Raises
     ------
-    UsageError
+    DiskError
         The file cannot be written.
     """
     try:
         figure.savefig(path, dpi=DPI)
     except OSError as error:
-        raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
+        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None

@@ -21,6 +21,7 @@ from labrig.report.heat_map import (
     shown_values,
 )
 from labrig.report.picture_file import require_picture, save_picture
+from labrig.report.reradiation_spectra import emission_spectra, spectra_marks
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -31,9 +32,6 @@ FloatArray = NDArray[np.float64]
 
 #: X, Y, Z of a screen's white, D65.
 SCREEN_WHITE = np.array([0.95047, 1.0, 1.08883])
-#: Colours of the emission spectra that are drawn, and the least distance of excitations in nm.
-COLUMN_COLOURS = ("#3b1f7a", "#2b62c9", "#0f8f8a", "#6aa32d", "#d98b00")
-APART_NM = 20.0
 
 
 def describe_reradiation(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) -> str:
@@ -204,7 +202,9 @@ def draw_reradiation(matrix: ReradiationMatrix, lights: Sequence[Spectrum], path
     Raises
     ------
     UsageError
-        The file name is not that of a picture, or the file cannot be written.
+        The file name is not that of a picture.
+    DiskError
+        The file cannot be written.
 
     Examples
     --------
@@ -254,28 +254,18 @@ def _draw_matrix(axes: "Axes", matrix: ReradiationMatrix) -> None:
 
 def _draw_emission(axes: "Axes", matrix: ReradiationMatrix) -> None:
     """Draw emission spectra of the strongest excitations."""
-    for colour, column in zip(COLUMN_COLOURS, strongest_columns(matrix), strict=False):
-        shown = matrix.is_stokes[:, column]
-        axes.plot(
-            matrix.output_nm[shown], BAND_NM * matrix.reradiation[shown, column], linewidth=1.3,
-            color=colour, label=f"{matrix.input_nm[column]:g} nm",
-        )  # fmt: skip
+    from labrig.report.chart_figure import draw_mark
+
+    spectra = emission_spectra(matrix)
+    for order, (_, mark) in enumerate(spectra_marks(spectra), start=2):
+        draw_mark(axes, mark, order)
+    for line, spectrum in zip(axes.lines, spectra, strict=True):
+        line.set_label(f"{spectrum.given_nm:g} nm")
     axes.axhline(0.0, color=RULE, linewidth=0.8, zorder=0)
     axes.set(xlabel="returning wavelength / nm", xlim=matrix.output_nm[[0, -1]])
     axes.set_title("re-radiation per 10 nm, by incident wavelength", fontsize="medium", color=INK)
-    if axes.lines[1:]:
+    if spectra:
         axes.legend(frameon=False, fontsize="small")
-
-
-def strongest_columns(matrix: ReradiationMatrix) -> list[int]:
-    """Return columns of much re-radiation that are not neighbours, by wavelength."""
-    fraction = matrix.reradiated_fraction
-    chosen: list[int] = []
-    for column in np.argsort(-fraction):
-        far = all(abs(matrix.input_nm[column] - matrix.input_nm[k]) >= APART_NM for k in chosen)
-        if far and len(chosen) < len(COLUMN_COLOURS) and fraction[column] > 0.05 * fraction.max():
-            chosen.append(int(column))
-    return sorted(chosen)
 
 
 def _draw_reflectance(axes: "Axes", matrix: ReradiationMatrix) -> None:
@@ -316,7 +306,7 @@ def _draw_colours(axes: "Axes", matrix: ReradiationMatrix, lights: Sequence[Spec
             pair = []
         full = max([1.0, *(float(colour.xyz[1]) for colour in pair)])
         for y, colour in enumerate(pair):
-            fill = css_colour(_on_screen(colour) / full)
+            fill = css_colour(_on_screen(colour, light) / full)
             axes.add_patch(Rectangle((place + 0.03, y), 0.94, 0.94, facecolor=fill, linewidth=0))
         label = light.name if pair else f"{light.name}: not visible"
         scale = f", 1/{rounded(full, 2)} as bright" if full > 1.05 else ""
@@ -327,10 +317,14 @@ def _draw_colours(axes: "Axes", matrix: ReradiationMatrix, lights: Sequence[Spec
 def screen_colour(matrix: ReradiationMatrix, light: Spectrum) -> str:
     """Return the colour of a surface under a broad light as `#rrggbb`."""
     colour = appearance(matrix, light)
-    return css_colour(_on_screen(colour) / max(1.0, float(colour.xyz[1])))
+    return css_colour(_on_screen(colour, light) / max(1.0, float(colour.xyz[1])))
 
 
-def _on_screen(colour: Appearance) -> FloatArray:
+def _on_screen(colour: Appearance, light: Spectrum) -> FloatArray:
     """Return linear sRGB, where an eye used to a broad light sees its white as the screen's."""
-    white = colour.white if colour.white.min() > 0.2 else SCREEN_WHITE
-    return into_gamut(XYZ_TO_SRGB @ (colour.xyz * SCREEN_WHITE / white))
+    return screen_linear(colour.xyz, SCREEN_WHITE if is_narrow(light) else colour.white)
+
+
+def screen_linear(xyz: FloatArray, white: FloatArray) -> FloatArray:
+    """Return linear sRGB of X, Y, Z (3,), in which a white (3,) is the screen's."""
+    return into_gamut(XYZ_TO_SRGB @ (xyz * SCREEN_WHITE / white))

@@ -10,9 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from labrig.fit import fit_mixture
+from labrig.material import with_sigma
+from labrig.optics import read_light
+from labrig.process import report_mixture
 from labrig.record.history import Interruption
-from labrig.report import Report, write_report
+from labrig.report import FittedMatrix, Report, write_report
 from labrig.report.report_model import PatchReport
+from tests.material.reradiation.synthetic import YELLOW, measurement
 
 from .made import decay_report, decay_series, page_of, patch
 
@@ -79,6 +84,23 @@ def test_nothing_overflows_and_no_printed_page_is_blank(chromium: "Chrome", tmp_
     assert 0 not in pages
     # Results and sample, a page for each patch, the rest.
     assert 5 <= len(pages) <= 7
+
+
+def test_a_mixture_overflows_nowhere(chromium: "Chrome", tmp_path: Path) -> None:
+    matrix = replace(with_sigma(measurement(21, YELLOW).measured), name="paper_" * 20)
+    lights = tuple(read_light(name) for name in ("D65", "A", "450nm", "395nm", "FL2"))
+    fitted = FittedMatrix(matrix, fit_mixture(matrix), lights)
+    (tmp_path / "paper.csv").touch()
+    command = f"labrig fit mixture {'a/folder/' * 20}paper.csv"
+    page = report_mixture(tmp_path / "paper.csv", fitted, command, tmp_path)
+    for width in WIDTHS:
+        metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+        chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        chromium.get(page.as_uri())
+        assert chromium.execute_script(BEYOND) == [], width
+    chromium.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    printed = chromium.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
+    assert 0 not in shown_texts(base64.b64decode(printed["data"]))
 
 
 def test_a_link_opens_the_patch_that_it_names(chromium: "Chrome", tmp_path: Path) -> None:

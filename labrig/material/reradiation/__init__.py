@@ -1,9 +1,12 @@
 """Re-radiation matrices of fluorescent surfaces: files, colours, uncertainties."""
 
 from labrig.material.reradiation.appearance import (
+    REFERENCE_Y,
     Appearance,
     ColourDifference,
+    ColourPair,
     appearance,
+    colour_pair,
     compare_colours,
 )
 from labrig.material.reradiation.checks import (
@@ -45,8 +48,10 @@ from labrig.material.reradiation.spill import (
 )
 
 __all__ = [
+    "REFERENCE_Y",
     "Appearance",
     "ColourDifference",
+    "ColourPair",
     "ConditionalDensity",
     "InstrumentNoise",
     "ReradiationMatrix",
@@ -54,6 +59,7 @@ __all__ = [
     "SeenSpectrum",
     "SpectralImage",
     "appearance",
+    "colour_pair",
     "compare_colours",
     "corrected",
     "instrument_noise",

@@ -91,6 +91,30 @@ class ColourDifference:
         }
 
 
+@dataclass(frozen=True, eq=False)
+class ColourPair:
+    """Colours of a surface and a reference under a light, on the scale of one white.
+
+    Attributes
+    ----------
+    light
+        Name of the light.
+    white
+        Which white that is, see `White`.
+    white_xyz
+        X, Y, Z of the white, with Y = 1, shape (3,).
+    surface_xyz, reference_xyz
+        X, Y, Z of both on that scale, shape (3,); NaN under a narrow light in which the reference
+        is black.
+    """
+
+    light: str
+    white: White
+    white_xyz: FloatArray
+    surface_xyz: FloatArray
+    reference_xyz: FloatArray
+
+
 def appearance(matrix: ReradiationMatrix, light: Spectrum) -> Appearance:
     """Return the colour of a surface under a light.
 
@@ -186,20 +210,64 @@ def compare_colours(
     return [_difference(surface, reference, light) for light in lights]
 
 
+def colour_pair(
+    surface: ReradiationMatrix, reference: ReradiationMatrix, light: Spectrum
+) -> ColourPair:
+    """Return the colours of a surface and a reference, as `compare_colours` compares them.
+
+    Parameters
+    ----------
+    surface
+        The surface to judge.
+    reference
+        The surface to compare with.
+    light
+        Irradiance per nm.
+
+    Returns
+    -------
+    ColourPair
+        Both colours on the scale of one white.
+
+    Raises
+    ------
+    DataError
+        No eye sees the light.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.material import ReradiationMatrix, colour_pair
+    >>> from labrig.optics import read_light
+    >>> nm = np.arange(380.0, 781.0, 10.0)
+    >>> first, second = (
+    ...     ReradiationMatrix.from_bands("", nm, nm, np.diag(np.full(41, value)))
+    ...     for value in (0.20, 0.25)
+    ... )
+    >>> pair = colour_pair(first, second, read_light("450nm"))
+    >>> pair.white, round(float(pair.surface_xyz[1]), 3), round(float(pair.reference_xyz[1]), 3)
+    ('D65', 0.4, 0.5)
+    """
+    ours, theirs = appearance(surface, light), appearance(reference, light)
+    if not is_narrow(light):
+        return ColourPair(light.name, "light", theirs.white, ours.xyz, theirs.xyz)
+    luminance = float(theirs.xyz[1])
+    scale = REFERENCE_Y / luminance if luminance > 0 else np.nan
+    white = white_xyz("D65", _observer())
+    return ColourPair(light.name, "D65", white, scale * ours.xyz, scale * theirs.xyz)
+
+
 def _difference(
     surface: ReradiationMatrix, reference: ReradiationMatrix, light: Spectrum
 ) -> ColourDifference:
-    ours, theirs = appearance(surface, light), appearance(reference, light)
-    length = float(np.linalg.norm(theirs.xyz))
-    error = float(np.linalg.norm(ours.xyz - theirs.xyz)) / length if length > 0 else np.nan
-    if not is_narrow(light):
-        difference = float(delta_e(ours.lab, theirs.lab))
-        return ColourDifference(light.name, "light", difference, error)
-    if not theirs.xyz[1] > 0:
-        return ColourDifference(light.name, "D65", np.nan, error)
-    scale, white = REFERENCE_Y / theirs.xyz[1], white_xyz("D65", _observer())
-    difference = float(delta_e(lab(scale * ours.xyz, white), lab(scale * theirs.xyz, white)))
-    return ColourDifference(light.name, "D65", difference, error)
+    pair = colour_pair(surface, reference, light)
+    length = float(np.linalg.norm(pair.reference_xyz))
+    if np.isnan(length):
+        return ColourDifference(light.name, pair.white, np.nan, np.nan)
+    apart = float(np.linalg.norm(pair.surface_xyz - pair.reference_xyz))
+    error = apart / length if length > 0 else np.nan
+    ours, theirs = (lab(xyz, pair.white_xyz) for xyz in (pair.surface_xyz, pair.reference_xyz))
+    return ColourDifference(light.name, pair.white, float(delta_e(ours, theirs)), error)
 
 
 def _seen_by(

@@ -32,11 +32,11 @@ def samples() -> list[ReradiationMatrix]:
 
 def tiles() -> Iterator[ReradiationMatrix]:
     """Ceramic tiles, in their measurements of 13 days; some files are there under two names."""
-    seen = set()
+    contents = set()
     for path in sorted(FOLDER.glob("bcra_repeats/*/BC*.BFC")):
         tile = read(path)
-        if tile is not None and tile.reradiation.tobytes() not in seen:
-            seen.add(tile.reradiation.tobytes())
+        if tile is not None and tile.reradiation.tobytes() not in contents:
+            contents.add(tile.reradiation.tobytes())
             yield tile
 
 

@@ -147,10 +147,10 @@ def measurement(
     values = np.sum([dye.bands() for dye in dyes], axis=0) if dyes else np.zeros(STOKES.shape)
     values[np.arange(41), np.arange(8, 49)] = curve
     sigma = noise_sigma(rng) if sigma is None else sigma
-    seen = values + spill(rng, curve, spill_level) + noise(rng, sigma, common)
+    measured = values + spill(rng, curve, spill_level) + noise(rng, sigma, common)
     name = f"sample {seed}"
     return Measurement(
-        ReradiationMatrix.from_bands(name, INPUT_NM, OUTPUT_NM, seen),
+        ReradiationMatrix.from_bands(name, INPUT_NM, OUTPUT_NM, measured),
         ReradiationMatrix.from_bands(name, INPUT_NM, OUTPUT_NM, values),
         sigma,
     )

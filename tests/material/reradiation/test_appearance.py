@@ -22,7 +22,7 @@ def surface(reflectance: np.ndarray, into: float = 0.0) -> ReradiationMatrix:
 @pytest.mark.parametrize("light", ["D65", "A", "FL2"])
 def test_a_reflecting_surface_is_what_colour_science_says(light: str) -> None:
     reflectance = 0.5 + 0.3 * np.sin(NM / 60)
-    found = appearance(surface(reflectance), read_light(light))
+    seen_surface = appearance(surface(reflectance), read_light(light))
     eye = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     power = (
         colour.SDS_ILLUMINANTS[light]
@@ -33,17 +33,17 @@ def test_a_reflecting_surface_is_what_colour_science_says(light: str) -> None:
     by_nm = power.values * np.interp(nm, NM, reflectance)
     functions = eye.copy().trim(colour.SpectralShape(nm[0], nm[-1], 1)).values
     expected = by_nm @ functions / (power.values @ functions[:, 1])
-    assert_allclose(found.xyz, expected, rtol=2e-4)
-    assert found.reradiated_y == 0
-    expected_lab = colour.XYZ_to_Lab(expected, colour.XYZ_to_xy(found.white))
-    assert_allclose(found.lab, expected_lab, atol=0.02)
+    assert_allclose(seen_surface.xyz, expected, rtol=2e-4)
+    assert seen_surface.reradiated_y == 0
+    expected_lab = colour.XYZ_to_Lab(expected, colour.XYZ_to_xy(seen_surface.white))
+    assert_allclose(seen_surface.lab, expected_lab, atol=0.02)
 
 
 def test_a_perfect_white_is_white() -> None:
     for light in ("D65", "A", "FL11"):
-        found = appearance(surface(np.ones(49)), read_light(light))
-        assert_allclose(found.xyz, found.white, rtol=1e-12)
-        assert_allclose(found.lab, [100, 0, 0], atol=1e-3)
+        white = appearance(surface(np.ones(49)), read_light(light))
+        assert_allclose(white.xyz, white.white, rtol=1e-12)
+        assert_allclose(white.lab, [100, 0, 0], atol=1e-3)
 
 
 def test_what_is_reradiated_adds_luminance() -> None:
@@ -64,7 +64,7 @@ def test_a_narrow_light_has_the_white_of_a_screen() -> None:
     assert 0.03 < narrow.xyz_error < 0.1
     assert 1 < narrow.delta_e < 6
     same = compare_colours(dyed, dyed, [read_light("395nm"), read_light("A")])
-    assert [one.delta_e for one in same] == [0.0, 0.0]
+    assert [difference.delta_e for difference in same] == [0.0, 0.0]
 
 
 def test_the_scale_of_the_light_does_not_matter() -> None:
@@ -80,6 +80,7 @@ def test_a_light_that_no_eye_sees_is_refused() -> None:
 
 
 def test_a_black_reference_has_no_difference_under_a_narrow_light() -> None:
-    (found,) = compare_colours(surface(np.ones(49)), surface(np.zeros(49)), [read_light("450nm")])
-    assert np.isnan(found.delta_e)
-    assert np.isnan(found.xyz_error)
+    white, black = (surface(reflectance) for reflectance in (np.ones(49), np.zeros(49)))
+    (difference,) = compare_colours(white, black, [read_light("450nm")])
+    assert np.isnan(difference.delta_e)
+    assert np.isnan(difference.xyz_error)

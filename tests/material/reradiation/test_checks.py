@@ -18,12 +18,12 @@ from tests.material.reradiation.synthetic import (
 
 def bright(total: float, sigma: float | None = None) -> ReradiationMatrix:
     """A sample that returns this part of the light at 460 nm, half of it re-radiated."""
-    one = measurement(0, YELLOW).truth
-    column = one.reradiation.copy()
+    truth = measurement(0, YELLOW).truth
+    column = truth.reradiation.copy()
     column[:, 16] *= total / 2 / (column[:, 16].sum() * 10)
     reflectance = np.full(41, 0.4)
     reflectance[8] = total / 2
-    bare = replace(one, name="glow", reflectance=reflectance, reradiation=column)
+    bare = replace(truth, name="glow", reflectance=reflectance, reradiation=column)
     if sigma is None:
         return bare
     sigmas = np.zeros(column.shape)
@@ -32,10 +32,10 @@ def bright(total: float, sigma: float | None = None) -> ReradiationMatrix:
 
 
 def dark(value: float, sigma: float = 0.0) -> ReradiationMatrix:
-    one = measurement(0, YELLOW).truth
+    truth = measurement(0, YELLOW).truth
     reflectance, sigmas = np.full(41, 0.3), np.full(41, sigma)
     reflectance[3] = value
-    return replace(one, name="soot", reflectance=reflectance, reflectance_sigma=sigmas)
+    return replace(truth, name="soot", reflectance=reflectance, reflectance_sigma=sigmas)
 
 
 def test_a_usual_sample_has_no_warnings() -> None:
@@ -78,14 +78,14 @@ def test_negative_reflectance_is_refused(value: float, sigma: float) -> None:
 
 
 def test_a_sample_without_reflectance_is_judged_by_its_re_radiation() -> None:
-    one = replace(measurement(0, YELLOW).truth, reflectance=np.full(41, np.nan))
-    assert physical_warnings(one) == ()
+    truth = replace(measurement(0, YELLOW).truth, reflectance=np.full(41, np.nan))
+    assert physical_warnings(truth) == ()
 
 
 @pytest.mark.shared_data
 @pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
 def test_real_samples_pass_and_two_golf_balls_are_said() -> None:
-    said = {one.name: physical_warnings(one) for one in bfc450.samples()}
+    said = {sample.name: physical_warnings(sample) for sample in bfc450.samples()}
     assert len(said) == 97
     assert {name for name, lines in said.items() if lines} == {"GOLF", "GOLFYE"}
     assert said["GOLFYE"][0].startswith("1.068 of the light at 540 nm")

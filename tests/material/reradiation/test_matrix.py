@@ -51,12 +51,13 @@ def test_bands_without_an_input_have_no_reflectance() -> None:
 
 
 def test_light_at_one_wavelength_comes_back_as_the_column() -> None:
-    seen = matrix().under(Spectrum("line", np.array([464.9, 470.0, 475.1]), np.array([0, 2.0, 0])))
+    line = Spectrum("line", np.array([464.9, 470.0, 475.1]), np.array([0, 2.0, 0]))
+    returned = matrix().under(line)
     column = dye()[:, 17]
     power = 2.0 * 5.1
-    assert_allclose(seen.reradiated.value.sum() * 10, power * column[10:].sum(), rtol=0.01)
-    assert seen.reflected.value[9] > 0
-    assert seen.reflected.value[11] == 0
+    assert_allclose(returned.reradiated.value.sum() * 10, power * column[10:].sum(), rtol=0.01)
+    assert returned.reflected.value[9] > 0
+    assert returned.reflected.value[11] == 0
 
 
 def test_a_white_without_dye_returns_the_light() -> None:
@@ -68,12 +69,12 @@ def test_a_white_without_dye_returns_the_light() -> None:
 
 
 def test_sums_over_the_columns() -> None:
-    found = matrix()
+    paper = matrix()
     whole = dye()
     expected = np.where(OUTPUT_NM[:, np.newaxis] > INPUT_NM, whole, 0).sum(axis=0)
-    assert_allclose(found.reradiated_fraction, expected, atol=1e-15)
-    assert_allclose(found.total_fraction[17], expected[17] + found.reflectance[9])
-    assert_allclose(found.total_fraction[0], expected[0])
+    assert_allclose(paper.reradiated_fraction, expected, atol=1e-15)
+    assert_allclose(paper.total_fraction[17], expected[17] + paper.reflectance[9])
+    assert_allclose(paper.total_fraction[0], expected[0])
 
 
 def test_one_dye_has_one_singular_value_but_for_the_overlap() -> None:
@@ -86,9 +87,9 @@ def test_one_dye_has_one_singular_value_but_for_the_overlap() -> None:
 
 def test_sigma_of_what_is_seen_is_the_scatter() -> None:
     light = Spectrum("slope", np.array([300.0, 800.0]), np.array([1.0, 3.0]))
-    seen = [matrix(seed, 1e-3).under(light) for seed in range(400)]
+    returned = [matrix(seed, 1e-3).under(light) for seed in range(400)]
     for part in ("reflected", "reradiated"):
-        spectra = [getattr(one, part) for one in seen]
+        spectra = [getattr(light_back, part) for light_back in returned]
         scatter = np.std([spectrum.value for spectrum in spectra], axis=0)
         assert_allclose(scatter.mean() / spectra[0].sigma.mean(), 1, atol=0.04)
     fractions = [matrix(seed, 1e-3).reradiated_fraction for seed in range(400)]
@@ -103,8 +104,8 @@ def test_sigma_of_what_is_seen_is_the_scatter() -> None:
 )
 def test_other_bands_keep_the_light(inputs: list[int], outputs: list[int]) -> None:
     input_nm, output_nm = (10.0 * np.array(sorted(grid)) + 3 for grid in (inputs, outputs))
-    found = matrix()
-    other = found.rebinned(input_nm, output_nm)
+    paper = matrix()
+    other = paper.rebinned(input_nm, output_nm)
     rng = np.random.default_rng(len(inputs))
     power = rng.uniform(1, 2, len(input_nm))
     # The old bands' share of light that is constant in each new band.
@@ -114,10 +115,10 @@ def test_other_bands_keep_the_light(inputs: list[int], outputs: list[int]) -> No
         np.repeat(edges, 2)[1:-1] + np.tile([1e-7, -1e-7], len(power)),
         np.repeat(power, 2),
     )
-    absorbed = steps.in_bands(found.input_edges_nm) * found.input_width_nm
-    fine = found.reradiation @ absorbed
-    low = np.maximum(other.output_edges_nm[:-1, np.newaxis], found.output_edges_nm[:-1])
-    high = np.minimum(other.output_edges_nm[1:, np.newaxis], found.output_edges_nm[1:])
+    absorbed = steps.in_bands(paper.input_edges_nm) * paper.input_width_nm
+    fine = paper.reradiation @ absorbed
+    low = np.maximum(other.output_edges_nm[:-1, np.newaxis], paper.output_edges_nm[:-1])
+    high = np.minimum(other.output_edges_nm[1:, np.newaxis], paper.output_edges_nm[1:])
     expected = np.maximum(high - low, 0) @ fine
     coarse = other.reradiation @ (power * other.input_width_nm) * other.output_width_nm
     assert_allclose(coarse, expected, rtol=1e-6, atol=1e-9)
@@ -127,10 +128,10 @@ def test_other_bands_keep_the_light(inputs: list[int], outputs: list[int]) -> No
 
 
 def test_the_same_bands_change_nothing() -> None:
-    found = matrix(1, 1e-3)
-    same = found.rebinned(INPUT_NM, OUTPUT_NM)
+    paper = matrix(1, 1e-3)
+    same = paper.rebinned(INPUT_NM, OUTPUT_NM)
     for name in ("reflectance", "reradiation", "reflectance_sigma", "reradiation_sigma"):
-        assert_allclose(getattr(same, name), getattr(found, name), rtol=1e-12, atol=1e-18)
+        assert_allclose(getattr(same, name), getattr(paper, name), rtol=1e-12, atol=1e-18)
 
 
 def test_a_unit_stays_and_an_unknown_one_is_refused() -> None:
@@ -162,22 +163,22 @@ def test_errors_common_to_a_column_add_up_in_its_sum(bands: int) -> None:
     rng = np.random.default_rng(7 + bands)
     sigma, values = 1e-3, dye()
     coarse_nm = OUTPUT_NM[: 40 // bands * bands].reshape(-1, bands).mean(axis=1)
-    found = []
+    noisy = []
     for _ in range(600):
         offset, noise = rng.standard_normal((1, 49)), rng.standard_normal(values.shape)
         measured = values + sigma * (offset + noise) / np.sqrt(2)
-        one = replace(
+        sample = replace(
             ReradiationMatrix.from_bands(
                 "", INPUT_NM, OUTPUT_NM, measured, np.full(values.shape, sigma)
             ),
             column_correlation=np.full(49, 0.5),
         )
-        found.append(one if bands == 1 else one.rebinned(INPUT_NM, coarse_nm))
-    stated = found[0].reradiated_fraction_sigma
+        noisy.append(sample if bands == 1 else sample.rebinned(INPUT_NM, coarse_nm))
+    stated = noisy[0].reradiated_fraction_sigma
     assert stated is not None
-    scatter = np.std([one.reradiated_fraction for one in found], axis=0)
+    scatter = np.std([sample.reradiated_fraction for sample in noisy], axis=0)
     assert_allclose((scatter[:35] / stated[:35]).mean(), 1, atol=0.03)
-    entries = np.std([one.reradiation for one in found], axis=0)
-    assert found[0].reradiation_sigma is not None
-    clear = np.ix_(found[0].output_nm > 590, np.arange(20))
-    assert_allclose((entries[clear] / found[0].reradiation_sigma[clear]).mean(), 1, atol=0.03)
+    entries = np.std([sample.reradiation for sample in noisy], axis=0)
+    assert noisy[0].reradiation_sigma is not None
+    clear = np.ix_(noisy[0].output_nm > 590, np.arange(20))
+    assert_allclose((entries[clear] / noisy[0].reradiation_sigma[clear]).mean(), 1, atol=0.03)

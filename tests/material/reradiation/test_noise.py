@@ -61,8 +61,8 @@ def real_tiles() -> tuple[list[ReradiationMatrix], list[ReradiationMatrix]]:
 @pytest.mark.parametrize("common", [0.0, 0.75])
 @pytest.mark.parametrize("dyes", [(YELLOW,), (BRIGHTENER, ORANGE)], ids=["one dye", "two dyes"])
 def test_sigma_without_repeats_is_that_of_the_noise(common: float, dyes: tuple[Dye, ...]) -> None:
-    found = [measurement(seed, *dyes, common=common) for seed in range(20)]
-    ratio = np.array([band_sigma(with_sigma(one.measured)) / one.sigma for one in found])
+    samples = [measurement(seed, *dyes, common=common) for seed in range(20)]
+    ratio = np.array([band_sigma(with_sigma(sample.measured)) / sample.sigma for sample in samples])
     for name, region in REGIONS.items():
         assert_allclose(np.mean(ratio[:, region]), 1, atol=TOLERANCE, err_msg=name)
     # Nothing is known of these columns: rather too large.
@@ -78,8 +78,8 @@ def test_sigma_with_repeats_is_that_of_the_noise(common: float) -> None:
             measurement(1000 * seed + k, common=common, sigma=sigma).measured for k in range(40)
         ]
         sample = measurement(seed, YELLOW, common=common, sigma=sigma)
-        found = with_sigma(sample.measured, instrument_noise(tiles))
-        ratio.append(band_sigma(found) / sigma)
+        estimated = with_sigma(sample.measured, instrument_noise(tiles))
+        ratio.append(band_sigma(estimated) / sigma)
     for name, region in (REGIONS | {"ultraviolet": ULTRAVIOLET}).items():
         mean = np.mean(np.array(ratio)[:, region])
         assert_allclose(mean, 1, atol=TOLERANCE, err_msg=name)
@@ -88,10 +88,10 @@ def test_sigma_with_repeats_is_that_of_the_noise(common: float) -> None:
 def test_errors_are_as_large_as_sigma_says() -> None:
     pulls = []
     for seed in range(40):
-        one = measurement(seed, YELLOW, ORANGE, common=0.0)
-        found = with_sigma(one.measured)
-        difference = (found.reradiation - one.truth.reradiation) * 10
-        pulls.append(difference / band_sigma(found))
+        sample = measurement(seed, YELLOW, ORANGE, common=0.0)
+        estimated = with_sigma(sample.measured)
+        difference = (estimated.reradiation - sample.truth.reradiation) * 10
+        pulls.append(difference / band_sigma(estimated))
     # A σ from a few entries is often too small by chance, which makes some pulls large.
     rms = np.sqrt(np.mean(np.array(pulls)[:, FAR & (INPUT_NM >= 440)] ** 2))
     assert_allclose(rms, 1.02, atol=0.1)
@@ -99,17 +99,18 @@ def test_errors_are_as_large_as_sigma_says() -> None:
 
 def test_a_dark_samples_reflectance_is_as_uncertain_as_its_neighbours() -> None:
     dark = replace(measurement(3).measured, reflectance=np.full(41, 0.0))
-    found = with_sigma(dark)
-    assert found.reflectance_sigma is not None
-    assert_allclose(found.reflectance_sigma, [band_sigma(found)[i, i + 8] for i in range(41)])
+    estimated = with_sigma(dark)
+    assert estimated.reflectance_sigma is not None
+    diagonal = [band_sigma(estimated)[i, i + 8] for i in range(41)]
+    assert_allclose(estimated.reflectance_sigma, diagonal)
 
 
 def test_reflectance_is_less_certain_on_slopes_and_in_white() -> None:
     step = 0.1 + 0.8 / (1 + np.exp(-(OUTPUT_NM - 580) / 10))
-    found = with_sigma(replace(measurement(3).measured, reflectance=step))
-    assert found.reflectance_sigma is not None
-    own = np.array([band_sigma(found)[i, i + 8] for i in range(41)])
-    beyond = np.sqrt(found.reflectance_sigma**2 - own**2)
+    estimated = with_sigma(replace(measurement(3).measured, reflectance=step))
+    assert estimated.reflectance_sigma is not None
+    own = np.array([band_sigma(estimated)[i, i + 8] for i in range(41)])
+    beyond = np.sqrt(estimated.reflectance_sigma**2 - own**2)
     assert_allclose(beyond[-1], 0.0016 * 0.9, rtol=0.01)
     assert_allclose(beyond[20], np.hypot(0.2 * (step[21] - step[19]) / 20, 0.0016 * 0.5), rtol=1e-9)
 
@@ -119,46 +120,47 @@ def test_reflectance_is_less_certain_on_slopes_and_in_white() -> None:
 def test_sigma_scales_with_the_noise_and_no_single_entry_rules_it(
     scale: float, row: int, size: float
 ) -> None:
-    one = measurement(row, common=0.0).measured
-    before = band_sigma(with_sigma(one))
-    bad = one.reradiation.copy()
+    measured = measurement(row, common=0.0).measured
+    before = band_sigma(with_sigma(measured))
+    bad = measured.reradiation.copy()
     bad[row, row + 12] += size
-    after = band_sigma(with_sigma(replace(one, reradiation=bad * scale))) / scale
+    after = band_sigma(with_sigma(replace(measured, reradiation=bad * scale))) / scale
     assert_allclose(np.median(after / before), 1, atol=0.03)
     # An entry of up to six σ may be noise, and a larger one is none.
     assert (after / before).max() < 2
 
 
 def test_numbers_stay_and_gaps_are_left_out() -> None:
-    one = measurement(5, YELLOW).measured
-    gaps = one.reradiation.copy()
+    measured = measurement(5, YELLOW).measured
+    gaps = measured.reradiation.copy()
     gaps[7] = np.nan
-    found = with_sigma(replace(one, reradiation=gaps))
+    found = with_sigma(replace(measured, reradiation=gaps))
     np.testing.assert_array_equal(found.reradiation, gaps)
-    np.testing.assert_array_equal(found.reflectance, one.reflectance)
-    assert_allclose(band_sigma(found), band_sigma(with_sigma(one)), rtol=0.4)
+    np.testing.assert_array_equal(found.reflectance, measured.reflectance)
+    assert_allclose(band_sigma(found), band_sigma(with_sigma(measured)), rtol=0.4)
 
 
 def test_what_gives_no_sigma_is_refused_in_one_line() -> None:
-    one = measurement(0, YELLOW)
+    sample = measurement(0, YELLOW)
     noise = instrument_noise([measurement(1).measured])
-    other = one.measured.rebinned(INPUT_NM[::2], OUTPUT_NM[::2])
+    other = sample.measured.rebinned(INPUT_NM[::2], OUTPUT_NM[::2])
     with pytest.raises(DataError, match="on the bands of 'sample 0'"):
         with_sigma(other, noise)
     with pytest.raises(DataError, match="zeros only"):
-        with_sigma(one.truth)
-    stokes = replace(one.measured, reradiation=np.where(STOKES, one.measured.reradiation, np.nan))
+        with_sigma(sample.truth)
+    above = np.where(STOKES, sample.measured.reradiation, np.nan)
+    stokes = replace(sample.measured, reradiation=above)
     with pytest.raises(DataError, match=r"15 or more anti-Stokes entries .* got 0"):
         with_sigma(stokes)
     assert (band_sigma(with_sigma(stokes, noise)) > 0).all()
     with pytest.raises(DataError, match="got none"):
         instrument_noise([])
     with pytest.raises(ValueError, match="bands of 'sample 0'"):
-        instrument_noise([one.measured, other])
-    column = one.measured.reradiation.copy()
+        instrument_noise([sample.measured, other])
+    column = sample.measured.reradiation.copy()
     column[:, 4] = np.nan
     with pytest.raises(DataError, match="at 340 nm"):
-        instrument_noise([replace(one.measured, reradiation=column)])
+        instrument_noise([replace(sample.measured, reradiation=column)])
 
 
 @pytest.mark.shared_data
@@ -167,8 +169,8 @@ class TestRealTiles:
     """Tiles do not re-radiate: what is there off the diagonal is the error."""
 
     def pulls(self, noise: InstrumentNoise | None) -> NDArray[np.float64]:
-        found = [with_sigma(tile, noise) for tile in real_tiles()[1]]
-        return np.array([one.reradiation * 10 / band_sigma(one) for one in found])
+        tiles = [with_sigma(tile, noise) for tile in real_tiles()[1]]
+        return np.array([tile.reradiation * 10 / band_sigma(tile) for tile in tiles])
 
     def test_pulls_of_other_tiles_with_repeats(self) -> None:
         pulls = self.pulls(instrument_noise(real_tiles()[0]))
@@ -193,9 +195,9 @@ class TestRealTiles:
         assert all(reradiates(with_sigma(paper)) for paper in papers)
 
     def test_pulls_of_sums_over_columns(self) -> None:
-        found = [corrected(tile) for tile in real_tiles()[1]]
-        sums = np.array([one.reradiated_fraction[:40] for one in found])
-        sigmas = [one.reradiated_fraction_sigma for one in found]
+        tiles = [corrected(tile) for tile in real_tiles()[1]]
+        sums = np.array([tile.reradiated_fraction[:40] for tile in tiles])
+        sigmas = [tile.reradiated_fraction_sigma for tile in tiles]
         pulls = sums / np.array([sigma[:40] for sigma in sigmas if sigma is not None])
         for name, columns in {"ultraviolet": slice(0, 8), "430-600 nm": slice(13, 31)}.items():
             rms = np.sqrt(np.mean(pulls[:, columns] ** 2))
@@ -228,9 +230,9 @@ class TestRealTiles:
         rows = np.arange(1, 41)
         pulls = {}
         for name, change in (("before", lambda matrix: matrix), ("after", without_spill)):
-            found = [change(with_sigma(tile, noise)) for tile in others]
-            above = [one.reradiation[rows, rows + 7] * 10 for one in found]
-            pulls[name] = np.array(above) / [band_sigma(one)[rows, rows + 7] for one in found]
+            changed = [change(with_sigma(tile, noise)) for tile in others]
+            above = [tile.reradiation[rows, rows + 7] * 10 for tile in changed]
+            pulls[name] = np.array(above) / [band_sigma(tile)[rows, rows + 7] for tile in changed]
         assert np.sqrt(np.mean(pulls["before"] ** 2)) > 2.5
         assert 0.75 < np.sqrt(np.mean(pulls["after"] ** 2)) < 1.1
         assert abs(np.mean(pulls["after"])) < 0.25

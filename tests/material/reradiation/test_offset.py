@@ -28,8 +28,8 @@ FOUND = FAR & (INPUT_NM >= 420)
 SUMMED = (INPUT_NM >= 430) & (INPUT_NM <= 600)
 
 
-def pull_rms(errors: list[NDArray[np.float64]], found: list[ReradiationMatrix]) -> float:
-    pulls = np.array(errors) / [one.reradiation_sigma for one in found]
+def pull_rms(errors: list[NDArray[np.float64]], corrected: list[ReradiationMatrix]) -> float:
+    pulls = np.array(errors) / [matrix.reradiation_sigma for matrix in corrected]
     return float(np.sqrt(np.mean(pulls[:, FOUND] ** 2)))
 
 
@@ -40,38 +40,38 @@ def sum_rms(errors: list[NDArray[np.float64]]) -> float:
 
 
 def test_sums_are_nearer_to_the_truth_and_sigma_is_that_of_what_is_left() -> None:
-    before, after, found = [], [], []
+    before, after, corrected = [], [], []
     for seed in range(40):
-        one = measurement(seed, YELLOW)
-        measured = with_sigma(one.measured)
-        found.append(without_offset(measured))
-        before.append(measured.reradiation - one.truth.reradiation)
-        after.append(found[-1].reradiation - one.truth.reradiation)
+        sample = measurement(seed, YELLOW)
+        measured = with_sigma(sample.measured)
+        corrected.append(without_offset(measured))
+        before.append(measured.reradiation - sample.truth.reradiation)
+        after.append(corrected[-1].reradiation - sample.truth.reradiation)
     assert sum_rms(after) < 0.6 * sum_rms(before)
-    assert_allclose(pull_rms(after, found), 1, atol=0.13)
+    assert_allclose(pull_rms(after, corrected), 1, atol=0.13)
 
 
 def test_only_columns_with_three_noise_entries_change() -> None:
     measured = with_sigma(measurement(2, YELLOW).measured)
-    found = without_offset(measured)
+    corrected = without_offset(measured)
     assert measured.reradiation_sigma is not None
-    assert found.reradiation_sigma is not None
-    changed = (found.reradiation != measured.reradiation).any(axis=0)
+    assert corrected.reradiation_sigma is not None
+    changed = (corrected.reradiation != measured.reradiation).any(axis=0)
     assert_array_equal(changed, INPUT_NM >= 420)
     assert_allclose(
-        found.reradiation_sigma / measured.reradiation_sigma,
+        corrected.reradiation_sigma / measured.reradiation_sigma,
         np.broadcast_to(np.where(changed, 0.8, 1.0), (41, 49)),
     )
-    assert_array_equal(found.reflectance, measured.reflectance)
-    assert_array_equal(found.reflectance_sigma, measured.reflectance_sigma)
+    assert_array_equal(corrected.reflectance, measured.reflectance)
+    assert_array_equal(corrected.reflectance_sigma, measured.reflectance_sigma)
 
 
 def test_an_offset_is_taken_away_on_both_sides() -> None:
-    one = measurement(3, YELLOW).measured
-    shifted = one.reradiation + np.where(INPUT_NM == 600, 3e-4, 0.0)
+    measured = measurement(3, YELLOW).measured
+    shifted = measured.reradiation + np.where(INPUT_NM == 600, 3e-4, 0.0)
     clean = [
-        without_offset(with_sigma(replace(one, reradiation=values))).reradiation[:, 30]
-        for values in (one.reradiation, shifted)
+        without_offset(with_sigma(replace(measured, reradiation=values))).reradiation[:, 30]
+        for values in (measured.reradiation, shifted)
     ]
     assert abs(np.mean(clean[1] - clean[0])) < 1e-4
 
@@ -88,7 +88,7 @@ def test_real_tiles_have_smaller_sums_and_right_sigma(repeats: bool) -> None:
     tiles = list(bfc450.tiles())
     noise = instrument_noise(tiles[::2]) if repeats else None
     measured = [with_sigma(tile, noise) for tile in tiles[1::4]]
-    found = [without_offset(tile) for tile in measured]
-    after = [tile.reradiation for tile in found]
+    corrected = [without_offset(tile) for tile in measured]
+    after = [tile.reradiation for tile in corrected]
     assert sum_rms(after) < 0.45 * sum_rms([tile.reradiation for tile in measured])
-    assert_allclose(pull_rms(after, found), 1, atol=0.13)
+    assert_allclose(pull_rms(after, corrected), 1, atol=0.13)

@@ -31,13 +31,13 @@ def above(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_what_is_left_is_within_sigma(dyes: tuple[Dye, ...], level: float) -> None:
     before, after = [], []
     for seed in range(15):
-        one = measurement(seed, *dyes, common=0.0, spill_level=level)
-        found = with_sigma(one.measured)
-        clean = without_spill(found)
-        assert found.reradiation_sigma is not None
+        sample = measurement(seed, *dyes, common=0.0, spill_level=level)
+        measured = with_sigma(sample.measured)
+        clean = without_spill(measured)
+        assert measured.reradiation_sigma is not None
         assert clean.reradiation_sigma is not None
-        truth = above(one.truth.reradiation)
-        before.append((above(found.reradiation) - truth) / above(found.reradiation_sigma))
+        truth = above(sample.truth.reradiation)
+        before.append((above(measured.reradiation) - truth) / above(measured.reradiation_sigma))
         after.append((above(clean.reradiation) - truth) / above(clean.reradiation_sigma))
         assert (clean.reradiation[BELOW_DIAGONAL] == 0).all()
     assert 0.75 < np.sqrt(np.mean(np.square(after))) < 1.15
@@ -47,18 +47,18 @@ def test_what_is_left_is_within_sigma(dyes: tuple[Dye, ...], level: float) -> No
 
 
 def test_only_the_neighbours_of_the_diagonal_change() -> None:
-    found = with_sigma(measurement(4, YELLOW).measured)
-    clean = without_spill(found)
+    measured = with_sigma(measurement(4, YELLOW).measured)
+    clean = without_spill(measured)
     other = ~(ABOVE_DIAGONAL | BELOW_DIAGONAL)
-    assert_array_equal(clean.reflectance, found.reflectance)
-    assert_array_equal(clean.reradiation[other], found.reradiation[other])
-    assert found.reradiation_sigma is not None
+    assert_array_equal(clean.reflectance, measured.reflectance)
+    assert_array_equal(clean.reradiation[other], measured.reradiation[other])
+    assert measured.reradiation_sigma is not None
     assert clean.reradiation_sigma is not None
     assert_array_equal(
-        clean.reradiation_sigma[~ABOVE_DIAGONAL], found.reradiation_sigma[~ABOVE_DIAGONAL]
+        clean.reradiation_sigma[~ABOVE_DIAGONAL], measured.reradiation_sigma[~ABOVE_DIAGONAL]
     )
-    moved = abs(clean.reradiation - found.reradiation)[ABOVE_DIAGONAL]
-    grown = clean.reradiation_sigma**2 - found.reradiation_sigma**2
+    moved = abs(clean.reradiation - measured.reradiation)[ABOVE_DIAGONAL]
+    grown = clean.reradiation_sigma**2 - measured.reradiation_sigma**2
     # At 370 nm of input there is no reflectance.
     parts = np.concatenate([[0.0], np.full(39, 0.2), [0.8]])
     assert_allclose(np.sqrt(grown[ABOVE_DIAGONAL]), parts * moved, atol=1e-7)
@@ -70,19 +70,19 @@ def test_a_matrix_without_spill_stays_as_it_is() -> None:
 
 
 def test_one_strange_wavelength_spoils_no_other() -> None:
-    one = measurement(2, YELLOW).measured
-    bad = one.to_bands()
+    measured = measurement(2, YELLOW).measured
+    bad = measured.to_bands()
     bad[20, 29] += 0.2
     clean, spoilt = (
         without_spill(ReradiationMatrix.from_bands("", INPUT_NM, OUTPUT_NM, values)).reradiation
-        for values in (one.to_bands(), bad)
+        for values in (measured.to_bands(), bad)
     )
     assert abs(clean - spoilt).max() * 10 < 5e-4
 
 
 def test_bands_without_common_neighbours_have_no_spill_to_find() -> None:
-    one = measurement(2, YELLOW).measured
-    other = one.rebinned(INPUT_NM + 3, OUTPUT_NM)
+    measured = measurement(2, YELLOW).measured
+    other = measured.rebinned(INPUT_NM + 3, OUTPUT_NM)
     assert without_spill(other) is other
 
 

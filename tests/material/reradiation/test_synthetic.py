@@ -18,9 +18,9 @@ from tests.material.reradiation.synthetic import (
 
 
 def test_a_seed_is_a_sample() -> None:
-    one, same, other = (measurement(seed, YELLOW).measured for seed in (1, 1, 2))
-    assert_array_equal(one.to_bands(), same.to_bands())
-    assert abs(one.to_bands() - other.to_bands()).max() > 0.01
+    first, same, other = (measurement(seed, YELLOW).measured for seed in (1, 1, 2))
+    assert_array_equal(first.to_bands(), same.to_bands())
+    assert abs(first.to_bands() - other.to_bands()).max() > 0.01
 
 
 def test_bands_are_skewed_about_their_peaks() -> None:

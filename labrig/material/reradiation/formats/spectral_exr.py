@@ -13,6 +13,8 @@ import itertools
 import math
 import os
 import re
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +33,7 @@ from labrig.material.reradiation.formats.text_rows import (
     shown,
 )
 from labrig.material.reradiation.matrix import SAME_NM, FloatArray, ReradiationMatrix
-from labrig.optics import Spectrum, edges_from_centres
+from labrig.optics import CIE_1931, Spectrum, edges_from_centres, illuminant, observer
 
 Pixels = NDArray[np.float32]
 
@@ -52,6 +54,8 @@ _PREFIXES = dict(
         strict=True,
     )
 )
+#: File descriptor of the process's standard error.
+STDERR = 2
 _LIGHT_M_PER_S = 299_792_458.0
 
 
@@ -338,12 +342,30 @@ def _channels(path: Path) -> dict[str, Any]:
     import OpenEXR
 
     try:
-        # Of broken pixels the library prints a warning, in the midst of what labrig says.
-        with contextlib.redirect_stdout(io.StringIO()):
+        with _silenced():
             channels: dict[str, Any] = OpenEXR.File(str(path), separate_channels=True).channels()
     except (RuntimeError, ValueError, TypeError, MemoryError, IndexError):
         raise ValueError("the image's pixels cannot be read; the file is cut or broken") from None
     return channels
+
+
+@contextlib.contextmanager
+def _silenced() -> Iterator[None]:
+    """Keep back what the library writes of broken pixels, in the midst of what labrig says.
+
+    Pixels are compressed: that some are broken is known only while the library reads them. It
+    writes to Python's standard output, and past Python to the process's standard error.
+    """
+    sys.stderr.flush()
+    kept = os.dup(STDERR)
+    try:
+        with Path(os.devnull).open("wb") as nowhere:
+            os.dup2(nowhere.fileno(), STDERR)
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(kept, STDERR)
+        os.close(kept)
 
 
 def _check_header(header: dict[str, Any]) -> None:
@@ -444,20 +466,14 @@ def _channel(nm: float) -> str:
 
 def _rgb(matrix: ReradiationMatrix) -> dict[str, float]:
     """Return linear sRGB under D65 for programs that show no spectra, a perfect white (1, 1, 1)."""
-    colour = colour_science.load()
-    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-    d65 = colour.SDS_ILLUMINANTS["D65"]
-    light = Spectrum("D65", np.asarray(d65.wavelengths), np.asarray(d65.values))
+    eye, light = observer(CIE_1931), illuminant("D65")
     edges, width_nm = matrix.output_edges_nm, matrix.output_width_nm
     response = np.stack(
-        [
-            Spectrum("", np.asarray(observer.wavelengths), values).in_bands(edges)
-            for values in np.transpose(observer.values)
-        ]
+        [Spectrum("", eye.wavelength_nm, values).in_bands(edges) for values in eye.functions.T]
     )
     white = response[1] @ (light.in_bands(edges) * width_nm)
     seen = response @ (np.nan_to_num(matrix.under(light).total.value) * width_nm)
     if white <= 0:
         return dict.fromkeys("RGB", 0.0)
-    to_rgb = colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB
+    to_rgb = colour_science.load().RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB
     return dict(zip("RGB", np.maximum(to_rgb @ (seen / white), 0.0).tolist(), strict=True))

@@ -30,14 +30,14 @@ def two_dyes(seed: int = 0, noise: float = 1.5e-3) -> ReradiationMatrix:
     return ReradiationMatrix.from_bands("yellow paper", input_nm, output_nm, values)
 
 
-def assert_same(found: ReradiationMatrix, expected: ReradiationMatrix, rtol: float = 0.0) -> None:
+def assert_same(actual: ReradiationMatrix, expected: ReradiationMatrix, rtol: float = 0.0) -> None:
     """All that a matrix has is the same."""
     for field in fields(ReradiationMatrix):
-        one, other = getattr(found, field.name), getattr(expected, field.name)
-        if isinstance(other, np.ndarray):
-            assert_allclose(one, other, rtol=rtol, atol=0, err_msg=field.name)
+        value, expected_value = getattr(actual, field.name), getattr(expected, field.name)
+        if isinstance(expected_value, np.ndarray):
+            assert_allclose(value, expected_value, rtol=rtol, atol=0, err_msg=field.name)
         else:
-            assert one == other, field.name
+            assert value == expected_value, field.name
 
 
 @st.composite

@@ -58,8 +58,8 @@ def header_of(path: Path) -> dict[str, Any]:
 def square(matrix: ReradiationMatrix) -> ReradiationMatrix:
     """One grid of input and output, nothing re-radiated at shorter wavelengths."""
     nm = np.arange(400.0, 701.0, 20.0)
-    found = matrix.rebinned(nm, nm)
-    return replace(found, reradiation=np.where(found.is_stokes, found.reradiation, 0.0))
+    square = matrix.rebinned(nm, nm)
+    return replace(square, reradiation=np.where(square.is_stokes, square.reradiation, 0.0))
 
 
 def test_a_matrix_comes_back(tmp_path: Path) -> None:
@@ -89,8 +89,13 @@ def test_channels_and_attributes_are_the_layouts(tmp_path: Path) -> None:
     channels = OpenEXR.File(str(path), separate_channels=True).channels()
     assert set(channels) == (
         {"R", "G", "B"}
-        | {f"T.{one},000000nm" for one in nm}
-        | {f"T.{one},000000nm.{two},000000nm" for one in nm for two in nm if two > one}
+        | {f"T.{input_nm},000000nm" for input_nm in nm}
+        | {
+            f"T.{input_nm},000000nm.{output_nm},000000nm"
+            for input_nm in nm
+            for output_nm in nm
+            if output_nm > input_nm
+        }
     )
     assert {channel.pixels.dtype for channel in channels.values()} == {np.dtype(np.float32)}
     header = header_of(path)
@@ -147,9 +152,9 @@ def test_pixels_are_chosen(tmp_path: Path) -> None:
     path = image(tmp_path / "a.exr", {"T.400nm": half, "T.500nm": 0.5, "T.400nm.500nm": 0.01})
     with pytest.raises(UsageError, match="2 × 3 different pixels"):
         read_reradiation(path)
-    found = read_reradiation(path, pixel=(1, 2))
-    assert_allclose(found.reflectance, [0.7, 0.5])
-    assert_allclose(found.reradiation, [[0.0, 0.0], [1e-4, 0.0]])
+    chosen = read_reradiation(path, pixel=(1, 2))
+    assert_allclose(chosen.reflectance, [0.7, 0.5])
+    assert_allclose(chosen.reradiation, [[0.0, 0.0], [1e-4, 0.0]])
     for pixel in ((2, 0), (0, 3), (-1, 0)):
         with pytest.raises(UsageError, match="expected a pixel in 2 × 3"):
             read_reradiation(path, pixel=pixel)
@@ -165,9 +170,9 @@ def test_a_surface_without_bispectral_layers_re_radiates_nothing(tmp_path: Path)
 def test_pairs_that_are_left_out_are_zero_or_not_measured(tmp_path: Path) -> None:
     channels: dict[str, float | np.ndarray] = {f"T.{nm}nm": 0.5 for nm in (400, 500, 600)}
     path = image(tmp_path / "a.exr", channels | {"T.400nm.600nm": 0.2})
-    found = read_reradiation(path)
+    read = read_reradiation(path)
     expected = [[0.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [2e-3, np.nan, 0.0]]
-    assert_allclose(found.reradiation, expected, rtol=1e-6)
+    assert_allclose(read.reradiation, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

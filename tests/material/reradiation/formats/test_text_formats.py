@@ -59,8 +59,8 @@ def edited(path: Path, edit: Callable[[list[str]], list[str]]) -> Path:
 @pytest.mark.parametrize("ending", [".BFC", ".ark"])
 def test_fractions_come_back(tmp_path: Path, ending: str) -> None:
     paper = two_dyes(3)
-    found = there_and_back(paper, tmp_path / f"m{ending}")
-    assert_same(found, paper, rtol=1e-15)
+    read = there_and_back(paper, tmp_path / f"m{ending}")
+    assert_same(read, paper, rtol=1e-15)
 
 
 def test_a_table_keeps_all(tmp_path: Path) -> None:
@@ -244,10 +244,10 @@ def test_a_table_per_nm_and_one_per_band_are_one_matrix(tmp_path: Path) -> None:
     per_band.write_text("\n".join([r"out_nm\in_nm,380,390", *rows]))
     rows = ["380,0.5,0.001", "390,0.02,0.6", "400,0.03,0.04"]
     per_nm.write_text("\n".join(["# unit: 1/nm", "output_nm,380,390", *rows]))
-    one, other = read_reradiation(per_band), read_reradiation(per_nm)
-    assert_same(replace(other, name="band"), one, rtol=1e-15)
-    assert_array_equal(one.reflectance, [0.5, 0.6, np.nan])
-    assert_allclose(one.reradiation, [[0, 0.001], [0.02, 0], [0.03, 0.04]])
+    of_bands, other = read_reradiation(per_band), read_reradiation(per_nm)
+    assert_same(replace(other, name="band"), of_bands, rtol=1e-15)
+    assert_array_equal(of_bands.reflectance, [0.5, 0.6, np.nan])
+    assert_allclose(of_bands.reradiation, [[0, 0.001], [0.02, 0], [0.03, 0.04]])
     sigmas = ["# sigma", "output_nm,380,390", "380,0.1,0.2", "390,0.3,0.4", "400,0.5,0.6"]
     per_nm.write_text(per_nm.read_text() + "\n" + "\n".join(sigmas))
     with_sigmas = read_reradiation(per_nm)
@@ -258,7 +258,7 @@ def test_a_table_per_nm_and_one_per_band_are_one_matrix(tmp_path: Path) -> None:
     apart = tmp_path / "apart.csv"
     rows = ["380,0.5,0,0.01", "390,0.6,0.2,0", "400,,0.3,0.4"]
     apart.write_text("\n".join(["# unit: per band", "output_nm,reflectance,380,390", *rows]))
-    assert_same(replace(read_reradiation(apart), name="band"), one, rtol=1e-15)
+    assert_same(replace(read_reradiation(apart), name="band"), of_bands, rtol=1e-15)
 
 
 def test_matrices_of_an_archive_are_chosen_by_name(tmp_path: Path) -> None:
@@ -346,9 +346,9 @@ def test_a_real_archive_is_its_tables(colour: str) -> None:
     name = f"fluorescent_{colour}"
     table = read_reradiation(BISPECTRAL / f"art_postit/{name}.csv")
     archive = BISPECTRAL / "art_postit/FluorescentPostIt_yellow_green.ark"
-    found = read_reradiation(archive, name)
-    assert found.name == f"3M fluorescent {colour} Post-It (R) sticker"
-    assert_same(replace(found, name=name), table)
+    archived = read_reradiation(archive, name)
+    assert archived.name == f"3M fluorescent {colour} Post-It (R) sticker"
+    assert_same(replace(archived, name=name), table)
 
 
 @pytest.mark.shared_data

@@ -1,0 +1,64 @@
+"""Materials of any kind, from any of their files."""
+
+import os
+from pathlib import Path
+
+from labrig import resources
+from labrig.errors import UsageError
+from labrig.material.file import Material, read_material
+from labrig.material.fluorescent import read_fluorescent
+from labrig.material.reradiation import ReradiationMatrix, read_reradiation
+from labrig.yaml_file import read_yaml
+
+#: Endings of material files; all others are those of matrices.
+YAML = (".yaml", ".yml")
+PHOSPHOR, FLUORESCENT = "phosphor", "fluorescent"
+
+
+def read_any_material(
+    name_or_path: str | os.PathLike[str],
+    entry: str | None = None,
+    *,
+    pixel: tuple[int, int] | None = None,
+) -> Material | ReradiationMatrix:
+    """Read a phosphor, or the re-radiation matrix of a fluorescent material.
+
+    Parameters
+    ----------
+    name_or_path
+        Path of a material file (`.yaml`), whose `kind` tells what it is; name of a shipped
+        material such as `blue-paint`; or path of a file that `read_reradiation` reads.
+    entry, pixel
+        Matrix in a file of several, see `read_reradiation`.
+
+    Returns
+    -------
+    Material or ReradiationMatrix
+        The phosphor, or the matrix.
+
+    Raises
+    ------
+    UsageError, DataError
+        There is no such material, a file is malformed, or `entry` or `pixel` is given for a
+        material file.
+
+    Examples
+    --------
+    >>> from labrig.material import read_any_material
+    >>> type(read_any_material("blue-paint")).__name__
+    'Material'
+    >>> type(read_any_material("paper.csv")).__name__
+    'ReradiationMatrix'
+    """
+    path = Path(name_or_path)
+    if path.suffix and path.suffix.lower() not in YAML:
+        return read_reradiation(path, entry, pixel=pixel)
+    for option, value in (("entry", entry), ("pixel", pixel)):
+        if value is not None:
+            raise UsageError(f"{path}: expected a file of matrices for '{option}', got a material")
+    file = resources.find("config/materials", "material", name_or_path)
+    kind = read_yaml(file).get("kind")
+    if kind not in (PHOSPHOR, FLUORESCENT):
+        got = "nothing" if kind is None else f"'{kind}'"
+        raise UsageError(f"{file}: expected 'kind: {PHOSPHOR}' or 'kind: {FLUORESCENT}', got {got}")
+    return read_fluorescent(file) if kind == FLUORESCENT else read_material(file)
