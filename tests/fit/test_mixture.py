@@ -288,6 +288,16 @@ def test_what_was_not_measured_is_left_out() -> None:
     assert_allclose(fit.mixture.mean_nm, truth.mean_nm, rtol=1e-5)
 
 
+@pytest.mark.parametrize("skewed", [False, True])
+def test_light_of_a_single_wavelength_is_a_narrow_component(skewed: bool) -> None:
+    values = np.zeros((41, 49))
+    values[22, 10:16] = 0.1
+    matrix = ReradiationMatrix.from_bands("", INPUT_NM, OUTPUT_NM, values)
+    fit = fit_mixture(matrix, 1, threshold=0.01, skewed=skewed)
+    assert_allclose(fit.mixture.mean_nm, [[425, 600]], atol=1)
+    assert_allclose(bands(fit.mixture).sum(), 0.6, rtol=1e-9)
+
+
 def test_the_same_matrix_gives_the_same_text() -> None:
     texts = [fit_mixture(measured(two_dyes(), 21), 2).to_json() for _ in range(2)]
     assert texts[0] == texts[1]

@@ -114,7 +114,7 @@ def _likely(
     return maximise_likelihood(
         entries.monomials[:, kept],
         mass[np.newaxis, kept],
-        scattered_starts(entries.points[:, kept], mass[kept], components, STARTS),
+        scattered_starts(entries.points[:, kept], mass[kept], components, STARTS, least_sd**2),
         least_sd**2,
         MAX_ITERATIONS,
         TOLERANCE,

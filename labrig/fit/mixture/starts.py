@@ -14,7 +14,7 @@ MOST_CENTRES = 48
 
 
 def scattered_starts(
-    points: FloatArray, mass: FloatArray, components: int, count: int
+    points: FloatArray, mass: FloatArray, components: int, count: int, least_variance: float
 ) -> Gaussians:
     """Return mixtures whose means are entries far from one another (k-means++).
 
@@ -28,6 +28,8 @@ def scattered_starts(
         Number K of components.
     count
         Number B of mixtures.
+    least_variance
+        Least variance of a component in input and in output.
 
     References
     ----------
@@ -46,12 +48,13 @@ def scattered_starts(
         distance2 = np.minimum(distance2, (off**2).sum(axis=0))
         chance = distance2 * mass
     centre = points @ mass / mass.sum()
-    variance = ((points - centre[:, np.newaxis]) ** 2) @ mass / mass.sum() / components
+    variance = ((points - centre[:, np.newaxis]) ** 2) @ mass / mass.sum()
+    spread = np.maximum(variance / components, least_variance)
     shape = (count, components)
     return Gaussians(
         np.full(shape, 1 / components),
         points.T[chosen],
-        np.broadcast_to([variance[0], 0.0, variance[1]], (*shape, 3)),
+        np.broadcast_to([spread[0], 0.0, spread[1]], (*shape, 3)),
     )
 
 
