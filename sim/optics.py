@@ -41,8 +41,7 @@ ELECTRONS_PER_S_NM = 33_000.0
 #: Radiance that a white surface reflects at irradiance 1. Chosen: under the default lamp a grey
 #: card fills half of the range at ISO 100, f/5.6, 1/60 s, about 500 times the glow of blue paint.
 REFLECTED = 12.5
-#: Reflectance of a sample, and of the black cloth around it.
-SAMPLE_REFLECTANCE = 0.5
+#: Reflectance of the black cloth around the samples.
 CLOTH_REFLECTANCE = 0.03
 
 #: From the middle to the corner of a full-format frame, and the lens that a camera usually has.

@@ -31,6 +31,7 @@ from .optics import FOCAL_MM, bent_curves, measured_curves, vignetting
 from .samples import Samples
 from .sensor import BAYER_RGGB, Sensor, SensorTemperature, gain_electrons_per_dn
 from .simulation import Simulation
+from .surfaces import Surfaces
 from .truth import Truth, true_lvf, true_patches
 from .view import View
 
@@ -68,7 +69,9 @@ class Room:
         self._clock = clock
         self._layout = Layout(simulation)
         self._samples = Samples(simulation, self._layout)
-        self._view = View(simulation, self._layout)
+        self._view = View(
+            simulation, self._layout, Surfaces(self._samples.materials, simulation.gloss)
+        )
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
         self._leds = Leds(simulation.leds)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.material import read_material
+from labrig.material import Material, State, read_any_material
 
 from .arrangement import Arrangement, Arrangements
 from .layout import Layout
@@ -19,6 +19,14 @@ from .simulation import Simulation
 from .temperature import rate_factor
 
 FloatArray = NDArray[np.float64]
+
+#: What a sample that does not glow is among those that do.
+DARK = Material(
+    name="dark",
+    kind="phosphor",
+    bands_nm=(400.0, 700.0),
+    states=(State(k_r_per_s=1.0, reradiation=(0.0,)),),
+)
 
 
 class Samples:
@@ -37,7 +45,7 @@ class Samples:
     Attributes
     ----------
     materials
-        Material of every patch.
+        Material of every patch: a phosphor, or the matrix of a fluorescent material.
     cells : Phosphor
         States of the cells; `patch` is the cell to which a state belongs.
     radiance_at_one : ndarray, shape (states, wavelengths)
@@ -45,15 +53,16 @@ class Samples:
     """
 
     def __init__(self, simulation: Simulation, layout: Layout) -> None:
-        self.materials = [read_material(patch.material) for patch in simulation.patches]
+        self.materials = [read_any_material(patch.material) for patch in simulation.patches]
+        phosphors = [
+            material if isinstance(material, Material) else DARK for material in self.materials
+        ]
         charges = [patch.initial_charge for patch in simulation.patches]
         self._patches = replace(
-            phosphor(self.materials, charges, simulation.lamp.irradiance),
+            phosphor(phosphors, charges, simulation.lamp.irradiance),
             rate_factor=rate_factor(simulation.temperature),
         )
-        patch_states = [
-            np.flatnonzero(self._patches.patch == n) for n in range(len(self.materials))
-        ]
+        patch_states = [np.flatnonzero(self._patches.patch == n) for n in range(len(phosphors))]
         states = [patch_states[patch - 1] for patch in layout.patch[1:]]
         self._state_of_cells = np.concatenate(states)
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
@@ -63,7 +72,7 @@ class Samples:
             excitation=self._patches.excitation[self._state_of_cells],
             patch=cell,
         )
-        emitted = np.concatenate([emission(material) for material in self.materials])
+        emitted = np.concatenate([emission(material) for material in phosphors])
         self.radiance_at_one: FloatArray = (emitted * self._patches.k_r_per_s[:, None])[
             self._state_of_cells
         ]

@@ -51,7 +51,8 @@ class Patch(Part):
     Attributes
     ----------
     material
-        Name of a shipped material, such as `blue-paint`, or path of a material file.
+        Name of a shipped material, such as `blue-paint`, or path of a material file or of a file
+        with a re-radiation matrix.
     region
         Place of the sample in the frame: `[x, y, width, height]` in pixels, or all four as
         fractions of the frame.
@@ -218,6 +219,9 @@ class Simulation(Part):
     anisotropy
         Fraction of its glow that a sample loses when it is turned away by 90 degrees, for example
         `5 %`.
+    gloss
+        Fraction of the light that the samples mirror into the camera; crossed polarisers take most
+        of it away.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
@@ -252,6 +256,7 @@ class Simulation(Part):
     ambient: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     temperature: TemperatureSettings | None = None
     anisotropy: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
+    gloss: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     room_light: bool = True
 
     @field_validator("faults")

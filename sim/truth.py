@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from labrig.material import Material
+
 from .bench_settings import StripSettings
 from .layout import Layout
 from .lvf import Lvf, in_pixels
@@ -51,7 +53,7 @@ class TrueState(_Part):
 
 
 class TruePatch(_Part):
-    """One sample and its states by falling rate."""
+    """One sample and its states by falling rate; a fluorescent material has none."""
 
     material: str
     region: tuple[float, float, float, float]
@@ -150,42 +152,57 @@ def true_patches(
     faster
         Factor of the room's temperature on their rates.
     """
-    patches = []
-    k_r = samples.cells.k_r_per_s
-    for number, (placed, material) in enumerate(
-        zip(simulation.patches, samples.materials, strict=True), start=1
-    ):
-        cells = np.flatnonzero(layout.patch == number)
-        pixels = layout.pixels[cells]
-        weight = pixels / pixels.sum() if pixels.any() else np.full(len(cells), 1 / len(cells))
-        # One row a state, one column a cell.
-        index = np.flatnonzero(np.isin(samples.cells.patch, cells)).reshape(len(cells), -1).T
-        states = []
-        for rank in np.argsort(-k_r[index[:, 0]], kind="stable"):
-            indices, state = index[rank], material.states[rank]
-            amplitude = None
-            if effective is not None:
-                red, green, blue = dn_per_s[indices[0]] * float(weight @ effective[indices])
-                amplitude = (red, green, blue)
-            states.append(
-                TrueState(
-                    k_r_per_s=faster * k_r[indices[0]],
-                    k_e_per_s=state.k_e_per_s,
-                    reradiation=state.reradiation,
-                    emission=tuple(samples.radiance_at_one[indices[0]] / k_r[indices[0]]),
-                    concentration=None if level is None else float(weight @ level[indices]),
-                    amplitude_dn_per_s=amplitude,
-                )
+    return tuple(
+        TruePatch(
+            material=material.name,
+            region=placed.region,
+            bands_nm=material.bands_nm if isinstance(material, Material) else None,
+            states=_true_states(
+                number, material, samples, layout, level, effective, dn_per_s, faster
             )
-        patches.append(
-            TruePatch(
-                material=material.name,
-                region=placed.region,
-                bands_nm=material.bands_nm,
-                states=tuple(states),
+            if isinstance(material, Material)
+            else (),
+        )
+        for number, (placed, material) in enumerate(
+            zip(simulation.patches, samples.materials, strict=True), start=1
+        )
+    )
+
+
+def _true_states(
+    number: int,
+    material: Material,
+    samples: Samples,
+    layout: Layout,
+    level: FloatArray | None,
+    effective: FloatArray | None,
+    dn_per_s: FloatArray,
+    faster: float,
+) -> tuple[TrueState, ...]:
+    k_r = samples.cells.k_r_per_s
+    cells = np.flatnonzero(layout.patch == number)
+    pixels = layout.pixels[cells]
+    weight = pixels / pixels.sum() if pixels.any() else np.full(len(cells), 1 / len(cells))
+    # One row a state, one column a cell.
+    index = np.flatnonzero(np.isin(samples.cells.patch, cells)).reshape(len(cells), -1).T
+    states = []
+    for rank in np.argsort(-k_r[index[:, 0]], kind="stable"):
+        indices, state = index[rank], material.states[rank]
+        amplitude = None
+        if effective is not None:
+            red, green, blue = dn_per_s[indices[0]] * float(weight @ effective[indices])
+            amplitude = (red, green, blue)
+        states.append(
+            TrueState(
+                k_r_per_s=faster * k_r[indices[0]],
+                k_e_per_s=state.k_e_per_s,
+                reradiation=state.reradiation,
+                emission=tuple(samples.radiance_at_one[indices[0]] / k_r[indices[0]]),
+                concentration=None if level is None else float(weight @ level[indices]),
+                amplitude_dn_per_s=amplitude,
             )
         )
-    return tuple(patches)
+    return tuple(states)
 
 
 def true_lvf(simulation: Simulation) -> TrueLvf | None:

@@ -8,8 +8,9 @@ from .cards import reflectances
 from .layout import Layout, Places
 from .lights import VisibleLight
 from .lvf import Lvf
-from .optics import CLOTH_REFLECTANCE, REFLECTED, SAMPLE_REFLECTANCE
+from .optics import CLOTH_REFLECTANCE, REFLECTED
 from .simulation import Simulation
+from .surfaces import Surfaces
 
 FloatArray = NDArray[np.float64]
 
@@ -23,11 +24,14 @@ class View:
         Settings of the room.
     layout
         Layout of the picture.
+    surfaces
+        Surfaces of the samples.
     """
 
-    def __init__(self, simulation: Simulation, layout: Layout) -> None:
+    def __init__(self, simulation: Simulation, layout: Layout, surfaces: Surfaces) -> None:
         self._simulation = simulation
         self._layout = layout
+        self._surfaces = surfaces
         self._reflected = REFLECTED * simulation.lamp.irradiance
         self._lvf = None if simulation.lvf is None else Lvf(simulation.lvf)
 
@@ -65,11 +69,11 @@ class View:
             light = passed * reflected.sample + reflected.sample_stray
         if arrangement.card == "blank":
             glow_s = np.zeros_like(glow_s)
-            reflectance = reflectances("blank", self._simulation.grey_card)[1]
+            thrown_back = reflectances("blank", self._simulation.grey_card)[1] * light
         else:
-            reflectance = np.full_like(reflected.sample, SAMPLE_REFLECTANCE)
+            thrown_back = self._surfaces.thrown_back(light, self._layout.patch)
             glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
-        thrown_back = reflectance * light + CLOTH_REFLECTANCE * reflected.door
+        thrown_back = thrown_back + CLOTH_REFLECTANCE * reflected.door
         radiance: FloatArray = glow_s + self._reflected * thrown_back
         radiance[0] = self._reflected * CLOTH_REFLECTANCE * reflected.cloth
         return radiance
