@@ -104,6 +104,7 @@ def main() -> None:
     print_errors([*tried, *floors])
     print_colours([*tried, *floors])
     print(f"\npomegranate: {pomegranate.failed} of {pomegranate.tried} starts failed")
+    print_kept_light(targets)
     print_speed(tried)
     print_postits(asked.folder, pomegranate)
     print_draws(targets)
@@ -180,6 +181,18 @@ def print_colours(all_tried: Sequence[Tried]) -> None:
     for one in judged:
         found = [quantiles(column, 0.5, 0.9) for column in np.array(one.xyz_error).T]
         print(f"{one.label:31}" + "".join(f"{low:8.1%}{high:7.1%}" for low, high in found))
+
+
+def print_kept_light(targets: Sequence[Target]) -> None:
+    """Print how much of the light of the excited columns is above the threshold."""
+    parts = []
+    for target in targets:
+        matrix, excited = target.matrix, target.values.any(axis=0)
+        kept = with_values(matrix, target.values).reradiated_fraction[excited].sum()
+        parts.append(float(kept / matrix.reradiated_fraction[excited].sum()))
+    low, middle = quantiles(parts, 0.1, 0.5)
+    print(f"light above the threshold, of that in the same columns: median {middle:.1%}, "
+          f"10 % {low:.1%}")  # fmt: skip
 
 
 def print_speed(all_tried: Sequence[Tried]) -> None:
@@ -319,7 +332,7 @@ def print_large_textures(targets: Sequence[Target]) -> None:
     parts = rng.dirichlet(np.ones(3), TEXELS).astype(np.float32)
     tables = BYTES_PER_NUMBER * int(matrix.is_stokes.sum()) * TEXELS
     diagonals = BYTES_PER_NUMBER * len(matrix.output_nm) * TEXELS
-    print(f"\n{f'{TEXELS} texels, K = 2, blends of':42}{'time / s':>9}{'ms each':>9}"
+    print(f"\n{f'{TEXELS} texels, K = 2, blends of':40}{'time / s':>9}{'processor / s':>15}"
           f"{'median MSE':>12}{'bytes':>10}{'table':>11}{'ratio':>7}"
           f"{'with diagonal':>15}")  # fmt: skip
     same = np.broadcast_to(rng.choice(len(shown), 3, replace=False), (TEXELS, 3))
@@ -330,11 +343,11 @@ def print_large_textures(targets: Sequence[Target]) -> None:
         texels = np.zeros((TEXELS, *shown.shape[1:]), dtype=np.float32)
         for part, index in zip(parts.T, which.T, strict=True):
             texels += part[:, np.newaxis, np.newaxis] * shown[index]
-        before = time.perf_counter()
+        before, used = time.perf_counter(), time.process_time()
         texture = fit_mixture_texture(texels, matrix.input_nm, matrix.output_nm, components=2)
-        seconds = time.perf_counter() - before
+        seconds, used = time.perf_counter() - before, time.process_time() - used
         stored = texture.stored_bytes
-        print(f"{name:42}{seconds:9.1f}{1e3 * seconds / TEXELS:9.2f}"
+        print(f"{name:40}{seconds:9.1f}{used:15.1f}"
               f"{1e6 * np.median(texture.masked_mse):10.2f}e-6{stored:10}{tables:11}"
               f"{tables / stored:7.1f}"
               f"{(tables + diagonals) / (stored + diagonals):15.1f}")  # fmt: skip
