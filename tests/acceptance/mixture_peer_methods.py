@@ -12,10 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.fit import fit_mixture, fit_mixture_texture
+from labrig.fit.mixture.candidate import MAX_ITERATIONS, STARTS, TOLERANCE
 from labrig.fit.mixture.entries import StokesEntries, stokes_entries
-from labrig.fit.mixture.expectation_maximisation import maximise_likelihood
-from labrig.fit.mixture.fit import LEAST_SD_BANDS, MAX_ITERATIONS, STARTS, TOLERANCE
-from labrig.fit.mixture.starts import scattered_starts
 from labrig.material import ReradiationMatrix, ReradiationMixture
 
 Floats = npt.NDArray[np.float64]
@@ -89,19 +87,7 @@ def _of_mixture(target: Target, mixture: ReradiationMixture) -> Floats:
 
 def likelihood_only(target: Target, components: int) -> Floats:
     """Return what labrig's expectation maximisation makes of 8 starts, without refinement."""
-    entries = target.entries
-    kept = entries.is_kept
-    least_sd = LEAST_SD_BANDS * entries.band_nm / entries.unit_nm
-    found = maximise_likelihood(
-        entries.monomials[:, kept],
-        entries.mass[np.newaxis, kept],
-        scattered_starts(entries.points[:, kept], entries.mass[kept], components, STARTS),
-        least_sd**2,
-        MAX_ITERATIONS,
-        TOLERANCE,
-    ).gaussians
-    tried = [target.from_density(one) for one in found.density(entries.monomials)]
-    return min(tried, key=target.mse)
+    return _of_mixture(target, fit_mixture(target.matrix, components, refine=False).mixture)
 
 
 @dataclass

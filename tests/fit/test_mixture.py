@@ -252,6 +252,16 @@ def test_colours_need_lights_and_a_surface_that_can_be_seen() -> None:
         )
 
 
+def test_the_likelihood_alone_is_what_refinement_starts_from() -> None:
+    matrix = measured(two_dyes(), 35)
+    alone, whole = (fit_mixture(matrix, 3, refine=refine) for refine in (False, True))
+    assert_allclose(alone.masked_mse, whole.likelihood_mse, rtol=1e-9)
+    assert alone.refinement_iterations == 0
+    for options in ({"components": "auto"}, {"components": 2, "skewed": True}):
+        with pytest.raises(UsageError, match="without refinement"):
+            fit_mixture(matrix, refine=False, **options)  # type: ignore[arg-type]
+
+
 def test_skewed_components_are_found_again_and_said() -> None:
     truth = replace(two_components(32), skew=np.array([[-0.5, 0.4], [0.3, 0.6]]))
     fit = fit_mixture(truth.to_matrix(INPUT_NM, OUTPUT_NM), 2, "least-squares", 1e-9, skewed=True)

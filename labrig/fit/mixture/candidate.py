@@ -50,6 +50,16 @@ class Candidate:
     converged: bool
 
 
+def likeliest(entries: StokesEntries, components: int) -> Candidate:
+    """Return the mixture of greatest likelihood, with the scale of the integral."""
+    least_sd = _least_sd(entries)
+    likely = _likely(entries, entries.mass, components, least_sd)
+    gaussians, _ = _by_error(entries, likely.gaussians)[0]
+    mixture = with_integral(entries, _in_nm(entries, gaussians, 1.0))
+    converged = likely.iterations < MAX_ITERATIONS
+    return Candidate(mixture, masked_mse(entries, mixture), likely.iterations, 0, converged)
+
+
 def candidates(
     entries: StokesEntries, first: int, skewed: bool, is_final: bool = True
 ) -> Iterator[Candidate]:
@@ -57,7 +67,7 @@ def candidates(
 
     Without `is_final` they are only as near to the minimum as tells how good they are.
     """
-    least_sd = LEAST_SD_BANDS * entries.band_nm / entries.unit_nm
+    least_sd = _least_sd(entries)
     gaussians, scale = _greedy(entries, first - 1, least_sd)
     components = first
     while True:
@@ -85,6 +95,10 @@ def candidates(
             fit.converged,
         )
         components += 1
+
+
+def _least_sd(entries: StokesEntries) -> float:
+    return LEAST_SD_BANDS * entries.band_nm / entries.unit_nm
 
 
 def _greedy(entries: StokesEntries, components: int, least_sd: float) -> tuple[Gaussians, float]:

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.fit.mixture.candidate import Candidate, candidates
+from labrig.fit.mixture.candidate import Candidate, candidates, likeliest
 from labrig.fit.mixture.cross_validation import held_out_errors
 from labrig.fit.mixture.entries import FALSE_DISCOVERY_RATE, StokesEntries, stokes_entries
 from labrig.fit.mixture.refinement import PARAMETERS
@@ -38,6 +38,7 @@ def fit_mixture(
     selection: Selection = "bic",
     skewed: bool = False,
     lights: Sequence[Spectrum] = (),
+    refine: bool = True,
 ) -> MixtureFit:
     """Fit a mixture of normal densities to the re-radiation of a matrix.
 
@@ -66,6 +67,10 @@ def fit_mixture(
         Whether each component may be skewed in input and output: two more parameters each.
     lights
         Lights whose colours set the scale if `scaling` is "colour".
+    refine
+        Whether the squared error is minimised after the likelihood. The likelihood alone is what
+        the paper maximises: ten times faster, with three times the error; not for "auto" or skewed
+        components.
 
     Returns
     -------
@@ -75,7 +80,8 @@ def fit_mixture(
     Raises
     ------
     UsageError
-        There is neither σ nor a threshold, or there are more components than the entries allow.
+        There is neither σ nor a threshold, there are more components than the entries allow, or
+        `refine` is left out where it is needed.
     DataError
         No entry is above the threshold.
 
@@ -96,11 +102,17 @@ def fit_mixture(
     entries = stokes_entries(matrix, threshold)
     kept = int(entries.is_kept.sum())
     most = min(kept, len(entries.value) // parameters)
+    if not refine and (skewed or components == "auto"):
+        raise UsageError("expected a number of normal components for a fit without refinement")
     if components == "auto":
         most = max(min(MOST_COMPONENTS, kept // parameters), 1)
         fits, table = _selected(entries, most, parameters, selection, skewed)
     elif 1 <= components <= most:
-        fits = [next(candidates(entries, components, skewed))]
+        fits = [
+            next(candidates(entries, components, skewed))
+            if refine
+            else likeliest(entries, components)
+        ]
         table = [_scored(entries, fits[0], parameters)]
     else:
         raise UsageError(
