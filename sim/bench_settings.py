@@ -59,8 +59,9 @@ class LedSettings(Part):
     Attributes
     ----------
     relay
-        Relay that switches the LED, of the Numato board, or of the Arduino if that switches the
-        lamp; relay 0 is the lamp's.
+        Relay that switches the LED, of the board that `led_board` names; relay 0 is the lamp's. The
+        outputs of the first DC4100 count as 1 to 4, of the second as 5 to 8, of the third as 9 to
+        12.
     centre
         Centre wavelength of the LED's band, in nm.
     fwhm
@@ -70,7 +71,7 @@ class LedSettings(Part):
         `10 %`.
     """
 
-    relay: Annotated[int, Field(ge=1, le=7)]
+    relay: Annotated[int, Field(ge=1, le=12)]
     centre: Nanometres
     fwhm: Annotated[float, Field(ge=5, le=200)] = 25.0
     level: Annotated[Fraction, Field(gt=0)] = 0.1

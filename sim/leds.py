@@ -36,10 +36,14 @@ class Leds:
         Settings of the LEDs.
     states
         Begin in seconds and closed relays of each state; the first from 0 on.
+    dimmings
+        Time in seconds, relay and fraction of the full light, of every change of an LED's
+        brightness; full before the first one.
     """
 
     bank: tuple[LedSettings, ...] = ()
     states: tuple[tuple[float, frozenset[int]], ...] = ((0.0, frozenset()),)
+    dimmings: tuple[tuple[float, int, float], ...] = ()
 
     @property
     def lit(self) -> frozenset[int]:
@@ -57,6 +61,14 @@ class Leds:
         if relays == self.lit or relay not in {led.relay for led in self.bank}:
             return self
         return replace(self, states=(*self.states, (at_s, relays)))
+
+    def dimmed(self, relay: int, fraction: float, at_s: float) -> "Leds":
+        """Return the bank after the brightness of an LED was changed, lit or not."""
+        return replace(
+            self,
+            states=(*self.states, (at_s, self.lit)),
+            dimmings=(*self.dimmings, (at_s, relay, fraction)),
+        )
 
     def until(self, time_s: float) -> "Leds":
         """Return the bank without switches after `time_s`."""
@@ -98,5 +110,13 @@ class Leds:
         spectra = {led.relay: led_spectrum(led) for led in self.bank}
         dark = np.zeros_like(WAVELENGTH_NM)
         return np.array(
-            [sum((spectra[relay] for relay in relays), dark) for _, relays in self.states]
+            [
+                sum((self._brightness(relay, at_s) * spectra[relay] for relay in relays), dark)
+                for at_s, relays in self.states
+            ]
         )
+
+    def _brightness(self, relay: int, time_s: float) -> float:
+        """Return the fraction of its full light that an LED has if it is lit."""
+        changes = [part for at_s, of, part in self.dimmings if of == relay and at_s <= time_s]
+        return changes[-1] if changes else 1.0

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,16 @@ from labrig.clock import VirtualClock
 from labrig.yaml_file import validate
 
 from . import protocol_sim
-from .boards import ArduinoBoard, ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
+from .boards import (
+    ArduinoBoard,
+    ChangerBoard,
+    Dc4100Board,
+    LcusBoard,
+    MaestroBoard,
+    NumatoBoard,
+    SerialCable,
+)
+from .boards.dc4100 import OUTPUTS
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
 from .clock import RoomClock
@@ -23,13 +32,15 @@ from .simulation import Simulation
 from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
-#: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`.
+#: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`; with LEDs on Thorlabs units
+#: `sim://room/dc4100-1` to `sim://room/dc4100-3`.
 NAME = "room"
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
 RELAYS = 8
 LCUS_RELAYS = 4
 ARDUINO_RELAYS = 4
+DC4100_UNITS = 3
 #: Analogue input of the Numato board that has the thermometer.
 TEMPERATURE_INPUT = 0
 #: Stream of random numbers of the thermometer alone.
@@ -63,7 +74,9 @@ class OpenRoom:
             ARDUINO_RELAYS, lambda relay, on: self._relay_moved("arduino", relay, on), clock
         )
         self._lamp_board = simulation.lamp.board
-        self._led_board = "arduino" if self._lamp_board == "arduino" else "relays"
+        self._led_board: str = simulation.led_board
+        if self._led_board == "relays" and self._lamp_board == "arduino":
+            self._led_board = "arduino"
         relay_boards: dict[str, NumatoBoard | LcusBoard | ArduinoBoard] = {
             "relays": relays,
             "lcus": lcus,
@@ -84,7 +97,7 @@ class OpenRoom:
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
-            for name, board in relay_boards.items()
+            for name, board in (relay_boards | _dc4100_units(simulation, self.room)).items()
         }
         self.camera = SimulatedCamera(
             clock,
@@ -157,6 +170,38 @@ def open_room(
         yield room
     finally:
         protocol_sim.close_door(NAME)
+
+
+@dataclass(frozen=True)
+class _UnitOutputs:
+    """LEDs of the room on the outputs of one DC4100."""
+
+    room: Room
+    first_relay: int
+
+    def switch(self, output: int, on: bool) -> None:
+        self.room.switch_led(self.first_relay + output, on)
+
+    def dim(self, output: int, fraction: float) -> None:
+        self.room.dim_led(self.first_relay + output, fraction)
+
+
+def _dc4100_units(simulation: Simulation, room: Room) -> dict[str, Dc4100Board]:
+    """Return the Thorlabs units that switch the LEDs, by their addresses; none if they do not."""
+    if simulation.led_board != "dc4100":
+        return {}
+    units = {}
+    for unit in range(DC4100_UNITS):
+        first_relay = 1 + OUTPUTS * unit
+        heads_nm = {
+            led.relay - first_relay: led.centre
+            for led in simulation.leds
+            if first_relay <= led.relay < first_relay + OUTPUTS
+        }
+        units[f"dc4100-{unit + 1}"] = Dc4100Board(
+            _UnitOutputs(room, first_relay), heads_nm, f"M0010000{unit + 1}"
+        )
+    return units
 
 
 def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:

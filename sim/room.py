@@ -132,6 +132,10 @@ class Room:
         """Move the contact of a relay now, to which an LED may be connected."""
         self._leds = self._leds.switched(relay, on, self._clock.now())
 
+    def dim_led(self, relay: int, fraction: float) -> None:
+        """Change the brightness of an LED now, as a fraction of its full light."""
+        self._leds = self._leds.dimmed(relay, fraction, self._clock.now())
+
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
         """Return the DNG of an exposure that is over.
 

@@ -80,6 +80,13 @@ _BOARDS: dict[tuple[int, int | None], _Board] = {
         ", starts_in: 2 s" + _SKETCH,
         hints=("these are the commands of the sketch in the guide 'Use boards of your own'",),
     ),
+    (0x1313, 0x8066): _Board(
+        "Thorlabs DC4100 LED driver",
+        "thorlabs_dc4100",
+        ', channels: {"455 nm": {output: 1, brightness: 60 %, centre: 455, fwhm: 18}}',
+        role="leds",
+        hints=("name each LED head with the output to which it is connected",),
+    ),
     (0x1313, None): _Board("Thorlabs instrument"),
     (0x04D8, 0xFFEE): _Board(
         "Devantech relay board",

@@ -102,6 +102,7 @@ def test_serial_ports_are_reported_by_their_usb_numbers(
         ((0x1FFB, 0x0089), "maestro_door", "door", "usually the lower one"),
         ((0x1FFB, 0x008C), "maestro_door", "door", "USB Dual Port"),
         ((0x2341, 0x0043), "serial_relay", "lamp", "commands of the sketch"),
+        ((0x1313, 0x8066), "thorlabs_dc4100", "leds", "the output to which it is connected"),
         ((0x0403, 0x6001), "serial_relay", "lamp", "write its own commands"),
         ((0x04D8, 0xFFEE), "serial_relay", "lamp", "never acknowledges"),
         ((0x1234, 0x5678), "serial_relay", "lamp", "write its own commands"),

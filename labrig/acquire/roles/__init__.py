@@ -23,7 +23,7 @@ from labrig.acquire.roles.door_and_shield import (
     TrapDoor,
 )
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
-from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedSwitch
+from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedLight, LedSwitch
 from labrig.acquire.roles.role import (
     DARK,
     Checkable,
@@ -98,6 +98,7 @@ __all__ = [
     "Lamp",
     "LampShield",
     "LedBank",
+    "LedLight",
     "LedSwitch",
     "Light",
     "LiveView",
