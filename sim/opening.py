@@ -1,4 +1,4 @@
-"""Opening of a simulated room: boards on serial lines, a camera on USB."""
+"""Opening of a simulated room: boards on serial lines, a camera and a spectrometer on USB."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -29,11 +29,12 @@ from .disk import SimulatedDisk
 from .faults import Fault, FaultTime, given
 from .room import Room
 from .simulation import Simulation
+from .spectrometer import Detector, SpectrometerBackend, UsbSpectrometer
 from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
-#: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`; with LEDs on Thorlabs units
-#: `sim://room/dc4100-1` to `sim://room/dc4100-3`.
+#: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`, `sim://room/spectrometer`; with
+#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`.
 NAME = "room"
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
@@ -45,10 +46,12 @@ DC4100_UNITS = 3
 TEMPERATURE_INPUT = 0
 #: Stream of random numbers of the thermometer alone.
 TEMPERATURE_STREAM = 9
+#: Streams of random numbers of the spectrometer's pixels, and of its noise.
+PIXEL_STREAM, SPECTRUM_STREAM = 10, 11
 
 
 class OpenRoom:
-    """The open room, its clock, its boards and its camera."""
+    """The open room, its clock, its boards, its camera and its spectrometer."""
 
     def __init__(self, simulation: Simulation, clock: VirtualClock) -> None:
         self.clock = clock
@@ -107,6 +110,20 @@ class OpenRoom:
             faults=_camera_faults(faults),
             body=simulation.camera,
         )
+        detector = Detector(np.random.default_rng([simulation.seed, PIXEL_STREAM]))
+        self.spectrometer = SpectrometerBackend(
+            clock,
+            UsbSpectrometer(
+                clock,
+                self.room.white_exposure,
+                detector,
+                "USB2P00001",
+                (simulation.seed, SPECTRUM_STREAM),
+            ),
+            unplugged=given(fault.spectrometer_unplugged for fault in faults),
+            silent=given(fault.spectrometer_silent for fault in faults),
+            truncated=given(fault.spectrometer_truncated for fault in faults),
+        )
         self.disk = SimulatedDisk(
             clock,
             full=given(fault.disk_full for fault in faults),
@@ -115,7 +132,7 @@ class OpenRoom:
 
     def usb(self, device: str) -> usb.backend.IBackend | None:
         """Return the USB bus on which `device` is alone; None if there is no such device."""
-        return self.camera.backend if device == "camera" else None
+        return {"camera": self.camera.backend, "spectrometer": self.spectrometer}.get(device)
 
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
         if (board, relay) == (self._lamp_board, LAMP_RELAY):

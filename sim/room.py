@@ -179,6 +179,13 @@ class Room:
             mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, lens_notes)
         )
 
+    def white_exposure(self, start_s: float, end_s: float) -> FloatArray:
+        """Return ∫ irradiance dt at a white reference beside the samples, on `WAVELENGTH_NM`.
+
+        The trap door does not come before it; the shield of the lamp does.
+        """
+        return self._lights().seen(start_s, end_s).cloth
+
     def preview(self, at_s: float) -> NDArray[np.uint8]:
         """Return the viewfinder's picture for a display, R, G, B, with the room light if any.
 

@@ -12,6 +12,7 @@ from .frames import (
     ActionRecord as ActionRecord,
     FrameRecord as FrameRecord,
     FrameRole as FrameRole,
+    SpectrumRecord as SpectrumRecord,
     TemperatureRecord as TemperatureRecord,
     unit_in as unit_in,
     unit_within as unit_within,

@@ -40,7 +40,12 @@ from labrig.acquire.roles.role import (
     Role,
     Suggestion,
 )
-from labrig.acquire.roles.spectrometer import SPECTROMETER, Spectrometer
+from labrig.acquire.roles.spectrometer import (
+    SPECTROMETER,
+    ReadSpectrum,
+    Spectrometer,
+    require_integration,
+)
 from labrig.acquire.roles.thermometer import THERMOMETER, Thermometer
 from labrig.acquire.roles.viewfinder import VIEWFINDER, LiveView
 
@@ -104,6 +109,7 @@ __all__ = [
     "LiveView",
     "Measured",
     "PlannedDevice",
+    "ReadSpectrum",
     "Role",
     "Shield",
     "Shoot",
@@ -112,4 +118,5 @@ __all__ = [
     "Switch",
     "Thermometer",
     "TrapDoor",
+    "require_integration",
 ]
