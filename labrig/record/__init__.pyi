@@ -10,6 +10,7 @@ from .frames import (
     PERSON as PERSON,
     UNDONE as UNDONE,
     ActionRecord as ActionRecord,
+    FileRecord as FileRecord,
     FrameRecord as FrameRecord,
     FrameRole as FrameRole,
     SpectrumRecord as SpectrumRecord,

@@ -102,6 +102,9 @@ class SpectrumRecord:
     late_s: float
 
 
+#: A record of something that is in a file of its own.
+FileRecord = FrameRecord | SpectrumRecord
+
 #: Devices of a person's actions: a step done by hand, and the undoing of a unit that was done
 #: wrongly.
 PERSON, UNDONE = "person", "taken back"

@@ -114,7 +114,7 @@ class RunFolder:
 
     def unknown_files(self) -> list[str]:
         """Return the names of files among the frames that have no journal line, left by a crash."""
-        recorded = {path.name for attempt in self.read().attempts for path in attempt.files()}
+        recorded = {file.path.name for attempt in self.read().attempts for file in attempt.files}
         return sorted(
             path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
         )

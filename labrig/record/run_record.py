@@ -12,6 +12,7 @@ from labrig.errors import DataError, DiskError
 from labrig.record.frames import (
     UNDONE,
     ActionRecord,
+    FileRecord,
     FrameRecord,
     SpectrumRecord,
     TemperatureRecord,
@@ -62,12 +63,10 @@ class Attempt:
     temperatures: list[TemperatureRecord] = field(default_factory=list)
     spectra: list[SpectrumRecord] = field(default_factory=list)
 
-    def files(self) -> list[Path]:
-        """Return the files of the attempt's frames and spectra."""
-        return [
-            *(frame.path for frame in self.frames),
-            *(spectrum.path for spectrum in self.spectra),
-        ]
+    @property
+    def files(self) -> list[FileRecord]:
+        """Records of all that is in files of its own, frames before spectra."""
+        return [*self.frames, *self.spectra]
 
     @property
     def completed(self) -> bool:
@@ -190,8 +189,8 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
     folder = Path(run)
     record = run_record(folder, read_journal(folder / JOURNAL))
     for attempt in record.attempts:
-        for path in attempt.files():
-            _require_file(path)
+        for recorded in attempt.files:
+            _require_file(recorded.path)
     return record
 
 

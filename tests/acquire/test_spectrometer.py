@@ -24,10 +24,12 @@ from labrig.acquire import (
     read_rig_file,
     run_units,
 )
+from labrig.analyse import Overrides, verify_frames
+from labrig.analyse.frames import require_intact
 from labrig.bench import open_bench
 from labrig.errors import DataError, DeviceLostError, ProtocolError
 from labrig.optics import read_spectrometer_reading
-from labrig.record import FRAMES, RunFolder, read_run
+from labrig.record import FRAMES, RunFolder, damaged_frames, read_run
 from tests.conftest import Ended
 
 from .fakes import Watching
@@ -136,6 +138,49 @@ def test_a_journal_that_counts_other_spectra_was_changed(run: Path) -> None:
     journal.write_text("\n".join(kept) + "\n")
     with pytest.raises(DataError, match="it counts 2 spectra, there are 1"):
         read_run(run)
+
+
+def test_a_spectrum_that_was_changed_is_refused(run: Path) -> None:
+    record = read_run(run)
+    assert verify_frames(record, Overrides()) == "all 4 frames have the checksums of the journal"
+    led = record.spectra("led")[0]
+    led.path.write_text(led.path.read_text().replace("450", "451"))
+    (damaged,) = damaged_frames(run, [*record.spectra("led"), *record.spectra("dark")]).items()
+    assert damaged == (led, "was changed after the run (its checksum differs)")
+    require_intact(record, ["dark"], Overrides())
+    with pytest.raises(DataError, match=r"000002\.csv was changed after the run"):
+        require_intact(record, ["led"], Overrides())
+    assert "left out: 000002.csv" in verify_frames(record, Overrides(excluded=frozenset({"2"})))
+
+
+def test_what_was_measured_before_a_break_is_there_after_it(make: Make, tmp_path: Path) -> None:
+    rig = make()
+    seen: list[int] = []
+
+    class Counting:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def run(self, session: Session) -> None:
+            seen.append(len(session.spectra("led")))
+            session.perform(ReadSpectrum("led", 0.1, 2))
+            if len(seen) == 2:
+                raise DeviceLostError("pulled")
+
+    units = [Counting("one"), Counting("two"), Counting("three")]
+    with open_bench(read_rig_file(rig), str(rig)) as bench, bench.devices() as devices:
+        folder = RunFolder.create(tmp_path / "runs", "break", bench.clock.wall(), {}, seed=1)
+        with folder:
+            with pytest.raises(DeviceLostError):
+                run_units(units, devices, folder, Watching(), {})
+            folder.close_open_attempts(bench.clock.wall, "fail", "pulled")
+        with RunFolder(folder.path, seed=1) as again:
+            run_units(units, devices, again, Watching(), {})
+        record = read_run(folder.path)
+    assert seen == [0, 1, 1, 2]
+    assert [spectrum.path.name for spectrum in record.spectra("led")] == [
+        "000001.csv", "000003.csv", "000004.csv",
+    ]  # fmt: skip
 
 
 def test_it_is_planned_with_its_time(make: Make) -> None:
