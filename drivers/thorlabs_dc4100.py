@@ -38,8 +38,9 @@ UNIT_FAULTS = {
 OUTPUT_FAULTS = {
     0x20: "no LED head is connected: plug it in",
     0x2000: "its LED is open, with the largest voltage and no current: check the head's plug",
-    0x200000: "its LED has reached the current limit: lower 'brightness', or raise the limit",
 }
+#: Bit of the status word for output 1 at its current limit, where 100 % is meant to be.
+AT_LIMIT = 0x200000
 #: Differences of the head's own wavelength from the rig file's peak, in nm, that are worth a
 #: warning, and that mean another head than was meant.
 NOTABLE_NM, OTHER_HEAD_NM = 5.0, 20.0
@@ -108,6 +109,8 @@ class ThorlabsDc4100:
                 f"{self.name} has the serial number {self._serial_number}, the rig file says "
                 f"{serial_number}; exchange the addresses, or correct 'serial_numbers'"
             )
+        # At once, since the next unit may be missing.
+        self.darken_all()
 
     def identity(self) -> str:
         """Return model, serial number and firmware of the unit."""
@@ -124,26 +127,58 @@ class ThorlabsDc4100:
         self._set("m", str(BRIGHTNESS_MODE), "is it under external control?")
         self._set("sm", str(SINGLE), "set its selection mode to 'single' by hand")
 
-    def switch(self, output: int, *, on: bool) -> None:
-        """Switch an output, counted from 1, and read it back with the unit's status.
+    def light(self, output: int, per_cent: int) -> None:
+        """Switch an output on, counted from 1, and read it back with the unit's status.
 
         Raises
         ------
         DeviceError
             The unit reports a fault of itself or the output, which then gives no light as set.
         UnclearAnswerError
-            The unit refuses, or the output does not read as it was switched.
+            The unit refuses, or brightness or output do not read as they were set.
         """
-        state = int(on)
-        self._command(f"o {output - 1} {state}")
-        if on:
-            self._raise_faults(output)
-        if self.is_on(output) != on:
-            wanted, opposite = ("on", "off") if on else ("off", "on")
+        self._set_brightness(output, per_cent)
+        self._command(f"o {output - 1} 1")
+        self._raise_faults(output, per_cent)
+        if not self.is_on(output):
             raise UnclearAnswerError(
-                f"output {output} of {self.name} was switched {wanted} but reads {opposite}; "
-                "switch it off by hand and check the unit"
+                f"output {output} of {self.name} was switched on but reads off; switch it off by "
+                "hand and check the unit"
             )
+
+    def darken(self, output: int) -> None:
+        """Switch an output off, counted from 1, and read it back.
+
+        Raises
+        ------
+        UnclearAnswerError
+            The unit refuses, or the output reads on.
+        """
+        self._command(f"o {output - 1} 0")
+        if self.is_on(output):
+            raise UnclearAnswerError(
+                f"output {output} of {self.name} was switched off but reads on; switch it off by "
+                "hand and check the unit"
+            )
+
+    def darken_all(self) -> None:
+        """Switch all outputs off, each even if another one fails.
+
+        Raises
+        ------
+        DeviceError
+            An output could not be confirmed as off.
+        """
+        failure: DeviceError | None = None
+        for output in range(1, OUTPUTS + 1):
+            try:
+                self.darken(output)
+            except DeviceError as error:
+                failure = failure or error
+                with suppress(DeviceError):  # so that the next one is understood
+                    self.resynchronise()
+        if failure:
+            raise failure
 
     def is_on(self, output: int) -> bool:
         """Return whether an output, counted from 1, is on."""
@@ -154,14 +189,17 @@ class ThorlabsDc4100:
             )
         return answer == "1"
 
-    def set_brightness(self, output: int, per_cent: int) -> None:
-        """Set the brightness of an output, counted from 1, and read it back.
+    def head_nm(self, output: int) -> float:
+        """Return the wavelength in nm that the head on an output names; 0 if it names none."""
+        return self._number(f"wl? {output - 1}")
 
-        Raises
-        ------
-        UnclearAnswerError
-            The unit refuses, or reads back another brightness.
-        """
+    def resynchronise(self) -> None:
+        """End a half-typed command, discard the answer, and forget an error of before."""
+        self._line.write(LINE_END)
+        self._line.drain()
+        self._ask("e?")
+
+    def _set_brightness(self, output: int, per_cent: int) -> None:
         self._command(f"bp {output - 1} {per_cent}")
         read = self._number(f"bp? {output - 1}")
         if round(read) != per_cent:
@@ -170,19 +208,10 @@ class ThorlabsDc4100:
                 "leave its knobs and its port to labrig"
             )
 
-    def head_nm(self, output: int) -> float:
-        """Return the wavelength in nm that the head on an output names; 0 if it names none."""
-        return self._number(f"wl? {output - 1}")
-
-    def resynchronise(self) -> None:
-        """End a half-typed command, and discard the answer."""
-        self._line.write(LINE_END)
-        self._line.drain()
-
-    def _raise_faults(self, output: int) -> None:
+    def _raise_faults(self, output: int, per_cent: int) -> None:
         answer = self._ask("r?")
         try:
-            status = int(answer, 0)
+            status = int(answer, 16 if answer.lower().startswith("0x") else 10)
         except ValueError:
             raise UnclearAnswerError(
                 f"{self.name} was asked for its status: expected a number, got '{answer}'"
@@ -193,6 +222,11 @@ class ThorlabsDc4100:
         for bit, fault in OUTPUT_FAULTS.items():
             if status & bit << 2 * (output - 1):
                 raise DeviceError(f"output {output} of {self.name} reports a fault: {fault}")
+        if per_cent < 100 and status & AT_LIMIT << 2 * (output - 1):
+            raise DeviceError(
+                f"output {output} of {self.name} reports that it has reached its current limit at "
+                f"{per_cent} %, and so gives less light: set the limit at the unit to the head's"
+            )
 
     def _set(self, what: str, value: str, hint: str) -> None:
         self._command(f"{what} {value}")
@@ -253,8 +287,9 @@ class _Output:
 
     def switch(self, *, on: bool) -> None:
         if on:
-            self.unit.set_brightness(self.number, self.per_cent)
-        self.unit.switch(self.number, on=on)
+            self.unit.light(self.number, self.per_cent)
+        else:
+            self.unit.darken(self.number)
 
     def is_on(self) -> bool:
         return self.unit.is_on(self.number)
@@ -329,7 +364,7 @@ class ThorlabsLedBank(LedSwitches):
         }
         name = " and ".join(unit.name for unit in self._units.values())
         super().__init__(name, self._outputs, self._leds, self._resynchronise)
-        self.make_safe()
+        self._may_be_lit.clear()  # every unit has switched its outputs off
         for unit in self._units.values():
             unit.prepare()
         self._require_heads()
@@ -376,10 +411,16 @@ class ThorlabsLedBank(LedSwitches):
         DeviceError
             An output could not be confirmed as off.
         """
-        try:
-            super().make_safe()
-        finally:
-            self._switch_off_unnamed()
+        failure: DeviceError | None = None
+        for unit in self._units.values():
+            try:
+                unit.resynchronise()
+                unit.darken_all()
+            except DeviceError as error:
+                failure = failure or error
+        if failure:
+            raise failure
+        self._may_be_lit.clear()
 
     def _require_heads(self) -> None:
         for name, head_nm, peak_nm in self._wavelengths_nm():
@@ -390,13 +431,6 @@ class ThorlabsLedBank(LedSwitches):
                     f"{head_nm:g} nm, the LED '{name}' of the rig file has its peak at "
                     f"{peak_nm:g} nm; plug the heads in as in the rig file, or correct that"
                 )
-
-    def _switch_off_unnamed(self) -> None:
-        named = {(output.unit.name, output.number) for output in self._outputs.values()}
-        for unit in self._units.values():
-            for number in range(1, OUTPUTS + 1):
-                if (unit.name, number) not in named:
-                    unit.switch(number, on=False)
 
     def _wavelengths_nm(self) -> Iterator[tuple[str, float, float]]:
         """Yield name, head's wavelength and rig file's peak of LEDs of which both are known."""

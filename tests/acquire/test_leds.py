@@ -256,6 +256,9 @@ def test_every_bank_says_what_is_known_of_its_light(driver: str, tmp_path: Path)
     assert lights["b"].relative_spectrum() is None
     planned = planned_rig(read_rig_file(path), str(path))
     assert [planned[LEDS].settling_s(name) for name in "ab"] == [0.5, 0.0]
+    (tmp_path / "measured.csv").unlink()
+    with pytest.raises(UsageError, match=r"measured\.csv"):
+        planned_rig(read_rig_file(path), str(path))
     leds["a"] |= {"centre": 450, "fwhm": 20}
     path.write_text(yaml.safe_dump(content))
     with pytest.raises(UsageError, match="expected 'spectrum', or 'centre' and 'fwhm'"):

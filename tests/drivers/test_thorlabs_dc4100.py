@@ -18,8 +18,8 @@ CHANNELS: dict[str, Any] = {
     "455 nm": {"output": 1, "brightness": "60 %", "centre": 455, "fwhm": 18, "settling": "0.5 s"},
     "530 nm": {"output": 4},
 }
-SYNC = (b"\r\n", b"")
 NO_ERROR = (b"e?\r\n", b"ERROR 0:No error\r\n")
+SYNC: Script = [(b"\r\n", b""), NO_ERROR]
 
 
 def asked(query: str, answer: str) -> Script:
@@ -34,11 +34,12 @@ def off(output: int) -> Script:
     return [*told(f"o {output} 0"), *asked(f"o? {output}", "0")]
 
 
-IDENTIFIED = [SYNC, *asked("n?", "DC4100"), *asked("s?", "M00272310")]
-MADE_SAFE = [SYNC, *off(0), *off(3), *off(1), *off(2)]
+NAMED = [*SYNC, *asked("n?", "DC4100"), *asked("s?", "M00272310")]
+ALL_OFF = [*off(0), *off(1), *off(2), *off(3)]
+IDENTIFIED = [*NAMED, *ALL_OFF]
 MODES = [*told("m 1"), *asked("m?", "1"), *told("sm 1"), *asked("sm?", "1")]
 HEADS = [*asked("wl? 0", "455"), *asked("wl? 3", "530")]
-OPENED = [*IDENTIFIED, *MADE_SAFE, *MODES, *HEADS]
+OPENED = [*IDENTIFIED, *MODES, *HEADS]
 
 
 def lit(output: int, per_cent: int, status: str = "0", state: str = "1") -> Script:
@@ -94,6 +95,7 @@ def test_it_is_identified_darkened_and_set_before_one_is_lit() -> None:
             *off(3),
             *asked("v?", "1.5.0"),
             *HEADS,
+            *SYNC, *ALL_OFF,
         ]
     )  # fmt: skip
     assert isinstance(driver, LedBank)
@@ -110,6 +112,7 @@ def test_it_is_identified_darkened_and_set_before_one_is_lit() -> None:
     )
     (finding,) = driver.findings()
     assert finding.severity == "fine"
+    driver.make_safe()
     assert port.script == []
 
 
@@ -120,7 +123,7 @@ def test_it_is_identified_darkened_and_set_before_one_is_lit() -> None:
         (0x8, "it is too hot"),
         (0x20, "output 1 of the DC4100 at COM7 reports a fault: no LED head is connected"),
         (0x2000, "output 1 .* its LED is open"),
-        (0x200000, "output 1 .* lower 'brightness'"),
+        (0x200000, "output 1 .* has reached its current limit at 60 %"),
     ],
 )
 def test_faults_in_the_status_word_are_told_in_words(status: int, said: str) -> None:
@@ -137,18 +140,31 @@ def test_faults_of_other_outputs_are_none_of_this_one() -> None:
     assert port.script == []
 
 
+def test_the_limit_is_where_full_brightness_is_meant_to_be() -> None:
+    at_limit = 0x200000 << 6
+    driver, port = bank([*OPENED, *lit(3, 100, f"{at_limit:012d}")])
+    driver.light("530 nm")
+    assert port.script == []
+
+
+def test_an_error_of_before_is_none_of_this_one() -> None:
+    stale = [(b"\r\n", b"ERROR 12:Invalid command\r\n"), (b"e?\r\n", b"ERROR 12:Invalid\r\n")]
+    _, port = bank([*stale, *OPENED[2:]])
+    assert port.script == []
+
+
 @pytest.mark.parametrize(
     ("script", "said"),
     [
-        ([SYNC, *asked("n?", "DC2200")], "expected DC4100 or DC4104, got 'DC2200'"),
-        ([SYNC, *asked("n?", "DC4104"), *asked("s?", "M1")], "number M1, the rig file says M2"),
-        ([SYNC, (b"n?\r\n", b"")], "did not answer within 1 s"),
-        ([*IDENTIFIED, SYNC, *told("o 0 0"), *asked("o? 0", "1"), SYNC, *off(3), *off(1), *off(2)],
+        ([*SYNC, *asked("n?", "DC2200")], "expected DC4100 or DC4104, got 'DC2200'"),
+        ([*SYNC, *asked("n?", "DC4104"), *asked("s?", "M1")], "number M1, the rig file says M2"),
+        ([*SYNC, (b"n?\r\n", b"")], "did not answer within 1 s"),
+        ([*NAMED, *told("o 0 0"), *asked("o? 0", "1"), *SYNC, *off(1), *off(2), *off(3)],
          "output 1 .* was switched off but reads on"),
-        ([*IDENTIFIED, *MADE_SAFE, *told("m 1"), *asked("m?", "2")], "under external control"),
-        ([*IDENTIFIED, *MADE_SAFE, *MODES, *asked("wl? 0", "625")],
+        ([*IDENTIFIED, *told("m 1"), *asked("m?", "2")], "under external control"),
+        ([*IDENTIFIED, *MODES, *asked("wl? 0", "625")],
          "the head on output 1 .* is one of 625 nm, the LED '455 nm' .* peak at 455 nm"),
-        ([*IDENTIFIED, *MADE_SAFE, *MODES, *asked("wl? 0", "blue")], "expected a number, got 'bl"),
+        ([*IDENTIFIED, *MODES, *asked("wl? 0", "blue")], "expected a number, got 'bl"),
     ],
     ids=["another device", "another unit", "silent", "stuck", "mode", "another head", "no number"],
 )  # fmt: skip
@@ -174,7 +190,7 @@ def test_a_brightness_that_does_not_hold_is_told() -> None:
 
 def test_a_head_a_little_off_is_a_warning() -> None:
     heads = [*asked("wl? 0", "462"), *asked("wl? 3", "530")]
-    driver, _ = bank([*IDENTIFIED, *MADE_SAFE, *MODES, *heads, *heads])
+    driver, _ = bank([*IDENTIFIED, *MODES, *heads, *heads])
     (finding,) = driver.findings()
     assert finding.severity == "warn"
     assert "says 462 nm, the rig file's peak is 455 nm" in finding.what
@@ -229,6 +245,16 @@ def test_over_three_units_two_are_never_lit_and_any_interruption_can_be_made_saf
                 assert heads.fractions[number] == 0.5
     assert heads.most <= 1
     driver.make_safe()
+    assert not any(heads.lit.values())
+
+
+def test_a_unit_that_is_missing_leaves_no_light_on_the_others() -> None:
+    clock, heads = VirtualClock(), Heads()
+    units = dict(list(three_units(heads))[:2])
+    next(iter(units.values())).receive(b"o 2 1\n")
+    assert heads.lit[2]
+    with pytest.raises(KeyError, match="COM10"):
+        ThorlabsLedBank("COM7", nine(), Units(clock, units))
     assert not any(heads.lit.values())
 
 

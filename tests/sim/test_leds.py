@@ -123,8 +123,8 @@ def test_an_open_door_keeps_them_from_the_sample() -> None:
 @pytest.mark.parametrize(
     "leds",
     [[KEYS[0], KEYS[0]], [{"relay": 0, "centre": 450}], [{"relay": 1}],
-     [{"relay": 1, "centre": 450, "fwhm": 1}]],
-    ids=["two on a relay", "the lamp's relay", "no centre", "too narrow"],
+     [{"relay": 1, "centre": 450, "fwhm": 1}], [{"relay": 8, "centre": 450}]],
+    ids=["two on a relay", "the lamp's relay", "no centre", "too narrow", "no such relay"],
 )  # fmt: skip
 def test_leds_that_cannot_be(leds: list[dict[str, float]]) -> None:
     with pytest.raises(UsageError, match="leds"):

@@ -137,9 +137,14 @@ class LedBank(Light, Protocol):
 
 
 class PlannedLedBank(PlannedDevice):
-    """Stand-in of a bank of LEDs in a plan; protocols wait for its settling themselves."""
+    """Stand-in of a bank of LEDs in a plan; protocols wait for its settling themselves.
+
+    Files of spectra are read, so that a missing one is found before anything moves.
+    """
 
     def __init__(self, leds: Mapping[str, LedLight]) -> None:
+        for light in leds.values():
+            light.relative_spectrum()
         self._leds = dict(leds)
         self._channel_on: str | None = None
 
