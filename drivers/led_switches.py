@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Protocol
 
+from labrig.acquire import LedLight
 from labrig.errors import DeviceError
 
 
@@ -29,15 +30,22 @@ class LedSwitches:
         Name of the board in messages.
     switches
         Relay of each LED by the LED's name.
+    lights
+        What the rig file says of each LED's light, by the LED's name.
     resynchronise
         Function after which the board understands the next command, whatever was interrupted.
     """
 
     def __init__(
-        self, board: str, switches: Mapping[str, Switch], resynchronise: Callable[[], None]
+        self,
+        board: str,
+        switches: Mapping[str, Switch],
+        lights: Mapping[str, LedLight],
+        resynchronise: Callable[[], None],
     ) -> None:
         self._board_name = board
         self._switches = dict(switches)
+        self._lights = dict(lights)
         self._resynchronise = resynchronise
         #: LEDs not read back as off since they were last lit; after connecting, all.
         self._may_be_lit = set(self._switches)
@@ -45,6 +53,10 @@ class LedSwitches:
     def channels(self) -> tuple[str, ...]:
         """Return the names of the LEDs, in the rig file's order."""
         return tuple(self._switches)
+
+    def settling_s(self, channel: str) -> float:
+        """Return the time in seconds from switching an LED on until its light is steady."""
+        return self._lights[channel].settling
 
     def light(self, channel: str) -> None:
         """Switch off all LEDs that may be lit, then switch on one; read back where possible."""

@@ -294,8 +294,8 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
             f"{folder.path / 'frames'}: the journal does not tell of {_listed(unknown)}, which a "
             "crash or a failing disk left; they are kept, and nothing is made of them"
         )
-    frames = [frame for attempt in record.completed().values() for frame in attempt.frames]
-    damaged = damaged_frames(folder.path, frames)
+    files = [file for attempt in record.completed().values() for file in attempt.files]
+    damaged = damaged_frames(folder.path, files)
     if texts := [f"{frame.path.name} {damage}" for frame, damage in damaged.items()]:
         yield (
             f"{folder.path / 'frames'}: {_listed(texts)}; restore from a copy, or begin a new "

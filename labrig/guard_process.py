@@ -98,7 +98,8 @@ class Lights:
         ports = SerialPorts()
         for key, entry in file.devices.items():
             plugins.load(plugins.DRIVERS, entry.driver, source)  # imported now, not in an emergency
-            ports.look_up(entry.address)
+            for address in entry.addresses():
+                ports.look_up(address)
             single = file.model_copy(update={"devices": {key: entry}})
             self._benches.append(Bench(single, source, self._clock, None, ports=ports))
 

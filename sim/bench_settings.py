@@ -59,8 +59,9 @@ class LedSettings(Part):
     Attributes
     ----------
     relay
-        Relay that switches the LED, of the Numato board, or of the Arduino if that switches the
-        lamp; relay 0 is the lamp's.
+        Relay that switches the LED, of the board that `led_board` names; relay 0 is the lamp's. The
+        outputs of the first DC4100 count as 1 to 4, of the second as 5 to 8, of the third as 9 to
+        12.
     centre
         Wavelength of the strongest light of the cold LED, in nm.
     fwhm
@@ -81,7 +82,7 @@ class LedSettings(Part):
         Time constant with which the lit LED warms, and cools again, for example `20 s`.
     """
 
-    relay: Annotated[int, Field(ge=1, le=31)]
+    relay: Annotated[int, Field(ge=1, le=12)]
     centre: Nanometres
     fwhm: Annotated[float, Field(ge=5, le=200)] = 25.0
     asymmetry: Annotated[float, Field(ge=0.2, le=5)] = 1.0

@@ -178,6 +178,12 @@ class Fault(_Part):
         The room's light has been left on.
     thermometer_off
         The thermometer's wire has come off its input.
+    spectrometer_unplugged
+        The spectrometer's cable is pulled, and plugged in again.
+    spectrometer_silent
+        The spectrometer receives nothing and sends nothing.
+    spectrometer_truncated
+        The spectrometer's spectra end too early.
     disk_full
         The disk with the run has no room for another byte; with `after_bytes`, in the middle of a
         write.
@@ -212,6 +218,9 @@ class Fault(_Part):
     filter_skipped: Skipped | None = None
     light_left_on: FaultTime | None = None
     thermometer_off: FaultTime | None = None
+    spectrometer_unplugged: FaultTime | None = None
+    spectrometer_silent: FaultTime | None = None
+    spectrometer_truncated: FaultTime | None = None
     disk_full: AfterBytes | None = None
     disk_slow: Slowness | None = None
     clock_ahead: Step | None = None

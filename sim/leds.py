@@ -54,10 +54,14 @@ class Leds:
         Settings of the LEDs.
     states
         Begin in seconds and closed relays of each state; the first from 0 on.
+    dimmings
+        Time in seconds, relay and fraction of the full light, of every change of an LED's
+        brightness; full before the first one.
     """
 
     bank: tuple[LedSettings, ...] = ()
     states: tuple[tuple[float, frozenset[int]], ...] = ((0.0, frozenset()),)
+    dimmings: tuple[tuple[float, int, float], ...] = ()
 
     @property
     def lit(self) -> frozenset[int]:
@@ -75,6 +79,14 @@ class Leds:
         if relays == self.lit or relay not in {led.relay for led in self.bank}:
             return self
         return replace(self, states=(*self.states, (at_s, relays)))
+
+    def dimmed(self, relay: int, fraction: float, at_s: float) -> "Leds":
+        """Return the bank after the brightness of an LED was changed, lit or not."""
+        return replace(
+            self,
+            states=(*self.states, (at_s, self.lit)),
+            dimmings=(*self.dimmings, (at_s, relay, fraction)),
+        )
 
     def until(self, time_s: float) -> "Leds":
         """Return the bank without switches after `time_s`."""
@@ -127,7 +139,9 @@ class Leds:
         """Yield the LEDs of a state: warmth at its begin, light of the cold and of the warm one."""
         for led in self.bank:
             if led.relay in self.states[state][1]:
-                yield led, self._warmth[state][led.relay], *self._spectra[led.relay]
+                brightness = self._brightness(led.relay, self.states[state][0])
+                cold, warm = self._spectra[led.relay]
+                yield led, self._warmth[state][led.relay], brightness * cold, brightness * warm
 
     @cached_property
     def _spectra(self) -> dict[int, tuple[FloatArray, FloatArray]]:
@@ -148,3 +162,8 @@ class Leds:
                 remains = math.exp((since_s - until_s) / led.warm_up)
                 warmth[-1][led.relay] = goal + (warmth[-2][led.relay] - goal) * remains
         return warmth
+
+    def _brightness(self, relay: int, time_s: float) -> float:
+        """Return the fraction of its full light that an LED has if it is lit."""
+        changes = [part for at_s, of, part in self.dimmings if of == relay and at_s <= time_s]
+        return changes[-1] if changes else 1.0

@@ -1,8 +1,8 @@
-"""Opening of a simulated room: boards on serial lines, a camera on USB."""
+"""Opening of a simulated room: boards on serial lines, a camera and a spectrometer on USB."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,16 @@ from labrig.clock import VirtualClock
 from labrig.yaml_file import validate
 
 from . import protocol_sim
-from .boards import ArduinoBoard, ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
+from .boards import (
+    ArduinoBoard,
+    ChangerBoard,
+    Dc4100Board,
+    LcusBoard,
+    MaestroBoard,
+    NumatoBoard,
+    SerialCable,
+)
+from .boards.dc4100 import OUTPUTS
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
 from .clock import RoomClock
@@ -20,24 +29,29 @@ from .disk import SimulatedDisk
 from .faults import Fault, FaultTime, given
 from .room import Room
 from .simulation import Simulation
+from .spectrometer import Detector, SpectrometerBackend, UsbSpectrometer
 from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
-#: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`.
+#: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`, `sim://room/spectrometer`; with
+#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`.
 NAME = "room"
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
 RELAYS = 8
 LCUS_RELAYS = 4
 ARDUINO_RELAYS = 4
+DC4100_UNITS = 3
 #: Analogue input of the Numato board that has the thermometer.
 TEMPERATURE_INPUT = 0
 #: Stream of random numbers of the thermometer alone.
 TEMPERATURE_STREAM = 9
+#: Streams of random numbers of the spectrometer's pixels, and of its noise.
+PIXEL_STREAM, SPECTRUM_STREAM = 10, 11
 
 
 class OpenRoom:
-    """The open room, its clock, its boards and its camera."""
+    """The open room, its clock, its boards, its camera and its spectrometer."""
 
     def __init__(self, simulation: Simulation, clock: VirtualClock) -> None:
         self.clock = clock
@@ -63,7 +77,9 @@ class OpenRoom:
             ARDUINO_RELAYS, lambda relay, on: self._relay_moved("arduino", relay, on), clock
         )
         self._lamp_board = simulation.lamp.board
-        self._led_board = "arduino" if self._lamp_board == "arduino" else "relays"
+        self._led_board: str = simulation.led_board
+        if self._led_board == "relays" and self._lamp_board == "arduino":
+            self._led_board = "arduino"
         relay_boards: dict[str, NumatoBoard | LcusBoard | ArduinoBoard] = {
             "relays": relays,
             "lcus": lcus,
@@ -84,7 +100,7 @@ class OpenRoom:
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
-            for name, board in relay_boards.items()
+            for name, board in (relay_boards | _dc4100_units(simulation, self.room)).items()
         }
         self.camera = SimulatedCamera(
             clock,
@@ -94,6 +110,20 @@ class OpenRoom:
             faults=_camera_faults(faults),
             body=simulation.camera,
         )
+        detector = Detector(np.random.default_rng([simulation.seed, PIXEL_STREAM]))
+        self.spectrometer = SpectrometerBackend(
+            clock,
+            UsbSpectrometer(
+                clock,
+                self.room.white_exposure,
+                detector,
+                "USB2P00001",
+                (simulation.seed, SPECTRUM_STREAM),
+            ),
+            unplugged=given(fault.spectrometer_unplugged for fault in faults),
+            silent=given(fault.spectrometer_silent for fault in faults),
+            truncated=given(fault.spectrometer_truncated for fault in faults),
+        )
         self.disk = SimulatedDisk(
             clock,
             full=given(fault.disk_full for fault in faults),
@@ -102,7 +132,7 @@ class OpenRoom:
 
     def usb(self, device: str) -> usb.backend.IBackend | None:
         """Return the USB bus on which `device` is alone; None if there is no such device."""
-        return self.camera.backend if device == "camera" else None
+        return {"camera": self.camera.backend, "spectrometer": self.spectrometer}.get(device)
 
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
         if (board, relay) == (self._lamp_board, LAMP_RELAY):
@@ -157,6 +187,38 @@ def open_room(
         yield room
     finally:
         protocol_sim.close_door(NAME)
+
+
+@dataclass(frozen=True)
+class _UnitOutputs:
+    """LEDs of the room on the outputs of one DC4100."""
+
+    room: Room
+    first_relay: int
+
+    def switch(self, output: int, on: bool) -> None:
+        self.room.switch_led(self.first_relay + output, on)
+
+    def dim(self, output: int, fraction: float) -> None:
+        self.room.dim_led(self.first_relay + output, fraction)
+
+
+def _dc4100_units(simulation: Simulation, room: Room) -> dict[str, Dc4100Board]:
+    """Return the Thorlabs units that switch the LEDs, by their addresses; none if they do not."""
+    if simulation.led_board != "dc4100":
+        return {}
+    units = {}
+    for unit in range(DC4100_UNITS):
+        first_relay = 1 + OUTPUTS * unit
+        heads_nm = {
+            led.relay - first_relay: led.centre
+            for led in simulation.leds
+            if first_relay <= led.relay < first_relay + OUTPUTS
+        }
+        units[f"dc4100-{unit + 1}"] = Dc4100Board(
+            _UnitOutputs(room, first_relay), heads_nm, f"M0010000{unit + 1}"
+        )
+    return units
 
 
 def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:

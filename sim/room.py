@@ -135,6 +135,10 @@ class Room:
         """Move the contact of a relay now, to which an LED may be connected."""
         self._leds = self._leds.switched(relay, on, self._clock.now())
 
+    def dim_led(self, relay: int, fraction: float) -> None:
+        """Change the brightness of an LED now, as a fraction of its full light."""
+        self._leds = self._leds.dimmed(relay, fraction, self._clock.now())
+
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
         """Return the DNG of an exposure that is over.
 
@@ -177,6 +181,13 @@ class Room:
         return encode_dng(
             mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, lens_notes)
         )
+
+    def white_exposure(self, start_s: float, end_s: float) -> FloatArray:
+        """Return ∫ irradiance dt at a white reference beside the samples, on `WAVELENGTH_NM`.
+
+        The trap door does not come before it; the shield of the lamp does.
+        """
+        return self._lights().seen(start_s, end_s).cloth
 
     def preview(self, at_s: float) -> NDArray[np.uint8]:
         """Return the viewfinder's picture for a display, R, G, B, with the room light if any.

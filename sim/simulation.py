@@ -28,6 +28,8 @@ from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
 
+#: Largest number of a relay of the Numato board.
+RELAYS = 7
 #: Place of a single sample without a region.
 MIDDLE: Region = (0.1, 0.1, 0.8, 0.8)
 
@@ -188,6 +190,9 @@ class Simulation(Part):
         Properties of the halogen lamp.
     leds
         Narrow-band LEDs beside the lamp.
+    led_board
+        Board that switches the LEDs: `relays`, the Numato board, or the Arduino if that switches
+        the lamp; or `dc4100`, Thorlabs units at `sim://room/dc4100-1` to `sim://room/dc4100-3`.
     door
         Trap door: closed, the sample faces the lamp; open, the camera. Null: none, and the sample
         always faces both.
@@ -244,6 +249,7 @@ class Simulation(Part):
     faults: tuple[Fault, ...] = ()
     lamp: LampSettings = LampSettings()
     leds: tuple[LedSettings, ...] = ()
+    led_board: Literal["relays", "dc4100"] = "relays"
     door: DoorSettings | None = None
     shield: DoorSettings | None = None
     servo: ServoBoardSettings = ServoBoardSettings()
@@ -274,6 +280,8 @@ class Simulation(Part):
             raise ValueError("expected 'door' and 'shield' on two channels of the servo board")
         if len({led.relay for led in self.leds}) < len(self.leds):
             raise ValueError("expected a relay of its own for each of 'leds'")
+        if self.led_board == "relays" and any(led.relay > RELAYS for led in self.leds):
+            raise ValueError(f"expected relays 1 to {RELAYS} for 'leds': the board has no more")
         if self.lvf is None and any(fault.lvf_turned for fault in self.faults):
             raise ValueError("a fault of the LVF needs an 'lvf:'")
         return self

@@ -1,11 +1,11 @@
 """LEDs behind relays of any board on a serial line, one lit at a time."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import Connections, Finding
+from labrig.acquire import Connections, Finding, LedLight
 
 from ..led_switches import LedSwitches
 from .board import Board, Relay, findings
@@ -13,6 +13,10 @@ from .settings import BoardSettings, SwitchCommands
 from .wire_text import wire_text
 
 Name = Annotated[str, Field(min_length=1)]
+
+
+class CommandedLed(LedLight, SwitchCommands):
+    """Commands of an LED's relay, with what is known of its light."""
 
 
 class SerialLedBank(LedSwitches):
@@ -35,10 +39,10 @@ class SerialLedBank(LedSwitches):
         ----------
         channels
             Commands of each LED's relay by the LED's name, for example
-            `{"450 nm": {on: on 1, off: off 1}}`.
+            `{"450 nm": {on: on 1, off: off 1, centre: 450, fwhm: 20, settling: 0.5 s}}`.
         """
 
-        channels: dict[Name, SwitchCommands] = Field(min_length=1)
+        channels: dict[Name, CommandedLed] = Field(min_length=1)
 
         @model_validator(mode="after")
         def _a_relay_each(self) -> Self:
@@ -52,12 +56,17 @@ class SerialLedBank(LedSwitches):
             name: Relay(self._board, commands, name) for name, commands in settings.channels.items()
         }
         off = [relay.off for relay in self._relays.values()]
-        super().__init__(self._board.name, self._relays, lambda: self._board.resynchronise(off))
+        super().__init__(
+            self._board.name,
+            self._relays,
+            settings.channels,
+            lambda: self._board.resynchronise(off),
+        )
 
     @classmethod
-    def declared_channels(cls, settings: Settings) -> tuple[str, ...]:
-        """Return the names of the LEDs, for plans."""
-        return tuple(settings.channels)
+    def declared_leds(cls, settings: Settings) -> Mapping[str, LedLight]:
+        """Return what the rig file says of the LEDs' light by their names, for plans."""
+        return settings.channels
 
     def reads_back(self) -> bool:
         """Return whether the rig file has a query for the state of every LED."""

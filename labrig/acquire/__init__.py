@@ -3,7 +3,7 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.connections import Connections, SerialPort
-from labrig.acquire.loading import load_driver, read_protocol
+from labrig.acquire.loading import led_lights, load_driver, read_protocol
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -55,6 +55,7 @@ __all__ = [
     "at",
     "frame_bytes",
     "in_safe_order",
+    "led_lights",
     "lights_that_read_back",
     "load_driver",
     "plan",

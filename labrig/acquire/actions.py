@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.acquire.roles import DeviceAction, Shoot
+from labrig.acquire.roles import DeviceAction, ReadSpectrum, Shoot
 from labrig.quantity import duration_text
 
 
@@ -32,7 +32,7 @@ class UndoManualStep(Exception):  # noqa: N818, a wish and no error
     """Request of a person to undo the last step done by hand and to do its unit again."""
 
 
-Action = DeviceAction | Shoot
+Action = DeviceAction | Shoot | ReadSpectrum
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class TimedAction:
     at_s
         Begin of the action in seconds after the start of the sequence.
     action
-        Action of a device, or photograph.
+        Action of a device, photograph, or reading of a spectrum.
     """
 
     at_s: float
@@ -59,7 +59,7 @@ def at(at_s: float, action: Action) -> TimedAction:
     at_s
         Begin of the action in seconds after the start of the sequence.
     action
-        Action of a device, or photograph.
+        Action of a device, photograph, or reading of a spectrum.
 
     Returns
     -------

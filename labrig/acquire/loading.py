@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from labrig.acquire.protocol import ProtocolModel
-from labrig.acquire.roles import ROLES
+from labrig.acquire.rig_file import RigFile
+from labrig.acquire.roles import LEDS, ROLES, LedLight
 from labrig.errors import UsageError
 from labrig.plugins import DRIVERS, PROTOCOLS, load, names
 from labrig.yaml_file import read_yaml, validate
@@ -45,6 +46,45 @@ def load_driver(key: str, name: str, source: str) -> Any:
             f"'devices.{key}'"
         )
     return driver
+
+
+def led_lights(rig: RigFile, source: str) -> dict[str, LedLight]:
+    """Return what a rig file says of the light of its LEDs, without opening any device.
+
+    Parameters
+    ----------
+    rig
+        Rig file with the devices.
+    source
+        Name or path of the rig file, for messages.
+
+    Returns
+    -------
+    dict of str to LedLight
+        Spectrum and settling time of each LED by its name, in the rig file's order; empty if the
+        rig has no LEDs.
+
+    Raises
+    ------
+    UsageError
+        If there is no such driver, or a key of the LEDs is unknown or invalid.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig import resources
+    >>> from labrig.acquire import led_lights
+    >>> path = resources.find("config", "rig", "sim-arduino")
+    >>> lights = led_lights(labrig.read_rig_file(path), "sim-arduino")
+    >>> [(name, light.peak_nm()) for name, light in lights.items()]
+    [('450 nm', 450.0), ('525 nm', 525.0)]
+    """
+    entry = rig.devices.get(LEDS.key)
+    if entry is None:
+        return {}
+    driver = load_driver(LEDS.key, entry.driver, source)
+    settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{LEDS.key}")
+    return dict(driver.declared_leds(settings))
 
 
 def read_protocol(path: str | Path) -> ProtocolModel:

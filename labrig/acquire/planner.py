@@ -18,8 +18,9 @@ from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import CameraOffers, Frame
 from labrig.clock import VirtualClock
 from labrig.errors import ProtocolError
+from labrig.optics import SpectrometerReading
 from labrig.quantity import duration_text
-from labrig.record import ActionRecord, FrameRecord
+from labrig.record import ActionRecord, FrameRecord, SpectrumRecord
 from labrig.yaml_file import validate
 
 #: Largest number of steps: more than any run has, and laid out in about a second.
@@ -162,6 +163,11 @@ class _PlanRecorder:
         action, exposure_s = f"{role} frame, {frame.settings}", frame.settings.exposure_s
         self._add(Step(frame.start_s, self.unit, CAMERA.key, action, exposure_s), late_s)
 
+    def spectrum(
+        self, role: str, reading: SpectrometerReading, start_s: float, end_s: float, late_s: float
+    ) -> None:
+        pass
+
     def temperature(self, celsius: float, at_s: float) -> None:
         pass
 
@@ -173,6 +179,9 @@ class _PlanRecorder:
         return ""
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
+        return ()
+
+    def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return ()
 
     def actions(self, device: str) -> Sequence[ActionRecord]:

@@ -1,6 +1,7 @@
 """The rig file: driver, address and warm-up time of each device, and the optics of the bench."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -43,6 +44,19 @@ class DeviceEntry(BaseModel):
     def settings(self) -> dict[str, Any]:
         """Return the keys that belong to the driver."""
         return dict(self.__pydantic_extra__ or {})
+
+    def addresses(self) -> list[str]:
+        """Return all addresses of the device: its own, and those under keys `address` within."""
+        return [self.address, *_addresses_within(self.settings())]
+
+
+def _addresses_within(value: Any) -> Iterator[str]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if key == "address" and isinstance(inner, str):
+                yield inner
+            else:
+                yield from _addresses_within(inner)
 
 
 def _with_calibrations(model: type[ModelT]) -> type[ModelT]:

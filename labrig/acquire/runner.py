@@ -12,12 +12,14 @@ from labrig.acquire.session import Observer, Session
 from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import Frame
 from labrig.clock import Clock
+from labrig.optics import SpectrometerReading
 from labrig.record import (
     UNDONE,
     ActionRecord,
     AttemptWriter,
     FrameRecord,
     RunFolder,
+    SpectrumRecord,
     TemperatureRecord,
 )
 
@@ -128,6 +130,7 @@ def _run_remaining_units(
     record = folder.read()
     completed = record.completed()
     frames = [frame for attempt in completed.values() for frame in attempt.frames]
+    spectra = [spectrum for attempt in completed.values() for spectrum in attempt.spectra]
     actions = [action for attempt in completed.values() for action in attempt.actions]
     lights = LightReadback(rig)
     for number, unit in enumerate(units, start=1):
@@ -135,7 +138,7 @@ def _run_remaining_units(
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        recorder = _Recorder(rig.clock, writer, frames, actions, observer)
+        recorder = _Recorder(rig.clock, writer, frames, spectra, actions, observer)
         session = Session(rig, recorder, observer, temperature, lights)
         try:
             with rig.clock.noticing_sleep():
@@ -146,7 +149,8 @@ def _run_remaining_units(
             recorder.take_back()
             raise
         writer.stop("success")
-        frames, actions = recorder.kept_frames, recorder.kept_actions
+        frames, spectra = recorder.kept_frames, recorder.kept_spectra
+        actions = recorder.kept_actions
 
 
 class _Recorder:
@@ -157,6 +161,7 @@ class _Recorder:
         clock: Clock,
         writer: AttemptWriter,
         frames: Sequence[FrameRecord],
+        spectra: Sequence[SpectrumRecord],
         actions: Sequence[ActionRecord],
         observer: RunObserver,
     ) -> None:
@@ -164,6 +169,7 @@ class _Recorder:
         self._writer = writer
         self._observer = observer
         self.kept_frames = list(frames)
+        self.kept_spectra = list(spectra)
         self.kept_actions = list(actions)
 
     def acted(
@@ -212,8 +218,25 @@ class _Recorder:
         self.kept_frames.append(record)
         self._observer.frame(record)
 
+    def spectrum(
+        self, role: str, reading: SpectrometerReading, start_s: float, end_s: float, late_s: float
+    ) -> None:
+        record = self._writer.spectrum(
+            reading.text().encode(),
+            role=role,
+            integration_s=reading.integration_s,
+            repetitions=len(reading.raw_counts),
+            start_time=self._clock.wall(start_s),
+            end_time=self._clock.wall(end_s),
+            late_s=late_s,
+        )
+        self.kept_spectra.append(record)
+
     def frames(self, role: str) -> Sequence[FrameRecord]:
         return [frame for frame in self.kept_frames if frame.role == role]
+
+    def spectra(self, role: str) -> Sequence[SpectrumRecord]:
+        return [spectrum for spectrum in self.kept_spectra if spectrum.role == role]
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self.kept_actions if action.device == device]

@@ -11,15 +11,24 @@ from typing import Protocol, TypeVar
 from labrig.acquire.actions import Action, LateAction, ManualStep, TimedAction, UndoManualStep
 from labrig.acquire.readback import LightReadback
 from labrig.acquire.rig import Rig, device_errors
-from labrig.acquire.roles import CAMERA, CHANGER, Guarded, KeptAwake, Shoot
+from labrig.acquire.roles import (
+    CAMERA,
+    CHANGER,
+    SPECTROMETER,
+    Guarded,
+    KeptAwake,
+    ReadSpectrum,
+    Shoot,
+)
 from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
+from labrig.optics import SpectrometerReading
 from labrig.quantity import duration_text
-from labrig.record import PERSON, ActionRecord, FrameRecord, unit_within
+from labrig.record import PERSON, ActionRecord, FrameRecord, SpectrumRecord, unit_within
 
 T = TypeVar("T")
-RecordT = TypeVar("RecordT", FrameRecord, ActionRecord)
+RecordT = TypeVar("RecordT", FrameRecord, ActionRecord, SpectrumRecord)
 
 #: Period of keeping devices awake; cameras switch off after one minute at the earliest.
 AWAKE_PERIOD_S = 30.0
@@ -48,6 +57,11 @@ class Recorder(Protocol):
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         """Record a frame."""
 
+    def spectrum(
+        self, role: str, reading: SpectrometerReading, start_s: float, end_s: float, late_s: float
+    ) -> None:
+        """Record a reading of the spectrometer."""
+
     def temperature(self, celsius: float, at_s: float) -> None:
         """Record a reading of the thermometer."""
 
@@ -56,6 +70,9 @@ class Recorder(Protocol):
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
         """Return the frames with a role, those of completed units before those of this one."""
+
+    def spectra(self, role: str) -> Sequence[SpectrumRecord]:
+        """Return the spectra with a role, those of completed units before those of this one."""
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         """Return the actions of a device, those of completed units before those of this one."""
@@ -221,6 +238,10 @@ class Session:
         """Return the frames taken with a role, in completed units and in this one so far."""
         return self._recorder.frames(role)
 
+    def spectra(self, role: str) -> Sequence[SpectrumRecord]:
+        """Return the spectra read with a role, in completed units and in this one so far."""
+        return self._recorder.spectra(role)
+
     def actions(self, device: str) -> Sequence[ActionRecord]:
         """Return the actions of a device, in completed units and in this one so far."""
         return self._recorder.actions(device)
@@ -285,7 +306,9 @@ class Session:
         self._temperature.read_if_due(self._recorder.temperature)
 
     def _read_lights_before(self, actions: Sequence[Action]) -> None:
-        self._lights.read_before([action for action in actions if not isinstance(action, Shoot)])
+        self._lights.read_before(
+            [action for action in actions if not isinstance(action, Shoot | ReadSpectrum)]
+        )
 
     def _heartbeat_if_due(self) -> None:
         if self.clock.now() - self._heartbeat_s >= AWAKE_PERIOD_S:
@@ -325,9 +348,14 @@ class Session:
             return
         self._observer.doing(f"{action.device} {action}")
         start_s = self.clock.now()
-        with device_errors(action.device):
-            action.begin(self.rig.device(action.device))
-        self._lights.asked(action)
+        if isinstance(action, ReadSpectrum):
+            with device_errors(SPECTROMETER.key):
+                reading = self.rig[SPECTROMETER].read(action.integration_s, action.repetitions)
+            self._recorder.spectrum(action.role, reading, start_s, self.clock.now(), late_s)
+        else:
+            with device_errors(action.device):
+                action.begin(self.rig.device(action.device))
+            self._lights.asked(action)
         self._recorder.acted(action.device, str(action), start_s, self.clock.now(), late_s)
 
 
@@ -337,6 +365,7 @@ class _PartRecorder:
     def __init__(self, recorder: Recorder, part: str) -> None:
         self.acted = recorder.acted
         self.photographed = recorder.photographed
+        self.spectrum = recorder.spectrum
         self.temperature = recorder.temperature
         self.last_manual_step = recorder.last_manual_step
         self.choose = recorder.choose
@@ -345,6 +374,9 @@ class _PartRecorder:
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
         return self._records_of_part(self._recorder.frames(role))
+
+    def spectra(self, role: str) -> Sequence[SpectrumRecord]:
+        return self._records_of_part(self._recorder.spectra(role))
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         return self._records_of_part(self._recorder.actions(device))

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from labrig.analyse.inputs import Part
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile, CameraFile
 from labrig.errors import DataError, UsageError
-from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, damaged_frames
+from labrig.record import Attempt, FileRecord, FrameRecord, FrameRole, RunRecord, damaged_frames
 from labrig.reduce import SeriesFrame, read_exif
 from labrig.region import Region
 from labrig.results import add_flag
@@ -43,19 +44,26 @@ def require_calibrated_camera(
         camera.require_match(camera_identity(run), lens, f_number)
 
 
+FileRecordT = TypeVar("FileRecordT", bound=FileRecord)
+
 #: Most damaged frames that a message names.
 MAX_NAMED = 4
 
 
 def require_intact(run: RunRecord, roles: Sequence[str], overrides: Overrides) -> None:
-    """Refuse frames of completed units that are missing or were changed, and are not excluded.
+    """Refuse files of completed units that are missing or were changed, and are not excluded.
+
+    These are frames and spectra.
 
     Raises
     ------
     DataError
         Frames are damaged; the message names them and how to leave them out.
     """
-    require(run, damaged_frames(run.folder, _frames_in_roles(run, roles)), overrides)
+    files = [
+        file for attempt in run.completed().values() for file in attempt.files if file.role in roles
+    ]
+    require(run, damaged_frames(run.folder, files), overrides)
 
 
 def _frames_in_roles(run: RunRecord, roles: Sequence[str]) -> list[FrameRecord]:
@@ -67,7 +75,7 @@ def _frames_in_roles(run: RunRecord, roles: Sequence[str]) -> list[FrameRecord]:
     ]
 
 
-def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overrides) -> None:
+def require(run: RunRecord, damaged: Mapping[FileRecordT, str], overrides: Overrides) -> None:
     """Refuse damaged frames that the user has not excluded.
 
     Raises
@@ -107,7 +115,7 @@ def verify_frames(run: RunRecord, overrides: Overrides) -> str:
     >>> verify_frames(labrig.read_run("runs/decay"), Overrides())
     'all 37 frames have the checksums of the journal'
     """
-    frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
+    frames = [file for attempt in run.completed().values() for file in attempt.files]
     damaged = damaged_frames(run.folder, frames, trust=False)
     require(run, damaged, overrides)
     if not damaged:
@@ -119,7 +127,7 @@ def verify_frames(run: RunRecord, overrides: Overrides) -> str:
     )
 
 
-def _damage_text(damaged: Mapping[FrameRecord, str]) -> str:
+def _damage_text(damaged: Mapping[FileRecordT, str]) -> str:
     """Return a line that names damaged frames and the remedy."""
     listed = list(damaged.items())[:MAX_NAMED]
     remainder = (

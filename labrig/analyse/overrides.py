@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
 from labrig.errors import UsageError
-from labrig.record import FrameRecord
+from labrig.record import FileRecord
 from labrig.region import Region, parse_region
 from labrig.yaml_file import did_you_mean
 
@@ -150,11 +150,11 @@ class Overrides:
             patches[name] = region
         return patches
 
-    def excludes(self, frame: FrameRecord) -> bool:
+    def excludes(self, frame: FileRecord) -> bool:
         """Return whether `frame` is to be left out."""
         return bool(self.excluded & _names(frame))
 
-    def check(self, frames: Sequence[FrameRecord]) -> None:
+    def check(self, frames: Sequence[FileRecord]) -> None:
         """Refuse to exclude frames that the run does not have.
 
         Raises
@@ -179,5 +179,5 @@ def _parse_calibration(text: str) -> tuple[str, str]:
     return key, str(Path(named).resolve()) if Path(named).exists() else named
 
 
-def _names(frame: FrameRecord) -> set[str]:
+def _names(frame: FileRecord) -> set[str]:
     return {frame.path.name, frame.path.stem, frame.path.stem.lstrip("0")}

@@ -30,7 +30,7 @@ def rigs() -> None:
 def list_devices(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
-    """Serial ports and USB cameras on this PC, each with its line for a rig file.
+    """Serial ports, USB cameras and spectrometers on this PC, each with its line for a rig file.
 
     Says, too, what else may hold a camera and how to make it let go. Nothing is switched or sent.
     """
@@ -88,7 +88,10 @@ app.command("use")(default_rig.use)
 
 
 def _print_discovery(discovery: "Discovery") -> None:
-    for title, devices in (("serial ports", discovery.ports), ("USB cameras", discovery.cameras)):
+    groups = [("serial ports", discovery.ports), ("USB cameras", discovery.cameras)]
+    if discovery.spectrometers:
+        groups.append(("USB spectrometers", discovery.spectrometers))
+    for title, devices in groups:
         typer.echo(f"{title}:" if devices else f"{title}: none")
         for device in devices:
             typer.echo(f"  {device.address}  {device.name}")
@@ -96,7 +99,7 @@ def _print_discovery(discovery: "Discovery") -> None:
                 typer.echo(f"    ! {hint}")
     for note in discovery.notes:
         typer.echo(f"! {note}")
-    snippets = [d.snippet for d in (*discovery.ports, *discovery.cameras) if d.snippet]
+    snippets = [device.snippet for _, devices in groups for device in devices if device.snippet]
     if snippets:
         typer.echo("\na rig file:\n\nname: my bench\n\ndevices:")
     roles: set[str] = set()

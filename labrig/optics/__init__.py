@@ -48,6 +48,12 @@ from labrig.optics.piecewise import (
     hat_functions,
     quadrature,
 )
+from labrig.optics.spectrometer import (
+    MeasuredSpectrum,
+    SpectrometerReading,
+    lamp_calibration,
+    read_spectrometer_reading,
+)
 from labrig.optics.spectrum import Spectrum, Transmittance
 from labrig.optics.strip import SLICES, Strip
 
@@ -65,7 +71,9 @@ __all__ = [
     "Factor",
     "Flat",
     "Lvf",
+    "MeasuredSpectrum",
     "Observer",
+    "SpectrometerReading",
     "Spectrum",
     "Strip",
     "Transmittance",
@@ -79,6 +87,7 @@ __all__ = [
     "illuminant",
     "is_narrow",
     "lab",
+    "lamp_calibration",
     "nominal_lvf",
     "observer",
     "peak_shape",
@@ -88,6 +97,7 @@ __all__ = [
     "read_curve_file",
     "read_light",
     "read_monochrome_camera",
+    "read_spectrometer_reading",
     "read_spectrum",
     "read_transmittance",
     "rho_squared",

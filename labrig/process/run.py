@@ -176,7 +176,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     """Process a run that no other process processes meanwhile."""
     rig, run = overrides.bench(folder), read_run(folder)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
-    overrides.check(frames)
+    overrides.check([file for attempt in run.completed().values() for file in attempt.files])
     analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
     inputs = Inputs.of(rig)
     result: RunResult = analyse(Part(run, protocol, rig, overrides, inputs))

@@ -6,7 +6,12 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from labrig.record.frames import ActionRecord, FrameRecord, TemperatureRecord
+from labrig.record.frames import (
+    ActionRecord,
+    FrameRecord,
+    SpectrumRecord,
+    TemperatureRecord,
+)
 from labrig.record.journal import Disk, Journal, write_durably
 
 _ACTION_KEYS: dict[str, str] = {
@@ -30,6 +35,17 @@ _FRAME_KEYS: dict[str, str] = {
     "end_time": "number",
     "late_s": "number",
     "disk_s": "number",
+}
+_SPECTRUM_KEYS: dict[str, str] = {
+    "frame": "string",
+    "sha256": "string",
+    "size_bytes": "integer",
+    "role": "string",
+    "integration_s": "number",
+    "repetitions": "integer",
+    "start_time": "number",
+    "end_time": "number",
+    "late_s": "number",
 }
 
 
@@ -141,6 +157,36 @@ class AttemptWriter:
         )
         content = {key: getattr(record, key) for key in _FRAME_KEYS if key != "frame"}
         self._event("frames", _FRAME_KEYS, {"frame": f"frames/{path.name}", **content})
+        return record
+
+    def spectrum(
+        self,
+        data: bytes,
+        *,
+        role: str,
+        integration_s: float,
+        repetitions: int,
+        start_time: float,
+        end_time: float,
+        late_s: float,
+    ) -> SpectrumRecord:
+        """Write one reading of the spectrometer, its file among the frames, then its line."""
+        path = self._frames_folder / f"{self._next_number():06d}.csv"
+        write_durably(path, data, self._disk)
+        record = SpectrumRecord(
+            path=path,
+            sha256=hashlib.sha256(data).hexdigest(),
+            size_bytes=len(data),
+            unit=self.unit,
+            role=role,
+            integration_s=integration_s,
+            repetitions=repetitions,
+            start_time=start_time,
+            end_time=end_time,
+            late_s=late_s,
+        )
+        content = {key: getattr(record, key) for key in _SPECTRUM_KEYS if key != "frame"}
+        self._event("spectra", _SPECTRUM_KEYS, {"frame": f"frames/{path.name}", **content})
         return record
 
     def stop(self, exit_status: str, reason: str = "") -> None:

@@ -1,4 +1,4 @@
-"""Checksums of a run's frames, read anew only if a file was touched since.
+"""Checksums of a run's frames and spectra, read anew only if a file was touched since.
 
 That a frame has the checksum of its journal is noted with the size and the modification time of its
 file. As long as both stay the same, the file is trusted and not read.
@@ -11,9 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from hashlib import file_digest
 from pathlib import Path
+from typing import TypeVar
 
 from labrig.errors import DiskError
-from labrig.record.frames import FrameRecord
+from labrig.record.frames import FileRecord
 from labrig.record.journal import write_durably
 
 #: Folder of the frames in a run folder.
@@ -26,27 +27,28 @@ _READERS = 4
 
 #: Size in bytes, modification time in nanoseconds, and checksum of a file.
 _State = list[int | str]
+FileRecordT = TypeVar("FileRecordT", bound=FileRecord)
 
 
 def damaged_frames(
-    run: Path, frames: Iterable[FrameRecord], *, trust: bool = True
-) -> dict[FrameRecord, str]:
-    """Return the frames whose files do not have the checksums of the journal, and their damage.
+    run: Path, frames: Iterable[FileRecordT], *, trust: bool = True
+) -> dict[FileRecordT, str]:
+    """Return the frames and spectra whose files differ from the journal's checksums, and how.
 
     Parameters
     ----------
     run
         Run folder.
     frames
-        Frames of the run.
+        Frames and spectra of the run.
     trust
         Whether a file that was read before, and has the same size and modification time since, is
         not read again.
 
     Returns
     -------
-    dict of FrameRecord to str
-        For each damaged frame how its file differs, as in `is missing`.
+    dict of FrameRecord or SpectrumRecord to str
+        For each damaged one how its file differs, as in `is missing`.
 
     Examples
     --------
@@ -72,7 +74,7 @@ def damaged_frames(
     return damaged
 
 
-def _is_checked(frame: FrameRecord, checked: dict[str, _State]) -> bool:
+def _is_checked(frame: FileRecord, checked: dict[str, _State]) -> bool:
     """Return whether the frame's file is the one that was read before, by all that can be seen."""
     try:
         status = frame.path.stat()
@@ -81,7 +83,7 @@ def _is_checked(frame: FrameRecord, checked: dict[str, _State]) -> bool:
     return checked.get(frame.path.name) == [status.st_size, status.st_mtime_ns, frame.sha256]
 
 
-def _checked_state(frame: FrameRecord) -> _State | str:
+def _checked_state(frame: FileRecord) -> _State | str:
     """Read a frame's file and return its state, or its damage as text."""
     try:
         with frame.path.open("rb") as file:

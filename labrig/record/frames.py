@@ -1,4 +1,4 @@
-"""Records of frames, actions and temperatures."""
+"""Records of frames, spectra, actions and temperatures."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -63,6 +63,47 @@ class FrameRecord:
     late_s: float
     disk_s: float = 0.0
 
+
+@dataclass(frozen=True)
+class SpectrumRecord:
+    """One reading of the spectrometer in a run folder.
+
+    Attributes
+    ----------
+    path
+        File of the reading, with raw counts; `labrig.optics.read_spectrometer_reading` reads it.
+    sha256
+        Checksum of the file.
+    size_bytes
+        Size of the file in bytes.
+    unit
+        Name of the unit that took the reading.
+    role
+        Purpose of the reading in the protocol, such as `dark`.
+    integration_s
+        Integration time of each repetition in seconds.
+    repetitions
+        Number of repetitions.
+    start_time, end_time
+        Measured begin and end of the reading in seconds since 1970.
+    late_s
+        Delay of its begin after its planned time, in seconds.
+    """
+
+    path: Path
+    sha256: str
+    size_bytes: int
+    unit: str
+    role: str
+    integration_s: float
+    repetitions: int
+    start_time: float
+    end_time: float
+    late_s: float
+
+
+#: A record of something that is in a file of its own.
+FileRecord = FrameRecord | SpectrumRecord
 
 #: Devices of a person's actions: a step done by hand, and the undoing of a unit that was done
 #: wrongly.

@@ -114,7 +114,7 @@ class RunFolder:
 
     def unknown_files(self) -> list[str]:
         """Return the names of files among the frames that have no journal line, left by a crash."""
-        recorded = {frame.path.name for attempt in self.read().attempts for frame in attempt.frames}
+        recorded = {file.path.name for attempt in self.read().attempts for file in attempt.files}
         return sorted(
             path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
         )
@@ -163,6 +163,7 @@ class RunFolder:
         for attempt in open_attempts:
             counts = {
                 "frames": len(attempt.frames),
+                "spectra": len(attempt.spectra),
                 "actions": len(attempt.actions),
                 "temperatures": len(attempt.temperatures),
             }

@@ -12,7 +12,9 @@ from labrig.errors import DataError, DiskError
 from labrig.record.frames import (
     UNDONE,
     ActionRecord,
+    FileRecord,
     FrameRecord,
+    SpectrumRecord,
     TemperatureRecord,
     unit_within,
 )
@@ -26,9 +28,9 @@ LARGEST_TEMPERATURE_C = 1000.0
 #: Names of frames as `AttemptWriter` gives them.
 _FRAME_NAME = re.compile(r"frames/\d{6,}[\w.-]*")
 
-Recorded = TypeVar("Recorded", FrameRecord, ActionRecord)
+Recorded = TypeVar("Recorded", FrameRecord, SpectrumRecord, ActionRecord)
 _FRAME, _ACTION = TypeAdapter(FrameRecord), TypeAdapter(ActionRecord)
-_TEMPERATURE = TypeAdapter(TemperatureRecord)
+_SPECTRUM, _TEMPERATURE = TypeAdapter(SpectrumRecord), TypeAdapter(TemperatureRecord)
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Attempt:
         Status of the RunStop; None while the attempt runs, and if the process died during it.
     reason
         Reason of the RunStop.
-    frames, actions, temperatures
+    frames, actions, temperatures, spectra
         Records of the attempt.
     """
 
@@ -59,6 +61,12 @@ class Attempt:
     frames: list[FrameRecord] = field(default_factory=list)
     actions: list[ActionRecord] = field(default_factory=list)
     temperatures: list[TemperatureRecord] = field(default_factory=list)
+    spectra: list[SpectrumRecord] = field(default_factory=list)
+
+    @property
+    def files(self) -> list[FileRecord]:
+        """Records of all that is in files of its own, frames before spectra."""
+        return [*self.frames, *self.spectra]
 
     @property
     def completed(self) -> bool:
@@ -120,6 +128,15 @@ class RunRecord:
             if frame.role == role
         ]
 
+    def spectra(self, role: str) -> list[SpectrumRecord]:
+        """Return the readings of the spectrometer with a given role in completed units."""
+        return [
+            spectrum
+            for attempt in self.completed().values()
+            for spectrum in attempt.spectra
+            if spectrum.role == role
+        ]
+
     def temperatures(self) -> list[TemperatureRecord]:
         """Return all readings of the thermometer in order of time, including failed attempts."""
         readings = [reading for attempt in self.attempts for reading in attempt.temperatures]
@@ -134,6 +151,7 @@ def _attempt_within(part: str, attempt: Attempt) -> Attempt | None:
         attempt,
         unit=unit,
         frames=[replace(frame, unit=unit) for frame in attempt.frames],
+        spectra=[replace(spectrum, unit=unit) for spectrum in attempt.spectra],
         actions=[replace(action, unit=unit) for action in attempt.actions],
         temperatures=[replace(reading, unit=unit) for reading in attempt.temperatures],
     )
@@ -170,8 +188,9 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
     """
     folder = Path(run)
     record = run_record(folder, read_journal(folder / JOURNAL))
-    for frame in (frame for attempt in record.attempts for frame in attempt.frames):
-        _require_file(frame.path)
+    for attempt in record.attempts:
+        for recorded in attempt.files:
+            _require_file(recorded.path)
     return record
 
 
@@ -218,6 +237,10 @@ def _add_document(
             path = folder / _frame_name(data.pop("frame"))
             frame = _FRAME.validate_python({**data, "path": path, "unit": attempt.unit})
             attempt.frames.append(_check_times(frame))
+        elif stream == "spectra":
+            path = folder / _frame_name(data.pop("frame"))
+            spectrum = _SPECTRUM.validate_python({**data, "path": path, "unit": attempt.unit})
+            attempt.spectra.append(_check_times(spectrum))
         elif stream == "actions":
             action = _ACTION.validate_python({**data, "unit": attempt.unit})
             attempt.actions.append(_check_times(action))
@@ -258,6 +281,7 @@ def _open_attempt(doc: dict[str, Any]) -> Attempt:
 def _close_attempt(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
     counts = {
         "frames": len(attempt.frames),
+        "spectra": len(attempt.spectra),
         "actions": len(attempt.actions),
         "temperatures": len(attempt.temperatures),
     }

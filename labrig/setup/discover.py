@@ -1,4 +1,4 @@
-"""Discovery of serial ports and USB cameras, each with its entry for a rig file."""
+"""Discovery of serial ports, USB cameras and spectrometers, each with its rig file's entry."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -16,6 +16,8 @@ NO_LIBUSB = (
     "libusb-1.0-0, macOS: brew install libusb, Windows: pip install libusb-package)"
 )
 _STILL_IMAGE = 6
+#: USB vendor of Ocean Optics, now Ocean Insight.
+_OCEAN_OPTICS = 0x2457
 #: Of a reflex camera whose mirror has to swing.
 USUAL_SHUTTER_LAG = "60 ms"
 
@@ -80,6 +82,13 @@ _BOARDS: dict[tuple[int, int | None], _Board] = {
         ", starts_in: 2 s" + _SKETCH,
         hints=("these are the commands of the sketch in the guide 'Use boards of your own'",),
     ),
+    (0x1313, 0x8066): _Board(
+        "Thorlabs DC4100 LED driver",
+        "thorlabs_dc4100",
+        ', channels: {"455 nm": {output: 1, brightness: 60 %, centre: 455, fwhm: 18}}',
+        role="leds",
+        hints=("name each LED head with the output to which it is connected",),
+    ),
     (0x1313, None): _Board("Thorlabs instrument"),
     (0x04D8, 0xFFEE): _Board(
         "Devantech relay board",
@@ -135,15 +144,18 @@ class Discovery:
         USB cameras.
     notes
         Kinds of devices that could not be looked for, with the reason.
+    spectrometers
+        USB spectrometers.
     """
 
     ports: tuple[FoundDevice, ...]
     cameras: tuple[FoundDevice, ...]
     notes: tuple[str, ...] = ()
+    spectrometers: tuple[FoundDevice, ...] = ()
 
 
 def discover(host: Host, drivers: Collection[str]) -> Discovery:
-    """List serial ports and USB cameras with their entries for a rig file.
+    """List serial ports, USB cameras and spectrometers with their entries for a rig file.
 
     Nothing is sent to any of the devices.
 
@@ -157,7 +169,7 @@ def discover(host: Host, drivers: Collection[str]) -> Discovery:
     Returns
     -------
     Discovery
-        Ports, cameras and notes.
+        Ports, cameras, spectrometers and notes.
 
     Examples
     --------
@@ -174,15 +186,21 @@ def discover(host: Host, drivers: Collection[str]) -> Discovery:
         _serial(port, drivers) for port in sorted(host.ports(), key=lambda port: port.device)
     )
     try:
-        devices = [device for device in host.usb_devices() if _is_camera(device)]
+        connected = list(host.usb_devices())
     except usb.core.NoBackendError:
         return Discovery(ports, (), (NO_LIBUSB,))
+    devices = [device for device in connected if _is_camera(device)]
     model_counts = Counter((device.idVendor, device.idProduct) for device in devices)
     return Discovery(
         ports,
         tuple(
             _camera(device, host, drivers, model_counts[device.idVendor, device.idProduct] > 1)
             for device in devices
+        ),
+        spectrometers=tuple(
+            _spectrometer(device, host, drivers)
+            for device in connected
+            if device.idVendor == _OCEAN_OPTICS
         ),
     )
 
@@ -252,6 +270,22 @@ def _camera(device: Any, host: Host, drivers: Collection[str], has_twin: bool) -
         address,
         " ".join(word for word in name_parts if word) or "camera",
         snippet if driver in drivers else "",
+        tuple(hints),
+    )
+
+
+def _spectrometer(device: Any, host: Host, drivers: Collection[str]) -> FoundDevice:
+    address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
+    obstacle = unreachable(device, host.platform)
+    driver = "seabreeze_spectrometer"
+    hints = [obstacle] if obstacle else []
+    hints += [f"may be held by {holder}" for holder in port_users(device, host)]
+    hints.append("needs python-seabreeze: pip install 'labrig[seabreeze]'")
+    usb.util.dispose_resources(device)
+    return FoundDevice(
+        address,
+        "Ocean Optics spectrometer",
+        f'spectrometer: {{driver: {driver}, address: "{address}"}}' if driver in drivers else "",
         tuple(hints),
     )
 

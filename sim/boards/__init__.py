@@ -2,6 +2,7 @@
 
 from .arduino import ArduinoBoard
 from .changer import ChangerBoard
+from .dc4100 import Dc4100Board
 from .lcus import LcusBoard
 from .maestro import MaestroBoard, Pulse
 from .numato import NumatoBoard
@@ -10,6 +11,7 @@ from .serial_cable import SerialCable
 __all__ = [
     "ArduinoBoard",
     "ChangerBoard",
+    "Dc4100Board",
     "LcusBoard",
     "MaestroBoard",
     "NumatoBoard",

@@ -1,5 +1,6 @@
 """The role `leds`: lit by a protocol on a simulated bench, planned, read back, checked, guarded."""
 
+import copy
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,14 +15,17 @@ from labrig.acquire import (
     LEDS,
     LEDS_OFF,
     LIGHTS,
+    LedLight,
     LedSwitch,
     ProtocolModel,
     Rig,
     Session,
     Unit,
     at,
+    led_lights,
     lights_that_read_back,
     plan,
+    planned_rig,
     read_rig_file,
     run_units,
 )
@@ -31,6 +35,7 @@ from labrig.clock import VirtualClock
 from labrig.errors import DeviceError, ProtocolError, UsageError
 from labrig.guard import guarding
 from labrig.record import RunFolder
+from labrig.sim.lamp import WAVELENGTH_NM
 from tests.conftest import Ended
 
 from .fakes import Watching
@@ -125,7 +130,7 @@ class Shared(PlannedLedBank):
     """Somebody else switches it off after 30 s."""
 
     def __init__(self, clock: VirtualClock) -> None:
-        super().__init__(tuple(BANK))
+        super().__init__({name: LedLight() for name in BANK})
         self._clock = clock
 
     def reads_back(self) -> bool:
@@ -163,6 +168,113 @@ def test_the_rig_check_lights_each(rig: Path, labrig: Callable[..., Ended]) -> N
         "450 nm on, read back", "525 nm on, read back", "off, read back",
     ]  # fmt: skip
     assert "LEDs 450 nm on relay 1" in leds["identity"]
+
+
+def thorlabs(make_rig: Make) -> Path:
+    """Five LEDs on two Thorlabs units, and the lamp on its own board."""
+    path = make_rig(
+        leds=[{"relay": 1 + n, "centre": 400 + 50 * n, "fwhm": 20} for n in range(5)],
+        led_board="dc4100",
+    )
+    content = yaml.safe_load(path.read_text())
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    channels: dict[str, dict[str, Any]] = {
+        f"{400 + 50 * n} nm": {"output": n % 4 + 1, "centre": 400 + 50 * n, "fwhm": 20}
+        for n in range(5)
+    }
+    channels["400 nm"] |= {"brightness": "30 %", "settling": "0.5 s"}
+    channels["600 nm"]["address"] = "sim://room/dc4100-2"
+    content["devices"]["leds"] = {
+        "driver": "thorlabs_dc4100", "address": "sim://room/dc4100-1", "channels": channels,
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_a_bank_over_two_units_lights_the_room(make_rig: Make) -> None:
+    path = thorlabs(make_rig)
+    with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+        assert bench.room is not None
+        light = {}
+        for name in devices[LEDS].channels():
+            devices[LEDS].light(name)
+            bench.clock.sleep(1.0)
+            light[name] = bench.room.room.leds.irradiance(bench.clock.now())
+        devices[LEDS].dark()
+        at = bench.clock.now()
+        assert not bench.room.room.leds.irradiance(at).any()
+    ratio = light["400 nm"].sum() / light["450 nm"].sum()
+    assert ratio == pytest.approx(0.3, rel=0.01)
+    peaks_nm = [WAVELENGTH_NM[spectrum.argmax()] for spectrum in light.values()]
+    assert peaks_nm == pytest.approx([400, 450, 500, 550, 600], abs=2.5)
+
+
+def test_the_rig_check_lists_heads_and_settling(
+    make_rig: Make, labrig: Callable[..., Ended]
+) -> None:
+    ended = labrig("rig", "check", thorlabs(make_rig), "--json")
+    report: dict[str, Any] = json.loads(ended.out)
+    assert (ended.code, report["failures"]) == (0, [])
+    (leds,) = [device for device in report["devices"] if device["key"] == "leds"]
+    said = {one["what"]: one["value"] for one in leds["measured"]}
+    assert said["400 nm settles, from the rig file"] == "500 ms, for which protocols wait"
+    assert "600 nm on, read back" in said
+    assert "serial M00100002, firmware 1.5.0, LEDs 600 nm on output 1 at 100 %" in leds["identity"]
+    assert leds["findings"][0]["severity"] == "fine"
+
+
+def test_all_addresses_of_a_bank_are_known(make_rig: Make) -> None:
+    entry = read_rig_file(thorlabs(make_rig)).devices["leds"]
+    assert entry.addresses() == ["sim://room/dc4100-1", "sim://room/dc4100-2"]
+
+
+BANKS: dict[str, dict[str, Any]] = {
+    "numato_led_bank": {"relays": {"a": {"relay": 1}, "b": 2}},
+    "serial_led_bank": {
+        "channels": {"a": {"on": "on 1", "off": "off 1"}, "b": {"on": "on 2", "off": "off 2"}}
+    },
+    "thorlabs_dc4100": {"channels": {"a": {"output": 1}, "b": {"output": 2}}},
+}
+
+
+@pytest.mark.parametrize("driver", BANKS)
+def test_every_bank_says_what_is_known_of_its_light(driver: str, tmp_path: Path) -> None:
+    (tmp_path / "measured.csv").write_text("wavelength_nm,value\n440,0\n447,2\n470,0\n")
+    light = {"spectrum": "measured.csv", "settling": "0.5 s"}
+    keys: dict[str, Any] = copy.deepcopy(BANKS[driver])
+    (leds,) = keys.values()
+    content = {
+        "name": "bench",
+        "devices": {"leds": {"driver": driver, "address": "COM3", **keys}},
+    }
+    leds["a"] |= light
+    path = tmp_path / "rig.yaml"
+    path.write_text(yaml.safe_dump(content))
+    lights = led_lights(read_rig_file(path), str(path))
+    assert [led.settling for led in lights.values()] == [0.5, 0.0]
+    assert lights["a"].peak_nm() == 447
+    assert lights["b"].relative_spectrum() is None
+    planned = planned_rig(read_rig_file(path), str(path))
+    assert [planned[LEDS].settling_s(name) for name in "ab"] == [0.5, 0.0]
+    (tmp_path / "measured.csv").unlink()
+    with pytest.raises(UsageError, match=r"measured\.csv"):
+        planned_rig(read_rig_file(path), str(path))
+    leds["a"] |= {"centre": 450, "fwhm": 20}
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(UsageError, match="expected 'spectrum', or 'centre' and 'fwhm'"):
+        led_lights(read_rig_file(path), str(path))
+
+
+def test_a_rig_without_leds_has_no_light_of_them(make_rig: Make) -> None:
+    assert led_lights(read_rig_file(make_rig()), "rig.yaml") == {}
+
+
+def test_a_band_has_its_width() -> None:
+    spectrum = LedLight(centre=523.0, fwhm=31.0).relative_spectrum()
+    assert spectrum is not None
+    above = spectrum.wavelength_nm[spectrum.value >= 0.5]
+    assert above[-1] - above[0] == pytest.approx(31.0, abs=31 / 20)
+    assert spectrum.value[[0, -1]] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_guard_watches_them() -> None:

@@ -22,8 +22,9 @@ from labrig.acquire import (
 )
 from labrig.acquire.values import Frame
 from labrig.clock import VirtualClock
+from labrig.optics import SpectrometerReading
 from labrig.protocols.decay import Decay
-from labrig.record import ActionRecord, FrameRecord, RunFolder
+from labrig.record import ActionRecord, FrameRecord, RunFolder, SpectrumRecord
 from tests.acquire.fakes import Watching
 
 Against = Callable[..., None]
@@ -99,6 +100,11 @@ class NothingRecorded:
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         pass
 
+    def spectrum(
+        self, role: str, reading: SpectrometerReading, start_s: float, end_s: float, late_s: float
+    ) -> None:
+        pass
+
     def temperature(self, celsius: float, at_s: float) -> None:
         pass
 
@@ -106,6 +112,9 @@ class NothingRecorded:
         return None
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
+        return ()
+
+    def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return ()
 
     def actions(self, device: str) -> Sequence[ActionRecord]:

@@ -67,7 +67,7 @@ def test_a_board_whose_commands_are_in_the_rig_file(labrig: Labrig, tmp_path: Pa
     assert (report["failures"], report["refusals"], report["unsafe"]) == ([], [], None)
     assert device(report, "lamp")["identity"] == "serial relay, labrig relays 1"
     assert len(device(report, "lamp")["measured"]) == 2
-    assert len(device(report, "leds")["measured"]) == 3
+    assert len(device(report, "leds")["measured"]) == 5
     rig["devices"]["leds"]["baud"] = 19200
     path.write_text(yaml_text(rig))
     ended = labrig("rig", "check", path)
@@ -208,7 +208,7 @@ def test_listing_needs_no_device(labrig: Labrig) -> None:
     assert ended.code == 0
     assert "serial ports:" in ended.out
     found = json.loads(labrig("rig", "list", "--json").out)
-    assert set(found) == {"ports", "cameras", "notes"}
+    assert set(found) == {"ports", "cameras", "spectrometers", "notes"}
 
 
 def test_what_is_listed_is_a_rig_file(

@@ -259,7 +259,7 @@ def test_the_likelihood_alone_is_what_refinement_starts_from() -> None:
     assert alone.refinement_iterations == 0
     for options in ({"components": "auto"}, {"components": 2, "skewed": True}):
         with pytest.raises(UsageError, match="without refinement"):
-            fit_mixture(matrix, refine=False, **options)  # type: ignore[arg-type]
+            fit_mixture(matrix, refine=False, **options)
 
 
 def test_skewed_components_are_found_again_and_said() -> None:

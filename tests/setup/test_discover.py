@@ -14,6 +14,7 @@ from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
 from labrig.setup import Host, Process, discover, host as host_module
+from labrig.sim import open_room
 from labrig.sim.camera import SimulatedCamera
 from labrig.yaml_file import parse_yaml, validate
 
@@ -59,6 +60,17 @@ def no_libusb() -> Iterable[Any]:
     raise usb.core.NoBackendError("No backend available")
 
 
+def test_a_spectrometer_is_listed_with_its_line_and_its_extra() -> None:
+    with open_room({"sample": "blue-paint"}, "rig.yaml") as room:
+        device = usb.core.find(backend=room.spectrometer)
+        found = discover(pc(usb_devices=[device, *cameras()]), plugins.names(plugins.DRIVERS))
+    (spectrometer,) = found.spectrometers
+    assert len(found.cameras) == 1
+    entry = parse_yaml(spectrometer.snippet, "snippet")["spectrometer"]
+    assert entry == {"driver": "seabreeze_spectrometer", "address": "usb://2457:101e"}
+    assert "pip install 'labrig[seabreeze]'" in spectrometer.hints[-1]
+
+
 def test_nothing_is_plugged_in() -> None:
     found = discover(pc(), DRIVERS)
     assert (found.ports, found.cameras, found.notes) == ((), (), ())
@@ -102,11 +114,21 @@ def test_serial_ports_are_reported_by_their_usb_numbers(
         ((0x1FFB, 0x0089), "maestro_door", "door", "usually the lower one"),
         ((0x1FFB, 0x008C), "maestro_door", "door", "USB Dual Port"),
         ((0x2341, 0x0043), "serial_relay", "lamp", "commands of the sketch"),
+        ((0x1313, 0x8066), "thorlabs_dc4100", "leds", "the output to which it is connected"),
         ((0x0403, 0x6001), "serial_relay", "lamp", "write its own commands"),
         ((0x04D8, 0xFFEE), "serial_relay", "lamp", "never acknowledges"),
         ((0x1234, 0x5678), "serial_relay", "lamp", "write its own commands"),
     ],
-    ids=["LCUS", "Maestro Micro 6", "Maestro Mini 24", "Arduino", "FTDI", "Devantech", "unknown"],
+    ids=[
+        "LCUS",
+        "Maestro Micro 6",
+        "Maestro Mini 24",
+        "Arduino",
+        "Thorlabs",
+        "FTDI",
+        "Devantech",
+        "unknown",
+    ],
 )
 def test_a_board_has_the_line_of_its_driver(
     ids: tuple[int, int], driver: str, role: str, hint: str
@@ -216,6 +238,8 @@ def test_a_camera_that_cannot_be_opened(
 
 def test_other_usb_devices_are_no_cameras() -> None:
     class Mouse:
+        idVendor = 0x046D  # noqa: N815, as pyusb calls it
+
         def __iter__(self) -> Any:
             raise usb.core.USBError("Entity not found", -5, 2)
 

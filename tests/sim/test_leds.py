@@ -49,6 +49,27 @@ def test_light_is_there_from_switch_to_switch() -> None:
     assert bank.until(30.0).lit == {2}
 
 
+def test_light_follows_the_brightness_from_its_change_on() -> None:
+    bank = BANK.dimmed(1, 0.5, 5.0).switched(1, True, 10.0).dimmed(1, 0.25, 15.0)
+    bank = bank.switched(1, False, 20.0).switched(2, True, 20.0)
+    light = bank.irradiance(np.array([9.0, 10.0, 14.0, 15.0, 19.0, 20.0]))
+    of_blue = light[:5] @ led_spectrum(BLUE) / (led_spectrum(BLUE) ** 2).sum()
+    assert of_blue == pytest.approx([0.0, 0.5, 0.5, 0.25, 0.25])
+    assert light[5] == pytest.approx(led_spectrum(GREEN))
+    assert bank.exposure(10.0, 20.0) == pytest.approx(3.75 * led_spectrum(BLUE))
+
+
+def test_a_white_reference_has_all_light_but_that_behind_the_shield() -> None:
+    bench = Darkroom(leds=KEYS)
+    bench.room.switch_led(1, True)
+    bench.clock.spend(2.0)
+    lit = bench.room.white_exposure(0.5, 1.5)
+    assert lit == pytest.approx(bench.room.leds.exposure(0.5, 1.5))
+    bench = Darkroom(leds=KEYS, ambient=0.01)
+    bench.clock.spend(2.0)
+    assert bench.room.white_exposure(0.0, 1.0).sum() > 0
+
+
 def test_no_filter_is_before_them() -> None:
     half = 0.5 * np.ones_like(WAVELENGTH_NM)
     lamp = Lamp.found(LampSettings(), on=True)
@@ -102,8 +123,8 @@ def test_an_open_door_keeps_them_from_the_sample() -> None:
 @pytest.mark.parametrize(
     "leds",
     [[KEYS[0], KEYS[0]], [{"relay": 0, "centre": 450}], [{"relay": 1}],
-     [{"relay": 1, "centre": 450, "fwhm": 1}]],
-    ids=["two on a relay", "the lamp's relay", "no centre", "too narrow"],
+     [{"relay": 1, "centre": 450, "fwhm": 1}], [{"relay": 8, "centre": 450}]],
+    ids=["two on a relay", "the lamp's relay", "no centre", "too narrow", "no such relay"],
 )  # fmt: skip
 def test_leds_that_cannot_be(leds: list[dict[str, float]]) -> None:
     with pytest.raises(UsageError, match="leds"):

@@ -23,7 +23,7 @@ from labrig.acquire.roles.door_and_shield import (
     TrapDoor,
 )
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
-from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedSwitch
+from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedLight, LedSwitch
 from labrig.acquire.roles.role import (
     DARK,
     Checkable,
@@ -40,7 +40,12 @@ from labrig.acquire.roles.role import (
     Role,
     Suggestion,
 )
-from labrig.acquire.roles.spectrometer import SPECTROMETER, Spectrometer
+from labrig.acquire.roles.spectrometer import (
+    SPECTROMETER,
+    ReadSpectrum,
+    Spectrometer,
+    require_integration,
+)
 from labrig.acquire.roles.thermometer import THERMOMETER, Thermometer
 from labrig.acquire.roles.viewfinder import VIEWFINDER, LiveView
 
@@ -98,11 +103,13 @@ __all__ = [
     "Lamp",
     "LampShield",
     "LedBank",
+    "LedLight",
     "LedSwitch",
     "Light",
     "LiveView",
     "Measured",
     "PlannedDevice",
+    "ReadSpectrum",
     "Role",
     "Shield",
     "Shoot",
@@ -111,4 +118,5 @@ __all__ = [
     "Switch",
     "Thermometer",
     "TrapDoor",
+    "require_integration",
 ]

@@ -1,0 +1,7 @@
+"""A simulated USB2000+ in front of a white reference, as pyusb sees it."""
+
+from .backend import SpectrometerBackend
+from .detector import Detector
+from .instrument import UsbSpectrometer
+
+__all__ = ["Detector", "SpectrometerBackend", "UsbSpectrometer"]
