@@ -15,6 +15,7 @@ import numpy as np
 import usb.core
 from pydantic import BaseModel, ConfigDict
 
+from labrig import resources
 from labrig.acquire import Connections, Finding, require_integration
 from labrig.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
 from labrig.optics import SpectrometerReading, Spectrum, read_spectrum
@@ -61,8 +62,8 @@ class SeabreezeSpectrometer:
         Attributes
         ----------
         calibration
-            File with the absolute scale: irradiance in W m⁻² nm⁻¹ of a light that gives one
-            corrected count per second, `wavelength_nm,value,sigma`, made by
+            File with the absolute scale, or name of a shipped one: irradiance in W m⁻² nm⁻¹ of a
+            light that gives one corrected count per second, `wavelength_nm,value,sigma`, made by
             `labrig.optics.lamp_calibration` from a reading under a standard lamp. Default: counts
             are relative.
         """
@@ -79,7 +80,7 @@ class SeabreezeSpectrometer:
         self._name = f"the spectrometer at {address}"
         self._calibration: Spectrum | None = None
         if settings.calibration is not None:
-            self._calibration = read_spectrum(settings.calibration)
+            self._calibration = read_spectrum(resources.curve_path(settings.calibration))
         self._device: SeaBreezeDevice | None = None
         self._open()
 

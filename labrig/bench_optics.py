@@ -1,15 +1,16 @@
 """Optical data named under `optics:` in a rig file: measured curves and calibrations."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 from pydantic import BaseModel
 
 from labrig import resources
-from labrig.acquire import RigFile
-from labrig.calibration import CalibrationKind, LvfFile, kinds
+from labrig.acquire import RigFile, led_lights
+from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
 from labrig.errors import UsageError
 from labrig.optics import (
     CameraResponse,
@@ -23,7 +24,31 @@ from labrig.yaml_file import did_you_mean
 
 FileT = TypeVar("FileT", bound=BaseModel)
 
-_SUFFIX = ".csv"
+#: Standard uncertainty in nm of the peak of an LED by its data sheet: makers sort them to 2–5 nm.
+DATA_SHEET_NM = 2.0
+#: Distance of an LED's centroid from its peak, in widths at half maximum (1 σ): blue and green ones
+#: are wider on the red side, red ones on the blue side, by a third.
+SKEW_SHARE = 0.14
+
+
+@dataclass(frozen=True, eq=False)
+class LedExposure:
+    """An LED as a light for a fit.
+
+    Attributes
+    ----------
+    light
+        Its spectrum, on any scale.
+    brightness, brightness_sigma
+        Brightness b on a scale common to all LEDs, and σ; b is 1 and σ infinite where unknown.
+    wavelength_sigma_nm
+        Standard uncertainty in nm of an error that all wavelengths have in common.
+    """
+
+    light: Spectrum
+    brightness: float
+    brightness_sigma: float
+    wavelength_sigma_nm: float
 
 
 def camera_curves(
@@ -62,12 +87,12 @@ def calibration(rig: RigFile, kind: CalibrationKind[FileT]) -> FileT | None:
 
 def lamp_spectrum(rig: RigFile) -> Spectrum:
     """Read the relative spectrum of the rig's lamp."""
-    return read_spectrum(_path(_named(rig.optics.lamp, "lamp")))
+    return read_spectrum(resources.curve_path(_named(rig.optics.lamp, "lamp")))
 
 
 def card_reflectance(rig: RigFile) -> Transmittance:
     """Read the reflectance of the rig's grey card."""
-    return read_transmittance(_path(_named(rig.optics.grey_card, "grey_card")))
+    return read_transmittance(resources.curve_path(_named(rig.optics.grey_card, "grey_card")))
 
 
 def filter_transmittances(rig: RigFile, names: Sequence[str]) -> list[Transmittance]:
@@ -85,6 +110,58 @@ def filter_transmittances(rig: RigFile, names: Sequence[str]) -> list[Transmitta
             f"{did_you_mean(unknown[0], list(files))}"
         )
     return [read_transmittance(files[name]) for name in names]
+
+
+def led_exposures(
+    rig: RigFile, source: str, calibration: LedsFile | None = None
+) -> dict[str, LedExposure]:
+    """Return spectrum and brightness of each LED of a rig: as calibrated, else by the rig file.
+
+    An LED that the calibration left out has the rig file's spectrum and no known brightness.
+
+    Parameters
+    ----------
+    rig, source
+        Rig file, and its name or path for messages.
+    calibration
+        Calibration of the LEDs; None if there is none.
+
+    Raises
+    ------
+    UsageError
+        The rig has no LEDs, nothing is known of the light of one, or the calibration is of other
+        LEDs.
+    """
+    lights = led_lights(rig, source)
+    if not lights:
+        raise UsageError(f"{source}: expected LEDs under 'devices', found none")
+    calibrated = {} if calibration is None else calibration.leds
+    if others := [name for name in calibrated if name not in lights]:
+        raise UsageError(
+            f"{source}: the calibration of the LEDs has '{others[0]}', the rig has "
+            f"{', '.join(lights)}; run led_brightness on this rig, and name its run (optics: leds)"
+        )
+    exposures = {}
+    for name, light in lights.items():
+        led = calibrated.get(name)
+        if led is not None:
+            known = led.brightness is not None and led.brightness_sigma is not None
+            exposures[name] = LedExposure(
+                led.spectrum(name),
+                led.brightness if led.brightness is not None and known else 1.0,
+                led.brightness_sigma if led.brightness_sigma is not None and known else math.inf,
+                led.wavelength_sigma_nm,
+            )
+            continue
+        spectrum = light.relative_spectrum()
+        if spectrum is None:
+            raise UsageError(
+                f"{source}: nothing is known of the light of LED '{name}'; give its 'centre' and "
+                "'fwhm', or a file 'spectrum'"
+            )
+        sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * (light.fwhm or 0.0))
+        exposures[name] = LedExposure(replace(spectrum, name=name), 1.0, math.inf, sigma_nm)
+    return exposures
 
 
 def require_optics(rig: RigFile) -> None:
@@ -114,11 +191,3 @@ def _named(value: str | None, key: str) -> str:
             f"'optics:', such as '{key}: ./my-{key.replace('_', '-')}.csv'"
         )
     return value
-
-
-def _path(named: str) -> Path:
-    """Return a file as given, or the shipped one of that name."""
-    path = Path(named)
-    if path.suffix or len(path.parts) > 1:
-        return path
-    return resources.folder("config/optics") / f"{named}{_SUFFIX}"

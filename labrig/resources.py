@@ -51,6 +51,20 @@ def find(place: str, kind: str, name_or_path: str | os.PathLike[str]) -> Path:
     return shipped[str(path)]
 
 
+def curve_path(named: str) -> Path:
+    """Return the path of a measured curve as given, or the shipped one of that name.
+
+    Parameters
+    ----------
+    named
+        Name of a shipped table, such as `grey_card_18`, or path of a file.
+    """
+    path = Path(named)
+    if path.suffix or len(path.parts) > 1:
+        return path
+    return folder("config/optics") / f"{named}.csv"
+
+
 def names(place: str) -> dict[str, Path]:
     """Return the files that are shipped in a folder by name, sorted."""
     files = (path for path in folder(place).iterdir() if path.suffix in SUFFIXES)

@@ -12,6 +12,8 @@ LampKind = Literal["halogen", "mercury"]
 
 #: Where the lamp stands unless the changer moves it.
 USUAL_LAMP_M = 1.0
+#: Angle between light and camera unless the changer turns the light.
+USUAL_LIGHT_DEG = 45
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,13 @@ class Arrangement:
         Distance of the lamp from the sample in metres.
     tilt_deg
         Angle of the sample against the camera's axis in degrees.
+    light_deg
+        Angle between light and camera, seen from the sample, in degrees.
+    placing
+        Number of times that the sample was put in anew.
+    faced
+        Sample that the spectrometer faces, from 1 on, while the samples lie open; 0 is a white
+        reference beside them.
     """
 
     card: Card = "sample"
@@ -44,6 +53,9 @@ class Arrangement:
     lamp: LampKind = "halogen"
     lamp_m: float = USUAL_LAMP_M
     tilt_deg: int = 0
+    light_deg: int = USUAL_LIGHT_DEG
+    placing: int = 0
+    faced: int = 0
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,22 @@ from collections.abc import Callable, Mapping
 from labrig.clock import VirtualClock
 from labrig.errors import UsageError
 
-from .arrangement import USUAL_LAMP_M, Arrangements, Card, LampKind, LvfPlace
+from .arrangement import (
+    USUAL_LAMP_M,
+    USUAL_LIGHT_DEG,
+    Arrangements,
+    Card,
+    LampKind,
+    LvfPlace,
+)
 from .faults import given
 from .filters import Filters
 from .simulation import Simulation
 
 #: Largest angle of a sample against the camera's axis.
 MAX_TILT_DEG = 85
+#: Largest angle between light and camera.
+MAX_LIGHT_DEG = 150
 #: Least distance of a lamp from the sample.
 MIN_LAMP_M = 0.2
 
@@ -43,6 +52,7 @@ class Changer:
         freshen: Callable[[], None],
         plug: Callable[[LampKind], None],
     ) -> None:
+        self._samples = len(simulation.patches)
         self._has_lvf = simulation.lvf is not None
         self._turned = given(fault.lvf_turned for fault in simulation.faults)
         self._skipped = given(fault.filter_skipped for fault in simulation.faults)
@@ -71,6 +81,11 @@ class Changer:
             "lamp at DISTANCE": self._move_lamp,
             "lamp back": lambda: self._change(lamp_m=USUAL_LAMP_M),
             "tilt DEGREES": self._tilt,
+            "yarn vertical DEGREES": self._put_in_anew,
+            "yarn horizontal DEGREES": self._put_in_anew,
+            "sphere anew": lambda: self._put_in_anew(str(USUAL_LIGHT_DEG)),
+            "light back": lambda: self._change(light_deg=USUAL_LIGHT_DEG),
+            "sample NUMBER": self._face,
         }
 
     def _change(self, **what: object) -> None:
@@ -81,7 +96,12 @@ class Changer:
         self._freshen()
 
     def _lay(self, card: Card) -> None:
-        self._change(card=card)
+        self._change(card=card, faced=0)
+
+    def _face(self, number: str) -> None:
+        if not number.isdecimal() or not 1 <= int(number) <= self._samples:
+            raise UsageError(f"expected a sample from 1 to {self._samples}, got '{number}'")
+        self._change(card="sample", faced=int(number))
 
     def _put_lvf(self, place: LvfPlace) -> None:
         if place != "away" and not self._has_lvf:
@@ -115,3 +135,12 @@ class Changer:
         if not degrees.isdecimal() or int(degrees) > MAX_TILT_DEG:
             raise UsageError(f"expected whole degrees from 0 to {MAX_TILT_DEG}, got '{degrees}'")
         self._change(tilt_deg=int(degrees))
+
+    def _put_in_anew(self, light_degrees: str) -> None:
+        """Put the sample in again, never quite as it was, and turn the light."""
+        if not light_degrees.isdecimal() or int(light_degrees) > MAX_LIGHT_DEG:
+            raise UsageError(
+                f"expected whole degrees from 0 to {MAX_LIGHT_DEG}, got '{light_degrees}'"
+            )
+        placing = self.arrangements.last.placing + 1
+        self._change(card="sample", light_deg=int(light_degrees), placing=placing)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from labrig.material import read_material
+from labrig.material import read_any_material
 from labrig.yaml_file import validate
 
 from .dng import Shot, encode_dng
@@ -57,7 +57,7 @@ def describe_room(content: Mapping[str, Any], source: str) -> RoomDescription:
     """
     simulation = validate(content, Simulation, f"{source}, simulation")
     for patch in simulation.patches:
-        read_material(patch.material)
+        read_any_material(patch.material)
     width, height = simulation.sensor.width, simulation.sensor.height
     lens = None if simulation.lens is None else (simulation.lens.name, simulation.lens.focal_mm)
     file = encode_dng(np.zeros((height, width), np.uint16), Shot(0.0, 1.0, 100, 4.0, lens))

@@ -115,7 +115,7 @@ class OpenRoom:
             clock,
             UsbSpectrometer(
                 clock,
-                self.room.white_exposure,
+                self.room.spectrometer_exposure,
                 detector,
                 "USB2P00001",
                 (simulation.seed, SPECTRUM_STREAM),

@@ -14,7 +14,9 @@ from .aiming import (
     developed,
     live_stride,
 )
+from .angles import Spheres
 from .arrangement import Arrangement, Arrangements
+from .cards import reflectances
 from .changer import Changer
 from .circuit import LampCircuit
 from .dng import Shot, encode_dng
@@ -69,9 +71,10 @@ class Room:
         self._clock = clock
         self._layout = Layout(simulation)
         self._samples = Samples(simulation, self._layout)
-        self._view = View(
-            simulation, self._layout, Surfaces(self._samples.materials, simulation.gloss)
-        )
+        self._surfaces = Surfaces(self._samples.materials, simulation.gloss)
+        self._view = View(simulation, self._layout, self._surfaces)
+        has_sphere = any(patch.shape == "sphere" for patch in simulation.patches)
+        self._spheres = Spheres(simulation) if has_sphere else None
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
         self._leds = Leds(simulation.leds)
@@ -167,6 +170,8 @@ class Room:
             rgb = self._electrons(begin_s, stop_s, arrangement, lights, reflected, f_number)
             painted = self._layout.places(arrangement).painted
             part = rgb[:, BAYER_RGGB].reshape(-1)[painted]
+            if self._spheres is not None and arrangement.card == "sample":
+                part = self._shaded(part, self._spheres, arrangement, reflected, f_number)
             light = part if light is None else light + part
         assert light is not None
         mosaic = self._sensor.expose(
@@ -188,6 +193,22 @@ class Room:
         The trap door does not come before it; the shield of the lamp does.
         """
         return self._lights().seen(start_s, end_s).cloth
+
+    def spectrometer_exposure(self, start_s: float, end_s: float) -> FloatArray:
+        """Return ∫ irradiance dt of what the spectrometer faces, as from a white of reflectance 1.
+
+        That is the grey card, the sample that the changer has put before it, or else a white
+        reference beside the samples.
+        """
+        total = np.zeros_like(WAVELENGTH_NM)
+        for begin_s, stop_s, arrangement in self._changer.arrangements.spans(start_s, end_s):
+            light = self.white_exposure(begin_s, stop_s)
+            if arrangement.card == "grey card":
+                light = reflectances("grey card", self._simulation.grey_card)[1] * light
+            elif arrangement.faced:
+                (light,) = self._surfaces.thrown_back(light, np.array([arrangement.faced]))
+            total += light
+        return total
 
     def preview(self, at_s: float) -> NDArray[np.uint8]:
         """Return the viewfinder's picture for a display, R, G, B, with the room light if any.
@@ -293,3 +314,21 @@ class Room:
         glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
         radiance_s = self._view.radiance_s(arrangement, glow_s, reflected)
         return self._curves.glow_electrons_per_s(radiance_s, f_number).astype(np.float32)
+
+    def _shaded(
+        self,
+        light: NDArray[np.float32],
+        spheres: Spheres,
+        arrangement: Arrangement,
+        reflected: VisibleLight,
+        f_number: float,
+    ) -> NDArray[np.float32]:
+        """Return the expected electrons of all pixels with the shading of the spheres."""
+        radiance_s = self._view.reradiated_s(arrangement, reflected)
+        rgb = self._curves.glow_electrons_per_s(radiance_s, f_number)
+        painted = self._layout.places(arrangement).painted
+        reradiated = rgb[:, BAYER_RGGB].reshape(-1)[painted]
+        shaded: FloatArray = (
+            light - reradiated
+        ) * spheres.reflected + reradiated * spheres.reradiated
+        return np.maximum(shaded, 0.0).astype(np.float32)

@@ -53,8 +53,8 @@ class Patch(Part):
     Attributes
     ----------
     material
-        Name of a shipped material, such as `blue-paint`, or path of a material file or of a file
-        with a re-radiation matrix.
+        Name of a shipped material, such as `blue-paint` or `yellow-textile`, or path of a material
+        file or of a file with a re-radiation matrix.
     region
         Place of the sample in the frame: `[x, y, width, height]` in pixels, or all four as
         fractions of the frame.
@@ -62,10 +62,14 @@ class Patch(Part):
         Concentration r that a long charge under this room's lamp reaches, 0 to 1, instead of the
         one that follows from the excitation rates. Null: it follows from them, and is 0.5 for
         states without excitation rates.
+    shape
+        Shape of the sample: `flat`, or a `sphere` as large as fits into the region, lit from the
+        left.
     """
 
     material: str
     region: Region = MIDDLE
+    shape: Literal["flat", "sphere"] = "flat"
     initial_charge: Charge | None = None
 
 
@@ -224,6 +228,13 @@ class Simulation(Part):
     anisotropy
         Fraction of its glow that a sample loses when it is turned away by 90 degrees, for example
         `5 %`.
+    reradiation_anisotropy
+        Fraction of its re-radiation that a fluorescent sample loses at 90 degrees, for example
+        `10 %`: between light and camera, or on a sphere between the surface's normal and the
+        camera.
+    repositioning
+        Standard deviation by which a sample's brightness changes when it is put in anew, for
+        example `1 %`.
     gloss
         Fraction of the light that the samples mirror into the camera; crossed polarisers take most
         of it away.
@@ -262,6 +273,8 @@ class Simulation(Part):
     ambient: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     temperature: TemperatureSettings | None = None
     anisotropy: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
+    reradiation_anisotropy: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
+    repositioning: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     gloss: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     room_light: bool = True
 

@@ -43,6 +43,13 @@ class Surfaces:
     def thrown_back(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
         """Return the light that comes back, as from a white of reflectance 1.
 
+        Parameters and shape are those of `reflected` and `reradiated`, whose sum it is.
+        """
+        return np.maximum(self.reflected(light, patch) + self.reradiated(light, patch), 0.0)
+
+    def reflected(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
+        """Return the light that comes back at its own wavelength.
+
         Parameters
         ----------
         light
@@ -55,14 +62,18 @@ class Surfaces:
         ndarray
             Shape (cells, wavelengths).
         """
-        each = np.broadcast_to(light, (len(patch), light.shape[-1]))
         nothing = np.zeros((1, light.shape[-1]))
-        reflectance = np.concatenate([nothing, self._reflectance + self._gloss])[patch]
-        back = reflectance * each
+        reflectance: FloatArray = np.concatenate([nothing, self._reflectance + self._gloss])[patch]
+        return reflectance * light
+
+    def reradiated(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
+        """Return the light that comes back at longer wavelengths, like `reflected`."""
+        each = np.broadcast_to(light, (len(patch), light.shape[-1]))
+        back = np.zeros_like(each)
         for number, matrix in self._reradiation.items():
             cells = patch == number
-            back[cells] += each[cells] @ matrix.T
-        return np.maximum(back, 0.0)
+            back[cells] = each[cells] @ matrix.T
+        return back
 
 
 def reradiation_on_grid(matrix: ReradiationMatrix) -> FloatArray:

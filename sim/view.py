@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from .angles import Angles
 from .arrangement import Arrangement, LvfPlace
 from .cards import reflectances
 from .layout import Layout, Places
@@ -32,6 +33,7 @@ class View:
         self._simulation = simulation
         self._layout = layout
         self._surfaces = surfaces
+        self._angles = Angles(simulation, layout.patch)
         self._reflected = REFLECTED * simulation.lamp.irradiance
         self._lvf = None if simulation.lvf is None else Lvf(simulation.lvf)
 
@@ -59,6 +61,13 @@ class View:
         radiance *= passed
         return radiance
 
+    def reradiated_s(self, arrangement: Arrangement, reflected: VisibleLight) -> FloatArray:
+        """Return the part of `radiance_s` that uncovered samples re-radiate at once."""
+        light = reflected.sample + reflected.sample_stray
+        reradiated = self._surfaces.reradiated(light, self._layout.patch)
+        seen: FloatArray = self._reflected * self._angles.reradiated(arrangement) * reradiated
+        return seen[self._layout.places(arrangement).cell]
+
     def _samples(
         self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
     ) -> FloatArray:
@@ -71,7 +80,11 @@ class View:
             glow_s = np.zeros_like(glow_s)
             thrown_back = reflectances("blank", self._simulation.grey_card)[1] * light
         else:
-            thrown_back = self._surfaces.thrown_back(light, self._layout.patch)
+            by_reflection = self._surfaces.reflected(light, self._layout.patch)
+            by_reradiation = self._surfaces.reradiated(light, self._layout.patch)
+            thrown_back = self._angles.reflected(arrangement) * by_reflection
+            thrown_back += self._angles.reradiated(arrangement) * by_reradiation
+            thrown_back = np.maximum(thrown_back, 0.0)
             glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
         thrown_back = thrown_back + CLOTH_REFLECTANCE * reflected.door
         radiance: FloatArray = glow_s + self._reflected * thrown_back

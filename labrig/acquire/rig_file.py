@@ -102,6 +102,9 @@ class Optics(BaseModel):
     fade
         Turn-off and turn-on transient of the lamp: its file `fade.yaml`, or the folder of the run
         of protocol `fade` that measured it.
+    leds
+        Spectra and brightnesses of the LEDs: their file `leds.yaml`, or the folder of the run of
+        protocol `led_brightness` that measured them.
     blank
         Background and stray light of the bench after lamp off: its file `blank.yaml`, or the folder
         of the run of protocol `blank` that measured it.

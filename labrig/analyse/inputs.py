@@ -15,6 +15,7 @@ from labrig.calibration import (
     CameraFile,
     FadeFile,
     IrradianceFile,
+    LedsFile,
     LvfFile,
     kinds,
 )
@@ -31,7 +32,7 @@ class Inputs:
 
     Attributes
     ----------
-    camera, blank, fade, lvf, irradiance
+    camera, blank, fade, lvf, irradiance, leds
         Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
         in the same run.
     others
@@ -50,6 +51,7 @@ class Inputs:
     fade: FadeFile | None = None
     lvf: LvfFile | None = None
     irradiance: IrradianceFile | None = None
+    leds: LedsFile | None = None
     others: Mapping[str, Any] = field(default_factory=dict)
     spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
     decays: Mapping[str, FittedDecay] = field(default_factory=dict)

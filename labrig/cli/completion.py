@@ -22,7 +22,7 @@ def complete_rig(incomplete: str) -> list[str]:
 
 
 def complete_material(incomplete: str) -> list[str]:
-    """Return the shipped materials that begin so."""
+    """Return the shipped phosphors that begin so."""
     return [name for name in _shipped("config/materials") if name.startswith(incomplete)]
 
 

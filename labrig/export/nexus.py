@@ -374,7 +374,8 @@ def _add_device(
 def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
     """Add time, settings and checksum of every frame of completed units."""
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
-    seconds = np.array([(frame.start_time, frame.end_time) for frame in frames]) - start_time
+    times = np.array([(frame.start_time, frame.end_time) for frame in frames]).reshape(-1, 2)
+    seconds = times - start_time
     add_number(camera, "count_time", [frame.exposure_s for frame in frames], "s")
     for name, column in zip(("start_time", "stop_time"), seconds.T, strict=True):
         add_number(camera, name, column, "s").attrs["start"] = _iso(start_time)

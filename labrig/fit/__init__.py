@@ -1,5 +1,12 @@
 """Fits: the least-squares core; decays, spectra, filters, excitation, mixtures fitted with it."""
 
+from labrig.fit.bispectral import (
+    BispectralColumns,
+    LitSpectrum,
+    SeparatedColumns,
+    bispectral_columns,
+    separate_columns,
+)
 from labrig.fit.decay import DecayFit, fit_decay
 from labrig.fit.least_squares import EPSILON, FloatArray, LeastSquaresFit, least_squares
 from labrig.fit.mixture import (
@@ -13,15 +20,20 @@ from labrig.fit.mixture import (
 
 __all__ = [
     "EPSILON",
+    "BispectralColumns",
     "DecayFit",
     "FloatArray",
     "HeldOutError",
     "LeastSquaresFit",
+    "LitSpectrum",
     "MixtureCandidate",
     "MixtureFit",
     "MixtureTexture",
+    "SeparatedColumns",
+    "bispectral_columns",
     "fit_decay",
     "fit_mixture",
     "fit_mixture_texture",
     "least_squares",
+    "separate_columns",
 ]

@@ -2,13 +2,16 @@
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from labrig import resources
 from labrig.errors import UsageError
 from labrig.material.file import Material, read_material
-from labrig.material.fluorescent import read_fluorescent
-from labrig.material.reradiation import ReradiationMatrix, read_reradiation
 from labrig.yaml_file import read_yaml
+
+# SciPy, which matrices need, is slow to load.
+if TYPE_CHECKING:
+    from labrig.material.reradiation import ReradiationMatrix
 
 #: Endings of material files; all others are those of matrices.
 YAML = (".yaml", ".yml")
@@ -20,14 +23,15 @@ def read_any_material(
     entry: str | None = None,
     *,
     pixel: tuple[int, int] | None = None,
-) -> Material | ReradiationMatrix:
+) -> "Material | ReradiationMatrix":
     """Read a phosphor, or the re-radiation matrix of a fluorescent material.
 
     Parameters
     ----------
     name_or_path
         Path of a material file (`.yaml`), whose `kind` tells what it is; name of a shipped
-        material such as `blue-paint`; or path of a file that `read_reradiation` reads.
+        material such as `blue-paint` or `yellow-textile`; or path of a file that
+        `read_reradiation` reads.
     entry, pixel
         Matrix in a file of several, see `read_reradiation`.
 
@@ -52,13 +56,21 @@ def read_any_material(
     """
     path = Path(name_or_path)
     if path.suffix and path.suffix.lower() not in YAML:
+        from labrig.material.reradiation import read_reradiation
+
         return read_reradiation(path, entry, pixel=pixel)
     for option, value in (("entry", entry), ("pixel", pixel)):
         if value is not None:
             raise UsageError(f"{path}: expected a file of matrices for '{option}', got a material")
-    file = resources.find("config/materials", "material", name_or_path)
+    is_dye = str(name_or_path) in resources.names("config/fluorescent")
+    place = "config/fluorescent" if is_dye else "config/materials"
+    file = resources.find(place, "material", name_or_path)
     kind = read_yaml(file).get("kind")
     if kind not in (PHOSPHOR, FLUORESCENT):
         got = "nothing" if kind is None else f"'{kind}'"
         raise UsageError(f"{file}: expected 'kind: {PHOSPHOR}' or 'kind: {FLUORESCENT}', got {got}")
-    return read_fluorescent(file) if kind == FLUORESCENT else read_material(file)
+    if kind == PHOSPHOR:
+        return read_material(file)
+    from labrig.material.fluorescent import read_fluorescent
+
+    return read_fluorescent(file)

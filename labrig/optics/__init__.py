@@ -31,6 +31,7 @@ from labrig.optics.curve_file import (
     read_spectrum,
     read_transmittance,
 )
+from labrig.optics.hyperspectral import HyperspectralCube, read_hyperspectral_cube
 from labrig.optics.lights import is_narrow, read_light
 from labrig.optics.lvf import (
     NOMINAL_FWHM_NM,
@@ -70,6 +71,7 @@ __all__ = [
     "CurveFile",
     "Factor",
     "Flat",
+    "HyperspectralCube",
     "Lvf",
     "MeasuredSpectrum",
     "Observer",
@@ -95,6 +97,7 @@ __all__ = [
     "read_camera",
     "read_checked_curves",
     "read_curve_file",
+    "read_hyperspectral_cube",
     "read_light",
     "read_monochrome_camera",
     "read_spectrometer_reading",

@@ -24,14 +24,19 @@ from labrig.report.chart import (
 from labrig.report.figure_style import (
     DASHED,
     INK,
-    LEFT_PT,
     MUTED,
     OTHER_CHANNELS,
     PAPER,
     RULE,
-    SHADE,
 )
-from labrig.report.heat_map import BAND_NM, draw_heat, largest, shown_values
+from labrig.report.heat_map import (
+    BAND_NM,
+    HEAT_HEIGHT_PT,
+    INCIDENT,
+    heat_figure,
+    largest,
+    shown_values,
+)
 from labrig.report.mixture import FittedMatrix
 from labrig.report.reradiation_spectra import (
     LEGEND_MARGINS,
@@ -49,10 +54,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INCIDENT, RETURNING = "Incident wavelength / nm", "Returning wavelength / nm"
-HEAT_HEIGHT_PT, HEIGHT_PT = 330.0, 256.0
-#: Room for the colour bar on the right, and its width.
-BAR_ROOM_PT, BAR_PT = 74.0, 11.0
+HEIGHT_PT = 256.0
 #: End of the scale of differences, of the strongest re-radiation.
 APART = 0.25
 #: Least error on a logarithmic axis.
@@ -201,22 +203,9 @@ def _heat_figure(
     fit: MixtureFit | None,
 ) -> "Figure":
     """Draw values (n, m) on the bands of a matrix, with ellipses of a fit's components."""
-    from labrig.report.figure_style import new_figure, place
-
-    figure = new_figure(HEAT_HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=BAR_ROOM_PT, top=12)
-    axes.grid(visible=False)
-    axes.set_facecolor(SHADE)
-    mesh = draw_heat(axes, matrix, values, ends, colours)
-    axes.set(xlim=matrix.input_edges_nm[[0, -1]], ylim=matrix.output_edges_nm[[0, -1]])
-    axes.set(xlabel=INCIDENT, ylabel=RETURNING)
+    figure, axes = heat_figure(matrix, values, ends, colours)
     if fit is not None:
         _draw_ellipses(axes, fit)
-    bar_left = figure.get_figwidth() * 72 - BAR_ROOM_PT + 8
-    beside = place(figure, left=bar_left, bottom=38, right=BAR_ROOM_PT - 8 - BAR_PT, top=12)
-    bar = figure.colorbar(mesh, cax=beside)
-    bar.outline.set_visible(False)
-    beside.grid(visible=False)
     return figure
 
 

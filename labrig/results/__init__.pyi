@@ -1,3 +1,13 @@
+from .angular_fluorescence import (
+    LEVEL as LEVEL,
+    POWER as POWER,
+    AngleMeans as AngleMeans,
+    AngularFluorescenceResult as AngularFluorescenceResult,
+    DependenceTest as DependenceTest,
+    ShadingFit as ShadingFit,
+    SphereViews as SphereViews,
+    YarnViews as YarnViews,
+)
 from .blank import (
     BlankResult as BlankResult,
     StrayLight as StrayLight,
@@ -17,6 +27,11 @@ from .decay import (
     DecayPatch as DecayPatch,
     DecayResult as DecayResult,
     NoiseBudget as NoiseBudget,
+)
+from .direct_bispectral import (
+    DirectBispectralResult as DirectBispectralResult,
+    DirectColumns as DirectColumns,
+    LightSpectrum as LightSpectrum,
 )
 from .emission_spectrum import (
     ChargeSpectrum as ChargeSpectrum,
@@ -66,6 +81,19 @@ from .isotropy import (
     AngularGlow as AngularGlow,
     IsotropyResult as IsotropyResult,
     is_within_paper as is_within_paper,
+)
+from .led_brightness import (
+    LedBrightnessResult as LedBrightnessResult,
+    LedFault as LedFault,
+    LedFinding as LedFinding,
+    LedMeasured as LedMeasured,
+)
+from .led_fluorescence import (
+    ColourUnderLight as ColourUnderLight,
+    FluorescentPatch as FluorescentPatch,
+    LedFluorescenceResult as LedFluorescenceResult,
+    MatrixOnBands as MatrixOnBands,
+    MeasuredDye as MeasuredDye,
 )
 from .lvf_calibration import (
     CameraCurves as CameraCurves,

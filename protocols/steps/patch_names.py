@@ -5,7 +5,7 @@ import unicodedata
 from itertools import combinations
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from labrig.region import Region
 
@@ -52,6 +52,13 @@ def _folders(patches: dict[str, Region]) -> dict[str, Region]:
     return patches
 
 
+def _sample_folders(names: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        raise ValueError(f"expected every sample once, got {', '.join(names)}")
+    _folders(dict.fromkeys(names, (0.0, 0.0, 1.0, 1.0)))
+    return names
+
+
 def _with_text_names_or_none(patches: Any) -> dict[str, Any]:
     return {} if patches in (None, {}) else _with_text_names(patches)
 
@@ -81,3 +88,6 @@ FilterPatches = Annotated[
     AfterValidator(_folders),
     AfterValidator(_in_separate_rows),
 ]
+
+#: Names of samples that are measured one after another.
+SampleNames = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_sample_folders)]

@@ -78,7 +78,7 @@ class Arrangement:
             Reason for the arrangement, for the person.
         """
         if before is None or self.lamp != before.lamp:
-            session.perform(LAMP_OFF)
+            _lamp_off(session)
         for name in ("lamp", "stage", "lvf", "filter"):
             if before is None or getattr(self, name) != getattr(before, name):
                 instruction, task = self._step(name)
@@ -98,6 +98,11 @@ class Arrangement:
             case _:
                 instruction = f"put the colour filter {self.filter} before the lamp"
                 return instruction, f"filter {self.filter}"
+
+
+def _lamp_off(session: Session) -> None:
+    if LAMP in session.rig:
+        session.perform(LAMP_OFF)
 
 
 def light(session: Session, warm_up_s: float) -> None:
@@ -170,7 +175,7 @@ class PutBackUnit:
 
     def run(self, session: Session) -> None:
         """Switch the lamp off, have filters and card taken away."""
-        session.perform(LAMP_OFF)
+        _lamp_off(session)
         arrangement = arrangement_after(self.before, session)
         Arrangement().set_up(session, arrangement, "the next measurement finds the bench as usual")
 
@@ -195,11 +200,14 @@ class Bracketing:
         Longest exposure in seconds.
     repeats
         Number of photographs at each exposure.
+    exposures
+        Number of exposures, each `LONGER` times the one before.
     """
 
     camera: CameraSettings
     longest_s: float
     repeats: int
+    exposures: int = 2
 
     def settings(self, exposure_s: float) -> ExposureSettings:
         """Return the camera settings with that shutter time."""
@@ -207,12 +215,12 @@ class Bracketing:
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
-        exposures_s = {
-            offers.exposure_at_most(self.longest_s * part) for part in (1 / 64, 1 / 8, 1)
-        }
+        exposures_s = {offers.exposure_at_most(self.longest_s / LONGER**step) for step in range(3)}
         return [exposure_s for exposure_s in sorted(exposures_s) for _ in range(DARKS_PER_EXPOSURE)]
 
-    def photograph(self, session: Session, unit: str, role: str, lamp: str) -> None:
+    def photograph(
+        self, session: Session, unit: str, role: str, lamp: str, may_be_dark: bool = False
+    ) -> None:
         """Meter, then take the bracket.
 
         Parameters
@@ -223,6 +231,8 @@ class Bracketing:
             Unit and role of the frames.
         lamp
             Name of the expected lamp, for messages.
+        may_be_dark
+            Whether a dark scene is photographed with the longest exposure, not refused.
 
         Raises
         ------
@@ -230,21 +240,28 @@ class Bracketing:
             The scene is dark.
         """
         offers = session.rig[CAMERA].offers()
-        for exposure_s in self._ladder(offers):
+        self.meter(session, unit)
+        # That takes longest: all exposures of a bracket, and the last one as long as it may be.
+        worst_s = offers.exposure_at_most(self.longest_s / LONGER ** (self.exposures - 1))
+        exposure_s = session.choose(
+            "exposure", lambda: self.metered_s(session, unit, lamp, may_be_dark), worst_s
+        )
+        bracket_s = {
+            offers.exposure_at_most(min(exposure_s * LONGER**step, self.longest_s))
+            for step in range(self.exposures)
+        }
+        for each_s in sorted(bracket_s):
+            for _ in range(self.repeats):
+                session.perform(Shoot(role, self.settings(each_s)))
+
+    def meter(self, session: Session, unit: str) -> None:
+        """Photograph the scene with rising exposures until one is bright enough."""
+        for exposure_s in self._ladder(session.rig[CAMERA].offers()):
             session.perform(Shoot(FrameRole.LOOK, self.settings(exposure_s)))
             if session.choose(
                 "bright enough", lambda: self._is_bright_enough(session, unit), worst=False
             ):
                 break
-        # That takes longest: both exposures of a bracket, and the longer one as long as it may be.
-        worst_s = offers.exposure_at_most(self.longest_s / LONGER)
-        exposure_s = session.choose(
-            "exposure", lambda: self._exposure_s(session, unit, lamp), worst_s
-        )
-        longer_s = offers.exposure_at_most(min(exposure_s * LONGER, self.longest_s))
-        for bracket_s in sorted({exposure_s, longer_s}):
-            for _ in range(self.repeats):
-                session.perform(Shoot(role, self.settings(bracket_s)))
 
     def _ladder(self, offers: CameraOffers) -> Sequence[float]:
         return sorted({offers.exposure_at_most(self.longest_s * fraction) for fraction in LADDER})
@@ -252,11 +269,30 @@ class Bracketing:
     def _is_bright_enough(self, session: Session, unit: str) -> bool:
         return _measure_brightness(_metering_frames(session, unit)[-1]).fraction > ENOUGH
 
-    def _exposure_s(self, session: Session, unit: str, lamp: str) -> float:
-        """Return the shutter time at which the brightest pixels fill the target fraction."""
+    def metered_s(self, session: Session, unit: str, lamp: str, may_be_dark: bool = False) -> float:
+        """Return the shutter time at which the brightest pixels fill the target fraction.
+
+        Parameters
+        ----------
+        session
+            Session of the run.
+        unit
+            Unit that has metered.
+        lamp
+            Name of the expected lamp, for messages.
+        may_be_dark
+            Whether a dark scene gets the longest exposure and is not refused.
+
+        Raises
+        ------
+        DeviceError
+            The scene was dark.
+        """
         offers, frames = session.rig[CAMERA].offers(), _metering_frames(session, unit)
         brightness = [_measure_brightness(frame) for frame in frames]
         detected = [reading for reading in brightness if reading.visible]
+        if not detected and may_be_dark:
+            return offers.exposure_at_most(self.longest_s)
         if not detected:
             raise DeviceError(
                 f"{unit}: dark even in {duration_text(frames[-1].exposure_s)}: the {lamp} lamp did "

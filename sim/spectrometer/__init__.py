@@ -1,4 +1,4 @@
-"""A simulated USB2000+ in front of a white reference, as pyusb sees it."""
+"""A simulated USB2000+ in front of a white reference or a sample, as pyusb sees it."""
 
 from .backend import SpectrometerBackend
 from .detector import Detector

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import Material, read_material
 from labrig.results import FittedExcitation
+from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
 
 FloatArray = NDArray[np.float64]
@@ -31,7 +32,9 @@ LAMP = 0.005
 def run(material: Material, seed: int) -> tuple[FittedExcitation, Bench]:
     """One bench, measured and fitted."""
     bench = Bench(material, seed=seed)
-    bare = bench.series("bare lamp", np.ones((1, 160)), [5400.0], shots=30, every_s=6.0)
+    bare = bench.series(
+        "bare lamp", np.ones((1, len(WAVELENGTH_NM))), [5400.0], shots=30, every_s=6.0
+    )
     lvf = bench.series("through LVF", LVF, CHARGES_S)
     rates = np.array([state.k_r_per_s for state in material.states])
     uncertain = RelativeSigmas(bench.flicker, LAMP)

@@ -24,6 +24,12 @@ SHORTER: dict[str, dict[str, Any]] = {
         "filters": FILTERS, "stripes": "2 min", "repeats": 1, "longest": "4 s",
     },
     "irradiance": {"longest": "4 s", "repeats": 1, "rounds": 1},
+    "led_brightness": {
+        "leds": ["455 nm", "530 nm"], "longest": "1 s", "exposures": 2, "repeats": 1,
+    },
+    "direct_bispectral": {
+        "leds": ["430 nm", "530 nm"], "samples": ["yellow"], "repetitions": 4,
+    },
     "emission_spectrum": {"charge": "2 min", "times": ["2 s", "10 s"], "longest": "4 s"},
     "decay": {"charge": "5 min", "first": "1 s", "for": "60 s"},
     "decay-eleven": {"charge": "5 min", "for": "60 s"},
@@ -43,7 +49,11 @@ NEEDED = {
     "excitation": ("lvf", "irradiance", "fade"),
 }
 ANOTHER_DAY = "2026-01-02T00:02:00Z"
-RIGS = {"decay-eleven": "sim-eleven"}
+RIGS = {
+    "decay-eleven": "sim-eleven",
+    "direct_bispectral": "sim-fluorescent",
+    "led_brightness": "sim-fluorescent",
+}
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ FULL = 3000.0
 
 
 def lvf_windows(centres_nm: FloatArray, fwhm_nm: float = 25.0, peak: float = 0.45) -> FloatArray:
-    """(P, 160) what a linear variable filter lets through at each place; it leaks a little."""
+    """(P, n) what a linear variable filter lets through at each place; it leaks a little."""
     width = fwhm_nm / 2.3548
     line: FloatArray = np.exp(-0.5 * ((WAVELENGTH_NM - centres_nm[:, None]) / width) ** 2)
     return peak * line + 1e-4

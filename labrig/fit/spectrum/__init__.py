@@ -1,6 +1,11 @@
 """Spectra from pictures through a variable filter, or from any sensor with known channels."""
 
-from labrig.fit.spectrum.fit import BandedSpectrum, SpectrumFit, fit_spectrum
+from labrig.fit.spectrum.fit import (
+    BandedSpectrum,
+    SpectrumFit,
+    fit_spectrum,
+    nonnegative_minimum,
+)
 from labrig.fit.spectrum.line import LineFit, fit_line
 from labrig.fit.spectrum.system import CurveError, SpectralSystem, curve_modes, system_through_lvf
 
@@ -13,5 +18,6 @@ __all__ = [
     "curve_modes",
     "fit_line",
     "fit_spectrum",
+    "nonnegative_minimum",
     "system_through_lvf",
 ]

@@ -32,7 +32,7 @@ def simulation_of(run: Path) -> Simulation:
 
 
 def true_transmission(simulation: Simulation, strip: Strip, on_sample: bool) -> FloatArray:
-    """(p, 160) T on the room's own wavelengths, means over the pixels of every slice."""
+    """(p, wavelengths) T on the room's own wavelengths, means over the pixels of every slice."""
     lvf, sensor = simulation.lvf, simulation.sensor
     assert lvf is not None
     placed = lvf.on_sample if on_sample else lvf.before_camera

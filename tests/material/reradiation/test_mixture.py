@@ -10,7 +10,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from labrig.material import ConditionalDensity, ReradiationMixture
 
-DRAWS = 1_000_000
+DRAWS = 300_000
 BINS = 200
 #: Chance that a right sampler fails a test of its draws.
 LEVEL = 1e-4
@@ -167,9 +167,9 @@ def test_the_mean_weight_of_draws_is_the_integral(given: str, seed: int) -> None
     weight = wanted.reradiation(*pair) / density.pdf(drawn, given_nm)
     nm = stokes_grid(given, given_nm)
     line = (given_nm, nm) if given == "input" else (nm, given_nm)
-    assert_allclose(weight.mean(), trapezoid(wanted.reradiation(*line), nm), rtol=2e-3)
+    assert_allclose(weight.mean(), trapezoid(wanted.reradiation(*line), nm), rtol=3e-3)
     assert_allclose(
-        weight.mean(), wanted.scale * conditional(wanted, given).integral(given_nm), rtol=2e-3
+        weight.mean(), wanted.scale * conditional(wanted, given).integral(given_nm), rtol=3e-3
     )
 
 

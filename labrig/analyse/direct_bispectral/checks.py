@@ -1,0 +1,177 @@
+"""Checks of the lights: two alight, another order, light of the room, a white that fluoresces."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from labrig.fit.bispectral import BispectralColumns, LitSpectrum
+from labrig.optics import SpectrometerReading
+
+#: Ends of the range within which a light's power is counted, in nm.
+Window: TypeAlias = tuple[float, float]
+
+#: Significance in σ from which something counts as seen.
+SIGNIFICANT = 6.0
+#: Noise of a pixel over the median of all from which the detector is all but blind there.
+LOUD = 2.0
+#: Part of a light beyond its band that is told, and that of another light.
+TOLD_BEYOND, TOLD_OTHER = 0.002, 0.005
+#: Height of a second peak above the dip before it, of the first; and pixels that are averaged.
+SECOND_PEAK, SMOOTHED_PIXELS = 0.03, 9
+#: Correlation of what is beyond a light's band with another light, from which it is that light.
+SAME_LIGHT = 0.9
+#: Distance of a light's peak from what the rig file says that is told, in nm.
+TOLD_SHIFT_NM = 15.0
+#: Anti-Stokes light in a column that is told, as part of the light's power per band.
+TOLD_STRAY = 5e-4
+#: Largest reflectance of a sample.
+WHITE_REFLECTANCE = 1.1
+#: Part of the pixels at each end of the range, where little light of a room is.
+END_PART = 0.08
+#: Light in the dark that is told, in counts per second.
+TOLD_AMBIENT_PER_S = 2.0
+
+
+def second_peak(name: str, light: LitSpectrum, window_nm: Window) -> str | None:
+    """Return what to say of a light whose band on the white reference has two peaks."""
+    low_nm, high_nm = window_nm
+    nm = light.wavelength_nm
+    inside = (nm >= low_nm) & (nm <= high_nm)
+    even = np.full(SMOOTHED_PIXELS, 1 / SMOOTHED_PIXELS)
+    smooth = np.convolve(light.value, even, mode="same")[inside]
+    noise = float(light.sigma[inside].max()) / np.sqrt(SMOOTHED_PIXELS)
+    prominence = max(SECOND_PEAK * float(smooth.max()), SIGNIFICANT * noise)
+    places, _ = find_peaks(smooth, prominence=prominence)
+    if len(places) < 2:
+        return None
+    peaks = " and ".join(f"{at_nm:.0f} nm" for at_nm in nm[inside][places])
+    return f"{name}: the white reference shows peaks at {peaks}: two lights are alight; left out"
+
+
+def other_light(
+    name: str, lights: Mapping[str, LitSpectrum], windows_nm: Mapping[str, Window]
+) -> str | None:
+    """Return what to say of a light whose white reading shows another of the lights as well."""
+    light = lights[name]
+    low_nm, high_nm = windows_nm[name]
+    nm = light.wavelength_nm
+    outside = (nm < low_nm) | (nm > high_nm)
+    power = _integral(light, ~outside)
+    for other, spectrum in lights.items():
+        if other == name:
+            continue
+        left_nm, right_nm = windows_nm[other]
+        there = outside & (nm > left_nm) & (nm < right_nm)
+        amount, sigma = _integral(light, there), _integral_sigma(light, there)
+        if not there.any() or amount < max(SIGNIFICANT * sigma, TOLD_OTHER * power):
+            continue
+        if np.corrcoef(light.value[there], spectrum.value[there])[0, 1] > SAME_LIGHT:
+            return (
+                f"{name}: with it shines {other} ({100 * amount / power:.1f} % of its light on the "
+                "white reference): two are alight; left out"
+            )
+    return None
+
+
+def part_beyond(light: LitSpectrum, window_nm: Window) -> tuple[float, float]:
+    """Return the light of longer wavelength than a light's band over its power, and σ."""
+    low_nm, high_nm = window_nm
+    nm = light.wavelength_nm
+    # The ends of the range, where a detector sees little, hold noise only.
+    beyond = (nm > high_nm) & (light.sigma < LOUD * np.median(light.sigma))
+    power = _integral(light, (nm >= low_nm) & (nm <= high_nm))
+    return _integral(light, beyond) / power, _integral_sigma(light, beyond) / power
+
+
+def light_beyond(
+    name: str, light: LitSpectrum, window_nm: Window, *, is_filter: bool
+) -> Iterator[str]:
+    """Yield what to say of light at longer wavelengths than a light's own band."""
+    part, sigma = part_beyond(light, window_nm)
+    if part <= max(SIGNIFICANT * sigma, TOLD_BEYOND):
+        return
+    if is_filter:
+        yield (
+            f"{name}: {100 * part:.2f} % of its light is beyond its pass band: the filter leaks, "
+            "and re-radiation there is hardly told from that; put a short-pass filter with it"
+        )
+    else:
+        yield (
+            f"{name}: {100 * part:.2f} % of its light on the white reference is beyond its band: "
+            "the reference fluoresces, or the light shines there, too; use a reference of PTFE or "
+            "barium sulphate to find out"
+        )
+
+
+def disorder(name: str, light: LitSpectrum, window_nm: Window, named_nm: float) -> Iterator[str]:
+    """Yield what to say of a light with another peak than the rig file says."""
+    low_nm, high_nm = window_nm
+    inside = (light.wavelength_nm >= low_nm) & (light.wavelength_nm <= high_nm)
+    peak_nm = float(light.wavelength_nm[inside][light.value[inside].argmax()])
+    if abs(peak_nm - named_nm) > TOLD_SHIFT_NM:
+        yield (
+            f"{name}: its light has its peak at {peak_nm:.0f} nm, the rig file says "
+            f"{named_nm:.0f} nm: are the LEDs connected in another order? The measured spectrum is "
+            "taken"
+        )
+
+
+def stray_in_column(name: str, light: str, column: BispectralColumns) -> str | None:
+    """Return what to say of a column with light at shorter wavelengths than its own."""
+    ends = column.output_nm < column.window_nm[0, 0] - 5.0
+    # What a light itself has there, as a filter that leaks, comes back at most as of a white.
+    own = WHITE_REFLECTANCE * np.maximum(column.share[ends, 0], 0.0)
+    value, sigma = column.column[ends, 0] - own, column.column_sigma[ends, 0]
+    if not ends.any():
+        return None
+    worst = int(np.argmax(value / np.maximum(sigma, 1e-300)))
+    if value[worst] > max(SIGNIFICANT * sigma[worst], TOLD_STRAY):
+        return (
+            f"{name}: under {light} light came back at {column.output_nm[ends][worst]:g} nm, of "
+            "shorter wavelength than the light: another light was on, or the room's changed; its "
+            "column is left out"
+        )
+    return None
+
+
+def ambient_light(darks: Sequence[SpectrometerReading]) -> Iterator[str]:
+    """Yield what to say of light with all lights off.
+
+    Offsets fall out between a long and a short reading, dark current is that of the ends.
+    """
+    if len(darks) < 2:
+        return
+    longest, shortest = (
+        select(darks, key=lambda dark: dark.integration_s) for select in (max, min)
+    )
+    time_s = longest.integration_s - shortest.integration_s
+    if time_s <= 0:
+        return
+    grown = longest.corrected().counts - shortest.corrected().counts
+    lit = np.delete(grown, list(longest.dark_pixels))
+    number = max(int(END_PART * len(lit)), 2)
+    ends, middle = np.concatenate([lit[:number], lit[-number:]]), lit[number:-number]
+    # Averaged over neighbours, so that a broad light stands out of the pixels' scatter.
+    smooth = np.convolve(middle, np.full(number, 1 / number), mode="valid")
+    light = float(smooth.max() - ends.mean())
+    sigma = float(ends.std(ddof=1)) * np.sqrt(1 / number + 1 / len(ends))
+    if light > max(SIGNIFICANT * sigma, TOLD_AMBIENT_PER_S * time_s):
+        yield (
+            f"with all lights off the spectrometer sees light ({light / time_s:.0f} counts a "
+            "second); what stays the same is subtracted: darken the room, cover displays"
+        )
+
+
+def _integral(light: LitSpectrum, where: NDArray[np.bool_]) -> float:
+    return float(np.gradient(light.wavelength_nm)[where] @ light.value[where])
+
+
+def _integral_sigma(light: LitSpectrum, where: NDArray[np.bool_]) -> float:
+    step_nm = np.gradient(light.wavelength_nm)[where]
+    sigma = float(np.sqrt(step_nm**2 @ light.sigma[where] ** 2))
+    if light.common_sigma is None:
+        return sigma
+    return float(np.hypot(sigma, step_nm @ light.common_sigma[where]))

@@ -1,0 +1,208 @@
+"""Re-radiation matrices of the patches of a fluorescence run."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from labrig.analyse.inputs import Part
+from labrig.analyse.led_fluorescence.card_checks import unused_leds
+from labrig.analyse.led_fluorescence.lit_patches import LitPatch, lit_patches, mean_of
+from labrig.analyse.led_fluorescence.lit_system import lit_system
+from labrig.analyse.led_fluorescence.warnings import (
+    SEEN_SIGMA,
+    bleaching_warnings,
+    fact_warnings,
+    left_warnings,
+)
+from labrig.bench_optics import camera_curves, card_reflectance, led_exposures
+from labrig.errors import DataError, UsageError
+from labrig.fit.fluorescence import (
+    EstimatedFluorophore,
+    FluorescenceFit,
+    FluorescenceSystem,
+    JointEstimator,
+    fit_per_led,
+    predicted_colour,
+)
+from labrig.material import appearance
+from labrig.optics import Spectrum, delta_e, read_light
+from labrig.protocols.led_fluorescence import CARD, SAMPLE, LedFrames
+from labrig.results import (
+    BoolArray,
+    ColourUnderLight,
+    FloatArray,
+    FluorescentPatch,
+    LedFluorescenceResult,
+    MatrixOnBands,
+    Measured,
+    MeasuredDye,
+)
+
+#: Lights under which colours are told.
+LIGHTS = ("D65", "A", "FL2")
+#: Peak in nm below which light is ultraviolet.
+ULTRAVIOLET_NM = 400.0
+#: ΔE2000 from which a colour depends on what lights of unknown brightness excite, if they excite a
+#: dye as much as a strong one would be.
+DEPENDS, EXCITED = 0.5, 0.5
+
+
+def analyse(part: Part) -> LedFluorescenceResult:
+    """Estimate the re-radiation matrix of each patch.
+
+    Raises
+    ------
+    UsageError
+        The rig file lacks an LED, or the curves of camera or card.
+    DataError
+        Frames are missing or damaged, LEDs are named in another order than they light, or fewer
+        than two of them can be used.
+    """
+    leds = part.protocol.leds
+    lights = led_exposures(part.rig, "rig.yaml", part.inputs.leds)
+    if unknown := [led for led in leds if led not in lights]:
+        raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
+    spectra = {led: replace(lights[led].light, name=led) for led in leds}
+    peak_nm = {
+        led: float(light.wavelength_nm[light.value.argmax()]) for led, light in spectra.items()
+    }
+    camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
+    cards = lit_patches(part, LedFrames.CARD, CARD)
+    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE)
+    left_out = list(unused_leds(leds, spectra, camera, white, mean_of(cards)))
+    warnings = [unused.reason for unused in left_out]
+    warnings += [*left_warnings("card", cards, leds), *left_warnings("sample", samples, leds)]
+    used = [led for led in leds if led not in {unused.led for unused in left_out}]
+    used.sort(key=peak_nm.__getitem__)
+    if len(used) < 2:
+        raise DataError(f"expected two LEDs that can be used, got {len(used)} ({warnings[0]})")
+    rows = [leds.index(led) for led in used]
+    cards = {name: _without_rest(card.under(rows)) for name, card in cards.items()}
+    card = mean_of(cards)
+    system = lit_system([lights[led] for led in used], camera, white, card)
+    estimator, patches = JointEstimator(system), {}
+    for number, name in enumerate(samples):
+        sample = _without_rest(samples[name].under(rows))
+        if sample.is_clipped.any():
+            which = ", ".join(np.array(used)[sample.is_clipped])
+            raise DataError(f"{name}: clips at the shortest exposure under {which}; dim the LEDs")
+        even = sample.times(*_evenness(cards[name], card, system))
+        fit = estimator.fit(name, even.value, even.variance, seed=number)
+        per_led = fit_per_led(name, even.value, even.variance, system)
+        patches[name] = _patch(fit, per_led, even, system)
+        warnings += fact_warnings(name, fit, camera.channels)
+        warnings += bleaching_warnings(name, even.bleaching)
+    return LedFluorescenceResult(
+        leds=tuple(used),
+        led_peak_nm=np.array([peak_nm[led] for led in used]),
+        channels=camera.channels,
+        brightness=system.brightness,
+        is_brightness_known=~system.is_loose,
+        uv_scale=_uv_scale([peak_nm[led] for led in used], system),
+        patches=patches,
+        run=part.run.folder.resolve().name,
+        warnings=tuple(warnings),
+    )
+
+
+def _without_rest(patch: LitPatch) -> LitPatch:
+    """Return a patch without the light that is left when its LED is off, if there is any."""
+    is_left = patch.off > SEEN_SIGMA * patch.off_sigma
+    return replace(
+        patch,
+        value=np.where(is_left, patch.value - patch.off, patch.value),
+        variance=np.where(is_left, patch.variance + patch.off_sigma**2, patch.variance),
+    )
+
+
+def _evenness(
+    here: LitPatch, mean: LitPatch, system: FluorescenceSystem
+) -> tuple[FloatArray, FloatArray]:
+    """Return the card's mean light over that at a patch, and its relative variance, (m,) each.
+
+    LEDs that the camera does not see are taken to shine like the others do in the middle.
+    """
+    weight = mean.value / mean.variance
+    at_patch = (weight * here.value).sum(axis=1)
+    factor = (weight * mean.value).sum(axis=1) / at_patch
+    variance = (weight**2 * here.variance).sum(axis=1) / at_patch**2
+    seen = ~system.is_loose
+    if seen.any():
+        scatter = np.var(factor[seen]) if seen.sum() > 1 else 0.0
+        factor = np.where(seen, factor, np.median(factor[seen]))
+        variance = np.where(seen, variance, scatter)
+    return factor, variance
+
+
+def _patch(
+    fit: FluorescenceFit, per_led: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem
+) -> FluorescentPatch:
+    excitable = _excitable(fit, lit, system)
+    return FluorescentPatch(
+        matrix=MatrixOnBands.of(fit.matrix),
+        per_led=MatrixOnBands.of(per_led.matrix),
+        is_extrapolated=fit.is_extrapolated,
+        dyes=tuple(_dye(fluorophore) for fluorophore in fit.fluorophores),
+        probability=tuple(number.probability for number in fit.numbers),
+        value=lit.value,
+        sigma=np.sqrt(lit.variance),
+        predicted=fit.predicted,
+        pull=fit.pull,
+        reduced_chi2=fit.reduced_chi2,
+        colours=tuple(_colour(fit, read_light(light), excitable) for light in LIGHTS),
+        bleaching=lit.bleaching,
+    )
+
+
+def _dye(fluorophore: EstimatedFluorophore) -> MeasuredDye:
+    emission, excitation = fluorophore.emission, fluorophore.excitation
+    assert emission.sigma is not None
+    assert excitation.sigma is not None
+    return MeasuredDye(
+        emission.value,
+        emission.sigma,
+        excitation.value,
+        excitation.sigma,
+        Measured(fluorophore.quantum_yield, fluorophore.quantum_yield_sigma),
+    )
+
+
+def _colour(fit: FluorescenceFit, light: Spectrum, excitable: BoolArray) -> ColourUnderLight:
+    colour = predicted_colour(fit, light)
+    depends = False
+    if excitable.any():
+        emission = fit.fluorophores[0].emission.value[:, np.newaxis]
+        reradiation = np.where(excitable, EXCITED * emission, fit.matrix.reradiation)
+        brighter = appearance(replace(fit.matrix, reradiation=reradiation), light)
+        depends = float(delta_e(brighter.lab, colour.lab)) > DEPENDS
+    lightness, a, b = colour.lab.tolist()
+    return ColourUnderLight(
+        light.name, (lightness, a, b), tuple(colour.lab_sigma.tolist()), depends
+    )
+
+
+def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) -> BoolArray:
+    """Return in which input bands a sample is excited, but who knows how much, shape (i,).
+
+    These are bands of lights of unknown brightness, under which it shows more than their own light.
+    """
+    loose = np.flatnonzero(system.is_loose)
+    if not fit.fluorophores:
+        return np.zeros(len(system.input_nm), dtype=np.bool_)
+    known = system.response.absorbed[~system.is_loose].sum(axis=0)
+    dark = np.zeros_like(fit.matrix.reradiation)
+    reflected = system.values(fit.matrix.reflectance, dark) * system.brightness[:, np.newaxis]
+    more = fit.predicted - reflected > SEEN_SIGMA * np.sqrt(lit.variance)
+    unknown = system.response.absorbed[[row for row in loose if more[row].any()]].sum(axis=0)
+    return np.asarray(unknown > known)
+
+
+def _uv_scale(
+    peaks_nm: Sequence[float], system: FluorescenceSystem
+) -> Literal["measured", "unknown", "none"]:
+    is_uv = np.array(peaks_nm) < ULTRAVIOLET_NM
+    if not is_uv.any():
+        return "none"
+    return "unknown" if system.is_loose[is_uv].any() else "measured"

@@ -1,0 +1,48 @@
+"""Re-radiation matrices from photographs under narrow-band lights.
+
+One light after the other, and an RGB camera, after P. McEvoy, *Capture and simulation of
+fluorescence in fabrics* (Chalmers, 2020), called the thesis here.
+"""
+
+from labrig.fit.fluorescence.colour import PredictedColour, predicted_colour
+from labrig.fit.fluorescence.estimate import fit_fluorescence
+from labrig.fit.fluorescence.joint import JointEstimator
+from labrig.fit.fluorescence.per_led import fit_per_led
+from labrig.fit.fluorescence.result import (
+    EstimatedFluorophore,
+    EstimateFact,
+    ExtrapolatedExcitation,
+    FluorescenceFit,
+    FluorophoreNumber,
+    Method,
+    MoreThanWhite,
+    Surfaces,
+    UnexplainedValues,
+    UnknownBrightness,
+)
+from labrig.fit.fluorescence.study import LedStudy, gaussian_led, study_leds
+from labrig.fit.fluorescence.system import Exposure, FluorescenceSystem, fluorescence_system
+
+__all__ = [
+    "EstimateFact",
+    "EstimatedFluorophore",
+    "Exposure",
+    "ExtrapolatedExcitation",
+    "FluorescenceFit",
+    "FluorescenceSystem",
+    "FluorophoreNumber",
+    "JointEstimator",
+    "LedStudy",
+    "Method",
+    "MoreThanWhite",
+    "PredictedColour",
+    "Surfaces",
+    "UnexplainedValues",
+    "UnknownBrightness",
+    "fit_fluorescence",
+    "fit_per_led",
+    "fluorescence_system",
+    "gaussian_led",
+    "predicted_colour",
+    "study_leds",
+]

@@ -1,0 +1,244 @@
+"""All lights at once: one to three dyes, each with one emission that all lights excite alike.
+
+Hypotheses are weighed by their evidence, the best of them again with surfaces bounded to what is
+not negative, and the estimate is the mean of surfaces drawn from all that are left. In 159
+estimates of 53 measured surfaces that only reflect, no fluorescence was found
+(`tests/acceptance/led_matrices.py --dark`).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from labrig.fit.fluorescence.hypotheses import (
+    REFINED,
+    Hypotheses,
+    Hypothesis,
+    Measured,
+    Scored,
+    log_prior_of,
+    log_sum,
+)
+from labrig.fit.fluorescence.posterior import Draws, Posterior
+from labrig.fit.fluorescence.result import (
+    FluorescenceFit,
+    FluorophoreNumber,
+    Surfaces,
+)
+from labrig.fit.fluorescence.shapes import emission_shapes
+from labrig.fit.fluorescence.summary import facts_of, fluorophores_of
+from labrig.fit.fluorescence.system import (
+    UNKNOWN,
+    FluorescenceSystem,
+    checked_values,
+    require_scale,
+)
+from labrig.fit.least_squares import FloatArray
+from labrig.material import ReradiationMatrix
+from labrig.optics import Spectrum
+
+DRAWS = 200
+#: Log-probability below the best at which a hypothesis is dropped.
+HOPELESS = 9.0
+#: What bands of 10 nm leave out: relative error of a value, and relative to the largest.
+RELATIVE_ERROR, ABSOLUTE_ERROR = 1e-3, 2e-4
+#: Reduced χ² that correct errors hardly exceed, and how often errors are made larger where it does.
+LARGE_CHI2, ROUNDS = 2.0, 2
+#: Relative error of a value before the errors of lights and curves are known for a surface.
+CRUDE_ERROR = 0.03
+
+
+class JointEstimator:
+    """Estimates of many surfaces under the same lights, which share most of the work.
+
+    Parameters
+    ----------
+    system
+        Lights and camera.
+    library
+        Measured emissions of dyes, on any scale: the surface may have one of them.
+
+    Raises
+    ------
+    UsageError
+        No light has a known brightness, or an emission is not positive or lies outside of the
+        output bands.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import labrig
+    >>> from labrig.fit.fluorescence import Exposure, JointEstimator, fluorescence_system
+    >>> from labrig.optics import read_light
+    >>> lights = [Exposure(read_light(f"{nm}nm")) for nm in (405, 450, 475, 500, 520, 560, 620)]
+    >>> system = fluorescence_system(lights, labrig.read_camera("canon_eos_5d_mark_ii"))
+    >>> emission = np.exp(-(((system.output_nm - 520) / 25) ** 2) / 2)
+    >>> excitation = np.exp(-(((system.input_nm - 460) / 40) ** 2) / 2)
+    >>> dye = 0.005 * np.outer(emission, excitation) * system.is_stokes
+    >>> value = system.values(np.full(41, 0.3), dye)
+    >>> fit = JointEstimator(system).fit("dye", value, (0.002 * value) ** 2 + 1e-12)
+    >>> max(fit.numbers, key=lambda one: one.probability).fluorophores
+    1
+    >>> peak = fit.fluorophores[0].emission
+    >>> float(peak.wavelength_nm[peak.value.argmax()])
+    520.0
+    """
+
+    def __init__(self, system: FluorescenceSystem, library: Sequence[Spectrum] = ()) -> None:
+        require_scale(system)
+        self._common = Hypotheses(system, emission_shapes(system.output_nm, library))
+
+    def fit(
+        self, name: str, value: ArrayLike, variance: ArrayLike, seed: int = 0
+    ) -> FluorescenceFit:
+        """Estimate the matrix of a surface.
+
+        Parameters
+        ----------
+        name
+            Name of the surface.
+        value, variance
+            Values under each light and their variances, shape (m, k).
+        seed
+            Seed of the draws: the same values give the same matrix.
+
+        Returns
+        -------
+        FluorescenceFit
+            The matrix with its uncertainty.
+
+        Raises
+        ------
+        UsageError
+            Shapes disagree, a value is not finite, or a variance is not above 0.
+        """
+        common, system = self._common, self._common.system
+        values, variances = checked_values(system, value, variance)
+        scale = system.brightness[:, np.newaxis]
+        target = (values / scale).ravel()
+        measured = self._measured(target, (variances / scale**2).ravel())
+        weighted = self._refined(measured)
+        reduced = weighted[0].posterior.reduced_chi2()
+        misfit = reduced
+        for _ in range(ROUNDS):
+            if not misfit > LARGE_CHI2:
+                break
+            # No surface explains the values: their errors must be larger than is known.
+            measured = replace(measured, misfit=measured.misfit * misfit)
+            weighted = self._refined(measured)
+            misfit = weighted[0].posterior.reduced_chi2()
+        drawn = self._drawn(weighted, np.random.default_rng(seed))
+        numbers = self._numbers(weighted)
+        likely = max(numbers, key=lambda number: number.probability).fluorophores
+
+        reradiation = (
+            np.concatenate([draws.reradiation.sum(axis=1) for _, draws in drawn]) * common.edge
+        )
+        surfaces = Surfaces(
+            np.concatenate([draws.reflectance for _, draws in drawn]),
+            reradiation.astype(np.float32),
+        )
+        matrix = ReradiationMatrix(
+            name,
+            system.input_nm,
+            system.output_nm,
+            surfaces.reflectance.mean(axis=0),
+            reradiation.mean(axis=0),
+            surfaces.reflectance.std(axis=0, ddof=1),
+            reradiation.std(axis=0, ddof=1),
+        )
+        predicted = system.values(matrix.reflectance, matrix.reradiation)
+        residual = target - predicted.ravel()
+        pull = (residual / weighted[0].posterior.sigma).reshape(system.shape)
+        is_extrapolated = ~system.is_lit
+        dyes = [draws for hypothesis, draws in drawn if len(hypothesis.fluorophores) == likely]
+        return FluorescenceFit(
+            method="joint",
+            matrix=matrix,
+            is_extrapolated=is_extrapolated,
+            fluorophores=fluorophores_of(system, dyes) if likely else (),
+            numbers=numbers,
+            predicted=predicted * scale,
+            pull=pull,
+            reduced_chi2=reduced,
+            facts=facts_of(system, matrix, surfaces, pull, reduced),
+            surfaces=surfaces,
+        )
+
+    def _measured(self, target: FloatArray, variance: FloatArray) -> Measured:
+        """Return values per brightness (n,) with all errors that do not depend on the dyes."""
+        system = self._common.system
+        floor = (RELATIVE_ERROR * target) ** 2 + (ABSOLUTE_ERROR * np.abs(target).max()) ** 2
+        noise = np.diag(variance + floor)
+        channels = system.shape[1]
+        for light in np.flatnonzero(system.is_loose).tolist():
+            # Any multiple of its three values is as probable.
+            direction = np.zeros_like(target)
+            direction[light * channels : (light + 1) * channels] = UNKNOWN
+            noise += np.outer(direction * target, direction * target)
+        measured = Measured(target, noise, np.zeros_like(noise))
+        if not len(system.modes.reflected):
+            return measured
+        crude = replace(measured, noise=noise + np.diag((CRUDE_ERROR * target) ** 2))
+        best = max(self._common.scored(crude, 0), key=lambda one: one.log_posterior)
+        surface = Posterior(self._common, best.hypothesis, crude).most_likely()
+        return replace(measured, reflected_noise=system.covariance(*surface))
+
+    def _refined(self, measured: Measured) -> "list[_Weighted]":
+        """Return the best hypotheses, the most probable one first."""
+        by_number: dict[int, list[Scored]] = {}
+        for one in self._common.scored(measured):
+            by_number.setdefault(len(one.hypothesis.fluorophores), []).append(one)
+        found = []
+        for scored in by_number.values():
+            best = sorted(scored, key=lambda one: -one.log_posterior)[:REFINED]
+            for one in best:
+                posterior = Posterior(self._common, one.hypothesis, measured)
+                log_prior = self._common.log_prior(one.hypothesis)
+                found.append(
+                    _Weighted(one.hypothesis, posterior, posterior.log_evidence(), log_prior)
+                )
+        return sorted(found, key=lambda one: -one.log_posterior)
+
+    def _numbers(self, weighted: "Sequence[_Weighted]") -> tuple[FluorophoreNumber, ...]:
+        total = log_sum([one.log_posterior for one in weighted])
+        numbers = []
+        for number in sorted({len(one.hypothesis.fluorophores) for one in weighted}):
+            those = [one for one in weighted if len(one.hypothesis.fluorophores) == number]
+            posterior = log_sum([one.log_posterior for one in those])
+            numbers.append(
+                FluorophoreNumber(
+                    number, posterior - log_prior_of(number), math.exp(posterior - total)
+                )
+            )
+        return tuple(numbers)
+
+    def _drawn(
+        self,
+        weighted: "Sequence[_Weighted]",
+        rng: np.random.Generator,
+    ) -> list[tuple[Hypothesis, Draws]]:
+        best = weighted[0].log_posterior
+        kept = [one for one in weighted if one.log_posterior > best - HOPELESS]
+        weight = np.exp([one.log_posterior - best for one in kept])
+        counts = rng.multinomial(DRAWS, weight / weight.sum())
+        return [
+            (one.hypothesis, one.posterior.draw(int(count), rng))
+            for one, count in zip(kept, counts, strict=True)
+            if count
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighted:
+    hypothesis: Hypothesis
+    posterior: Posterior
+    log_evidence: float
+    log_prior: float
+
+    @property
+    def log_posterior(self) -> float:
+        return self.log_evidence + self.log_prior

@@ -1,0 +1,251 @@
+"""A surface under one hypothesis: most likely, and drawn at random.
+
+Reflectance and excitation are not negative. Draws are those of A. Bardsley and P. C. Hansen (*MCMC
+algorithms for computational UQ of nonnegativity constrained linear inverse problems*, SIAM J. Sci.
+Comput. 42, 2020), as in `labrig.fit.spectrum`: values and prior are drawn anew, and every draw is
+the non-negative surface nearest to them. The deviations of an emission from its shape count as
+noise of the values there, and are drawn afterwards.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag, cho_solve, solve_triangular
+
+from labrig.fit.fluorescence.hypotheses import (
+    Fluorophore,
+    Hypotheses,
+    Hypothesis,
+    Measured,
+)
+from labrig.fit.fluorescence.prior import REFLECTANCE, reflectance_covariance
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum import nonnegative_minimum
+
+#: Variance of the excitation, relative to its largest, below which it is 0.
+LEAST_VARIANCE = 1e-3
+#: Added to prior covariances, relative to their largest variance.
+JITTER = 1e-6
+#: The same of a covariance of 0.
+TINY = 1e-20
+#: Iterations in which the deviations of an emission follow its excitation.
+ROUNDS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Surfaces drawn under one hypothesis.
+
+    Attributes
+    ----------
+    reflectance
+        ρ, shape (d, o).
+    reradiation
+        Φ of each fluorophore at all wavelengths, in 1/nm, shape (d, j, o, i); what lies on the
+        anti-Stokes side does not come back.
+    """
+
+    reflectance: FloatArray
+    reradiation: FloatArray
+
+
+class Posterior:
+    """The density of surfaces under a hypothesis, given values.
+
+    Parameters
+    ----------
+    common
+        What all hypotheses share.
+    hypothesis
+        The hypothesis.
+    measured
+        Values with errors.
+    """
+
+    def __init__(self, common: Hypotheses, hypothesis: Hypothesis, measured: Measured) -> None:
+        self._common, self._hypothesis = common, hypothesis
+        self._value, self._noise = measured.value, measured.total
+        self._parts = [_Part.of_reflectance(common, hypothesis)]
+        self._parts += [_Part.of_dye(common, dye) for dye in hypothesis.fluorophores]
+        self._design = np.concatenate([part.design for part in self._parts], axis=1)
+        self._mean = np.concatenate([part.mean for part in self._parts])
+        self._precision_root = block_diag(*(part.precision_root for part in self._parts))
+        self._precision = self._precision_root @ self._precision_root.T
+        self._deviation_designs = [
+            common.designs(common.modes * common.shapes.value[dye.shape])
+            for dye in hypothesis.fluorophores
+        ]
+        self._deviations = [
+            dye.amplitude**2 * common.excitation_covariance(dye.shape)
+            for dye in hypothesis.fluorophores
+        ]
+        background = hypothesis.background_sigma**2 * common.background_variance
+        self._background = background
+        for dye in hypothesis.fluorophores:
+            variance = common.error_variance[dye.shape]
+            self._noise = self._noise + measured.misfit * dye.amplitude**2 * variance
+        self._solve()
+        for _ in range(ROUNDS if hypothesis.fluorophores else 0):
+            errors = common.system.covariance(*self.most_likely())
+            self._noise = measured.misfit * (measured.noise + errors)
+            self._deviations = [
+                np.outer(excitation, excitation) * common.deviation_correlation
+                for excitation in self._excitations(self._most_likely)
+            ]
+            self._solve()
+
+    def _solve(self) -> None:
+        """Find the most likely surface, with deviations of some covariance as noise."""
+        deviation = np.zeros_like(self._noise)
+        for design, covariance in zip(self._deviation_designs, self._deviations, strict=True):
+            deviation += np.einsum("rni,rmi->nm", design @ covariance, design, optimize=True)
+        self._deviation = deviation
+        self._lower = np.linalg.cholesky(self._noise + self._background + deviation)
+        self._whitened = solve_triangular(self._lower, self._design, lower=True)
+        self._curvature = self._whitened.T @ self._whitened + self._precision
+        target = solve_triangular(self._lower, self._value, lower=True)
+        self._linear = self._whitened.T @ target + self._precision @ self._mean
+        self._most_likely = nonnegative_minimum(
+            self._curvature, self._linear, np.ones(len(self._mean), dtype=np.bool_)
+        )
+
+    def _excitations(self, unknowns: FloatArray) -> list[FloatArray]:
+        """Return the excitation (…, i) of each dye."""
+        start, found = len(self._common.system.output_nm), []
+        for part in self._parts[1:]:
+            excitation = np.zeros((*unknowns.shape[:-1], len(self._common.system.input_nm)))
+            excitation[..., part.used] = unknowns[..., start : start + len(part.mean)]
+            start += len(part.mean)
+            found.append(excitation)
+        return found
+
+    def _variance(self) -> FloatArray:
+        """Return the covariance (n, n) of the values without noise."""
+        total = self._common.reflectance_variance[self._hypothesis.reflectance_sigma].copy()
+        total += self._deviation + self._background
+        for dye in self._hypothesis.fluorophores:
+            total += dye.amplitude**2 * self._common.shape_variance[dye.shape]
+        return total
+
+    def log_evidence(self) -> float:
+        """Return the log-evidence by the most likely non-negative surface.
+
+        It is that of the unbounded normal density where no bound is active.
+        """
+        x = self._most_likely
+        residual = solve_triangular(self._lower, self._value, lower=True) - self._whitened @ x
+        away = self._precision_root.T @ (x - self._mean)
+        lower = np.linalg.cholesky(self._noise + self._variance())
+        log_root = np.log(np.diag(lower)).sum()
+        n = len(self._value)
+        return float(
+            -(residual @ residual + away @ away) / 2 - log_root - n / 2 * np.log(2 * np.pi)
+        )
+
+    def most_likely(self) -> tuple[FloatArray, FloatArray]:
+        """Return ρ (o,) and Φ (o, i) at the maximum, emissions as their shapes."""
+        system = self._common.system
+        reradiation = np.zeros((len(system.output_nm), len(system.input_nm)))
+        for dye, excitation in zip(
+            self._hypothesis.fluorophores, self._excitations(self._most_likely), strict=True
+        ):
+            reradiation += np.outer(self._common.shapes.value[dye.shape], excitation)
+        return self._most_likely[: len(system.output_nm)], reradiation * self._common.edge
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Return σ of the values about the most likely surface, shape (n,)."""
+        return np.asarray(np.sqrt(np.square(self._lower).sum(axis=1)))
+
+    def reduced_chi2(self) -> float:
+        """Return χ² of the values per degree of freedom that the surface leaves."""
+        target = solve_triangular(self._lower, self._value, lower=True)
+        residual = target - self._whitened @ self._most_likely
+        free = self._most_likely > 0
+        curvature, whitened = self._curvature[np.ix_(free, free)], self._whitened[:, free]
+        taken = np.trace(np.linalg.solve(curvature, whitened.T @ whitened))
+        dof = float(len(target) - taken)
+        return float(residual @ residual) / dof if dof > 0 else math.nan
+
+    def draw(self, count: int, rng: np.random.Generator) -> Draws:
+        """Return some surfaces drawn at random."""
+        n, p = self._design.shape
+        linear = (
+            self._linear[:, np.newaxis]
+            + self._whitened.T @ rng.standard_normal((n, count))
+            + self._precision_root @ rng.standard_normal((p, count))
+        )
+        solution, free = np.empty((count, p)), self._most_likely > 0
+        for number in range(count):
+            solution[number] = nonnegative_minimum(self._curvature, linear[:, number], free)
+        residual = self._value - solution @ self._design.T
+        outputs, inputs = len(self._common.system.output_nm), len(self._common.system.input_nm)
+        dyes = self._hypothesis.fluorophores
+        reradiation = np.empty((count, len(dyes), outputs, inputs))
+        deviations = self._draw_deviations(residual, rng)
+        for number, excitation in enumerate(self._excitations(solution)):
+            relative = np.einsum("ro,dri->doi", self._common.modes, deviations[number])
+            relative += excitation[:, np.newaxis]
+            emission = self._common.shapes.value[dyes[number].shape]
+            reradiation[:, number] = emission[:, np.newaxis] * np.maximum(relative, 0.0)
+        return Draws(solution[:, :outputs], reradiation)
+
+    def _draw_deviations(self, residual: FloatArray, rng: np.random.Generator) -> list[FloatArray]:
+        """Return excitations (d, modes, i) of each dye's deviations, given what is left to them.
+
+        Drawn before the values, then moved by what they say (Matheron's rule).
+        """
+        count, modes = len(residual), len(self._common.modes)
+        noise = (
+            rng.standard_normal(residual.shape)
+            @ np.linalg.cholesky(self._noise + self._background).T
+        )
+        before, seen = [], residual - noise
+        for design, covariance in zip(self._deviation_designs, self._deviations, strict=True):
+            drawn = rng.standard_normal((count, modes, len(covariance))) @ _root(covariance).T
+            before.append(drawn)
+            seen = seen - np.einsum("rni,dri->dn", design, drawn, optimize=True)
+        pulled = cho_solve((self._lower, True), seen.T)
+        return [
+            drawn + np.einsum("rni,nd->dri", design, pulled, optimize=True) @ covariance
+            for design, drawn, covariance in zip(
+                self._deviation_designs, before, self._deviations, strict=True
+            )
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Unknowns of one kind: their design (n, p), mean (p,), root of their precision, and place."""
+
+    design: FloatArray
+    mean: FloatArray
+    precision_root: FloatArray
+    used: np.ndarray
+
+    @classmethod
+    def of_reflectance(cls, common: Hypotheses, hypothesis: Hypothesis) -> "_Part":
+        nm = common.system.output_nm
+        covariance = reflectance_covariance(nm, hypothesis.reflectance_sigma)
+        mean = np.full(len(nm), REFLECTANCE)
+        return cls(common.reflectance_design, mean, _precision_root(covariance), np.arange(len(nm)))
+
+    @classmethod
+    def of_dye(cls, common: Hypotheses, dye: Fluorophore) -> "_Part":
+        covariance = dye.amplitude**2 * common.excitation_covariance(dye.shape)
+        variance = np.diag(covariance)
+        used = np.flatnonzero(variance > LEAST_VARIANCE * variance.max())
+        root = _precision_root(covariance[np.ix_(used, used)])
+        design = common.excitation_designs[dye.shape][:, used]
+        return cls(design, np.zeros(len(used)), root, used)
+
+
+def _precision_root(covariance: FloatArray) -> FloatArray:
+    """Return W with W Wᵀ the inverse of a covariance."""
+    return np.asarray(np.linalg.inv(_root(covariance)).T)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    jitter = (JITTER * float(np.diag(covariance).max()) + TINY) * np.eye(len(covariance))
+    return np.asarray(np.linalg.cholesky(covariance + jitter))

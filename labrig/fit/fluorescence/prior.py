@@ -1,0 +1,89 @@
+"""What is expected of a surface before it is photographed: normal densities of smooth curves.
+
+Reflectances are about a half, and smooth. A dye is excited below its emission's peak, by a curve
+that is smooth, too, and falls off towards the ultraviolet. Amplitudes are chosen by the data.
+The numbers describe measured re-radiation matrices; they are no fit to any one of them.
+"""
+
+import numpy as np
+
+from labrig.fit.least_squares import FloatArray
+
+#: Mean reflectance, standard deviation of its level and correlation length of its course in nm.
+REFLECTANCE, LEVEL_SIGMA, REFLECTANCE_NM = 0.5, 0.5, 90.0
+#: Standard deviations of a reflectance's course that are tried, the usual one first.
+REFLECTANCE_SIGMAS = (0.2, 0.1, 0.4)
+#: Standard deviations of the excitation, a fraction of the incident light, that are tried.
+EXCITATION_SIGMAS = (0.03, 0.1, 0.3, 0.7)
+#: The excitation ends this far below the emission's peak, within a few times a width, in nm.
+STOKES_NM, STOKES_WIDTH_NM = 15.0, 8.0
+#: How far below the peak it begins to fall, and over which distance by e, in nm.
+PLATEAU_NM, DECAY_NM = 60.0, 90.0
+#: Where most materials begin to absorb ultraviolet themselves, over which width, and what is left,
+#: in nm and as a fraction.
+ULTRAVIOLET_NM, ULTRAVIOLET_WIDTH_NM, ULTRAVIOLET_LEFT = 342.0, 14.0, 0.15
+#: How far below the peak deviations from the usual course end, in nm.
+BEYOND_NM = -5.0
+#: Part of the excitation's variance that is its usual course, and correlation length of the rest.
+USUAL_PART, EXCITATION_NM = 0.5, 35.0
+#: Standard deviations that are tried of light of all wavelengths that no dye explains (stray light,
+#: a pedestal of the lights' spectra), as re-radiation in 1/nm, independent for each light.
+BACKGROUND_SIGMAS = (5e-6, 5e-5)
+#: Relative deviation of an emission from its shape, and its correlation length in nm.
+EMISSION_SIGMA, EMISSION_NM = 0.3, 30.0
+#: Distance in nm above the exciting wavelength over which an emission sets in.
+EDGE_NM = 12.0
+#: Part of the deviation's variance that is the same whatever light excites (Kasha's rule).
+SAME_EMISSION = 0.9
+
+
+def reflectance_covariance(output_nm: FloatArray, sigma: float) -> FloatArray:
+    """Return the covariance of the reflectance between wavelengths, shape (o, o)."""
+    return LEVEL_SIGMA**2 + sigma**2 * _smooth(output_nm, REFLECTANCE_NM)
+
+
+def excitation_covariance(input_nm: FloatArray, peak_nm: float) -> FloatArray:
+    """Return the second moment of the excitation of a dye, for an amplitude of 1, shape (i, i).
+
+    It is that of u(λ) z + v(λ) g(λ), with u the usual course, z and g normal, and v the envelope
+    of deviations.
+    """
+    below_nm = peak_nm - input_nm
+    fall = np.exp(-np.maximum(below_nm - PLATEAU_NM, 0.0) / DECAY_NM)
+    usual = fall * _step((below_nm - STOKES_NM) / STOKES_WIDTH_NM)
+    passed = _step((input_nm - ULTRAVIOLET_NM) / ULTRAVIOLET_WIDTH_NM)
+    usual *= ULTRAVIOLET_LEFT + (1 - ULTRAVIOLET_LEFT) * passed
+    envelope = np.sqrt(fall * _step((below_nm - BEYOND_NM) / STOKES_WIDTH_NM))
+    deviation = np.outer(envelope, envelope) * _smooth(input_nm, EXCITATION_NM)
+    return USUAL_PART * np.outer(usual, usual) + (1 - USUAL_PART) * deviation
+
+
+def stokes_edge(input_nm: FloatArray, output_nm: FloatArray) -> FloatArray:
+    """Return the part of an emission that light of each wavelength excites, shape (o, i).
+
+    There is none at shorter wavelengths than that light's, and little just above it.
+    """
+    shift_nm = np.maximum(output_nm[:, np.newaxis] - input_nm, 0.0)
+    return np.asarray(1 - np.exp(-shift_nm / EDGE_NM))
+
+
+def emission_modes(output_nm: FloatArray, count: int) -> FloatArray:
+    """Return independent relative deviations of an emission, one σ of each, shape (count, o)."""
+    covariance = EMISSION_SIGMA**2 * _smooth(output_nm, EMISSION_NM)
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors[:, -count:] * np.sqrt(values[-count:])).T)
+
+
+def deviation_correlation(input_nm: FloatArray) -> FloatArray:
+    """Return the correlation (i, i) of an emission's deviations between exciting wavelengths."""
+    return SAME_EMISSION + (1 - SAME_EMISSION) * _smooth(input_nm, EXCITATION_NM)
+
+
+def _smooth(nm: FloatArray, distance_nm: float) -> FloatArray:
+    """Return the Matérn correlation of order 3/2 between wavelengths."""
+    distance = np.sqrt(3) * np.abs(nm[:, np.newaxis] - nm) / distance_nm
+    return np.asarray((1 + distance) * np.exp(-distance))
+
+
+def _step(x: FloatArray) -> FloatArray:
+    return np.asarray(1 / (1 + np.exp(-x)))

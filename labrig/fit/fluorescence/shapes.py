@@ -1,0 +1,109 @@
+"""Shapes of emission spectra among which a fit chooses, by their prior probability."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.errors import UsageError
+from labrig.fit.least_squares import FloatArray
+from labrig.optics import Spectrum, edges_from_centres
+
+#: Peaks in nm, full widths at half maximum in nm, and skews of the shapes that are tried.
+PEAKS_NM = np.arange(400.0, 721.0, 10.0)
+WIDTHS_NM = (35.0, 50.0, 70.0, 95.0)
+SKEWS = (0.0, 0.3)
+#: Dyes' widths and skews, log-normal and normal: median and standard deviation.
+MEDIAN_WIDTH_NM, LOG_WIDTH_SIGMA = 55.0, 0.35
+MEAN_SKEW, SKEW_SIGMA = 0.15, 0.25
+FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))
+#: Part of the prior probability that a library of measured emissions has.
+LIBRARY_SHARE = 0.5
+#: Step in nm on which a shape is averaged in bands.
+STEP_NM = 1.0
+#: Least part of an emission of a library that must lie in the output bands.
+LEAST_INSIDE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class EmissionShapes:
+    """Emission spectra with unit integral.
+
+    Attributes
+    ----------
+    names
+        Name of each shape.
+    peak_nm
+        Its maximum in nm, shape (s,).
+    value
+        Mean in each output band, in 1/nm, shape (s, o).
+    log_prior
+        Logarithm of its prior probability, shape (s,).
+    """
+
+    names: tuple[str, ...]
+    peak_nm: FloatArray
+    value: FloatArray
+    log_prior: FloatArray
+
+
+def emission_shapes(output_nm: FloatArray, library: Sequence[Spectrum] = ()) -> EmissionShapes:
+    """Return skewed Gaussians of all peaks, widths and skews, and the emissions of a library.
+
+    A skewed Gaussian has a half of another width on either side of its maximum, of which the ratio
+    is exp(2 · skew).
+
+    Parameters
+    ----------
+    output_nm
+        Middles of the output bands in nm, shape (o,).
+    library
+        Measured emissions on any scale. Half of the prior probability is theirs.
+
+    Raises
+    ------
+    UsageError
+        An emission of the library is not positive, or most of it lies outside of the bands.
+    """
+    edges = edges_from_centres(output_nm)
+    grid_nm = np.arange(edges[0], edges[-1] + STEP_NM, STEP_NM)
+    names, peaks, values, weights = [], [], [], []
+    for peak in PEAKS_NM.tolist():
+        if not edges[0] < peak < edges[-1]:
+            continue
+        for width in WIDTHS_NM:
+            for skew in SKEWS:
+                sigma = width / FWHM_OVER_SIGMA * np.exp(np.where(grid_nm < peak, -skew, skew))
+                bell = Spectrum("", grid_nm, np.exp(-(((grid_nm - peak) / sigma) ** 2) / 2))
+                names.append(f"{peak:g} nm, width {width:g} nm, skew {skew:g}")
+                peaks.append(peak)
+                values.append(bell.in_bands(edges))
+                weights.append(
+                    -((np.log(width / MEDIAN_WIDTH_NM) / LOG_WIDTH_SIGMA) ** 2) / 2
+                    - ((skew - MEAN_SKEW) / SKEW_SIGMA) ** 2 / 2
+                )
+    probability = np.exp(weights)
+    probability *= (1 - LIBRARY_SHARE if library else 1.0) / probability.sum()
+    for emission in library:
+        banded = emission.in_bands(edges)
+        inside = float(banded @ np.diff(edges))
+        whole = float(np.trapezoid(emission.value, emission.wavelength_nm))
+        if not (whole > 0 and inside >= LEAST_INSIDE * whole):
+            raise UsageError(
+                f"emission '{emission.name}': expected positive light, most of it from "
+                f"{edges[0]:g} to {edges[-1]:g} nm, got {max(inside, 0.0):.3g} of {whole:.3g} "
+                "there; leave it out"
+            )
+        names.append(emission.name)
+        peaks.append(float(output_nm[np.argmax(banded)]))
+        values.append(np.maximum(banded, 0.0))
+    probability = np.append(
+        probability, np.full(len(library), LIBRARY_SHARE / max(len(library), 1))
+    )
+    table = np.array(values)
+    return EmissionShapes(
+        tuple(names),
+        np.array(peaks),
+        table / (table @ np.diff(edges))[:, np.newaxis],
+        np.log(probability),
+    )

@@ -1,0 +1,255 @@
+"""Result of an angular run: whether re-radiation depends on angle, and how sure that is."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from labrig.results.measured import FloatArray, Measured
+from labrig.results.run_result import RunResult
+from labrig.results.text_files import write_csv
+
+#: Level of the tests: the probability of a dependence found where there is none.
+LEVEL = 0.05
+#: Power at which the smallest dependence is stated that would have been found.
+POWER = 0.9
+
+
+@dataclass(frozen=True)
+class DependenceTest:
+    """Test of one quantity against no dependence.
+
+    Attributes
+    ----------
+    p
+        Probability of a statistic as large as this one where there is no dependence.
+    level
+        Level of this test, `LEVEL` divided by the number of tests that share the answer.
+    statistic
+        Fisher's F.
+    dof
+        Degrees of freedom of F: of the dependence, and of the measured scatter.
+    amplitude
+        Dependence as a fraction: the linear change from the least to the largest angle, or the
+        change from 0° to 90° of a sphere's surface.
+    interval
+        Confidence interval of the amplitude at 1 − `level`.
+    detectable
+        Smallest amplitude that would have been found with `POWER`.
+    """
+
+    p: float
+    level: float
+    statistic: float
+    dof: tuple[float, float]
+    amplitude: Measured
+    interval: tuple[float, float]
+    detectable: float
+
+    @property
+    def finds_dependence(self) -> bool:
+        """Whether a dependence is found at the test's level."""
+        return self.p < self.level
+
+
+@dataclass(frozen=True, eq=False)
+class AngleMeans:
+    """Means of n views at k angles, relative to the mean over the angles, and their test.
+
+    Attributes
+    ----------
+    angle_deg
+        Angles in degrees, rising, shape (k,).
+    mean, mean_sigma
+        Mean at each angle and its standard uncertainty by the measured scatter, shape (k,).
+    band
+        Half width at each angle of the interval about 1 in which the mean lies with 95 %
+        probability if there is no dependence, shape (k,).
+    scatter
+        Standard deviation of the repositionings, beyond the camera's noise, as a fraction.
+    drift
+        Change from the first view to the last one, as a fraction.
+    ratio, residual
+        Views relative to the mean over the angles, drift divided out, and what remains of them
+        beside the means, shape (n,).
+    test
+        Test of the means.
+    """
+
+    angle_deg: FloatArray
+    mean: FloatArray
+    mean_sigma: FloatArray
+    band: FloatArray
+    scatter: Measured
+    drift: Measured
+    ratio: FloatArray
+    residual: FloatArray
+    test: DependenceTest
+
+
+@dataclass(frozen=True, eq=False)
+class YarnViews:
+    """Views of a yarn in one direction under one LED.
+
+    Attributes
+    ----------
+    led, direction
+        Name of the LED and direction of the yarn.
+    channels
+        Channels of the camera whose sum is the signal.
+    reflected_at_most
+        Upper limit of the reflected light as a fraction of the signal; NaN if unknown.
+    angle_deg
+        Angle between light and camera of each view in degrees, shape (n,).
+    signal, signal_sigma
+        Signal of each view in DN/s and its σ by the camera's noise, shape (n,).
+    means
+        Means by angle, with the test.
+    """
+
+    led: str
+    direction: str
+    channels: tuple[str, ...]
+    reflected_at_most: float
+    angle_deg: FloatArray
+    signal: FloatArray
+    signal_sigma: FloatArray
+    means: AngleMeans
+
+
+@dataclass(frozen=True, eq=False)
+class ShadingFit:
+    """Shading of a sphere in several views, against Lambert's law.
+
+    Attributes
+    ----------
+    cos_incidence
+        Cosine of the angle of incidence, mean of each of b bins, rising, shape (b,).
+    radiance, radiance_sigma
+        Radiance over irradiance at normal incidence, fall-off divided out, scaled to Lambert's law,
+        and its scatter between views, shape (b,).
+    oren_nayar
+        Model of Oren and Nayar at the fitted roughness in the same bins, shape (b,).
+    roughness_deg
+        Standard deviation of the facets' slopes in degrees by that model.
+    by_view
+        Test of a dependence on the angle between normal and camera: amplitude of a term
+        1 − cos θ.
+    by_incidence
+        Test of a dependence of the radiance over the irradiance on the angle of incidence.
+    """
+
+    cos_incidence: FloatArray
+    radiance: FloatArray
+    radiance_sigma: FloatArray
+    oren_nayar: FloatArray
+    roughness_deg: Measured
+    by_view: DependenceTest
+    by_incidence: DependenceTest
+
+
+@dataclass(frozen=True, eq=False)
+class SphereViews:
+    """Views of a sphere under one LED.
+
+    Attributes
+    ----------
+    led
+        Name of the LED.
+    part
+        Part of the light: `re-radiated` or `reflected`.
+    channels
+        Channels of the camera whose sum is the signal.
+    reflected_at_most
+        Upper limit of the reflected light as a fraction of the signal; NaN if unknown.
+    is_lens_known
+        Whether the fall-off of the lens was calibrated and divided out.
+    circles
+        x, y and radius in pixels of the outline in each view, shape (views, 3).
+    shading
+        Shading, with the tests.
+    """
+
+    led: str
+    part: str
+    channels: tuple[str, ...]
+    reflected_at_most: float
+    is_lens_known: bool
+    circles: FloatArray
+    shading: ShadingFit
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AngularFluorescenceResult(RunResult):
+    """Whether re-radiation depends on angle.
+
+    Attributes
+    ----------
+    yarns
+        Views of a yarn by LED and direction; empty for a sphere.
+    spheres
+        Views of a sphere by LED; empty for a yarn.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> print(result.finds_dependence, result.p, result.detectable)
+    """
+
+    kind: ClassVar[str] = "angular_fluorescence"
+
+    yarns: tuple[YarnViews, ...] = ()
+    spheres: tuple[SphereViews, ...] = ()
+
+    @property
+    def tests(self) -> tuple[DependenceTest, ...]:
+        """Tests of the re-radiated light, which share the level `LEVEL`."""
+        shadings = [view.shading for view in self.spheres if view.part == "re-radiated"]
+        return (
+            *(views.means.test for views in self.yarns),
+            *(test for shading in shadings for test in (shading.by_view, shading.by_incidence)),
+        )
+
+    @property
+    def p(self) -> float:
+        """Probability of so small a p among all tests where there is no dependence (Bonferroni)."""
+        return min(1.0, len(self.tests) * min(test.p for test in self.tests))
+
+    @property
+    def finds_dependence(self) -> bool:
+        """Whether re-radiation depends on angle, at the level of 5 % for all tests together."""
+        return any(test.finds_dependence for test in self.tests)
+
+    @property
+    def detectable(self) -> float:
+        """Smallest amplitude that each of the tests would have found with 90 % power."""
+        return max(test.detectable for test in self.tests)
+
+    def write_files(self, folder: Path) -> None:
+        """Write `angular.csv`."""
+        head = (
+            *("led", "sample", "part", "angle_deg", "cos_incidence"),
+            *("ratio", "ratio_sigma", "oren_nayar"),
+        )
+        write_csv(folder / "angular.csv", head, self._rows())
+
+    def _rows(self) -> Iterator[tuple[Any, ...]]:
+        for yarn in self.yarns:
+            means = yarn.means
+            for angle_deg, ratio, sigma in zip(
+                means.angle_deg, means.mean, means.mean_sigma, strict=True
+            ):
+                name = f"{yarn.direction} yarn"
+                measured = f"{ratio:.6g}", f"{sigma:.6g}"
+                yield yarn.led, name, "re-radiated", f"{angle_deg:g}", "", *measured, ""
+        for sphere in self.spheres:
+            shading = sphere.shading
+            for cosine, ratio, sigma, model in zip(
+                shading.cos_incidence,
+                shading.radiance,
+                shading.radiance_sigma,
+                shading.oren_nayar,
+                strict=True,
+            ):
+                numbers = (f"{number:.6g}" for number in (cosine, ratio, sigma, model))
+                yield sphere.led, "sphere", sphere.part, "", *numbers

@@ -1,0 +1,212 @@
+"""Result of a fluorescence run: the re-radiation matrix of each sample, with its uncertainty."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from labrig.material import Provenance, ReradiationMatrix, write_fluorescent
+from labrig.results.measured import BoolArray, FloatArray, Measured
+from labrig.results.run_result import RunResult
+from labrig.results.text_files import write_csv
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixOnBands:
+    """A re-radiation matrix.
+
+    Attributes
+    ----------
+    input_nm, output_nm
+        Middles of the bands of incident (i,) and of returning light (o,) in nm.
+    reflectance, reflectance_sigma
+        Radiance factor without re-radiation and its σ, shape (o,).
+    reradiation, reradiation_sigma
+        Re-radiation in 1/nm of output and its σ, shape (o, i).
+    """
+
+    input_nm: FloatArray
+    output_nm: FloatArray
+    reflectance: FloatArray
+    reflectance_sigma: FloatArray | None
+    reradiation: FloatArray
+    reradiation_sigma: FloatArray | None
+
+    @classmethod
+    def of(cls, matrix: ReradiationMatrix) -> "MatrixOnBands":
+        """Return the numbers of a matrix."""
+        return cls(
+            matrix.input_nm,
+            matrix.output_nm,
+            matrix.reflectance,
+            matrix.reflectance_sigma,
+            matrix.reradiation,
+            matrix.reradiation_sigma,
+        )
+
+    def named(self, name: str) -> ReradiationMatrix:
+        """Return the matrix as a material's."""
+        return ReradiationMatrix(
+            name,
+            self.input_nm,
+            self.output_nm,
+            self.reflectance,
+            self.reradiation,
+            reflectance_sigma=self.reflectance_sigma,
+            reradiation_sigma=self.reradiation_sigma,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredDye:
+    """A dye of a sample.
+
+    Attributes
+    ----------
+    emission, emission_sigma
+        Emission with unit integral in 1/nm and its σ, shape (o,).
+    excitation, excitation_sigma
+        Fraction of the light of each input band that the dye would emit over all of its emission,
+        and its σ, shape (i,).
+    quantum_yield
+        Photons emitted per photon that does not come back at its own wavelength; NaN where no light
+        tells it.
+    """
+
+    emission: FloatArray
+    emission_sigma: FloatArray
+    excitation: FloatArray
+    excitation_sigma: FloatArray
+    quantum_yield: Measured
+
+
+@dataclass(frozen=True)
+class ColourUnderLight:
+    """Colour of a sample under a light, for the CIE 1931 2° observer.
+
+    Attributes
+    ----------
+    light
+        Name of the light.
+    lab
+        L*, a*, b* with a perfect white under the light.
+    lab_sigma
+        Their standard deviations.
+    depends_on_uv
+        Whether the colour changes with the brightness of ultraviolet lights that is not known.
+    """
+
+    light: str
+    lab: tuple[float, float, float]
+    lab_sigma: tuple[float, float, float]
+    depends_on_uv: bool
+
+
+@dataclass(frozen=True, eq=False)
+class FluorescentPatch:
+    """A sample under every LED, and its matrix.
+
+    Attributes
+    ----------
+    matrix
+        Matrix by all LEDs together, with σ.
+    per_led
+        Matrix by the method of the thesis, each LED by itself; None if that was not asked for.
+    is_extrapolated
+        Whether no LED reached an input band, shape (i,).
+    dyes
+        The dyes by rising wavelength of their emission, of the most probable number of them.
+    probability
+        Probability of each number of dyes from 0 on.
+    value, sigma
+        Values of each channel under each LED in DN/s, as if it shone evenly, and their σ, (m, k).
+    predicted
+        The same of the matrix, shape (m, k).
+    pull
+        `value` less `predicted` over their σ, with that of lights and curves, shape (m, k).
+    reduced_chi2
+        χ² per degree of freedom.
+    colours
+        Colours under some lights.
+    bleaching
+        Signal under the first LED at the end of the run over that at its begin.
+    """
+
+    matrix: MatrixOnBands
+    per_led: MatrixOnBands | None
+    is_extrapolated: BoolArray
+    dyes: tuple[MeasuredDye, ...]
+    probability: tuple[float, ...]
+    value: FloatArray
+    sigma: FloatArray
+    predicted: FloatArray
+    pull: FloatArray
+    reduced_chi2: float
+    colours: tuple[ColourUnderLight, ...]
+    bleaching: Measured | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LedFluorescenceResult(RunResult):
+    """Re-radiation matrices of samples.
+
+    Attributes
+    ----------
+    leds
+        Names of the m LEDs that were used.
+    led_peak_nm
+        Their peaks in nm, shape (m,).
+    channels
+        Names of the k channels.
+    brightness
+        Brightness of each LED by the card, shape (m,).
+    is_brightness_known
+        Whether it is known: the camera sees the LED, or a calibration tells it, shape (m,).
+    uv_scale
+        "measured" if the brightness of every LED below 400 nm is known, "unknown" if not, "none"
+        without such an LED.
+    patches
+        The samples by name.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for name, patch in result.patches.items():
+    ...     print(name, patch.matrix.named(name).reradiated_fraction.max())
+    """
+
+    kind: ClassVar[str] = "led_fluorescence"
+
+    leds: tuple[str, ...]
+    led_peak_nm: FloatArray
+    channels: tuple[str, ...]
+    brightness: FloatArray
+    is_brightness_known: BoolArray
+    uv_scale: Literal["measured", "unknown", "none"]
+    patches: Mapping[str, FluorescentPatch]
+    run: str
+
+    def write_files(self, folder: Path) -> None:
+        """Write a material file and its matrix for each sample, and a table of colours."""
+        for name, patch in self.patches.items():
+            place = folder / name if len(self.patches) > 1 else folder
+            place.mkdir(exist_ok=True)
+            note = f"ultraviolet scale: {self.uv_scale}"
+            origin = Provenance(
+                source="photographs under LEDs, with labrig", run=self.run, note=note
+            )
+            write_fluorescent(place / "material.yaml", patch.matrix.named(name), origin)
+        write_csv(
+            folder / "colours.csv",
+            ("patch", "light", "L", "a", "b", "L_sigma", "a_sigma", "b_sigma", "depends_on_uv"),
+            (
+                (
+                    name,
+                    colour.light,
+                    *(f"{number:.4f}" for number in (*colour.lab, *colour.lab_sigma)),
+                    str(colour.depends_on_uv).lower(),
+                )
+                for name, patch in self.patches.items()
+                for colour in patch.colours
+            ),
+        )

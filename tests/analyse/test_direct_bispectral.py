@@ -1,0 +1,291 @@
+"""Columns measured directly, against the true matrix averaged over each light's real spectrum."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from labrig.analyse import Part
+from labrig.analyse.direct_bispectral import analyse
+from labrig.errors import DataError
+from labrig.material import read_reradiation
+from labrig.optics import SpectrometerReading, read_spectrometer_reading
+from labrig.process import process_and_report
+from labrig.results import DirectBispectralResult, DirectColumns
+from tests.analyse.direct_bench import (
+    MATERIALS,
+    record,
+    true_column,
+    true_light,
+    true_reflectance,
+)
+from tests.analyse.recorded import part_of
+from tests.results.made import assert_read_back
+
+pytest.importorskip("seabreeze")
+
+FloatArray = NDArray[np.float64]
+
+#: Two that tell one another's reflectance, and one far off.
+LEDS = ["430 nm", "455 nm", "625 nm"]
+QUICK: dict[str, Any] = {
+    "leds": ["365 nm", "430 nm", "490 nm"], "samples": ["yellow-textile"], "order_seed": 4,
+    "repetitions": 4,
+}  # fmt: skip
+
+
+def misfit(columns: DirectColumns, material: str, of_sigma: float = 1.0) -> FloatArray:
+    """χ² over the number of entries of each column, with the error that its entries share."""
+    chi2 = []
+    for number, light in enumerate(columns.lights):
+        true, _ = true_column(material, true_light(light), columns.output_nm)
+        sigma, common = columns.column_sigma[:, number], columns.common_sigma[:, number]
+        of_light = columns.light_sigma[number] * columns.column[:, number]
+        covariance = np.diag(sigma**2 - common**2 - of_light**2)
+        covariance += np.outer(common, common) + np.outer(of_light, of_light)
+        error = columns.column[:, number] - true
+        chi2.append(error @ np.linalg.solve(covariance * of_sigma**2, error) / len(error))
+    return np.array(chi2)
+
+
+def are_right(chi2: FloatArray) -> bool:
+    return bool(0.9 < np.sqrt(chi2.mean()) < 1.1)
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of one sample under three LEDs."""
+    return record(tmp_path_factory.mktemp("quick"), QUICK)
+
+
+def test_columns_are_the_true_matrix_over_the_real_lights_within_sigma(tmp_path: Path) -> None:
+    chi2, pulls, sigmas, reflectance, mixed = [], [], [], [], []
+    for seed in (1, 2, 3):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        samples = MATERIALS[seed - 1 :: 3]
+        run = record(folder, {"leds": LEDS, "samples": list(samples), "repetitions": 6}, seed,
+                     sample=[{"material": name} for name in samples])  # fmt: skip
+        result = analyse(part_of(run))
+        assert result.warnings == ()
+        for name, columns in result.samples.items():
+            chi2.append(misfit(columns, name))
+            true = [true_column(name, true_light(light), columns.output_nm) for light in LEDS]
+            apart = columns.reradiated - np.array([reradiated for _, reradiated in true]).T
+            pulls.append((apart / columns.reradiated_sigma)[~columns.is_mixed])
+            mixed.append((apart / columns.reradiated_sigma)[columns.is_mixed])
+            sigmas.append(np.median(columns.column_sigma))
+            known = columns.reflectance - true_reflectance(name, columns.output_nm)
+            reflectance.append(known / columns.reflectance_sigma)
+    whole = np.concatenate(chi2)
+    assert are_right(whole)
+    assert not are_right(whole / 1.2**2)
+    assert not are_right(whole * 1.2**2)
+    assert 0.8 < np.sqrt(np.mean(np.concatenate(pulls) ** 2)) < 1.2
+    # What may be re-radiated where the light itself is has all of its range in σ.
+    assert 0.3 < np.sqrt(np.nanmean(np.concatenate(mixed) ** 2)) < 1.2
+    assert 0.3 < np.sqrt(np.nanmean(np.concatenate(reflectance) ** 2)) < 1.2
+    # A Labsphere BFC-450 repeats its ceramic tiles within 0.001 to 0.006 (shared data).
+    assert max(sigmas) < 0.001
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(10, 16))
+def test_all_leds_on_all_shipped_samples(tmp_path: Path, seed: int) -> None:
+    result = analyse(part_of(record(tmp_path, {"samples": list(MATERIALS)}, seed)))
+    assert result.warnings == ()
+    chi2 = [misfit(columns, name) for name, columns in result.samples.items()]
+    assert 0.85 < np.sqrt(np.mean(chi2)) < 1.15
+
+
+def test_what_the_light_itself_covers_is_told_by_another_light_or_not_at_all(quick: Path) -> None:
+    (columns,) = analyse(part_of(quick)).samples.values()
+    own = np.argmin(np.abs(columns.output_nm[:, np.newaxis] - columns.input_nm), axis=0)
+    numbers = np.arange(len(columns.lights))
+    assert columns.is_mixed[own[1:], numbers[1:]].all()
+    assert np.isnan(columns.reradiated[own, numbers][1:]).all()
+    assert np.isnan(columns.reflectance[columns.output_nm > 600]).all()
+    matrix, is_extrapolated = columns.interpolated("yellow")
+    unlit = (matrix.input_nm < columns.input_nm[0] - 5) | (
+        matrix.input_nm > columns.input_nm[-1] + 5
+    )
+    assert (is_extrapolated == unlit).all()
+    stokes = matrix.is_stokes
+    assert np.isnan(matrix.reradiation[:, unlit][stokes[:, unlit]]).all()
+    between = (matrix.output_nm > 620)[:, np.newaxis] & ~unlit
+    assert np.isfinite(matrix.reradiation[between]).all()
+
+
+def test_the_files_are_read_back_and_the_report_says_what_it_is(quick: Path) -> None:
+    processed = process_and_report(quick)
+    assert isinstance(processed.result, DirectBispectralResult)
+    assert_read_back(processed.result)
+    (columns,) = processed.result.samples.values()
+    folder = processed.report.parent
+    matrix = read_reradiation(folder / "matrix.csv")
+    assert np.array_equal(matrix.input_nm, columns.input_nm)
+    assert np.array_equal(matrix.reradiation, columns.reradiated / 10, equal_nan=True)
+    assert matrix.column_correlation is not None
+    assert len((folder / "columns.csv").read_text().splitlines()) == 1 + 3 * 41
+    assert (folder / "material.yaml").is_file()
+    (line,) = processed.lines
+    assert line.startswith("yellow-textile: re-radiates up to ")
+    page = processed.report.read_text()
+    assert "reflected and re-radiated light come together" in page
+    assert "Beyond its band" in page
+
+
+def changed(part: Part, change: dict[str, Any]) -> Part:
+    """A part some of whose units have other readings: by unit, the factor and the unit of more."""
+    attempts = {attempt.unit: attempt for attempt in part.run.attempts}
+    readings: dict[str, SpectrometerReading] = {}
+    folder = part.run.folder / "frames"
+    for unit, (factor, more) in change.items():
+        spectrum = attempts[unit].spectra[-1]
+        reading = read_spectrometer_reading(spectrum.path)
+        stage = unit.removeprefix("again ").partition(":")[0]
+        dark = next(
+            read_spectrometer_reading(one.path)
+            for one in attempts[f"{stage}: dark"].spectra
+            if np.isclose(one.integration_s, spectrum.integration_s)
+        )
+        light = factor * (reading.raw_counts - dark.raw_counts.mean(axis=0))
+        counts = dark.raw_counts[: len(light)] + light
+        for other, part_of_it in more.items():
+            added = read_spectrometer_reading(attempts[other].spectra[-1].path)
+            counts = counts + part_of_it * (added.raw_counts - dark.raw_counts.mean(axis=0))
+        readings[unit] = replace(reading, raw_counts=np.rint(counts))
+    new = []
+    for attempt in part.run.attempts:
+        if attempt.unit not in readings:
+            new.append(attempt)
+            continue
+        data = readings[attempt.unit].text().encode()
+        path = folder / f"{attempt.spectra[-1].path.stem}-changed.csv"
+        path.write_bytes(data)
+        last = replace(attempt.spectra[-1], path=path, **_checks(data))
+        new.append(replace(attempt, spectra=[*attempt.spectra[:-1], last]))
+    return replace(part, run=replace(part.run, attempts=new))
+
+
+def _checks(data: bytes) -> dict[str, Any]:
+    from hashlib import sha256
+
+    return {"sha256": sha256(data).hexdigest(), "size_bytes": len(data)}
+
+
+@pytest.mark.parametrize(
+    ("change", "said", "kept"),
+    [
+        ({"white: 430 nm": (0.0, {})}, "430 nm: gave no light on the white reference", 2),
+        (
+            {"white: 430 nm": (1.0, {"white: 490 nm": 0.3})},
+            "430 nm: the white reference shows peaks at 43",
+            2,
+        ),
+        ({"white: 365 nm": (1.0, {"white: 490 nm": 0.3})}, "365 nm: with it shines 490 nm", 2),
+        ({"white: 430 nm": (1000.0, {})}, "white under 430 nm: pixels are saturated", 2),
+        ({"yellow-textile: 430 nm": (0.0, {})}, "no light came back under 430 nm", 2),
+        (
+            {"yellow-textile: 490 nm": (1.0, {"white: 430 nm": 0.3})},
+            "under 490 nm light came back at 4",
+            2,
+        ),
+        (
+            {
+                f"{stage}: 430 nm": (0.0, {f"{stage}: 490 nm": 1.0})
+                for stage in ("white", "yellow-textile")
+            },
+            "has the same spectrum as 4",
+            2,
+        ),
+    ],
+)
+def test_a_wrong_light_is_named_and_the_others_are_kept(
+    quick: Path, change: dict[str, Any], said: str, kept: int
+) -> None:
+    result = analyse(changed(part_of(quick), change))
+    assert len([line for line in result.warnings if said in line]) == 1, result.warnings
+    (columns,) = result.samples.values()
+    assert len(columns.lights) == kept
+
+
+def test_lights_in_another_order_and_a_sample_that_bleaches_are_said(quick: Path) -> None:
+    swapped = {
+        f"{stage}: {to}": (0.0, {f"{stage}: {by}": 1.0})
+        for stage in ("white", "yellow-textile")
+        for to, by in (("430 nm", "490 nm"), ("490 nm", "430 nm"))
+    }
+    result = analyse(changed(part_of(quick), swapped))
+    assert sum("connected in another order" in line for line in result.warnings) == 2
+    part = part_of(quick)
+    first = part.protocol.shuffled()[0]
+    result = analyse(changed(part, {f"again yellow-textile: {first}": (0.9, {})}))
+    (line,) = result.warnings
+    assert f"yellow-textile: under {first}, read once more at the end" in line
+    (columns,) = result.samples.values()
+    assert columns.drift.value == pytest.approx(0.9, abs=0.01)
+    steady = next(iter(analyse(part).samples.values()))
+    assert (columns.column_sigma >= steady.column_sigma).all()
+    assert columns.column_sigma.max() > 5 * steady.column_sigma.max()
+
+
+def test_a_white_that_fluoresces_is_noticed(tmp_path: Path, quick: Path) -> None:
+    """The sample stands for a reference that gives back blue and ultraviolet as green."""
+    glow = {"white: 365 nm": (1.0, {"yellow-textile: 365 nm": 0.3})}
+    result = analyse(changed(part_of(quick), glow))
+    assert any("365 nm" in line and "the reference fluoresces" in line for line in result.warnings)
+
+
+def test_what_the_room_adds_is_said_and_subtracted(tmp_path: Path) -> None:
+    run = record(tmp_path, QUICK | {"leds": ["430 nm"]}, ambient=1e-3)
+    result = analyse(part_of(run))
+    (line,) = result.warnings
+    assert "with all lights off the spectrometer sees light" in line
+    (columns,) = result.samples.values()
+    assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
+
+
+def test_filters_before_the_lamp_are_lights_too_and_leaks_are_said(tmp_path: Path) -> None:
+    filters = {"filters": ["bandpass-425", "bandpass-475"], "samples": ["yellow-textile"]}
+    result = analyse(part_of(record(tmp_path, filters | {"repetitions": 4})))
+    assert len(result.warnings) == 2
+    assert all("the filter leaks" in line for line in result.warnings)
+    assert [round(light.peak_nm, -1) for light in result.lights] == [440, 480]
+    (columns,) = result.samples.values()
+    blue = columns.reradiated[:, 0]
+    strongest = int(np.nanargmax(blue))
+    assert columns.output_nm[strongest] == pytest.approx(520, abs=20)
+    assert blue[strongest] > 5 * columns.reradiated_sigma[strongest, 0]
+
+
+def test_an_unfinished_run_gives_what_it_has(quick: Path) -> None:
+    part = part_of(quick)
+    done = [attempt for attempt in part.run.attempts if attempt.unit != "yellow-textile: 430 nm"]
+    result = analyse(replace(part, run=replace(part.run, attempts=done)))
+    assert "yellow-textile: was not read under 430 nm" in result.warnings
+    only_white = [a for a in part.run.attempts if not a.unit.startswith("yellow")]
+    with pytest.raises(DataError, match="no sample was read under a light"):
+        analyse(replace(part, run=replace(part.run, attempts=only_white)))
+    with pytest.raises(DataError, match="expected readings of the white reference"):
+        analyse(replace(part, run=replace(part.run, attempts=[])))
+
+
+def test_without_a_scale_there_is_one_clear_line(quick: Path) -> None:
+    part = part_of(quick)
+    attempts = []
+    for attempt in part.run.attempts:
+        spectra = []
+        for spectrum in attempt.spectra:
+            reading = replace(read_spectrometer_reading(spectrum.path), calibration=None)
+            data = reading.text().encode()
+            path = spectrum.path.with_name(f"{spectrum.path.stem}-relative.csv")
+            path.write_bytes(data)
+            spectra.append(replace(spectrum, path=path, **_checks(data)))
+        attempts.append(replace(attempt, spectra=spectra))
+    with pytest.raises(DataError, match="expected a spectrometer with a scale") as caught:
+        analyse(replace(part, run=replace(part.run, attempts=attempts)))
+    assert "\n" not in str(caught.value)
