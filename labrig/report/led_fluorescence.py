@@ -116,14 +116,14 @@ def _patch_sections(
         Picture(
             f"{slug}-matrix",
             partial(matrix_figure, matrix, patch.is_extrapolated),
-            "Re-radiation per 10 nm. Hatched: incident light that no LED had; there it is "
-            "extrapolated.",
+            "Re-radiation per 10 nm. Hatched: incident light that no LED of known brightness had; "
+            "there it is extrapolated.",
         ),
         Picture(
             f"{slug}-excitation",
             excitation_chart(patch, matrix),
             "Fraction re-radiated by incident wavelength, by all LEDs together with a band of "
-            "± 1 σ, and by the thesis's method, one LED by itself. Marks at the bottom: LEDs.",
+            "± 1 σ, and by the thesis's method, one LED by itself.",
         ),
         Picture(
             f"{slug}-reflectance",

@@ -152,11 +152,9 @@ def spectra_chart(spectra: Sequence[MatrixSpectrum], x_label: str) -> Chart:
         (zero, *(mark for _, mark in labelled)),
         LEGEND_MARGINS,
     )
-    legend = (
-        *((label, mark) for label, mark in labelled if label),
-        ("measured", Points(MUTED)),
-        ("mixture", Line(MUTED)),
-    )
+    legend = tuple((label, mark) for label, mark in labelled if label)
+    if any(spectrum.model is not None for spectrum in spectra):
+        legend = (*legend, ("measured", Points(MUTED)), ("mixture", Line(MUTED)))
     return Chart((panel,), SPECTRA_HEIGHT_PT, legend=legend, columns=LEGEND_COLUMNS)
 
 

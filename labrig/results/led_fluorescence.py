@@ -113,7 +113,8 @@ class FluorescentPatch:
     per_led
         Matrix by the method of the thesis, each LED by itself; None if that was not asked for.
     is_extrapolated
-        Whether no LED reached an input band, shape (i,).
+        Whether no LED of known brightness reached an input band, shape (i,): there the numbers are
+        extrapolated, and may be off by more than their σ.
     dyes
         The dyes by rising wavelength of their emission, of the most probable number of them.
     probability

@@ -44,6 +44,8 @@ from labrig.results import (
 LIGHTS = ("D65", "A", "FL2")
 #: Peak in nm below which light is ultraviolet.
 ULTRAVIOLET_NM = 400.0
+#: Part of an LED's strongest input band from which another one counts as lit by it.
+LIT = 0.1
 #: ΔE2000 from which a colour depends on what lights of unknown brightness excite, if they excite a
 #: dye as much as a strong one would be.
 DEPENDS, EXCITED = 0.5, 0.5
@@ -143,7 +145,7 @@ def _patch(
     return FluorescentPatch(
         matrix=MatrixOnBands.of(fit.matrix),
         per_led=MatrixOnBands.of(per_led.matrix),
-        is_extrapolated=fit.is_extrapolated,
+        is_extrapolated=_extrapolated(system),
         dyes=tuple(_dye(fluorophore) for fluorophore in fit.fluorophores),
         probability=tuple(number.probability for number in fit.numbers),
         value=lit.value,
@@ -154,6 +156,12 @@ def _patch(
         colours=tuple(_colour(fit, read_light(light), excitable) for light in LIGHTS),
         bleaching=lit.bleaching,
     )
+
+
+def _extrapolated(system: FluorescenceSystem) -> BoolArray:
+    """Return which input bands no LED of known brightness lit, shape (i,)."""
+    known = system.response.absorbed[~system.is_loose]
+    return np.asarray(~(known > LIT * known.max(axis=1, keepdims=True)).any(axis=0))
 
 
 def _dye(fluorophore: EstimatedFluorophore) -> MeasuredDye:
