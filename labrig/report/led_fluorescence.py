@@ -70,6 +70,8 @@ def _line(patch: FluorescentPatch) -> str:
         plus_minus(value, sigma) for value, sigma in zip(colour.lab, colour.lab_sigma, strict=True)
     )
     under = f"under {colour.light} L* {lightness}, a* {a}, b* {b}"
+    if colour.depends_on_uv:
+        under += ", if ultraviolet excites as little as that: its scale is not known"
     if not patch.dyes:
         return f"no fluorescence found; {under}"
     peak = _strongest(matrix, patch)

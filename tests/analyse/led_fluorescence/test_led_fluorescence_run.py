@@ -106,6 +106,9 @@ def test_the_result_is_read_back_and_written_as_materials(run: Path) -> None:
         assert material.reradiation_sigma is not None
     assert len((folder / "colours.csv").read_text().splitlines()) == 1 + 4 * 3
     assert [line.split(":")[0] for line in done.lines] == sorted(SAMPLES)
+    unknown = {line.split(":")[0] for line in done.lines if "its scale is not known" in line}
+    assert "paper" in unknown
+    assert "felt" not in unknown
     page = done.report.read_text()
     assert "uv_scale: unknown" in page
     assert page.count("<h2>") >= 13
