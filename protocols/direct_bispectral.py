@@ -4,7 +4,6 @@ After the direct set-up of the thesis of which chapters 3 and 4 describe fluores
 (fig. 4.11 compares with it): what comes back of one light, over what a white reference gives back.
 """
 
-import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -29,8 +28,7 @@ from labrig.optics import read_spectrometer_reading
 from labrig.quantity import Count, DurationS
 from labrig.record import PERSON, SpectrumRecord
 
-from .led_fluorescence import LED_NAMES
-from .steps.led_scenes import LedNames
+from .steps.led_scenes import LED_NAMES, LedNames, shuffled
 from .steps.patch_names import SampleNames
 from .steps.scenes import light
 
@@ -118,9 +116,7 @@ class DirectBispectral(ProtocolModel):
 
     def shuffled(self) -> Sequence[str]:
         """Return the lights in the order in which they are lit."""
-        order = list(self.lights)
-        random.Random(self.order_seed).shuffle(order)
-        return order
+        return shuffled(self.lights, self.order_seed)
 
     def unit_name(self, stage: str, light: str, again: bool = False) -> str:
         """Return the name of the unit of a stage under a light, the first or its repetition."""

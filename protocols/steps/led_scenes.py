@@ -1,13 +1,27 @@
 """Scenes lit by one LED after another, each followed by a frame with all LEDs off."""
 
+import random
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from labrig.acquire import LEDS, LEDS_OFF, LedSwitch, Session, Shoot
+from labrig.acquire import LEDS, LEDS_OFF, LedSwitch, ProtocolModel, Session, Shoot
+from labrig.quantity import Count, DurationS
 
-from .scenes import Bracketing
+from .camera_settings import CameraSettings
+from .scenes import Arrangement, Bracketing
+
+#: LEDs of the shipped rig, after the thesis's nine and its ultraviolet lamp.
+LED_NAMES = (
+    "365 nm", "405 nm", "430 nm", "455 nm", "490 nm", "530 nm", "565 nm", "590 nm", "625 nm",
+)  # fmt: skip
+#: The bench with the samples, and with the card in their place.
+ON_SAMPLE, ON_CARD = Arrangement(), Arrangement("grey card")
+#: Begin of the names of units, which end with the LED: the card, and the first LED once more.
+CARD, AGAIN = "card ", "again "
+CARD_REASON = "its light under every LED tells how bright the LED is"
 
 
 def _once(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -18,6 +32,51 @@ def _once(names: tuple[str, ...]) -> tuple[str, ...]:
 
 #: Names of LEDs of the rig.
 LedNames = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_once)]
+
+
+def shuffled(names: Sequence[str], seed: int) -> list[str]:
+    """Return names in an order by chance, the same for the same seed."""
+    order = list(names)
+    random.Random(seed).shuffle(order)
+    return order
+
+
+class LedSettings(ProtocolModel):
+    """Settings of a protocol that lights one LED after another before a camera.
+
+    Attributes
+    ----------
+    leds
+        Names of the LEDs in the rig file, for example `[455 nm, 530 nm]`.
+    camera
+        Sensitivity and aperture of the camera.
+    longest
+        Longest exposure, for example `8 s`.
+    exposures
+        Number of exposures in a bracket, each eight times the one before; the longest ones are for
+        channels that see little of the light.
+    repeats
+        Number of photographs at each exposure.
+    order_seed
+        Seed of the order of the LEDs, which is shuffled so that drift does not look like a
+        spectrum.
+    """
+
+    leds: LedNames = LED_NAMES
+    camera: CameraSettings = CameraSettings(iso=100)
+    longest: DurationS = Field(8.0, gt=0)
+    exposures: Annotated[Count, Field(ge=1, le=5)] = 3
+    repeats: Count = Field(2, ge=1)
+    order_seed: Count = Field(1, ge=0)
+
+    @property
+    def bracketing(self) -> Bracketing:
+        """Bracketing of every scene."""
+        return Bracketing(self.camera, self.longest, self.repeats, self.exposures)
+
+    def shuffled(self) -> Sequence[str]:
+        """Return the LEDs in the order in which they are lit."""
+        return shuffled(self.leds, self.order_seed)
 
 
 @dataclass(frozen=True)

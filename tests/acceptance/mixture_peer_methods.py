@@ -19,8 +19,8 @@ from labrig.material import ReradiationMatrix, ReradiationMixture
 Floats = npt.NDArray[np.float64]
 
 MISSING = (
-    "pomegranate is not installed: python -m uv pip install torch --index-url "
-    "https://download.pytorch.org/whl/cpu && python -m uv pip install pomegranate"
+    "pomegranate is not installed: python -m uv pip install pomegranate (with torch for processors "
+    "only, if there is no GPU)"
 )
 #: Iterations of pomegranate between two looks at the likelihood, which it does not weigh itself.
 BLOCK = 5

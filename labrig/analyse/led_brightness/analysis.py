@@ -30,7 +30,7 @@ from labrig.fit.leds import (
     fit_brightness,
 )
 from labrig.optics import Spectrum
-from labrig.protocols.led_brightness import AGAIN, CARD
+from labrig.protocols.steps.led_scenes import AGAIN, CARD
 from labrig.reduce import FLICKER
 from labrig.results import (
     FloatArray,

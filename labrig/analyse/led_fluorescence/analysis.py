@@ -28,7 +28,8 @@ from labrig.fit.fluorescence import (
 )
 from labrig.material import appearance
 from labrig.optics import Spectrum, delta_e, read_light
-from labrig.protocols.led_fluorescence import CARD, SAMPLE, LedFrames
+from labrig.protocols.led_fluorescence import SAMPLE, LedFrames
+from labrig.protocols.steps.led_scenes import CARD
 from labrig.results import (
     BoolArray,
     ColourUnderLight,

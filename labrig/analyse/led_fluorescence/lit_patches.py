@@ -9,7 +9,8 @@ from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.errors import DataError
-from labrig.protocols.led_fluorescence import AGAIN, LedFrames
+from labrig.protocols.led_fluorescence import LedFrames
+from labrig.protocols.steps.led_scenes import AGAIN
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches
 from labrig.results import BoolArray, FloatArray, Measured, Series
