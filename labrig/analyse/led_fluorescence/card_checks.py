@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from labrig.analyse.led_fluorescence.lit_patches import LitPatch
 from labrig.errors import DataError
+from labrig.fit.leds import match_channels
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 from labrig.results import FloatArray
 
@@ -15,9 +15,6 @@ from labrig.results import FloatArray
 VISIBLE = 0.01
 #: Significance in σ from which a light is seen.
 SEEN_SIGMA = 5.0
-#: Angle in rad between colour and expected colour that no error of curves and spectra explains,
-#: and how much nearer another explanation has to be.
-WRONG_COLOUR, NEARER = 0.3, 0.4
 
 
 @dataclass(frozen=True)
@@ -74,14 +71,13 @@ def unused_leds(
         if not (signal > SEEN_SIGMA * sigma).any():
             yield UnusedLed(led, f"{led}: the card is dark, the LED did not light")
             continue
-        angles = np.where(is_visible, _angles(signal, expected), np.inf)
-        if angles[row] < WRONG_COLOUR:
+        match = match_channels(led, signal, card.variance[row], spectra, camera, white)
+        if not match.is_odd(led):
             continue
-        nearest = int(np.argmin(angles))
-        if angles[nearest] < NEARER * angles[row]:
-            swapped.append(f"{leds[nearest]} is lit as {led}")
-        elif (other := _second(row, signal, expected, angles[row])) is not None:
-            reason = f"{led}: the card has the colour of two LEDs, {leds[other]} is lit, too"
+        if (other := match.other(led)) is not None:
+            swapped.append(f"{other} is lit as {led}")
+        elif match.pair is not None:
+            reason = f"{led}: the card has the colour of two LEDs, {match.pair} is lit, too"
             yield UnusedLed(led, reason)
         else:
             yield UnusedLed(led, f"{led}: the card has another colour than this LED")
@@ -98,24 +94,3 @@ def _expected(spectrum: Spectrum, camera: CameraResponse, white: Transmittance) 
     light = spectrum.at(nm) * white.at(nm)
     power = np.trapezoid(spectrum.value, spectrum.wavelength_nm)
     return np.asarray(np.trapezoid(light * camera.sensitivity.T, nm, axis=1) / power)
-
-
-def _angles(signal: FloatArray, expected: FloatArray) -> FloatArray:
-    """Return the angle in rad between a colour (k,) and each expected one (m, k), shape (m,)."""
-    lengths = np.linalg.norm(expected, axis=1) * np.linalg.norm(signal)
-    cosines = expected @ signal / np.maximum(lengths, np.finfo(np.float64).tiny)
-    return np.asarray(np.arccos(np.clip(cosines, -1.0, 1.0)))
-
-
-def _second(row: int, signal: FloatArray, expected: FloatArray, angle: float) -> int | None:
-    """Return the LED that explains the colour together with the right one; None if none does."""
-    best = None
-    for other in range(len(expected)):
-        if other == row:
-            continue
-        both = expected[[row, other]].T
-        amounts, _ = nnls(both, signal)
-        left = float(_angles(signal, (both @ amounts)[np.newaxis])[0])
-        if amounts.min() > 0 and left < NEARER * angle and (best is None or left < best[0]):
-            best = left, other
-    return None if best is None else best[1]
