@@ -1,33 +1,26 @@
 """The simulated spectrometer as pyusb sees it: an `IBackend` with one device, or none."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
-import usb.backend
-
 from labrig.clock import VirtualClock
 
-from ..camera.usb import errors
+from .. import usb_errors
+from ..camera.usb.cable import BYTES_PER_S, TRANSACTION_S
 from ..faults import FaultTime
+from ..usb_device import CONFIGURATION_VALUE, OneDeviceBackend, UsbHandle
 from .instrument import ANSWERS, COMMANDS, SPECTRA, UsbSpectrometer
 
 VENDOR, PRODUCT = 0x2457, 0x101E
-CONFIGURATION_VALUE = 1
 #: Endpoints in the order of the descriptor; the second of spectra is used by other models.
 ENDPOINTS = (COMMANDS, ANSWERS, SPECTRA, 0x86)
 PACKET = 512
-#: Time of a transfer, and rate of a bulk pipe, as of the camera's cable.
-TRANSACTION_S, BYTES_PER_S = 125e-6, 35e6
 #: Bytes of a transfer that was cut off.
 CUT_OFF = 512
 
 
-class _Handle:
-    """One opening of the device, valid until it is closed or the cable comes out."""
-
-
-class SpectrometerBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is untyped
+class SpectrometerBackend(OneDeviceBackend):
     """Bus with this one spectrometer on it; every transfer takes virtual time.
 
     Parameters
@@ -53,23 +46,12 @@ class SpectrometerBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb 
         silent: Sequence[FaultTime] = (),
         truncated: Sequence[FaultTime] = (),
     ) -> None:
-        super().__init__()
         self._clock = clock
         self._instrument = instrument
         self._unplugged = unplugged
         self._silent = silent
         self._truncated = truncated
-        self._plugging = self._times_unplugged
-        self._handles: set[_Handle] = set()
-
-    def enumerate_devices(self) -> Iterator[int]:
-        """Yield the spectrometer by its address on the bus, if it is plugged in."""
-        self._notice_unplugging()
-        if self._is_plugged:
-            yield 1 + self._plugging
-
-    def get_parent(self, dev: Any) -> None:
-        """Return None: no hub is simulated."""
+        super().__init__()
 
     def get_device_descriptor(self, dev: Any) -> SimpleNamespace:
         """Return the device descriptor; its serial number is in the EEPROM only."""
@@ -110,77 +92,54 @@ class SpectrometerBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb 
             wMaxPacketSize=PACKET, bInterval=0, bRefresh=0, bSynchAddress=0, extra_descriptors=b"",
         )  # fmt: skip
 
-    def open_device(self, dev: int) -> _Handle:
-        """Open the spectrometer, unless it has gone or come back under another address."""
-        self._notice_unplugging()
-        if dev != 1 + self._plugging or not self._is_plugged:
-            raise errors.unplugged()
-        handle = _Handle()
-        self._handles.add(handle)
-        return handle
-
-    def close_device(self, dev_handle: _Handle) -> None:
-        """Close the handle, also of a device that has been unplugged."""
-        self._handles.discard(dev_handle)
-
-    def get_configuration(self, dev_handle: _Handle) -> int:
-        """Return the one configuration, which is always the active one."""
-        self._use(dev_handle)
-        return CONFIGURATION_VALUE
-
-    def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
+    def set_configuration(self, dev_handle: UsbHandle, config_value: int) -> None:
         """Do nothing: there is one configuration."""
         self._use(dev_handle)
 
-    def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
+    def claim_interface(self, dev_handle: UsbHandle, intf: int) -> None:
         """Do nothing: nobody else is there."""
         self._use(dev_handle)
 
-    def release_interface(self, dev_handle: _Handle, intf: int) -> None:
+    def release_interface(self, dev_handle: UsbHandle, intf: int) -> None:
         """Do nothing: nobody else is there."""
 
-    def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
-        """Return False: no system has a driver of its own for it."""
-        self._use(dev_handle)
-        return False
-
-    def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
+    def bulk_write(self, dev_handle: UsbHandle, ep: int, intf: int, data: Any, timeout: int) -> int:
         """Do one bulk-out transfer."""
         self._use(dev_handle)
         if ep != COMMANDS:
-            raise errors.not_found()
+            raise usb_errors.not_found()
         command = data.tobytes()
         self._carry(len(command))
         if not self._is_any_on(self._silent):
             self._instrument.write(command)
         return len(command)
 
-    def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
+    def bulk_read(self, dev_handle: UsbHandle, ep: int, intf: int, buff: Any, timeout: int) -> int:
         """Do one bulk-in transfer, as soon as there is something to read.
 
         A time-out passes in full; the answer to an earlier command may still come then.
         """
         self._use(dev_handle)
         if ep not in (ANSWERS, SPECTRA):
-            raise errors.not_found()
+            raise usb_errors.not_found()
         wait_s = self._instrument.due_s(ep) - self._clock.now()
         if wait_s > timeout / 1000 or self._is_any_on(self._silent):
             self._pass(timeout / 1000)
-            raise errors.timed_out()
+            raise usb_errors.timed_out()
         self._pass(max(wait_s, 0.0))
         transfer = self._instrument.read(ep)
         if ep == SPECTRA and self._is_any_on(self._truncated):
             transfer = transfer[:CUT_OFF]
         target = memoryview(buff).cast("B")
         if len(transfer) > len(target):
-            raise errors.overflowed()
+            raise usb_errors.overflowed()
         self._carry(len(transfer))
         target[: len(transfer)] = transfer
         return len(transfer)
 
     def ctrl_transfer(
         self,
-        dev_handle: _Handle,
+        dev_handle: UsbHandle,
         bmRequestType: int,
         bRequest: int,
         wValue: int,
@@ -190,9 +149,9 @@ class SpectrometerBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb 
     ) -> int:
         """Stall: it has no strings and no requests of its own."""
         self._use(dev_handle)
-        raise errors.stalled()
+        raise usb_errors.stalled()
 
-    def reset_device(self, dev_handle: _Handle) -> None:
+    def reset_device(self, dev_handle: UsbHandle) -> None:
         """Reset the port: the instrument forgets what was asked."""
         self._use(dev_handle)
         self._instrument.reset()
@@ -202,20 +161,12 @@ class SpectrometerBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb 
         return not self._is_any_on(self._unplugged)
 
     @property
-    def _times_unplugged(self) -> int:
+    def _plugging(self) -> int:
         now_s = self._clock.now()
-        return sum(out.at <= now_s for out in self._unplugged)
+        return 1 + sum(out.at <= now_s for out in self._unplugged)
 
-    def _use(self, handle: _Handle) -> None:
-        self._notice_unplugging()
-        if handle not in self._handles or not self._is_plugged:
-            raise errors.unplugged()
-
-    def _notice_unplugging(self) -> None:
-        if self._plugging != self._times_unplugged:
-            self._plugging = self._times_unplugged
-            self._handles.clear()
-            self._instrument.reset()
+    def _power_lost(self) -> None:
+        self._instrument.reset()
 
     def _carry(self, n_bytes: int) -> None:
         self._pass(TRANSACTION_S + n_bytes / BYTES_PER_S)
@@ -227,7 +178,7 @@ class SpectrometerBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb 
         self._clock.spend(min(out_s, default=duration_s))
         if out_s:
             self._notice_unplugging()
-            raise errors.unplugged()
+            raise usb_errors.unplugged()
 
     def _is_any_on(self, spans: Sequence[FaultTime]) -> bool:
         now_s = self._clock.now()

@@ -1,14 +1,13 @@
 """The simulated camera as pyusb sees it: an `IBackend` with one device, or none when unplugged."""
 
-from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, NoReturn
 
-import usb.backend
-
 from labrig.clock import VirtualClock
 
-from . import descriptors, errors
+from ... import usb_errors
+from ...usb_device import CONFIGURATION_VALUE, OneDeviceBackend, UsbHandle
+from . import descriptors
 from .cable import Cable
 from .descriptors import UsbIdentity
 from .still_image import BULK_IN, BULK_OUT, INTERRUPT_IN, StillImageFunction
@@ -19,11 +18,7 @@ _FROM_INTERFACE, _TO_INTERFACE = 0xA1, 0x21
 _INTERFACE = 0
 
 
-class _Handle:
-    """One opening of the device, valid until it is closed or the cable comes out."""
-
-
-class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is untyped
+class CameraBackend(OneDeviceBackend):
     """Bus with this one camera on it.
 
     Every transfer takes virtual time; a time-out passes in full. A time-out of 0, for ever with
@@ -48,28 +43,17 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         cable: Cable,
         identity: UsbIdentity,
     ) -> None:
-        super().__init__()
         self._identity = identity
         self._clock = clock
         self._function = function
         self._cable = cable
-        self._plugging = cable.plugging
-        self._handles: set[_Handle] = set()
-        self._claimed_by: _Handle | None = None
+        self._claimed_by: UsbHandle | None = None
+        super().__init__()
 
     def close_all(self) -> None:
         """Close all handles, as an operating system does for a killed process."""
-        self._handles.clear()
+        super().close_all()
         self._claimed_by = None
-
-    def enumerate_devices(self) -> Iterator[int]:
-        """Yield the camera by its address on the bus, if it is plugged in."""
-        self._notice_unplugging()
-        if self._cable.is_plugged:
-            yield self._cable.plugging
-
-    def get_parent(self, dev: Any) -> None:
-        """Return None: no hub is simulated."""
 
     def get_device_descriptor(self, dev: Any) -> SimpleNamespace:
         """Return the device descriptor."""
@@ -91,86 +75,67 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         """Return the endpoint by its place in the interface."""
         return descriptors.endpoints()[ep]
 
-    def open_device(self, dev: int) -> _Handle:
-        """Open the camera, unless it has gone or come back under another address."""
-        self._notice_unplugging()
-        if dev != self._cable.plugging or not self._cable.is_plugged:
-            raise errors.unplugged()
-        handle = _Handle()
-        self._handles.add(handle)
-        return handle
-
-    def close_device(self, dev_handle: _Handle) -> None:
+    def close_device(self, dev_handle: UsbHandle) -> None:
         """Close the handle, also of a device that has been unplugged."""
-        self._handles.discard(dev_handle)
+        super().close_device(dev_handle)
         if self._claimed_by is dev_handle:
             self._claimed_by = None
 
-    def get_configuration(self, dev_handle: _Handle) -> int:
-        """Return the one configuration, which is always the active one."""
-        self._use(dev_handle)
-        return descriptors.CONFIGURATION_VALUE
-
-    def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
+    def set_configuration(self, dev_handle: UsbHandle, config_value: int) -> None:
         """Do nothing: there is one configuration."""
         self._use(dev_handle)
-        if config_value != descriptors.CONFIGURATION_VALUE:
-            raise errors.not_found()
+        if config_value != CONFIGURATION_VALUE:
+            raise usb_errors.not_found()
 
-    def set_interface_altsetting(self, dev_handle: _Handle, intf: int, altsetting: int) -> None:
+    def set_interface_altsetting(self, dev_handle: UsbHandle, intf: int, altsetting: int) -> None:
         """Do nothing: there is one setting."""
         self._use(dev_handle)
         if (intf, altsetting) != (_INTERFACE, 0):
-            raise errors.not_found()
+            raise usb_errors.not_found()
 
-    def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
+    def claim_interface(self, dev_handle: UsbHandle, intf: int) -> None:
         """Claim the interface, for one handle at a time."""
         self._use(dev_handle)
         if intf != _INTERFACE:
-            raise errors.not_found()
+            raise usb_errors.not_found()
         if self._claimed_by not in (None, dev_handle):
-            raise errors.claimed_by_another()
+            raise usb_errors.claimed_by_another()
         self._claimed_by = dev_handle
 
-    def release_interface(self, dev_handle: _Handle, intf: int) -> None:
+    def release_interface(self, dev_handle: UsbHandle, intf: int) -> None:
         """Release the interface."""
         self._use(dev_handle)
         if intf != _INTERFACE or self._claimed_by is not dev_handle:
-            raise errors.not_found()
+            raise usb_errors.not_found()
         self._claimed_by = None
 
-    def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
-        """Return False: no desktop has mounted this camera."""
-        self._use(dev_handle)
-        return False
-
-    def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
+    def bulk_write(self, dev_handle: UsbHandle, ep: int, intf: int, data: Any, timeout: int) -> int:
         """Do one bulk-out transfer."""
         self._use(dev_handle)
         if ep != BULK_OUT:
-            raise errors.not_found()
+            raise usb_errors.not_found()
         transfer = data.tobytes()
         self._cable.carry(len(transfer))
         if not self._function.write(transfer):
             self._time_out(timeout)
         return len(transfer)
 
-    def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
+    def bulk_read(self, dev_handle: UsbHandle, ep: int, intf: int, buff: Any, timeout: int) -> int:
         """Do one bulk-in transfer."""
         self._use(dev_handle)
         if ep != BULK_IN:
-            raise errors.not_found()
+            raise usb_errors.not_found()
         target = memoryview(buff).cast("B")
         transfer = self._function.read(len(target))
         if transfer is None:
             self._time_out(timeout)
         return self._deliver(transfer, target)
 
-    def intr_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
+    def intr_read(self, dev_handle: UsbHandle, ep: int, intf: int, buff: Any, timeout: int) -> int:
         """Do one interrupt transfer, as soon as the camera has an event."""
         self._use(dev_handle)
         if ep != INTERRUPT_IN:
-            raise errors.not_found()
+            raise usb_errors.not_found()
         wait_s = self._function.interrupt_due_s() - self._clock.now()
         if wait_s > timeout / 1000:
             self._time_out(timeout)
@@ -180,7 +145,7 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
 
     def ctrl_transfer(
         self,
-        dev_handle: _Handle,
+        dev_handle: UsbHandle,
         bmRequestType: int,
         bRequest: int,
         wValue: int,
@@ -200,35 +165,35 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         elif (bmRequestType, bRequest, wValue >> 8) == _GET_STRING:
             answer = descriptors.string(wValue & 0xFF, self._identity)
         else:
-            raise errors.stalled()
+            raise usb_errors.stalled()
         target = memoryview(data).cast("B")
         n_bytes = min(len(answer), len(target))
         target[:n_bytes] = answer[:n_bytes]
         self._cable.carry(0)
         return n_bytes
 
-    def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
+    def clear_halt(self, dev_handle: UsbHandle, ep: int) -> None:
         """Clear the halt of one endpoint."""
         self._use(dev_handle)
         self._cable.carry(0)
         self._function.clear_halt(ep)
 
-    def reset_device(self, dev_handle: _Handle) -> None:
+    def reset_device(self, dev_handle: UsbHandle) -> None:
         """Reset the port: the camera forgets its session, the handle stays good."""
         self._use(dev_handle)
         self._cable.carry(0)
         self._function.reset()
 
-    def _use(self, handle: _Handle) -> None:
-        self._notice_unplugging()
-        if handle not in self._handles or not self._cable.is_plugged:
-            raise errors.unplugged()
+    @property
+    def _is_plugged(self) -> bool:
+        return self._cable.is_plugged
 
-    def _notice_unplugging(self) -> None:
-        if self._plugging != self._cable.plugging:
-            self._plugging = self._cable.plugging
-            self.close_all()
-            self._function.reset()
+    @property
+    def _plugging(self) -> int:
+        return self._cable.plugging
+
+    def _power_lost(self) -> None:
+        self._function.reset()
 
     def _deliver(self, transfer: memoryview, target: memoryview) -> int:
         self._cable.carry(len(transfer))
@@ -237,4 +202,4 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
 
     def _time_out(self, timeout: int) -> NoReturn:
         self._cable.wait(timeout / 1000)
-        raise errors.timed_out()
+        raise usb_errors.timed_out()

@@ -4,9 +4,9 @@ import math
 
 from labrig.clock import VirtualClock
 
+from ... import usb_errors
 from ..faults import CameraFaults
 from ..power import AutoPowerOff
-from . import errors
 
 #: Time of host controller and scheduler for every transfer (one high-speed microframe).
 TRANSACTION_S = 125e-6
@@ -62,7 +62,7 @@ class Cable:
                 self._pass(TRANSACTION_S + self._bytes_to_unplug / BYTES_PER_S)
                 self._bytes_to_unplug = None
                 self._unplug_at_s = self._clock.now()
-                raise errors.unplugged()
+                raise usb_errors.unplugged()
             self._bytes_to_unplug -= n_bytes
         self._pass(TRANSACTION_S + n_bytes / BYTES_PER_S)
 
@@ -74,5 +74,5 @@ class Cable:
         to_unplug_s = self._unplug_at_s - self._clock.now()
         if 0 < to_unplug_s <= duration_s:
             self._clock.spend(to_unplug_s)
-            raise errors.unplugged()
+            raise usb_errors.unplugged()
         self._clock.spend(duration_s)

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from types import SimpleNamespace
 
-from . import errors
+from ... import usb_errors
+from ...usb_device import CONFIGURATION_VALUE
 from .still_image import BULK_IN, BULK_OUT, BULK_PACKET, INTERRUPT_IN, INTERRUPT_PACKET
 
-CONFIGURATION_VALUE = 1
 _ENGLISH = 0x0409
 _STRING = 3
 _STILL_IMAGE, _CAPTURE, _PTP = 6, 1, 1
@@ -124,5 +124,5 @@ def string(index: int, identity: UsbIdentity) -> bytes:
     elif strings.get(index):
         body = strings[index].encode("utf-16-le")
     else:
-        raise errors.stalled()
+        raise usb_errors.stalled()
     return bytes((2 + len(body), _STRING)) + body

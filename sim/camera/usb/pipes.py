@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from . import errors
+from ... import usb_errors
 
 
 class InPipe:
@@ -47,6 +47,6 @@ class InPipe:
             lost = whole_packets + self._packet_size
             if lost <= len(transfer):
                 self._transfers.appendleft(transfer[lost:])
-            raise errors.overflowed()
+            raise usb_errors.overflowed()
         self._transfers.appendleft(transfer[room:])
         return transfer[:room]

@@ -4,10 +4,10 @@ import struct
 
 from labrig.clock import Clock
 
+from ... import usb_errors
 from ..faults import CameraFaults
 from ..responder import Responder
 from ..vocabulary import ResponseCode
-from . import errors
 from .containers import (
     Assembler,
     Container,
@@ -74,7 +74,7 @@ class StillImageFunction:
         The camera takes nothing while an answer waits to be read.
         """
         if BULK_OUT in self._halted:
-            raise errors.stalled()
+            raise usb_errors.stalled()
         if self._in:
             return False
         try:
@@ -88,7 +88,7 @@ class StillImageFunction:
     def read(self, room: int) -> memoryview | None:
         """Return one bulk-in transfer of at most `room` bytes; None if there is nothing to read."""
         if BULK_IN in self._halted:
-            raise errors.stalled()
+            raise usb_errors.stalled()
         return self._in.take(room) if self._in else None
 
     def interrupt_due_s(self) -> float:
@@ -111,12 +111,12 @@ class StillImageFunction:
         elif request == CANCEL and len(data) == 6:
             self._cancel(*struct.unpack("<HI", data))
         else:
-            raise errors.stalled()
+            raise usb_errors.stalled()
 
     def request_in(self, request: int) -> bytes:
         """Return the answer to a class request of the host."""
         if request != GET_STATUS:
-            raise errors.stalled()
+            raise usb_errors.stalled()
         if self._halted:
             code = ResponseCode.TRANSACTION_CANCELLED
         elif self._clock.now() < self._cancelling_until_s:
@@ -175,7 +175,7 @@ class StillImageFunction:
 
     def _cancel(self, code: int, transaction_id: int) -> None:
         if code != _CANCELLATION:
-            raise errors.stalled()
+            raise usb_errors.stalled()
         if transaction_id == self._transaction_id:
             if self._command is not None:
                 self._responder.abandon(transaction_id)
