@@ -111,7 +111,7 @@ class DirectBispectral(ProtocolModel):
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """What is put before the spectrometer, in order: the white reference, then the samples."""
+        """Stages before the spectrometer, in order: the white reference, then the samples."""
         return (WHITE, *self.samples)
 
     def shuffled(self) -> Sequence[str]:
@@ -143,7 +143,7 @@ class DirectBispectral(ProtocolModel):
 
 @dataclass(frozen=True)
 class DarkUnit:
-    """What the spectrometer reads with all lights off, at all integration times."""
+    """Readings of the spectrometer with all lights off, at all integration times."""
 
     protocol: DirectBispectral
     stage: str

@@ -58,7 +58,7 @@ class FittedMatrix:
 
     @cached_property
     def differences(self) -> tuple[ColourDifference, ...]:
-        """How far the mixture's colours are from the matrix's; none of relative re-radiation."""
+        """Differences of the mixture's colours from the matrix's; none of relative re-radiation."""
         if self.matrix.unit == "relative":
             return ()
         return tuple(compare_colours(self.model, self.matrix, self.lights))

@@ -12,7 +12,7 @@ from labrig.results.run_result import RunResult
 
 
 class LedFault(StrEnum):
-    """What can be amiss with an LED, or with what it lights."""
+    """Faults of an LED, or of what it lights."""
 
     NOT_MEASURED = "not measured"
     NOT_LIT = "not lit"

@@ -12,7 +12,7 @@ LIMIT_MA = 1000
 
 
 class Outputs(Protocol):
-    """What the unit's outputs feed."""
+    """LEDs that the unit's outputs feed."""
 
     def switch(self, output: int, on: bool) -> None:
         """Let an output, counted from 0, have current or none."""

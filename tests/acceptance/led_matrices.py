@@ -75,7 +75,7 @@ WHITE_ERROR = 1e-3
 
 @dataclass(frozen=True)
 class Case:
-    """What is used, and what is wrong with it."""
+    """Things that are used, and what is wrong with them."""
 
     leds: tuple[str, ...] = NINE
     calibrated: bool = True

@@ -90,7 +90,7 @@ def true_light(name: str) -> FloatArray:
 def true_column(
     material: str, light: FloatArray, output_nm: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """What comes back in each band over the light's power: all of it, and what is re-radiated."""
+    """Light that comes back in each band over the light's power: all, and what is re-radiated."""
     surfaces = Surfaces([read_any_material(material)], 0.0)
     (back,) = surfaces.thrown_back(light, np.array([1]))
     edges_nm = edges_from_centres(output_nm)

@@ -30,7 +30,7 @@ TAIL_WIDTHS = 3.0
 
 
 class LedLight(BaseModel):
-    """What is known of an LED's light: keys that every bank of LEDs has for each of them.
+    """The light of an LED as far as it is known: keys that every bank of LEDs has for each of them.
 
     Attributes
     ----------

@@ -47,7 +47,7 @@ PASSED = 0.05
 
 @dataclass(frozen=True, eq=False)
 class _Lit:
-    """What came of one light: the spectrum, and the integration time in seconds.
+    """Result of one light: the spectrum, and the integration time in seconds.
 
     Of the white reference also the range in nm within which the light's power is counted.
     """

@@ -70,8 +70,12 @@ def analyse(part: Part) -> LedBrightnessResult:
         for unit in values
         if (seen := spectrometry(part, unit, unit.removeprefix(CARD))) is not None
     }
-    of_cards = {unit.removeprefix(CARD): one for unit, one in values.items() if _is_card(unit)}
-    by_led = {unit.removeprefix(CARD): one for unit, one in spectra.items() if _is_card(unit)}
+    of_cards = {
+        unit.removeprefix(CARD): reading for unit, reading in values.items() if _is_card(unit)
+    }
+    by_led = {
+        unit.removeprefix(CARD): reading for unit, reading in spectra.items() if _is_card(unit)
+    }
     checked = check_leds(bank, of_cards, by_led, part.protocol.leds)
     bank, of_cards = _without_unseen(checked, bank, of_cards)
     measured = _measured(bank, of_cards, by_led, checked)
@@ -90,10 +94,10 @@ def _bank(part: Part) -> Bank:
     source = str(part.run.folder)
     exposures = led_exposures(part.rig, source)
     camera = camera_curves(part.rig, part.overrides.camera)
-    nominal = {name: one.light for name, one in exposures.items()}
+    nominal = {name: exposure.light for name, exposure in exposures.items()}
     lights = led_lights(part.rig, source)
     sketched = frozenset(name for name, light in lights.items() if light.spectrum is None)
-    sigma_nm = {name: one.wavelength_sigma_nm for name, one in exposures.items()}
+    sigma_nm = {name: exposure.wavelength_sigma_nm for name, exposure in exposures.items()}
     return Bank(nominal, sketched, sigma_nm, camera, card_reflectance(part.rig))
 
 
@@ -116,8 +120,8 @@ def _without_unseen(
         channels=tuple(bank.camera.channels[n] for n in kept),
     )
     selected = {
-        name: CameraValues(one.value[kept], one.sigma[kept], one.off[kept], one.off_sigma[kept])
-        for name, one in values.items()
+        name: CameraValues(card.value[kept], card.sigma[kept], card.off[kept], card.off_sigma[kept])
+        for name, card in values.items()
     }
     return replace(bank, camera=camera), selected
 
@@ -133,25 +137,25 @@ def _measured(
     for name, nominal in bank.nominal.items():
         if name not in values or name in checked.left_out:
             continue
-        one = LedLightMeasured(name, nominal, DATA_SHEET_NM, is_nominal=name in bank.sketched)
+        led = LedLightMeasured(name, nominal, DATA_SHEET_NM, is_nominal=name in bank.sketched)
         if name not in checked.without_camera:
             seen = values[name]
-            one = replace(one, value=seen.value, variance=seen.sigma**2)
+            led = replace(led, value=seen.value, variance=seen.sigma**2)
         by_spectrometer = spectra.get(name)
         if by_spectrometer is not None and name not in checked.without_spectrometer:
-            one = _with_spectrum(one, by_spectrometer)
-        measured.append(one)
+            led = _with_spectrum(led, by_spectrometer)
+        measured.append(led)
     return measured
 
 
-def _with_spectrum(one: LedLightMeasured, seen: Spectrometry) -> LedLightMeasured:
+def _with_spectrum(led: LedLightMeasured, seen: Spectrometry) -> LedLightMeasured:
     band = seen.band
     if band is None:
-        return one
+        return led
     # The brightness is that of the time between both readings, of which two ends are known.
     sigma = math.hypot(band.sigma / band.light, BAND_SIGMA, seen.change / math.sqrt(12))
     return replace(
-        one,
+        led,
         spectrum=band.spectrum,
         wavelength_sigma_nm=math.hypot(SPECTROMETER_NM, band.centroid_sigma_nm),
         is_nominal=False,
@@ -173,11 +177,11 @@ def _drift(
     if begin not in values or end not in values:
         return None
     seen = [values[begin], values[end]]
-    if not all(one.is_seen for one in seen):
+    if not all(card.is_seen for card in seen):
         return None
     channel = int(np.nanargmax(seen[0].value))
-    before, after = (float(one.value[channel]) for one in seen)
-    noise = [float(one.sigma[channel] / one.value[channel]) for one in seen]
+    before, after = (float(card.value[channel]) for card in seen)
+    noise = [float(card.sigma[channel] / card.value[channel]) for card in seen]
     ratio = after / before
     return Measured(ratio - 1, ratio * math.hypot(*noise, FLICKER * math.sqrt(2)))
 
@@ -194,7 +198,7 @@ class _Comparison:
 
 @dataclass(frozen=True, eq=False)
 class _Calibration:
-    """From what counts of every LED to the result."""
+    """Result from the readings of every LED that count."""
 
     part: Part
     bank: Bank
@@ -213,8 +217,8 @@ class _Calibration:
         findings = [*self.checked.findings, *self._judged(brightness, comparison)]
         uv_scale = self._uv_scale(brightness)
         leds = {
-            one.name: self._calibrated(number, one, fit, brightness[one.name])
-            for number, one in enumerate(self.measured)
+            led.name: self._calibrated(number, led, fit, brightness[led.name])
+            for number, led in enumerate(self.measured)
         }
         calibration = LedsFile(
             leds=leds,
@@ -229,8 +233,8 @@ class _Calibration:
             uv_scale=uv_scale,
             channels=self.bank.camera.channels,
             leds={
-                one.name: self._led(one.name, leds[one.name], brightness[one.name], comparison)
-                for one in self.measured
+                led.name: self._led(led.name, leds[led.name], brightness[led.name], comparison)
+                for led in self.measured
             },
             drift=self.drift,
             findings=tuple(findings),
@@ -239,12 +243,12 @@ class _Calibration:
 
     @property
     def _is_absolute(self) -> bool:
-        lit = [self.spectra[one.name] for one in self.measured if one.light is not None]
+        lit = [self.spectra[led.name] for led in self.measured if led.light is not None]
         return bool(lit) and all(seen.is_absolute for seen in lit)
 
     @property
     def _by(self) -> str:
-        has_spectra = any(one.light is not None for one in self.measured)
+        has_spectra = any(led.light is not None for led in self.measured)
         return "spectrometer and camera" if has_spectra else "the camera"
 
     def _response(self) -> ResponseError:
@@ -258,23 +262,23 @@ class _Calibration:
         drift = 0.0 if self.drift is None else self.drift.value / math.sqrt(12)
         relative = np.hypot(fit.sigma, drift)
         known = [
-            relative[number] < LOOSE and not self._is_unseen(one)
-            for number, one in enumerate(self.measured)
+            relative[number] < LOOSE and not self._is_unseen(led)
+            for number, led in enumerate(self.measured)
         ]
         log_b = fit.log_brightness
         if not self._is_absolute and any(known):
             log_b = log_b - log_b[known].max()
         unit = "W m⁻²" if self._is_absolute else ""
         return {
-            one.name: Measured(math.exp(log), math.exp(log) * float(sigma), unit) if has else None
-            for one, log, sigma, has in zip(
+            led.name: Measured(math.exp(log), math.exp(log) * float(sigma), unit) if has else None
+            for led, log, sigma, has in zip(
                 self.measured, log_b.tolist(), relative, known, strict=True
             )
         }
 
-    def _is_unseen(self, one: LedLightMeasured) -> bool:
+    def _is_unseen(self, led: LedLightMeasured) -> bool:
         """Whether it is ultraviolet and no spectrometer saw it."""
-        return one.light is None and self.bank.peak_nm(one.name) < UV_NM
+        return led.light is None and self.bank.peak_nm(led.name) < UV_NM
 
     def _uv_scale(self, brightness: Mapping[str, Measured | None]) -> UvScale:
         ultraviolet = [name for name in brightness if self._peak_nm(name) < UV_NM]
@@ -290,9 +294,9 @@ class _Calibration:
 
     def _compared(self, response: ResponseError) -> _Comparison | None:
         """Compare both instruments where both saw an LED; None if that are fewer than two."""
-        both = [one for one in self.measured if one.light is not None and one.value is not None]
+        both = [led for led in self.measured if led.light is not None and led.value is not None]
         camera = fit_brightness(
-            [replace(one, light=None, light_sigma=None) for one in both],
+            [replace(led, light=None, light_sigma=None) for led in both],
             self.bank.camera,
             self.bank.card,
         ) if len(both) > 1 else None  # fmt: skip
@@ -302,8 +306,8 @@ class _Calibration:
         if len(rows) < 2:
             return None
         both = [both[row] for row in rows]
-        light = np.array([one.light for one in both], dtype=np.float64)
-        noise = np.array([one.light_sigma for one in both], dtype=np.float64)
+        light = np.array([led.light for led in both], dtype=np.float64)
+        noise = np.array([led.light_sigma for led in both], dtype=np.float64)
         centre = camera.centre_nm[rows]
         distance = (centre[:, np.newaxis] - centre) / response.correlation_nm
         by_response = response.sigma**2 * np.exp(-(distance**2) / 2) + np.diag(noise**2)
@@ -315,7 +319,7 @@ class _Calibration:
         left = about @ off
         chi2 = float(left @ np.linalg.solve(covariance, left))
         pulls = left / np.sqrt(np.diag(about @ covariance @ about.T))
-        names = [one.name for one in both]
+        names = [led.name for led in both]
         top = math.log(light.max())
         camera_log = np.log(light) + left - top
         return _Comparison(
@@ -326,8 +330,8 @@ class _Calibration:
                 )
             },
             {
-                name: Measured(float(one / light.max()), float(one / light.max() * sigma))
-                for name, one, sigma in zip(names, light, noise, strict=True)
+                name: Measured(float(amount / light.max()), float(amount / light.max() * sigma))
+                for name, amount, sigma in zip(names, light, noise, strict=True)
             },
             float(chi2_distribution.sf(chi2, len(rows) - 1)),
             names[int(np.argmax(np.abs(pulls)))],
@@ -338,14 +342,14 @@ class _Calibration:
     ) -> list[LedFinding]:
         """Return what the numbers themselves show to be amiss."""
         findings = []
-        unseen = [one.name for one in self.measured if self._is_unseen(one)]
+        unseen = [led.name for led in self.measured if self._is_unseen(led)]
         if unseen:
             text = (
                 f"the scale below 400 nm is unknown: no camera tells how bright "
                 f"{', '.join(unseen)} is; a spectrometer at the white reference would"
             )
             findings.append(LedFinding(LedFault.UNKNOWN_BRIGHTNESS, tuple(unseen), text))
-        loose = [name for name, one in brightness.items() if one is None and name not in unseen]
+        loose = [name for name, known in brightness.items() if known is None and name not in unseen]
         if loose:
             text = (
                 f"the brightness of {', '.join(loose)} stays unknown: no value of the camera tells "
@@ -369,19 +373,19 @@ class _Calibration:
         return findings
 
     def _calibrated(
-        self, number: int, one: LedLightMeasured, fit: BrightnessFit, brightness: Measured | None
+        self, number: int, led: LedLightMeasured, fit: BrightnessFit, brightness: Measured | None
     ) -> CalibratedLed:
         """Return spectrum and brightness of an LED for the file."""
-        spectrum, sigma_nm = self._spectrum(number, one, fit, brightness is not None)
+        spectrum, sigma_nm = self._spectrum(number, led, fit, brightness is not None)
         source: LedSource = "camera" if brightness is not None else "rig file"
-        if one.light is not None:
+        if led.light is not None:
             source = "spectrometer"
         top = spectrum.value.max()
         sigma = None if spectrum.sigma is None else tuple((spectrum.sigma / top).tolist())
         return CalibratedLed(
             wavelength_nm=tuple(spectrum.wavelength_nm.tolist()),
             value=tuple((spectrum.value / top).tolist()),
-            sigma=sigma if one.light is not None else None,
+            sigma=sigma if led.light is not None else None,
             brightness=None if brightness is None else brightness.value,
             brightness_sigma=None if brightness is None else brightness.sigma,
             wavelength_sigma_nm=sigma_nm,
@@ -389,7 +393,7 @@ class _Calibration:
         )
 
     def _spectrum(
-        self, number: int, one: LedLightMeasured, fit: BrightnessFit, is_known: bool
+        self, number: int, led: LedLightMeasured, fit: BrightnessFit, is_known: bool
     ) -> tuple[Spectrum, float]:
         """Return an LED's spectrum, and σ of its wavelengths in nm.
 
@@ -397,24 +401,24 @@ class _Calibration:
         is better known then is not said, since it is from the curves' slopes. The wavelengths of a
         spectrometer are better than what a camera says of them, but its response skews a spectrum.
         """
-        if one.light is None and not is_known:
-            return one.spectrum, self.bank.sheet_sigma_nm[one.name]
-        if one.light is None:
+        if led.light is None and not is_known:
+            return led.spectrum, self.bank.sheet_sigma_nm[led.name]
+        if led.light is None:
             shifted = changed_spectrum(
-                one.spectrum,
+                led.spectrum,
                 float(fit.shift_nm[number]),
                 float(fit.width_factor[number]),
                 float(fit.skew[number]),
             )
-            return shifted, self.bank.sheet_sigma_nm[one.name]
-        spectrum = one.spectrum
+            return shifted, self.bank.sheet_sigma_nm[led.name]
+        spectrum = led.spectrum
         if self._is_absolute:
-            return spectrum, one.wavelength_sigma_nm
+            return spectrum, led.wavelength_sigma_nm
         weight = np.maximum(spectrum.value, 0.0)
         off_nm = spectrum.wavelength_nm - centroid_nm(spectrum)
         skew_nm = float(weight @ off_nm**2 / weight.sum() * fit.response_slope_sigma_per_nm[number])
         levelled = _levelled(spectrum, fit.log_response_at(spectrum.wavelength_nm))
-        return levelled, math.hypot(one.wavelength_sigma_nm, skew_nm)
+        return levelled, math.hypot(led.wavelength_sigma_nm, skew_nm)
 
     def _led(
         self,

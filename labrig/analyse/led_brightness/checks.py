@@ -61,7 +61,7 @@ class Bank:
 
 @dataclass
 class Checked:
-    """What the checks leave to be used.
+    """Readings and LEDs that the checks leave to be used.
 
     Attributes
     ----------
@@ -198,16 +198,18 @@ def _check_spectra(checked: Checked, bank: Bank, spectra: Mapping[str, Spectrome
             )
             checked.found(LedFault.OTHER_WAVELENGTH, [name], text)
     fluorescent = {}
-    lit_beside = {name: one for name, band in bands.items() if (one := _beside(band)) is not None}
+    lit_beside = {
+        name: light for name, band in bands.items() if (light := _beside(band)) is not None
+    }
     short = {
-        name: one
-        for name, one in lit_beside.items()
-        if bands[name].centroid_nm < min(EXCITING_NM, one[1])
+        name: light
+        for name, light in lit_beside.items()
+        if bands[name].centroid_nm < min(EXCITING_NM, light[1])
     }
     for name, (part, centre_nm, rms_nm) in lit_beside.items():
         nearest = bank.nearest(centre_nm)
         is_led = nearest != name and abs(bank.peak_nm(nearest) - centre_nm) <= HALF_BAND_NM
-        alike = [one for one in short.values() if abs(one[1] - centre_nm) <= ALIKE_NM]
+        alike = [light for light in short.values() if abs(light[1] - centre_nm) <= ALIKE_NM]
         if name in short and len(alike) > 1:
             fluorescent[name] = part, centre_nm
         elif is_led and rms_nm <= _rms_nm(bank.nominal[nearest]) * WINGS + BIN_NM / 2:
@@ -333,9 +335,9 @@ def unseen_channels(bank: Bank, values: Mapping[str, CameraValues]) -> list[str]
     unseen = []
     for number, channel in enumerate(bank.camera.channels):
         seen = [
-            one.value[number] > SEEN_SIGMA * one.sigma[number]
-            for one in values.values()
-            if not one.is_clipped
+            card.value[number] > SEEN_SIGMA * card.sigma[number]
+            for card in values.values()
+            if not card.is_clipped
         ]
         if seen and not any(seen):
             unseen.append(channel)

@@ -118,7 +118,7 @@ def camera_values(part: Part, camera: CameraResponse) -> dict[str, CameraValues]
             "curves in the rig file (optics: camera)"
         )
     order = [series.channels.index(channel) for channel in camera.channels]
-    by_unit = {one.unit[0]: _mean(one) for one in off_series.by_unit()}
+    by_unit = {unit_series.unit[0]: _mean(unit_series) for unit_series in off_series.by_unit()}
     return {
         one.unit[0]: _less(_mean(one), by_unit.get(one.unit[0]), order) for one in series.by_unit()
     }

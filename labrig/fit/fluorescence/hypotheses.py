@@ -104,7 +104,7 @@ class Scored:
 
 @dataclass(frozen=True, eq=False)
 class Hypotheses:
-    """What all surfaces under the lights of one system have in common, computed once.
+    """Factors that all surfaces under the lights of one system have in common, computed once.
 
     Attributes
     ----------
@@ -253,10 +253,13 @@ class Hypotheses:
             return tried
         tried += self._with_one_more(bases, measured, residual)
         pairs = self._pairs(bases, measured, residual)
-        best_single = max(one.log_posterior for one in tried)
+        best_single = max(candidate.log_posterior for candidate in tried)
         tried += pairs
         if pairs and pairs[0].log_posterior > best_single:
-            bases = {one.hypothesis: self.variance(one.hypothesis) for one in pairs[:TRIPLED]}
+            bases = {
+                candidate.hypothesis: self.variance(candidate.hypothesis)
+                for candidate in pairs[:TRIPLED]
+            }
             tried += self._with_one_more(bases, measured, residual)
         return tried
 
@@ -284,22 +287,22 @@ class Hypotheses:
                     shapes = int(usual[first[index]]), int(usual[second[index]])
                     dyes = tuple(map(Fluorophore, shapes, amplitudes))
                     rough.append((float(density[index]), replace(base, fluorophores=dyes)))
-        rough.sort(key=lambda one: -one[0])
+        rough.sort(key=lambda pair: -pair[0])
         found: dict[Hypothesis, Scored] = {}
         for _, hypothesis in rough[:PAIRED]:
             for dye in hypothesis.fluorophores:
                 near = self._with_another(hypothesis, dye, measured, residual)
-                found.update({one.hypothesis: one for one in near})
+                found.update({candidate.hypothesis: candidate for candidate in near})
                 hypothesis = near[0].hypothesis
-        best = sorted(found.values(), key=lambda one: -one.log_posterior)[:REFINED]
-        for one in best:
+        best = sorted(found.values(), key=lambda candidate: -candidate.log_posterior)[:REFINED]
+        for candidate in best:
             for base in bases:
-                hypothesis = replace(base, fluorophores=one.hypothesis.fluorophores)
+                hypothesis = replace(base, fluorophores=candidate.hypothesis.fluorophores)
                 total = measured.total + self.variance(hypothesis)
                 log_posterior = float(_log_densities(total[np.newaxis], residual)[0])
                 log_posterior += self.log_prior(hypothesis)
                 found[hypothesis] = Scored(hypothesis, log_posterior)
-        return sorted(found.values(), key=lambda one: -one.log_posterior)
+        return sorted(found.values(), key=lambda candidate: -candidate.log_posterior)
 
     @cached_property
     def _usual_shapes(self) -> np.ndarray:
@@ -323,7 +326,7 @@ class Hypotheses:
         shapes = np.flatnonzero(away_nm <= NEAR_NM)
         covariance = measured.total + self.variance(base)
         found = self._added(base, covariance, shapes, residual)[0]
-        return sorted(found, key=lambda one: -one.log_posterior)
+        return sorted(found, key=lambda candidate: -candidate.log_posterior)
 
     def variance(self, hypothesis: Hypothesis) -> FloatArray:
         """Return the covariance (n, n) of the values under a hypothesis, without noise."""
@@ -350,10 +353,10 @@ class Hypotheses:
         shapes = np.arange(len(self.shapes.value))
         for base, covariance in bases.items():
             best, log_posterior = self._added(base, measured.total + covariance, shapes, residual)
-            found.update({one.hypothesis: one for one in best})
+            found.update({candidate.hypothesis: candidate for candidate in best})
             # The shapes that do best under the first base do best under the others.
             shapes = shapes[np.argsort(-log_posterior)[:SHORTLISTED]]
-        return sorted(found.values(), key=lambda one: -one.log_posterior)
+        return sorted(found.values(), key=lambda candidate: -candidate.log_posterior)
 
     def _added(
         self, base: Hypothesis, covariance: FloatArray, shapes: np.ndarray, residual: FloatArray
@@ -380,7 +383,7 @@ class Hypotheses:
         for index in np.argsort(-(density + log_prior), axis=None)[:REFINED].tolist():
             amplitude, column = divmod(index, len(shapes))
             dye = Fluorophore(int(shapes[column]), EXCITATION_SIGMAS[amplitude])
-            dyes = sorted((*base.fluorophores, dye), key=lambda one: one.shape)
+            dyes = sorted((*base.fluorophores, dye), key=lambda fluorophore: fluorophore.shape)
             hypothesis = replace(base, fluorophores=tuple(dyes))
             log_posterior = float(density.flat[index]) + self.log_prior(hypothesis)
             found.append(Scored(hypothesis, log_posterior))

@@ -183,32 +183,36 @@ class JointEstimator:
         if not len(system.modes.reflected):
             return measured
         crude = replace(measured, noise=noise + np.diag((CRUDE_ERROR * target) ** 2))
-        best = max(self._common.scored(crude, 0), key=lambda one: one.log_posterior)
+        best = max(self._common.scored(crude, 0), key=lambda candidate: candidate.log_posterior)
         surface = Posterior(self._common, best.hypothesis, crude).most_likely()
         return replace(measured, reflected_noise=system.covariance(*surface))
 
     def _refined(self, measured: Measured) -> "list[_Weighted]":
         """Return the best hypotheses, the most probable one first."""
         by_number: dict[int, list[Scored]] = {}
-        for one in self._common.scored(measured):
-            by_number.setdefault(len(one.hypothesis.fluorophores), []).append(one)
+        for candidate in self._common.scored(measured):
+            by_number.setdefault(len(candidate.hypothesis.fluorophores), []).append(candidate)
         found = []
         for scored in by_number.values():
-            best = sorted(scored, key=lambda one: -one.log_posterior)[:REFINED]
-            for one in best:
-                posterior = Posterior(self._common, one.hypothesis, measured)
-                log_prior = self._common.log_prior(one.hypothesis)
+            best = sorted(scored, key=lambda candidate: -candidate.log_posterior)[:REFINED]
+            for candidate in best:
+                posterior = Posterior(self._common, candidate.hypothesis, measured)
+                log_prior = self._common.log_prior(candidate.hypothesis)
                 found.append(
-                    _Weighted(one.hypothesis, posterior, posterior.log_evidence(), log_prior)
+                    _Weighted(candidate.hypothesis, posterior, posterior.log_evidence(), log_prior)
                 )
-        return sorted(found, key=lambda one: -one.log_posterior)
+        return sorted(found, key=lambda candidate: -candidate.log_posterior)
 
     def _numbers(self, weighted: "Sequence[_Weighted]") -> tuple[FluorophoreNumber, ...]:
-        total = log_sum([one.log_posterior for one in weighted])
+        total = log_sum([candidate.log_posterior for candidate in weighted])
         numbers = []
-        for number in sorted({len(one.hypothesis.fluorophores) for one in weighted}):
-            those = [one for one in weighted if len(one.hypothesis.fluorophores) == number]
-            posterior = log_sum([one.log_posterior for one in those])
+        for number in sorted({len(candidate.hypothesis.fluorophores) for candidate in weighted}):
+            those = [
+                candidate
+                for candidate in weighted
+                if len(candidate.hypothesis.fluorophores) == number
+            ]
+            posterior = log_sum([candidate.log_posterior for candidate in those])
             numbers.append(
                 FluorophoreNumber(
                     number, posterior - log_prior_of(number), math.exp(posterior - total)
@@ -222,12 +226,12 @@ class JointEstimator:
         rng: np.random.Generator,
     ) -> list[tuple[Hypothesis, Draws]]:
         best = weighted[0].log_posterior
-        kept = [one for one in weighted if one.log_posterior > best - HOPELESS]
-        weight = np.exp([one.log_posterior - best for one in kept])
+        kept = [candidate for candidate in weighted if candidate.log_posterior > best - HOPELESS]
+        weight = np.exp([candidate.log_posterior - best for candidate in kept])
         counts = rng.multinomial(DRAWS, weight / weight.sum())
         return [
-            (one.hypothesis, one.posterior.draw(int(count), rng))
-            for one, count in zip(kept, counts, strict=True)
+            (candidate.hypothesis, candidate.posterior.draw(int(count), rng))
+            for candidate, count in zip(kept, counts, strict=True)
             if count
         ]
 

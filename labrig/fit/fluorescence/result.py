@@ -15,7 +15,7 @@ Method = Literal["joint", "per-led"]
 
 @dataclass(frozen=True)
 class FluorophoreNumber:
-    """How probable some number of fluorophores is.
+    """Probability of some number of fluorophores.
 
     Attributes
     ----------

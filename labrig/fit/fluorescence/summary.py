@@ -32,8 +32,8 @@ def fluorophores_of(
     system: FluorescenceSystem, draws: Sequence[Draws]
 ) -> tuple[EstimatedFluorophore, ...]:
     """Return the dyes of draws with the same number of them, by rising emission."""
-    reradiation = np.concatenate([one.reradiation for one in draws])
-    reflectance = np.concatenate([one.reflectance for one in draws])
+    reradiation = np.concatenate([draw.reradiation for draw in draws])
+    reflectance = np.concatenate([draw.reflectance for draw in draws])
     widths = np.diff(edges_from_centres(system.output_nm))
     excitation = np.einsum("o,djoi->dji", widths, reradiation)
     emitted = reradiation.sum(axis=3)

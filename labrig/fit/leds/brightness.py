@@ -76,7 +76,7 @@ RESPONSE_CALIBRATED = ResponseError(0.01, 120.0)
 
 @dataclass(frozen=True, eq=False)
 class LedLightMeasured:
-    """What was measured of one LED.
+    """Measurement of one LED.
 
     Attributes
     ----------

@@ -99,13 +99,13 @@ def match_channels(
     '530nm'
     """
     matcher = _Matcher(value, variance, lights, camera, card, curve_error)
-    chi2 = {one: matcher.chi2([one]) for one in lights if one == name or matcher.sees(one)}
+    chi2 = {led: matcher.chi2([led]) for led in lights if led == name or matcher.sees(led)}
     if not matcher.sees(name):
         return ChannelMatch({name: 0.0}, None)
     pair = None
     if chi2[name] > ODD and min(chi2.values()) > ODD:
-        pairs = {one: matcher.chi2([name, one]) for one in chi2 if one != name}
-        best = min(pairs, key=lambda one: pairs[one], default=None)
+        pairs = {led: matcher.chi2([name, led]) for led in chi2 if led != name}
+        best = min(pairs, key=lambda led: pairs[led], default=None)
         pair = best if best is not None and pairs[best] < ODD else None
     return ChannelMatch(chi2, pair)
 
