@@ -1,6 +1,7 @@
 """Analysis of a decay, from its frames to a fit of every patch."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from importlib.metadata import version
 
 import numpy as np
@@ -33,7 +34,7 @@ def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
     It is None if the frames are too few, or σ is unknown.
     """
     brightest = fit.brightest
-    signal = fit.predict(series.t_s, series.exposure_s)[:, brightest] - fit.offset
+    signal, _ = fit.signal(series.t_s, series.exposure_s)
     # Comparisons with an unknown σ are false.
     rows = np.flatnonzero(series.usable & (signal > MIN_SIGNAL * series.sigma[:, brightest]))
     if len(rows) <= _TERMS:
@@ -89,7 +90,13 @@ def analyse(part: Part) -> DecayResult:
     require_calibrated_camera(part.inputs.camera, run, run.frames(FrameRole.DECAY))
     series = reduce_patches(frames.decay, regions, frames.dark, background, part.inputs.camera)
     states = overrides.states or (None if protocol.states == "auto" else protocol.states)
-    fits = _fit_all(series, states, overrides.fixed_rates_per_s)
+    fit = partial(
+        fit_series,
+        states=states,
+        fixed_rates_per_s=overrides.fixed_rates_per_s,
+        law=overrides.law,
+    )
+    fits = _fit_all(series, fit)
     temperature_c = glow_temperature_c(run, part.protocol.rate_frames)
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(
@@ -112,36 +119,30 @@ def analyse(part: Part) -> DecayResult:
 
 
 def _fit_all(
-    series: Mapping[str, Series], states: int | None, fixed_rates_per_s: Sequence[float]
+    series: Mapping[str, Series], fit: Callable[..., DecayFit]
 ) -> dict[str, DecayFit | str]:
     """Fit every patch, and return the fit or the reason why there is none, by patch.
 
     Shutter and aperture flicker alike for all patches of a frame. The flicker is taken from the
     patch that determines it best, for those that are dim or fade within a few frames.
     """
-    fits = {
-        name: _fit(patch_series, states, fixed_rates_per_s, None)
-        for name, patch_series in series.items()
-    }
+    fits = {name: _fitted(partial(fit, patch_series)) for name, patch_series in series.items()}
     measured = [fit for fit in fits.values() if isinstance(fit, DecayFit) and fit.flicker > 0]
     if len(fits) == 1 or not measured:
         return fits
     best = min(measured, key=lambda fit: fit.flicker_sigma / fit.flicker)
     return {
-        name: (fit if fit is best else _fit(series[name], states, fixed_rates_per_s, best.flicker))
-        for name, fit in fits.items()
+        name: (
+            fitted if fitted is best else _fitted(partial(fit, series[name], flicker=best.flicker))
+        )
+        for name, fitted in fits.items()
     }
 
 
-def _fit(
-    series: Series,
-    states: int | None,
-    fixed_rates_per_s: Sequence[float],
-    flicker: float | None,
-) -> DecayFit | str:
+def _fitted(fit: Callable[[], DecayFit]) -> DecayFit | str:
     """Return the fit, or the reason why there is none."""
     try:
-        return fit_series(series, states, flicker=flicker, fixed_rates_per_s=fixed_rates_per_s)
+        return fit()
     except FitError as error:
         return str(error)
 

@@ -10,6 +10,7 @@ from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_r
 from labrig.errors import UsageError
 from labrig.record import FileRecord
 from labrig.region import Region, parse_region
+from labrig.results import AUTO, require_law
 from labrig.yaml_file import did_you_mean
 
 
@@ -59,6 +60,8 @@ class Overrides:
         Number of states; None takes the protocol's.
     fixed_rates_per_s
         Rates in 1/s known from elsewhere, which are held in the fit; they count as states.
+    law
+        Law that describes a decay, or `auto`.
     camera
         Camera curves for the report's colours instead of the rig file's.
     optics
@@ -69,6 +72,7 @@ class Overrides:
     excluded: frozenset[str] = frozenset()
     states: int | None = None
     fixed_rates_per_s: tuple[float, ...] = ()
+    law: str = AUTO
     camera: str | None = None
     optics: Mapping[str, str] = field(default_factory=dict)
 
@@ -81,6 +85,7 @@ class Overrides:
         fixed_rates_per_s: Sequence[float] = (),
         camera: str | None = None,
         optics: Sequence[str] = (),
+        law: str = AUTO,
     ) -> Self:
         """Parse the texts of a command line.
 
@@ -98,12 +103,15 @@ class Overrides:
             Camera curves.
         optics
             Calibrations as `KEY=PATH` of the rig file's `optics:`.
+        law
+            Law that describes a decay, or `auto`.
 
         Raises
         ------
         UsageError
-            A region, a rate or a calibration is malformed.
+            A region, a rate or a calibration is malformed, or there is no such law.
         """
+        require_law(law)
         if invalid := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
             raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {invalid[0]}")
         named = {}
@@ -115,6 +123,7 @@ class Overrides:
             frozenset(excluded),
             states,
             tuple(fixed_rates_per_s),
+            law,
             camera,
             dict(_parse_calibration(text) for text in optics),
         )

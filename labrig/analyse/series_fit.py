@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.results import Series
+from labrig.results import AUTO, Series
 
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
@@ -23,6 +23,7 @@ def fit_series(
     offset_sigma: ArrayLike | None = None,
     flicker: float | None = None,
     fixed_rates_per_s: Sequence[float] = (),
+    law: str = AUTO,
 ) -> DecayFit:
     """Fit a sum of exponentials to the usable rows of a series.
 
@@ -40,6 +41,8 @@ def fit_series(
         Relative scatter common to the channels of a frame; None measures it.
     fixed_rates_per_s
         Rates in 1/s that take part and are held; they count as states.
+    law
+        Law that describes the decay, as in `fit_decay`.
 
     Returns
     -------
@@ -84,6 +87,7 @@ def fit_series(
         repeats=usable.unit,
         correlation=usable.correlation,
         offset_correlation=usable.dark_correlation,
+        law=law,
     )
     if not _is_seen(fit):
         raise FitError(

@@ -10,7 +10,15 @@ from labrig.analyse.series_fit import fit_series
 from labrig.errors import FitError, UsageError
 from labrig.fit import DecayFit
 from labrig.quantity import FRACTION, parse
-from labrig.results import FloatArray, Series, TableLayout, join_series, read_described_series
+from labrig.results import (
+    AUTO,
+    FloatArray,
+    Series,
+    TableLayout,
+    join_series,
+    read_described_series,
+    require_law,
+)
 
 #: Least counts in a Poisson weight, since fewer would weigh a point too much.
 MIN_COUNTS = 5.0
@@ -40,6 +48,8 @@ class TableFitOptions:
         Time of lamp off in the table's seconds.
     from_s
         Time in the table's seconds from which points are fitted; None takes all.
+    law
+        Law that describes the decay, or `auto`.
     """
 
     states: int | None = None
@@ -48,10 +58,12 @@ class TableFitOptions:
     weights: str = "given"
     origin_s: float = 0.0
     from_s: float | None = None
+    law: str = AUTO
 
     def __post_init__(self) -> None:
         if self.weights not in ("given", "counts"):
             raise UsageError(f"--weights: expected 'given' or 'counts', got '{self.weights}'")
+        require_law(self.law)
 
     @property
     def offset_sigma(self) -> float:
@@ -140,7 +152,7 @@ def fit_table(
         if np.isnan(part.sigma).all() and options.flicker == "auto":
             flicker = 0.0
         try:
-            fit = fit_series(part, options.states, options.offset_sigma, flicker)
+            fit = fit_series(part, options.states, options.offset_sigma, flicker, law=options.law)
         except FitError as error:
             raise FitError(f"{path}: {error}") from None
         sigma = part.sigma.copy()

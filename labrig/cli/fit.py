@@ -43,6 +43,17 @@ def decay(
         int | None,
         typer.Option("--states", min=1, max=3, help="Number of states; chosen by default."),
     ] = None,
+    law: Annotated[
+        str,
+        typer.Option(
+            "--law",
+            help="'auto', exponentials, becquerel, otor (one trap), stretched or rate-spectrum.",
+        ),
+    ] = "auto",
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", help="Time such as '10 min' at which to tell the signal. Repeatable."),
+    ] = None,
     offset: Annotated[
         str, typer.Option("--offset", help="'zero', 'free', or the σ of a constant background.")
     ] = "zero",
@@ -78,7 +89,7 @@ def decay(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print fit.json.")] = False,
 ) -> None:
-    """Rates and amplitudes of a sum of exponentials, with uncertainties.
+    """Rates and amplitudes of a sum of exponentials, and other laws, with uncertainties.
 
     Columns, units, separators and decimal marks are found in the table. Without σ in the table, σ
     is taken from the scatter about the best monotone curve.
@@ -88,13 +99,19 @@ def decay(
 
     if out is not None:
         _require_folder(out)
-    options = TableFitOptions(states, offset, flicker, weights, origin, start)
+    times_s = [_time_s(text) for text in at or ()]
+    options = TableFitOptions(states, offset, flicker, weights, origin, start, law)
     fitted = fit_table(table, options, TableLayout(time, column, time_unit, decimal))
     if not json:
         typer.echo(f"columns  {fitted[0].columns}")
     for part in fitted:
         fit = part.fit
-        typer.echo(fit.to_json() if json else f"{part.region}\n{fit}".strip())
+        if json:
+            typer.echo(fit.to_json())
+            continue
+        typer.echo(f"{part.region}\n{fit}".strip())
+        if times_s:
+            typer.echo(str(fit.forecast(times_s)))
     if out is not None:
         from labrig.process import report_table
 
@@ -209,6 +226,15 @@ def _require_one_of(option: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         quoted = ", ".join(f"'{choice}'" for choice in choices)
         raise UsageError(f"{option}: expected one of {quoted}, got '{value}'")
+
+
+def _time_s(text: str) -> float:
+    from labrig.quantity import TIME_S, parse
+
+    try:
+        return parse(text, TIME_S)
+    except ValueError as error:
+        raise UsageError(f"--at: {error}") from None
 
 
 def _components(text: str) -> "int | Literal['auto']":

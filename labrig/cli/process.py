@@ -34,6 +34,9 @@ def process(
         list[float] | None,
         typer.Option("--rate", help="Rate in 1/s that is held fixed. Repeatable."),
     ] = None,
+    law: Annotated[
+        str, typer.Option("--law", help="Law of decay, as of 'labrig fit decay'.")
+    ] = "auto",
     camera: Annotated[
         str | None,
         typer.Option("--camera", help="Camera curves to use instead, for the report's colours."),
@@ -65,7 +68,9 @@ def process(
     from labrig.catalogue import find_run
     from labrig.record import read_run
 
-    overrides = Overrides.parse(roi or [], exclude or [], states, rate or [], camera, optics or [])
+    overrides = Overrides.parse(
+        roi or [], exclude or [], states, rate or [], camera, optics or [], law
+    )
     folder = find_run(run, runs)
     if verify:
         typer.echo(verify_frames(read_run(folder), overrides), err=True)

@@ -69,7 +69,7 @@ def predicted(series: Series, fit: DecayFit) -> FloatArray:
     """Return the prediction of a fit for every row of its series, with repeat levels, (n, C)."""
     levels = dict(zip(fit.repeats, fit.levels, strict=True))
     level = np.array([levels.get(unit, 1.0) for unit in series.unit])
-    signal = fit.predict(series.t_s, series.exposure_s) - fit.offsets
+    signal = np.multiply.outer(fit.signal(series.t_s, series.exposure_s)[0], fit.channel_weights)
     return np.asarray(level[:, np.newaxis] * signal + fit.offsets)
 
 

@@ -7,6 +7,10 @@ from .comparison import (
     Pair as Pair,
     compare_materials as compare_materials,
 )
+from .decay_laws import (
+    DECAY_LAWS as DECAY_LAWS,
+    DecayLaw as DecayLaw,
+)
 from .file import (
     IrradianceNorm as IrradianceNorm,
     Material as Material,

@@ -37,6 +37,8 @@ class Provenance(BaseModel):
         Number of states that was fitted, or `auto`.
     fixed_rates_per_s
         Rates in 1/s that the user held fixed.
+    law
+        Law of decay that the user asked for, or `auto`.
     camera
         Name of the camera curves with which the report's pictures were coloured.
     frames
@@ -54,6 +56,7 @@ class Provenance(BaseModel):
     regions: dict[str, Region]
     states: str | int
     fixed_rates_per_s: tuple[float, ...]
+    law: str
     camera: str | None
     frames: dict[str, int]
     excluded: tuple[str, ...]
@@ -84,6 +87,7 @@ def provenance(
         regions=overrides.patches(protocol) if patches else dict(overrides.regions),
         states=overrides.states or getattr(protocol, "states", "auto"),
         fixed_rates_per_s=overrides.fixed_rates_per_s,
+        law=overrides.law,
         camera=camera,
         frames=dict(Counter(frame.role for frame in frames if not overrides.excludes(frame))),
         excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),

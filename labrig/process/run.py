@@ -234,7 +234,7 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     >>> from labrig.process import draw_figures
     >>> path, n_pages = draw_figures("runs/decay")
     >>> path.as_posix(), n_pages
-    ('runs/decay/result/figures/figures.pdf', 6)
+    ('runs/decay/result/figures/figures.pdf', 7)
     """
     folder = Path(folder)
     run, protocol, result = read_run(folder), read_run_protocol(folder), read_result(folder)

@@ -17,6 +17,7 @@ from labrig.report.decay_figures import (
     values_below_axis,
     visible_parts,
 )
+from labrig.report.law_figure import law_figure
 from labrig.report.methods import REFERENCES, UNKNOWN, UNKNOWN_OF_A_TABLE, methods
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.report_model import (
@@ -425,6 +426,7 @@ def _patch(number: int, patch: PatchReport, screen: Screen, anchor: str) -> _Pat
     noise_parts: tuple[str, ...] = ()
     if fit is not None:
         figures.append(Picture("residuals", residual_figure(series, fit)))
+        figures.append(Picture("laws", law_figure(series, fit)))
     if patch.noise is not None:
         figures.append(Picture("noise", noise_figure(patch.noise)))
         noise_parts = tuple(visible_parts(patch.noise))

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.fit.decay import exponential_means_and_slopes
 from labrig.number_format import power_of_ten, rounded
 from labrig.report.chart import (
     NO_VALUES,
@@ -40,7 +39,7 @@ from labrig.report.figure_style import (
 )
 from labrig.report.report_model import PatchReport
 from labrig.report.timing import FrameTiming
-from labrig.results import FittedDecay, FloatArray, NoiseBudget, Series
+from labrig.results import EXPONENTIALS, FittedDecay, FloatArray, NoiseBudget, Series
 
 #: Number of points of a fitted curve.
 POINTS = 160
@@ -60,7 +59,8 @@ class Curve:
         Standard uncertainty of `total` in the brightest channel in DN/s, shape (m,); the covariance
         of a fit does not cover the other channels. Infinite where a parameter is not determined.
     states
-        Signal of each state in the brightest channel without the offset in DN/s, shape (m, n).
+        Signal of each state in the brightest channel without the offset in DN/s, shape (m, n);
+        (m, 0) if another law describes the decay.
     brightest
         Index of the brightest channel.
     """
@@ -104,27 +104,15 @@ def fitted_curve(series: Series, fit: FittedDecay) -> Curve:
     exposure_s = np.interp(t_s, frame_t_s, frame_exposure_s)
     middle_s = t_s + exposure_s / 2
     states = [state.amplitude * np.exp(-state.k_r_per_s * middle_s) for state in fit.states]
+    is_exponential = fit.law == EXPONENTIALS
+    _, variance = fit.signal(t_s, exposure_s, with_offset=True)
     return Curve(
         t_s=middle_s,
         total=fit.predict(t_s, exposure_s),
-        sigma=_sigma(fit, t_s, exposure_s),
-        states=np.stack(states, axis=1),
+        sigma=np.sqrt(variance),
+        states=np.stack(states, axis=1) if is_exponential else np.empty((POINTS, 0)),
         brightest=fit.brightest,
     )
-
-
-def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray:
-    """Return σ = √(J Cov Jᵀ), shape (m,), with J the derivatives by k₁, a₁, k₂, a₂, …, offset."""
-    if not np.isfinite(fit.covariance).all():
-        return np.full_like(t_s, np.inf)
-    rates = np.array([state.k_r_per_s for state in fit.states])
-    amplitudes = np.array([state.amplitude for state in fit.states])
-    means, slopes = exponential_means_and_slopes(rates, t_s, exposure_s)
-    jacobian = np.ones((len(t_s), len(fit.covariance)))
-    jacobian[:, 0:-1:2] = amplitudes * slopes / rates
-    jacobian[:, 1:-1:2] = means
-    variance = np.einsum("mp,pq,mq->m", jacobian, fit.covariance, jacobian)
-    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 TIME_LABEL = "Time after lamp off / s"
@@ -239,7 +227,7 @@ def _decay(axis: Axis, series: Series, fit: FittedDecay | None, more: Sequence[M
             middle = curve.total[:, fit.brightest]
             marks.insert(0, Band(colour, curve.t_s, middle - curve.sigma, middle + curve.sigma))
         legend += [("fit", Line(MUTED)), ("± 1 σ", Band(colour))]
-        if fit.n_states > 1:
+        if curve.states.shape[1] > 1:
             marks += [
                 Line(INK, curve.t_s, state, width_pt=0.9, style=DASHED) for state in curve.states.T
             ]

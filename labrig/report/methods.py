@@ -14,7 +14,7 @@ from labrig.region import region_pixels
 from labrig.report.photographs import Sensor
 from labrig.report.report_model import DecayReport
 from labrig.report.timing import ON_TIME_S, LatenessStatistics
-from labrig.results import FittedDecay
+from labrig.results import EXPONENTIALS, LAW_LABELS, LAW_NAMES, FittedDecay
 
 #: Relative difference below which durations and exposures are given as one value.
 ALIKE = 0.02
@@ -314,9 +314,11 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
             f"The number of states, {number}, was chosen by the Bayesian information criterion "
             "and an F-test."
         )
-    others = list(dict.fromkeys(model.name for fit in fits for model in fit.alternative_models))
-    if others:
-        yield f"For comparison, a {listed(others).replace(' and ', ' and a ')} were fitted."
+    others = [LAW_LABELS[name] for name in LAW_NAMES if name != EXPONENTIALS]
+    yield (
+        f"Other laws were fitted to the same data: {listed(others)}; another law than exponentials "
+        "is taken if its BIC is lower by 6."
+    )
     yield "Uncertainties are standard uncertainties (1 σ) from the covariance of the fit."
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from labrig.number_format import plus_minus, rounded
-from labrig.results import FittedDecay
+from labrig.results import EXPONENTIALS, LAW_LABELS, FittedDecay
 
 #: Relative σ of a rate from which its reciprocal is given without σ.
 WORST_FOR_LIFETIME = 0.5
@@ -125,23 +125,27 @@ def reradiance_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
 
 def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
     """Return rows of the fits with each number of states, and of the alternative models."""
-    bics = [candidate.bic for candidate in fit.candidates] + [
-        alternative.bic for alternative in fit.alternative_models
-    ]
-    best = min(bics, default=math.inf)
+    others = [law for law in fit.compared_laws if law.name != EXPONENTIALS]
+    best = fit.best_bic
     rows = [
         CandidateRow(
             model=_states_text(candidate.n_states),
             reduced_chi2=rounded(candidate.reduced_chi2, 3),
             bic_above_best=_bic_difference(candidate.bic, best),
             p_value="–" if candidate.f_p_value is None else _p_value(candidate.f_p_value),
-            chosen=candidate.n_states == fit.n_states,
+            chosen=candidate.n_states == fit.n_states and fit.law == EXPONENTIALS,
         )
         for candidate in fit.candidates
     ]
     rows += [
-        CandidateRow(alternative.name, "–", _bic_difference(alternative.bic, best), "–", False)
-        for alternative in fit.alternative_models
+        CandidateRow(
+            model=f"{LAW_LABELS[law.name]}: {law.formula}",
+            reduced_chi2=rounded(law.reduced_chi2, 3),
+            bic_above_best=_bic_difference(best + law.bic_above_best, best),
+            p_value="–",
+            chosen=law.name == fit.law,
+        )
+        for law in others
     ]
     return rows
 
@@ -178,12 +182,11 @@ def n_states_reason(fit: FittedDecay) -> str:
         )
     elif more is None:
         sentences.append(_NO_MORE)
-    if fit.better_model is not None:
-        alternative = fit.better_model
-        exponent = plus_minus(alternative.exponent, alternative.exponent_sigma)
+    if fit.law != EXPONENTIALS:
+        above = next(law for law in fit.compared_laws if law.name == EXPONENTIALS).bic_above_best
         sentences.append(
-            f"A {alternative.name}, {alternative.formula}, describes the data clearly better "
-            f"(exponent {exponent})."
+            f"The law of the decay is another: {LAW_LABELS[fit.law]}; exponentials have a BIC "
+            f"{rounded(above, 3)} above that of the best law."
         )
     return " ".join(sentences)
 

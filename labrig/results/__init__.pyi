@@ -56,8 +56,9 @@ from .fade import (
     WarmingLight as WarmingLight,
 )
 from .fitted_decay import (
-    AlternativeModel as AlternativeModel,
+    FORECAST_SPANS as FORECAST_SPANS,
     Candidate as Candidate,
+    ComparedLaw as ComparedLaw,
     DecayState as DecayState,
     FittedDecay as FittedDecay,
     ScatterSigma as ScatterSigma,
@@ -70,6 +71,17 @@ from .fitted_excitation import (
     ConcentrationAtOff as ConcentrationAtOff,
     ExcitedState as ExcitedState,
     FittedExcitation as FittedExcitation,
+)
+from .fitted_law import (
+    AUTO as AUTO,
+    EXPONENTIALS as EXPONENTIALS,
+    LAW_LABELS as LAW_LABELS,
+    LAW_NAMES as LAW_NAMES,
+    RATE_SPECTRUM as RATE_SPECTRUM,
+    DecayForecast as DecayForecast,
+    FittedLaw as FittedLaw,
+    FittedRateSpectrum as FittedRateSpectrum,
+    require_law as require_law,
 )
 from .irradiance import (
     CardRatio as CardRatio,

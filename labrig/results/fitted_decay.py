@@ -14,16 +14,30 @@ from numpy.typing import ArrayLike
 from labrig.errors import DataError, FitError
 from labrig.material import exponential_means
 from labrig.number_format import aligned
+from labrig.results.fitted_law import (
+    EXPONENTIALS,
+    LAW_LABELS,
+    DecayForecast,
+    FittedLaw,
+    FittedRateSpectrum,
+    curve_variance,
+    fitted_law,
+    fitted_rate_spectrum,
+)
 from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text, write_json
 
 FILE = "fit.json"
+#: Times of the measurement beyond which a signal is not predicted with σ.
+FORECAST_SPANS = 3.0
+#: Reduced χ² of a law, in that of the best one, up to which it is in the bracket of a forecast.
+BRACKET_CHI2 = 4.0
 #: Width of a line for people.
 LINE_WIDTH = 100
 #: Relative difference below which the σ of all values is given as one.
 _SAME_SIGMA = 0.05
 #: Version of that file: another number means renamed keys or other meanings.
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -67,30 +81,26 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class AlternativeModel:
-    """An alternative decay model fitted, in the brightest channel.
+class ComparedLaw:
+    """A law of decay beside the others that were fitted to the same data.
 
     Attributes
     ----------
     name, formula
-        Name and formula of the model.
-    amplitude
-        Amplitude A at lamp off in the unit of the values.
-    tau_s
-        Time constant τ in seconds.
-    exponent, exponent_sigma
-        Exponent p or β and its standard uncertainty.
-    bic
-        Bayesian information criterion, comparable with the candidates'.
+        Name and formula of the law; the number of states of exponentials.
+    reduced_chi2
+        χ² per degree of freedom; NaN if there are none.
+    bic_above_best
+        BIC above that of the best law.
+    probability
+        Probability of the law among those fitted, by their BIC.
     """
 
     name: str
     formula: str
-    amplitude: float
-    tau_s: float
-    exponent: float
-    exponent_sigma: float
-    bic: float
+    reduced_chi2: float
+    bic_above_best: float
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -160,10 +170,15 @@ class FittedDecay:
         Limits of the fit and remedies, a line each.
     candidates
         Fits with each number of states that was tried.
-    alternative_models
-        Power law and stretched exponential, fitted to the same series.
-    better_model
-        Alternative model that is clearly better than exponentials; None if none is.
+    law
+        Name of the law that describes the decay: `exponentials`, or another that was asked for or
+        is clearly better.
+    laws
+        Other laws, fitted to the same data.
+    rate_spectrum
+        Smooth spectrum of rates, fitted to the same data; None without a signal.
+    measured_until_s
+        End of the last exposure in seconds after lamp off.
     scatter
         Uncertainties of the values from their scatter; None if they were given.
     """
@@ -184,9 +199,16 @@ class FittedDecay:
     covariance: FloatArray
     warnings: tuple[str, ...]
     candidates: tuple[Candidate, ...]
-    alternative_models: tuple[AlternativeModel, ...]
-    better_model: AlternativeModel | None
+    law: str
+    laws: tuple[FittedLaw, ...]
+    rate_spectrum: FittedRateSpectrum | None
+    measured_until_s: float
     scatter: ScatterSigma | None = field(default=None, kw_only=True)
+
+    @property
+    def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
+        """Laws other than exponentials that were fitted, the spectrum of rates last."""
+        return (*self.laws, *(() if self.rate_spectrum is None else (self.rate_spectrum,)))
 
     @property
     def covariance_parameters(self) -> tuple[str, ...]:
@@ -274,11 +296,118 @@ class FittedDecay:
                 f"expected times (n,) and one exposure or (n,), got {t.shape} and "
                 f"{exposure.shape}; give one exposure per time"
             )
+        signal, _ = self.signal(t, np.broadcast_to(exposure, t.shape))
+        law = self._law(self.law)
+        weights, offsets = (
+            (self.channel_weights, self.offsets)
+            if law is None
+            else (law.channel_weights, law.offsets)
+        )
+        predicted: FloatArray = np.multiply.outer(signal, weights) + offsets
+        return predicted
+
+    def _law(self, name: str) -> FittedLaw | FittedRateSpectrum | None:
+        """Return a law by its name; None for the exponentials."""
+        if name == EXPONENTIALS:
+            return None
+        for law in self.other_laws:
+            if law.name == name:
+                return law
+        raise FitError(f"expected one of the laws that were fitted, got '{name}'")
+
+    def signal(
+        self,
+        t_s: FloatArray,
+        exposure_s: FloatArray,
+        law: str | None = None,
+        *,
+        with_offset: bool = False,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the signal in the brightest channel and its variance, (n,) each.
+
+        Parameters
+        ----------
+        t_s, exposure_s
+            Begin after lamp off and length of the exposures in seconds, shape (n,).
+        law
+            Name of the law; None is the one that describes the decay.
+        with_offset
+            Whether the offset of the channel is a part of it.
+
+        Raises
+        ------
+        FitError
+            The law was not fitted.
+        """
+        other = self._law(law or self.law)
+        if other is not None:
+            return other.signal(t_s, exposure_s, with_offset=with_offset)
         rates = np.array([state.k_r_per_s for state in self.states])
         amplitudes = np.array([state.amplitude for state in self.states])
-        signal = exponential_means(rates, t, np.broadcast_to(exposure, t.shape)) @ amplitudes
-        predicted: FloatArray = np.multiply.outer(signal, self.channel_weights) + self.offsets
-        return predicted
+        means = exponential_means(rates, t_s, exposure_s)
+        step = 1e-4
+        further = exponential_means(rates * (1 + step), t_s, exposure_s)
+        jacobian = np.full((len(t_s), len(self.covariance)), float(with_offset))
+        jacobian[:, 0:-1:2] = (further - means) / (step * rates) * amplitudes
+        jacobian[:, 1:-1:2] = means
+        shift = self.offset if with_offset else 0.0
+        return means @ amplitudes + shift, curve_variance(jacobian, self.covariance)
+
+    @property
+    def compared_laws(self) -> tuple[ComparedLaw, ...]:
+        """All laws that were fitted, the best first."""
+        others = [(law.name, law.formula, law.reduced_chi2, law.bic) for law in self.other_laws]
+        own: tuple[Candidate | FittedDecay, ...] = self.candidates or (self,)
+        best = min(own, key=lambda each: each.bic)
+        number = f"{self.n_states} state{'' if self.n_states == 1 else 's'}"
+        entries = [(EXPONENTIALS, number, best.reduced_chi2, best.bic), *others]
+        lowest = min(bic for *_, bic in entries)
+        weights = [math.exp((lowest - bic) / 2) for *_, bic in entries]
+        compared = [
+            ComparedLaw(name, formula, chi2, bic - lowest, weight / sum(weights))
+            for (name, formula, chi2, bic), weight in zip(entries, weights, strict=True)
+        ]
+        return tuple(sorted(compared, key=lambda law: law.bic_above_best))
+
+    @property
+    def best_bic(self) -> float:
+        """Lowest Bayesian information criterion of all numbers of states and all laws."""
+        bics = [candidate.bic for candidate in self.candidates] or [self.bic]
+        return min([*bics, *(law.bic for law in self.other_laws)])
+
+    def forecast(self, t_s: ArrayLike, exposure_s: float = 0.0) -> DecayForecast:
+        """Return the signal at any times after lamp off, averaged over the laws by probability.
+
+        A law that describes what was measured may be wrong by a large factor later: beyond three
+        times the last measured time there is no value with σ, only the bracket of all laws that
+        describe the data about as well as the best one does.
+
+        Parameters
+        ----------
+        t_s
+            Begin of each exposure in seconds after lamp off, ≥ 0, shape (n,).
+        exposure_s
+            Exposure time in seconds, ≥ 0.
+        """
+        t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
+        exposure = np.full_like(t, exposure_s)
+        compared = self.compared_laws
+        curves = [self.signal(t, exposure, law.name) for law in compared]
+        values = np.stack([value for value, _ in curves])
+        weights = np.array([law.probability for law in compared])[:, None]
+        value = (weights * values).sum(axis=0)
+        spread = np.stack([variance for _, variance in curves]) + (values - value) ** 2
+        sigma = np.sqrt(np.where(weights > 0, weights * spread, 0.0).sum(axis=0))
+        chi2 = np.array([law.reduced_chi2 for law in compared])
+        describes = chi2 <= BRACKET_CHI2 * np.nanmin(chi2) if np.isfinite(chi2).any() else chi2 != 0
+        is_far = t > FORECAST_SPANS * self.measured_until_s
+        return DecayForecast(
+            t_s=t,
+            value=np.where(is_far, np.nan, value),
+            sigma=np.where(is_far, np.nan, sigma),
+            low=values[describes].min(axis=0),
+            high=values[describes].max(axis=0),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `fit.json`; values that are not finite are None."""
@@ -303,8 +432,11 @@ class FittedDecay:
             "covariance": self.covariance.tolist(),
             "warnings": list(self.warnings),
             "candidates": [asdict(candidate) for candidate in self.candidates],
-            "alternative_models": [asdict(alternative) for alternative in self.alternative_models],
-            "better_model": self.better_model.name if self.better_model else None,
+            "law": self.law,
+            "laws": [law.to_dict() for law in self.laws],
+            "rate_spectrum": self.rate_spectrum.to_dict() if self.rate_spectrum else None,
+            "law_comparison": [asdict(law) for law in self.compared_laws],
+            "measured_until_s": self.measured_until_s,
             "sigma_from_scatter": asdict(self.scatter) if self.scatter else None,
         }
         content: dict[str, Any] = finite(fields)
@@ -344,8 +476,22 @@ class FittedDecay:
         if self.scatter is not None:
             lines += wrap(f"σ        {self.scatter}", LINE_WIDTH, subsequent_indent=" " * 9)
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
+        if self.other_laws:
+            lines += aligned([["law", "", "reduced χ²", "BIC"], *self._law_rows()])
         lines += [f"! {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+    def _law_rows(self) -> list[list[str]]:
+        """Return the laws for people, the best first, with the one that was taken marked."""
+        return [
+            [
+                f"{LAW_LABELS[law.name]}{' *' if law.name == self.law else ''}",
+                law.formula,
+                f"{law.reduced_chi2:.3g}",
+                f"+{law.bic_above_best:.1f}" if law.bic_above_best else "best",
+            ]
+            for law in self.compared_laws
+        ]
 
     def _by_channel(self, values: tuple[float, ...]) -> dict[str, float]:
         return dict(zip(self.channels, values, strict=True))
@@ -481,11 +627,7 @@ def _from_dict(content: Any) -> FittedDecay:
     if content["schema_version"] != SCHEMA_VERSION:
         raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
     weights: Mapping[str, float] = content["channel_weights"]
-    alternative_models = tuple(
-        AlternativeModel(**model | {"exponent_sigma": _number_or(model["exponent_sigma"])})
-        for model in content["alternative_models"]
-    )
-    better, scatter = content["better_model"], content.get("sigma_from_scatter")
+    scatter, spectrum = content["sigma_from_scatter"], content["rate_spectrum"]
     return FittedDecay(
         states=tuple(
             DecayState(
@@ -519,8 +661,10 @@ def _from_dict(content: Any) -> FittedDecay:
             )
             for candidate in content["candidates"]
         ),
-        alternative_models=alternative_models,
-        better_model=next((model for model in alternative_models if model.name == better), None),
+        law=content["law"],
+        laws=tuple(fitted_law(law) for law in content["laws"]),
+        rate_spectrum=None if spectrum is None else fitted_rate_spectrum(spectrum),
+        measured_until_s=float(content["measured_until_s"]),
         scatter=None if scatter is None else ScatterSigma(**scatter),
     )
 

@@ -132,9 +132,9 @@ def fit_case(name: str, seed: int) -> tuple[DecayFit, truths.Observed]:
 def report(case: Case, fits: list[tuple[DecayFit, truths.Observed]]) -> str:
     """Shares of choices and warnings; pulls, coverage and efficiency where the truth has rates."""
     found = np.array([fit.n_states for fit, _ in fits])
-    alternative_models = [fit.better_model.name if fit.better_model else "" for fit, _ in fits]
-    power_law = np.mean([name == "power law" for name in alternative_models])
-    stretched = np.mean([name == "stretched exponential" for name in alternative_models])
+    power_law, stretched = (
+        np.mean([fit.law == name for fit, _ in fits]) for name in ("becquerel", "stretched")
+    )
     warned = np.mean([bool(fit.warnings) for fit, _ in fits])
     fractions = [100 * np.mean(found == n) for n in (1, 2, 3)]
     text = (

@@ -29,7 +29,7 @@ def test_strontium_aluminate(n_states: int, mean_square: float) -> None:
     assert fit.chi2 / len(t) == pytest.approx(mean_square, rel=0.005)
     assert any("not describe this decay" in line for line in fit.warnings)
     if n_states < 3:
-        assert any("fits better than" in line for line in fit.warnings)
+        assert any("describes this decay better" in line for line in fit.warnings)
     if n_states == 2:
         fast, slow = fit.states
         assert fast.k_r_per_s == pytest.approx(0.01046, rel=0.03)

@@ -54,7 +54,7 @@ def test_json_has_the_contract_keys_in_its_order() -> None:
     # G is the brightest.
     assert read["offsets"]["G"] == read["offset"] != read["offsets"]["R"]
     assert read["offsets_sigma"]["G"] == read["offset_sigma"] != read["offsets_sigma"]["R"]
-    assert {"bic", "flicker", "alternative_models"} <= read.keys()
+    assert {"bic", "flicker", "law", "laws", "rate_spectrum", "law_comparison"} <= read.keys()
 
 
 def test_what_is_not_finite_is_null() -> None:

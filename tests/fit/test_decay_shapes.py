@@ -1,11 +1,8 @@
 """Exposure-averaged decays against numerical integration and differences."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
-from labrig.fit.decay.alternative_models import power_law_mean, stretched_mean
 from labrig.fit.decay.states import exponential_means_and_slopes
 from labrig.fit.least_squares import FloatArray
 from labrig.material.rates import exponential_means
@@ -39,44 +36,6 @@ def test_mean_of_a_short_exposure_tends_to_the_moment() -> None:
     rates = np.array([0.02, 0.5])
     moment = exponential_means(rates, T_S, np.zeros(5))
     np.testing.assert_allclose(exponential_means(rates, T_S, np.full(5, 1e-12)), moment, rtol=1e-11)
-
-
-Mean = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-
-
-@pytest.mark.parametrize(
-    ("mean", "truth", "exponent", "precision"),
-    [
-        (power_law_mean, truths.power_law, 0.5, 1e-12),
-        (power_law_mean, truths.power_law, 1.0, 1e-12),
-        (power_law_mean, truths.power_law, 1.001, 1e-12),
-        (power_law_mean, truths.power_law, 6.0, 1e-12),
-        # Eight points an exposure.
-        (stretched_mean, truths.stretched, 0.3, 1e-6),
-        (stretched_mean, truths.stretched, 0.9, 1e-6),
-    ],
-)
-@pytest.mark.parametrize("tau_s", [3.0, 100.0])
-def test_alternative_models(
-    mean: Mean,
-    truth: Callable[[float, float], truths.Decay],
-    exponent: float,
-    precision: float,
-    tau_s: float,
-) -> None:
-    found, slopes = mean(tau_s, exponent, T_S, EXPOSURE_S)
-    expected = truths.exposed(truth(tau_s, exponent), T_S, EXPOSURE_S)
-    np.testing.assert_allclose(found, expected, rtol=precision)
-    step = 1e-5
-    by_log_tau = (
-        mean(tau_s * np.exp(step), exponent, T_S, EXPOSURE_S)[0]
-        - mean(tau_s * np.exp(-step), exponent, T_S, EXPOSURE_S)[0]
-    ) / (2 * step)
-    by_exponent = (
-        mean(tau_s, exponent + step, T_S, EXPOSURE_S)[0]
-        - mean(tau_s, exponent - step, T_S, EXPOSURE_S)[0]
-    ) / (2 * step)
-    np.testing.assert_allclose(slopes, np.stack([by_log_tau, by_exponent], 1), atol=1e-9)
 
 
 @pytest.mark.parametrize("exposure_s", [1e30, 1e100, 1e300])

@@ -101,7 +101,7 @@ def test_all_numbers_are_on_the_page(plain: Made) -> None:
         "Reduced χ²",
         "Flicker",
         "Offset",
-        "power law",
+        "Becquerel's law",
         "not determined separately by a decay alone",
         "No warnings.",
         f"{101:064x}",
@@ -286,10 +286,10 @@ def test_many_patches_are_folded_up_behind_an_overview(
         assert f"patch-{number}" in page.ids
         assert page.text.count(f"paint {number}") >= 3
     assert text.count('class="patch folded"') == folded
-    # A figure of every patch in the overview, four in its own section, and the timing.
-    assert text.count('role="img"') == 5 * count + 1
+    # A figure of every patch in the overview, five in its own section, and the timing.
+    assert text.count('role="img"') == 6 * count + 1
     files = len(list((tmp_path / "figures").iterdir()))
-    assert files == 4 * count + 1 + (0 if folded else count)
+    assert files == 5 * count + 1 + (0 if folded else count)
 
 
 def test_a_warning_about_a_patch_of_several_stands_at_its_row(tmp_path: Path) -> None:

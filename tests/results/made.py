@@ -42,8 +42,10 @@ def decay_result(
         covariance=np.eye(2 * len(states) + 1),
         warnings=(),
         candidates=(),
-        alternative_models=(),
-        better_model=None,
+        law="exponentials",
+        laws=(),
+        rate_spectrum=None,
+        measured_until_s=100.0,
     )
 
 

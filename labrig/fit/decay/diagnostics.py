@@ -53,15 +53,15 @@ class Misfit:
     noise_dof: float
 
 
-def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
+def misfit_warnings(misfit: Misfit, subject: str, remedy: str) -> list[str]:
     """Test the order, the scatter and the colour of the residuals against the noise.
 
     Parameters
     ----------
     misfit
         The residuals.
-    n_states
-        Number of states of the fit.
+    subject
+        Law that was fitted, with the verb "do".
     remedy
         Advice if the shape is wrong.
     """
@@ -69,7 +69,6 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
     disturbed = bool(warnings)
     p_order = order_p_value(misfit.frames)
     if p_order < MISFIT_LEVEL:
-        subject = "1 exponential does" if n_states == 1 else f"{n_states} exponentials do"
         warnings.append(
             f"{subject} not describe this decay: neighbouring residuals agree "
             f"(p = {p_order:.1g}); {remedy}"

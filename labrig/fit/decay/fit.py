@@ -6,17 +6,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.decay.alternative_models import ALTERNATIVES, fit_alternative, fitted_alternative
 from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
-from labrig.fit.decay.result import DecayFit, assemble
+from labrig.fit.decay.laws import LawFit, fit_laws
+from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
+from labrig.fit.decay.result import DecayFit, assemble, noise_matrices, student_factor
 from labrig.fit.decay.scatter import with_scatter_sigma
-from labrig.fit.decay.selection import CLEAR_BIC, bic, choose_states, is_needed
+from labrig.fit.decay.selection import CLEAR_BIC, choose_states, is_needed
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
-from labrig.results import AlternativeModel, Candidate, ScatterSigma
+from labrig.results import (
+    AUTO,
+    EXPONENTIALS,
+    LAW_NAMES,
+    RATE_SPECTRUM,
+    Candidate,
+    FittedRateSpectrum,
+    ScatterSigma,
+)
 
 #: Iterations in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
@@ -40,8 +49,12 @@ def fit_decay(
     repeats: Sequence[str] | None = None,
     correlation: ArrayLike | None = None,
     offset_correlation: ArrayLike | None = None,
+    law: str = AUTO,
 ) -> DecayFit:
     """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al., section 4.4).
+
+    Other laws are fitted beside it: those of `labrig.material.DECAY_LAWS`, and a smooth spectrum of
+    rates.
 
     For frame f and channel c, y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + b_c with g the mean of e^(−k t)
     over the exposure. The covariance within a frame is Cov = (σ_fc r_cd σ_fd) + ρ² s_f s_fᵀ, s the
@@ -82,6 +95,10 @@ def fit_decay(
     offset_correlation
         Correlation matrix of the offsets' priors, shape (C, C): the dark level of a warming sensor
         drifts in all channels. None is no correlation.
+    law
+        Law that describes the decay: `exponentials`, `becquerel`, `otor`, `stretched` or
+        `rate-spectrum`. `auto` takes exponentials, unless another law is clearly better: its BIC is
+        lower by 6, and no number of states was asked for. All of them are fitted in any case.
 
     Returns
     -------
@@ -105,6 +122,9 @@ def fit_decay(
     k = 0.2046 ± 0.0029 1/s
     k = 0.0101 ± 0.0001 1/s
     """
+    if law not in (AUTO, *LAW_NAMES):
+        known = ", ".join((*LAW_NAMES, AUTO))
+        raise FitError(f"expected one of the laws {known}, got '{law}'")
     series = decay_series(
         t_s,
         values,
@@ -128,22 +148,30 @@ def fit_decay(
     refuse_if_rising(data, smooth.weights)
     noise_dof = scatter.dof if scatter else smooth.dof if flicker is None else np.inf
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
-    alternative_models = _alternatives(data, chosen)
-    best = min(alternative_models, key=lambda alternative: alternative.bic)
-    is_better = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
+    weights, offsets = chosen.joint.weights, chosen.joint.offsets
+    student = student_factor(scatter)
+    noises = noise_matrices(data, smooth.signal, smooth)
+    laws = fit_laws(data, weights, offsets, noises, student)
+    spectrum = fit_rate_spectrum(data, weights, student)
+    if law == AUTO and n_states is not None:
+        law = EXPONENTIALS
+    chosen_law = _chosen_law(law, min(candidate.bic for candidate in tried), laws, spectrum)
     all_needed = is_needed(data, chosen, tried, noise_dof)
+    envelope_data = data
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     refuse_if_constant(chosen, data)
     return assemble(
         data,
         chosen,
         Evidence(
+            data=envelope_data,
             noise=smooth,
             scatter=scatter,
             noise_dof=noise_dof,
             candidates=tuple(tried),
-            alternative_models=alternative_models,
-            better_model=best if is_better else None,
+            law=chosen_law,
+            laws=laws,
+            rate_spectrum=spectrum,
             all_needed=all_needed,
             asked=n_states,
             max_states=max_states,
@@ -220,14 +248,19 @@ def _supported_states(
     raise FitError(NO_DECAY)
 
 
-def _alternatives(data: WhitenedSeries, chosen: StatesFit) -> tuple[AlternativeModel, ...]:
-    """Fit the models that are no sum of exponentials, with the weights of the candidates."""
-    joint = chosen.joint
-    fits = [
-        (shape, fit_alternative(data, shape, joint.weights, joint.offsets))
-        for shape in ALTERNATIVES
-    ]
-    return tuple(fitted_alternative(shape, fit, data.series, bic(data, fit)) for shape, fit in fits)
+def _chosen_law(
+    law: str, exponentials_bic: float, laws: Sequence[LawFit], spectrum: FittedRateSpectrum | None
+) -> str:
+    """Return the law that was asked for, or the one that the data clearly prefer."""
+    bics = {EXPONENTIALS: exponentials_bic, **{each.fitted.name: each.fitted.bic for each in laws}}
+    if spectrum is not None:
+        bics[RATE_SPECTRUM] = spectrum.bic
+    if law == AUTO:
+        best = min(bics, key=bics.__getitem__)
+        return best if bics[best] < exponentials_bic - CLEAR_BIC else EXPONENTIALS
+    if law not in bics:
+        raise FitError(f"expected a signal that decays by the law '{law}', got none")
+    return law
 
 
 def _reweighted(

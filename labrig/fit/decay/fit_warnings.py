@@ -15,10 +15,23 @@ from labrig.fit.decay.diagnostics import (
     state_warnings,
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
+from labrig.fit.decay.joint import JointFit
+from labrig.fit.decay.laws import LawFit
+from labrig.fit.decay.selection import CLEAR_BIC
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
-from labrig.results import AlternativeModel, Candidate, DecayState, ScatterSigma
+from labrig.number_format import rounded
+from labrig.results import (
+    EXPONENTIALS,
+    LAW_LABELS,
+    RATE_SPECTRUM,
+    Candidate,
+    DecayState,
+    FittedLaw,
+    FittedRateSpectrum,
+    ScatterSigma,
+)
 
 RISING_SIGMAS = 5.0
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
@@ -31,30 +44,55 @@ class Evidence:
 
     Attributes
     ----------
+    data
+        Series whitened by the envelope's signal, which all candidates and laws were fitted to.
     noise, noise_dof
         Envelope, and its degrees of freedom if σ or flicker were estimated from it, else inf.
     scatter
         Uncertainties of the values from their scatter; None if they were given.
-    candidates, alternative_models
-        Numbers of states and other models that were tried.
-    better_model
-        Alternative model that fits clearly better than exponentials, if there is one.
+    candidates
+        Numbers of states that were tried.
+    law
+        Name of the law that describes the decay.
+    laws, rate_spectrum
+        Other laws, and the spectrum of rates.
     all_needed
         Whether the data refute one state fewer.
     asked, max_states, n_fixed
         Requested number of states, largest number and number of fixed rates.
     """
 
+    data: WhitenedSeries
     noise: Envelope
     noise_dof: float
     scatter: ScatterSigma | None
     candidates: tuple[Candidate, ...]
-    alternative_models: tuple[AlternativeModel, ...]
-    better_model: AlternativeModel | None
+    law: str
+    laws: tuple[LawFit, ...]
+    rate_spectrum: FittedRateSpectrum | None
     all_needed: bool
     asked: int | None
     max_states: int
     n_fixed: int
+
+    @property
+    def other_laws(self) -> list[FittedLaw | FittedRateSpectrum]:
+        """Laws other than exponentials, the one of lowest BIC first."""
+        laws: list[FittedLaw | FittedRateSpectrum] = [each.fitted for each in self.laws]
+        if self.rate_spectrum is not None:
+            laws.append(self.rate_spectrum)
+        return sorted(laws, key=lambda law: law.bic)
+
+    @property
+    def exponentials_bic(self) -> float:
+        """Lowest BIC of the numbers of states that were tried."""
+        return min(candidate.bic for candidate in self.candidates)
+
+    @property
+    def is_another_better(self) -> bool:
+        """Whether a law other than exponentials is clearly better."""
+        laws = self.other_laws
+        return bool(laws) and laws[0].bic < self.exponentials_bic - CLEAR_BIC
 
 
 def refuse_if_rising(data: WhitenedSeries, weights: FloatArray) -> None:
@@ -134,33 +172,34 @@ def warnings_about(
             f"the others' amplitude is zero; ask for fewer (--states {fit.n_states}) or take more "
             "light"
         )
-    alternative = evidence.better_model
-    if alternative is not None:
-        n = evidence.candidates[-1].n_states
-        warnings.append(
-            f"a {alternative.name} {alternative.formula} fits better than {n} exponential"
-            f"{'s' if n > 1 else ''}: the rates are descriptive only, "
-            "do not extrapolate them beyond the times recorded"
-        )
+    is_exponential = evidence.law == EXPONENTIALS
+    if not is_exponential or evidence.is_another_better:
+        warnings.append(_law_warning(fit, evidence))
     advice = (
         f"allow more states (--states {fit.n_states + 1})"
-        if fit.n_states < evidence.max_states
-        else "look for another law of decay"
+        if is_exponential and fit.n_states < evidence.max_states
+        else "see the other laws that were fitted (--law)"
+        if evidence.is_another_better
+        else "no other law describes it clearly better"
     )
     closer = small_chi2_warnings(joint.chi2, fit.dof(data), evidence.scatter is not None)
     warnings += closer
     # The order of residuals that are far smaller than any scatter is that of rounding errors.
-    if not (closer and evidence.scatter):
+    if not (closer and evidence.scatter) and evidence.law != RATE_SPECTRUM:
+        law = next((each for each in evidence.laws if each.fitted.name == evidence.law), None)
+        judged = (data, joint) if law is None else (evidence.data, law.joint)
+        number = "1 exponential does" if fit.n_states == 1 else f"{fit.n_states} exponentials do"
         warnings += misfit_warnings(
-            _misfit(data, fit, evidence),
-            fit.n_states,
-            f"{advice}, and check background and times "
-            "(labrig fit decay --offset, --origin, --from)",
+            _misfit(*judged, evidence),
+            number if is_exponential else f"{LAW_LABELS[evidence.law]} does",
+            f"{advice}; check background and times (labrig fit decay --offset, --origin, --from)",
         )
     free_offset = bool(np.isinf(series.offset_sigma).any())
     if not free_offset:
         warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
+    if not is_exponential:
+        return warnings
     low, high = series.log_rate_bounds
     return warnings + state_warnings(
         states,
@@ -183,8 +222,21 @@ def _common_signal(
     return common, information
 
 
-def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:
-    series, joint = data.series, fit.joint
+def _law_warning(fit: StatesFit, evidence: Evidence) -> str:
+    """Return what it means for the rates that another law describes the decay."""
+    laws = evidence.other_laws
+    law = next((law for law in laws if law.name == evidence.law), laws[0])
+    gain = evidence.exponentials_bic - law.bic
+    number = f"{fit.n_states} exponential{'s' if fit.n_states > 1 else ''}"
+    how = f"better than {number} (ΔBIC {rounded(gain, 2)})" if gain > 0 else f"beside {number}"
+    return (
+        f"{LAW_LABELS[law.name]} ({law.formula}) describes this decay {how}: the rates are "
+        "descriptive only, do not extrapolate them beyond the times recorded"
+    )
+
+
+def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence) -> Misfit:
+    series = data.series
     frames, _ = joint.frame_residuals(data)
     n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
     along, across = joint.leverage(data)

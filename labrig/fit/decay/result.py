@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.misfit_covariance import with_misfit
@@ -12,7 +13,7 @@ from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import DecayState, FittedDecay
+from labrig.results import DecayState, FittedDecay, ScatterSigma
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,10 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
             warnings_about(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)
         ),
         candidates=evidence.candidates,
-        alternative_models=evidence.alternative_models,
-        better_model=evidence.better_model,
+        law=evidence.law,
+        laws=tuple(each.fitted for each in evidence.laws),
+        rate_spectrum=evidence.rate_spectrum,
+        measured_until_s=float((series.t + series.exposure + series.start).max()) * series.span_s,
         scatter=evidence.scatter,
         sigma=sigma_used,
         residuals=residuals * series.peak,
@@ -102,16 +105,25 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     """
     covariance, noise = fit.joint.least_squares.covariance, evidence.noise
     if evidence.scatter is not None:
-        dof = evidence.scatter.dof
-        student = dof / (dof - 2) if dof > 2 else np.inf
-        return with_misfit(covariance, fit, data, noise) * student
+        return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter)
     if len(noise.likely_flickers) == 1:
         return covariance
-    signal = fit.signal(data.series)
-    matrices = [
-        whitening_matrices(data.series, signal, flicker) for flicker in noise.likely_flickers
-    ]
+    matrices = noise_matrices(data, fit.signal(data.series), noise)
     return np.asarray(np.mean(fit.covariances_under(data.series, matrices), axis=0))
+
+
+def student_factor(scatter: ScatterSigma | None) -> float:
+    """Return ν/(ν − 2), the factor of a variance whose σ was told by ν degrees of freedom."""
+    if scatter is None:
+        return 1.0
+    return scatter.dof / (scatter.dof - 2) if scatter.dof > 2 else float("inf")
+
+
+def noise_matrices(data: WhitenedSeries, signal: FloatArray, noise: Envelope) -> list[FloatArray]:
+    """Return the whitening matrices (n, C, C) of every likely flicker of a signal (n, C)."""
+    if len(noise.likely_flickers) == 1:
+        return [data.matrices]
+    return [whitening_matrices(data.series, signal, rho) for rho in noise.likely_flickers]
 
 
 def _covariances(

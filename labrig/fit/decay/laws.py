@@ -1,0 +1,186 @@
+"""Fits of the laws of decay that are no sum of a few exponentials.
+
+They are fitted to the same series with the same noise and the same offsets as the exponentials, so
+that their χ² compare. Traps of many depths and the recombination of electrons and holes decay like
+this (Nalbach et al., section 4.4).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.errors import FitError
+from labrig.fit.decay.joint import JointFit, Shape, covariances_under, fit_jointly
+from labrig.fit.decay.search import projection
+from labrig.fit.decay.selection import bic
+from labrig.fit.decay.series import DecaySeries
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+from labrig.material import DECAY_LAWS, DecayLaw
+from labrig.results import FittedLaw
+
+#: Largest rate at lamp off in inverse shortest steps between frames, and smallest in spans: laws
+#: other than exponentials fall fast at first, and go on falling.
+FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
+#: Sizes of the grid of rates and shapes, and smallest shape above 0 on it.
+GRID = (20, 8)
+LEAST_SHAPE = 0.05
+MAX_ITERATIONS = 60
+TOLERANCE = 1e-5
+#: Gain in χ² of a step at which a fit ends: laws are compared by differences of several.
+LEAST_GAIN = 1e-3
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """Fit of a law in the series' own units, and in the user's.
+
+    Attributes
+    ----------
+    joint
+        Joint fit; its `shape` is [amplitude, log rate, shape of the law].
+    fitted
+        The law in the user's units.
+    """
+
+    joint: JointFit
+    fitted: FittedLaw
+
+
+def fit_law(
+    data: WhitenedSeries,
+    law: DecayLaw,
+    weights: FloatArray,
+    offsets: FloatArray,
+    noises: Sequence[FloatArray],
+    student: float,
+) -> LawFit | None:
+    """Fit a law from the best place of a grid of rates and shapes.
+
+    Parameters
+    ----------
+    data
+        Whitened series.
+    law
+        The law.
+    weights, offsets
+        Start values of the channels, shape (C,).
+    noises
+        Whitening matrices of equally probable noises, over which the covariance is averaged.
+    student
+        Factor of the covariance where the noise was estimated.
+
+    Returns
+    -------
+    LawFit or None
+        The fit; None if the law has no signal.
+    """
+    series = data.series
+    low, high = _log_rate_bounds(series)
+    shape = _shape(series, law)
+    start = _best_on_grid(data, law, weights, (low, high))
+    if start[0] == 0:
+        return None
+    least, largest = law.shapes
+    try:
+        fit = fit_jointly(
+            data,
+            shape,
+            start,
+            weights,
+            offsets,
+            np.array([0.0, low, least]),
+            np.array([np.inf, high, largest]),
+            MAX_ITERATIONS,
+            TOLERANCE,
+            LEAST_GAIN,
+        )
+    except FitError:
+        return None
+    if fit.shape[0] == 0:
+        return None
+    covariances = covariances_under(series, shape, fit, noises)
+    covariance = np.mean(covariances, axis=0)
+    covariance = np.where(covariance == 0, 0.0, student * covariance)
+    return LawFit(fit, _in_units(law, fit, series, covariance, bic(data, fit)))
+
+
+def fit_laws(
+    data: WhitenedSeries,
+    weights: FloatArray,
+    offsets: FloatArray,
+    noises: Sequence[FloatArray],
+    student: float,
+) -> tuple[LawFit, ...]:
+    """Fit every law; the arguments are those of `fit_law`."""
+    fits = (fit_law(data, law, weights, offsets, noises, student) for law in DECAY_LAWS.values())
+    return tuple(fit for fit in fits if fit is not None)
+
+
+def _log_rate_bounds(series: DecaySeries) -> tuple[float, float]:
+    steps = np.diff(series.t)
+    fastest = FASTEST_STEPS / float(steps[steps > 0].min())
+    return -float(np.log(SLOWEST_SPANS)), float(np.log(fastest))
+
+
+def _shape(series: DecaySeries, law: DecayLaw) -> Shape:
+    """Return the law as a function of [amplitude, log rate, shape]."""
+    time = series.t + series.start
+
+    def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        means, slopes = law.means(float(np.exp(theta[1])), float(theta[2]), time, series.exposure)
+        return theta[0] * means, np.column_stack([means, theta[0] * slopes])
+
+    return shape
+
+
+def _best_on_grid(
+    data: WhitenedSeries, law: DecayLaw, weights: FloatArray, log_rates: tuple[float, float]
+) -> FloatArray:
+    """Return the best [amplitude, log rate, shape] of the grid, with exposures as their middles."""
+    series = data.series
+    problem = projection(data, weights)
+    middle = series.t + series.start + series.exposure / 2
+    least, largest = law.shapes
+    shapes = np.geomspace(max(least, LEAST_SHAPE), largest, GRID[1])
+    log_rate, exponents = (
+        grid.ravel() for grid in np.meshgrid(np.linspace(*log_rates, GRID[0]), shapes)
+    )
+    phase = np.multiply.outer(middle, np.exp(log_rate))
+    columns = problem.columns(law.value(phase, exponents))
+    moments = problem.target @ columns
+    norms2 = np.einsum("ij,ij->j", columns, columns)
+    gains = np.maximum(moments, 0) ** 2 / np.where(norms2 > 0, norms2, np.inf)
+    best = int(np.argmax(gains))
+    if gains[best] == 0:
+        return np.zeros(3)
+    return np.array([float(moments[best]) / float(norms2[best]), log_rate[best], exponents[best]])
+
+
+def _in_units(
+    law: DecayLaw, fit: JointFit, series: DecaySeries, covariance: FloatArray, fit_bic: float
+) -> FittedLaw:
+    """Return the fit in the user's units; `covariance` is that of all fitted parameters."""
+    amplitude, log_rate, shape = (float(value) for value in fit.shape)
+    rate_per_s = float(np.exp(log_rate)) / series.span_s
+    units = np.array([series.peak, rate_per_s, 1.0, series.peak])
+    own = np.zeros((4, 4))
+    fitted = np.flatnonzero(series.fitted_offsets == fit.brightest)
+    rows = [0, 1, 2, *(3 + len(fit.weights) - 1 + fitted)]
+    own[: len(rows), : len(rows)] = covariance[np.ix_(rows, rows)]
+    n_values = series.n_values + len(series.offset_prior)
+    dof = n_values - fit.n_parameters - (len(series.repeats) - 1)
+    with np.errstate(invalid="ignore"):
+        in_units = np.where(own == 0, 0.0, own * np.outer(units, units))
+    return FittedLaw(
+        name=law.name,
+        amplitude=amplitude * series.peak,
+        rate_per_s=rate_per_s,
+        shape=shape,
+        covariance=in_units,
+        channel_weights=tuple(fit.weights.tolist()),
+        offsets=tuple((fit.offsets * series.peak).tolist()),
+        reduced_chi2=fit.chi2 / dof if dof > 0 else float("nan"),
+        bic=fit_bic,
+    )

@@ -1,0 +1,246 @@
+"""Laws of decay that are no sum of exponentials, averaged over exposures.
+
+Each is a signal of 1 at lamp off with a rate in 1/s and a shape, after the time t:
+
+- `becquerel`: (1 + t/τ)^(−p), the decay of general order b = p/(p − 1) of *one* charge; the rate is
+  p/τ, that at lamp off, and the shape 1/p, so that 0 is an exponential.
+- `otor`: one trap, one recombination centre. Of electrons that leave the trap, a part is trapped
+  again; with the ratio R of the two chances and n₀ electrons in the trap of 1 that it holds,
+  dn/dt = −p n²/((1 − R) n + R). The rate is that at lamp off, and the shape
+  R/(R + (1 − R) n₀): 0 is an exponential, 1 the second order. A decay does not tell R from n₀.
+- `stretched`: exp(−(t/τ)^β), the rate 1/τ and the shape β.
+
+References
+----------
+H. Nalbach et al., section 4.4, after A. K. Jonscher and A. de Polignac (1984) and others; R. Chen
+and V. Pagonis, *Thermally and Optically Stimulated Luminescence* (2011), for one trap; its solution
+by G. Kitis and N. D. Vlachos, *Radiation Measurements* 48 (2013) 47.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+#: Argument below which a series takes the place of a difference that loses digits.
+SERIES_BELOW = 0.03
+#: Part of a lifetime that an exposure must last for its light to be a difference of levels.
+SHORT_EXPOSURE = 1e-4
+#: Distance of a trap's shape from 0 and 1 within which it is the limit.
+NEAR_LIMIT = 1e-12
+#: Level below which its logarithm is not needed.
+TINY = 1e-300
+#: Gauss–Legendre nodes and weights on [0, 1], for functions without an elementary integral.
+_NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)
+NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
+
+#: (rate in 1/s, shape, begins in s (n,), exposures in s (n,)) → means (n,), and their derivatives
+#: by the logarithm of the rate and by the shape (n, 2).
+Means = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True)
+class DecayLaw:
+    """A law of decay with a rate and a shape.
+
+    Attributes
+    ----------
+    name, label
+        Name in files and on command lines, and in sentences.
+    value
+        Function of k t ≥ 0 and the shape, which broadcast, that returns the signal, 1 at 0.
+    means
+        Function of a rate in 1/s, a shape, begins and lengths of exposures in seconds (n,), that
+        returns the means (n,) of the signal, 1 at lamp off, over the exposures, and their
+        derivatives by the logarithm of the rate and by the shape (n, 2).
+    shapes
+        Least and largest shape.
+    """
+
+    name: str
+    label: str
+    value: Callable[[FloatArray, FloatArray], FloatArray]
+    means: Means
+    shapes: tuple[float, float]
+
+
+def becquerel_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
+    """Return (1 + u x)^(−1/u) at x = k t, e^(−x) where u = 0."""
+    x = shape * phase
+    return np.exp(-phase * np.where(x < TINY, 1.0, np.log1p(x) / np.maximum(x, TINY)))
+
+
+def becquerel_means(
+    rate_per_s: float, shape: float, t_s: FloatArray, exposure_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Average (1 + u k t)^(−1/u) over each exposure, u = 1/p and k = p/τ; at u = 0 it is e^(−k t).
+
+    With z = k T/(1 + u k t), ℓ(x) = log(1 + x)/x and ψ(x) = (e^x − 1)/x the mean is the value at
+    the begin times ℓ(u z) ψ(u z ℓ(u z) − z ℓ(u z)), without a special case.
+    """
+    phase = rate_per_s * t_s
+    growth = 1 + shape * phase
+    log_ratio, log_slope = _log_ratio(shape * phase)
+    z = rate_per_s * exposure_s / growth
+    y = shape * z
+    ell, ell_slope = _log_ratio(y)
+    psi, psi_slope = _growth((shape - 1) * z * ell)
+    mean = np.exp(-phase * log_ratio) * ell * psi
+    # Derivatives of log(mean), by log k and by u, through z, y = u z and (u − 1) z ℓ(y).
+    slopes = np.empty((len(t_s), 2))
+    z_slopes = z / growth, -z * phase / growth
+    y_slopes = shape * z_slopes[0], z / growth
+    begins = -phase / growth, -(phase**2) * log_slope
+    by_shape = 0.0, z * ell
+    for column in range(2):
+        exponent = (
+            by_shape[column]
+            + (shape - 1) * ell * z_slopes[column]
+            + (shape - 1) * z * ell_slope * y_slopes[column]
+        )
+        slopes[:, column] = mean * (
+            begins[column] + ell_slope / ell * y_slopes[column] + psi_slope * exponent
+        )
+    return mean, slopes
+
+
+def otor_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
+    """Return the light of one trap at x = k t over that at lamp off."""
+    level = _trap_level(phase, shape)
+    return level**2 / (shape + (1 - shape) * level)
+
+
+def otor_means(
+    rate_per_s: float, shape: float, t_s: FloatArray, exposure_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Average the light of one trap with retrapping over each exposure.
+
+    The level m, 1 at lamp off, obeys g (1/m − 1) − (1 − g) log m = k t with the shape g: 1/m is
+    Wright's ω function. The light is −dm/dt over its value k at lamp off; its mean over an exposure
+    is the fall of the level over k T.
+    """
+    begin, end = (_trap(rate_per_s, shape, at_s) for at_s in (t_s, t_s + exposure_s))
+    middle = _trap(rate_per_s, shape, t_s + exposure_s / 2)
+    length = rate_per_s * exposure_s
+    is_short = length < SHORT_EXPOSURE
+    safe = np.where(is_short, 1.0, length)
+    mean = np.where(is_short, middle.light, (begin.level - end.level) / safe)
+    by_log_rate = np.where(
+        is_short,
+        middle.light_by_log_rate,
+        (begin.level_by_log_rate - end.level_by_log_rate) / safe - mean,
+    )
+    by_shape = np.where(
+        is_short, middle.light_by_shape, (begin.level_by_shape - end.level_by_shape) / safe
+    )
+    return mean, np.stack([by_log_rate, by_shape], axis=1)
+
+
+def stretched_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
+    """Return exp(−x^β) at x = k t."""
+    value: FloatArray = np.exp(-(phase**shape))
+    return value
+
+
+def stretched_means(
+    rate_per_s: float, shape: float, t_s: FloatArray, exposure_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Average exp(−(k t)^β) over each exposure by Gauss's rule with eight points."""
+    time = rate_per_s * (t_s[:, None] + exposure_s[:, None] * NODES)
+    # x^β log x → 0 as x → 0.
+    log_time = np.log(np.maximum(time, TINY))
+    power = np.exp(shape * log_time)
+    falling = np.exp(-power) * FRACTIONS
+    by_log_rate = -shape * (falling * power).sum(axis=1)
+    by_shape = -(falling * power * log_time).sum(axis=1)
+    return falling.sum(axis=1), np.stack([by_log_rate, by_shape], axis=1)
+
+
+@dataclass(frozen=True)
+class _Trap:
+    """Level and light of a trap, relative to those at lamp off, and derivatives; shape (n,)."""
+
+    level: FloatArray
+    light: FloatArray
+    level_by_log_rate: FloatArray
+    level_by_shape: FloatArray
+    light_by_log_rate: FloatArray
+    light_by_shape: FloatArray
+
+
+def _trap_level(phase: FloatArray, shape: FloatArray) -> FloatArray:
+    """Return the level of a trap, 1 at lamp off, at k t, which broadcasts with the shape."""
+    # Not above: it takes longer to load than a plan to be printed.
+    from scipy.special import wrightomega
+
+    escaped = np.maximum(1 - shape, NEAR_LIMIT)
+    ratio = np.maximum(shape, NEAR_LIMIT) / escaped
+    level = ratio / wrightomega(np.log(ratio) + ratio + phase / escaped)
+    level = np.where(shape > 1 - NEAR_LIMIT, 1 / (1 + phase), level)
+    return np.where(shape < NEAR_LIMIT, np.exp(-phase), level)
+
+
+def _trap(rate_per_s: float, shape: float, t_s: FloatArray) -> _Trap:
+    phase = rate_per_s * t_s
+    retrapped, escaped = shape, 1 - shape
+    level = _trap_level(phase, np.asarray(shape))
+    share = retrapped + escaped * level
+    light = level**2 / share
+    # Of g (1/m − 1) − (1 − g) log m = k t: dm/d log k = −k t l, dm/dg = (1/m − 1 + log m) l.
+    by_log_rate = -phase * light
+    log_level = np.log(np.maximum(level, TINY))
+    by_shape = level * (1 - level + level * log_level) / share
+    light_by_level = level * (2 * retrapped + escaped * level) / share**2
+    return _Trap(
+        level,
+        light,
+        by_log_rate,
+        by_shape,
+        light_by_level * by_log_rate,
+        light_by_level * by_shape - light * (1 - level) / share,
+    )
+
+
+def _log_ratio(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ℓ(x) = log(1 + x)/x and its derivative, x ≥ 0."""
+    small = x < SERIES_BELOW
+    safe = np.where(small, 1.0, x)
+    y = np.minimum(x, SERIES_BELOW)
+    powers = y[..., None] ** np.arange(9)
+    series = powers @ ((-1.0) ** np.arange(9) / np.arange(1, 10))
+    series_slope = powers[..., :8] @ (
+        (-1.0) ** np.arange(1, 9) * np.arange(1, 9) / np.arange(2, 10)
+    )
+    ratio = np.where(small, series, np.log1p(safe) / safe)
+    slope = np.where(small, series_slope, (1 / (1 + safe) - np.log1p(safe) / safe) / safe)
+    return ratio, slope
+
+
+def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ψ(x) = (e^x − 1)/x and its logarithmic derivative 1/(1 − e^(−x)) − 1/x."""
+    small = np.abs(x) < SERIES_BELOW
+    safe = np.where(small, 1.0, x)
+    series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6))))
+    psi = np.where(small, series, np.expm1(safe) / safe)
+    # 1/2 + x/12 − x³/720 + …
+    slope = np.where(small, 0.5 + x / 12 - x**3 / 720, -1 / np.expm1(-safe) - 1 / safe)
+    return psi, slope
+
+
+#: The laws by their names. A shape needs a bound where an exponential is the limit.
+DECAY_LAWS: Mapping[str, DecayLaw] = MappingProxyType(
+    {
+        law.name: law
+        for law in (
+            DecayLaw("becquerel", "Becquerel's law", becquerel_value, becquerel_means, (0.0, 10.0)),
+            DecayLaw("otor", "one trap with retrapping", otor_value, otor_means, (0.0, 1.0)),
+            DecayLaw(
+                "stretched", "stretched exponential", stretched_value, stretched_means, (0.1, 0.95)
+            ),
+        )
+    }
+)

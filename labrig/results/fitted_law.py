@@ -1,0 +1,288 @@
+"""Fitted laws of decay that are no sum of a few exponentials, and their table."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from labrig.errors import UsageError
+from labrig.material import DECAY_LAWS, exponential_means
+from labrig.number_format import aligned, rounded
+from labrig.quantity import duration_text
+from labrig.results.measured import FloatArray, Measured, with_uncertainty
+
+#: Names of the sums of exponentials among the laws: a few, and a smooth spectrum of many.
+EXPONENTIALS, RATE_SPECTRUM = "exponentials", "rate-spectrum"
+#: Name of the choice by the data.
+AUTO = "auto"
+#: Names of the laws that a decay can be fitted with.
+LAW_NAMES = (EXPONENTIALS, *DECAY_LAWS, RATE_SPECTRUM)
+#: Name of each law in sentences.
+LAW_LABELS = {
+    EXPONENTIALS: "exponentials",
+    **{law.name: law.label for law in DECAY_LAWS.values()},
+    RATE_SPECTRUM: "smooth spectrum of rates",
+}
+
+
+def require_law(name: str) -> None:
+    """Refuse what is no name of a law, nor `auto`.
+
+    Parameters
+    ----------
+    name
+        Name of a law as on a command line.
+
+    Raises
+    ------
+    UsageError
+        There is no such law.
+
+    Examples
+    --------
+    >>> from labrig.results import require_law
+    >>> require_law("becquerel")
+    """
+    if name not in (AUTO, *LAW_NAMES):
+        known = ", ".join((*LAW_NAMES, AUTO))
+        raise UsageError(f"--law: expected one of {known}, got '{name}'")
+
+
+@dataclass(frozen=True, eq=False)
+class FittedLaw:
+    """A law of `labrig.material.DECAY_LAWS`, fitted to a decay.
+
+    Attributes
+    ----------
+    name
+        Name of the law.
+    amplitude, rate_per_s, shape
+        Signal at lamp off in the brightest channel, in the unit of the values, rate in 1/s and
+        shape, as `labrig.material.DECAY_LAWS` defines them. All are of *this* charge.
+    covariance
+        Covariance of amplitude, rate, shape and the offset of the brightest channel, shape (4, 4);
+        inf where undetermined.
+    channel_weights, offsets
+        Weights of the channels, whose maximum is 1, and their offsets.
+    reduced_chi2, bic
+        χ² per degree of freedom, NaN if there are none, and Bayesian information criterion.
+    """
+
+    name: str
+    amplitude: float
+    rate_per_s: float
+    shape: float
+    covariance: FloatArray
+    channel_weights: tuple[float, ...]
+    offsets: tuple[float, ...]
+    reduced_chi2: float
+    bic: float
+
+    @property
+    def parameters(self) -> dict[str, Measured]:
+        """The law's own parameters by name; those that the data leave open are missing.
+
+        Of Becquerel's law `decay_time_s` τ, `exponent` p and, for p > 1, `kinetic_order` b; of one
+        trap `decay_time_s` 1/k, that of the light at lamp off, and `retrapping`; of a stretched
+        exponential `decay_time_s` τ and `exponent` β.
+        """
+        _, rate_sigma, shape_sigma, _ = np.sqrt(np.diag(self.covariance))
+        shape = Measured(self.shape, float(shape_sigma))
+        time = Measured(1 / self.rate_per_s, float(rate_sigma) / self.rate_per_s**2, "s")
+        if self.name == "otor":
+            return {"decay_time_s": time, "retrapping": shape}
+        if self.name == "stretched":
+            return {"decay_time_s": time, "exponent": shape}
+        if self.shape <= shape_sigma:
+            # Nothing tells it from an exponential: the exponent has no upper limit.
+            return {"decay_time_s": time} if self.shape == 0 else {}
+        exponent = Measured(1 / self.shape, float(shape_sigma) / self.shape**2)
+        tau_s = 1 / (self.shape * self.rate_per_s)
+        by_parameters = -tau_s * np.array([1 / self.rate_per_s, 1 / self.shape])
+        variance = float(by_parameters @ self.covariance[1:3, 1:3] @ by_parameters)
+        own = {"decay_time_s": Measured(tau_s, math.sqrt(variance), "s"), "exponent": exponent}
+        if self.shape < 1:
+            slope = 1 / (1 - self.shape) ** 2
+            own["kinetic_order"] = Measured(1 / (1 - self.shape), slope * float(shape_sigma))
+        return own
+
+    @property
+    def formula(self) -> str:
+        """Formula of the signal, 1 at lamp off, with its numbers."""
+        tau_s = 1 / self.rate_per_s
+        if self.name == "otor":
+            return f"1/k = {tau_s:.3g} s at lamp off, retrapping {self.shape:.2g}"
+        if self.name == "stretched":
+            return f"exp(−(t/{tau_s:.3g} s)^{self.shape:.3g})"
+        if self.shape == 0:
+            return f"exp(−t/{tau_s:.3g} s)"
+        return f"(1 + t/{tau_s / self.shape:.3g} s)^−{1 / self.shape:.3g}"
+
+    def signal(
+        self, t_s: FloatArray, exposure_s: FloatArray, *, with_offset: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the signal in the brightest channel and its variance, (n,) each.
+
+        Parameters
+        ----------
+        t_s, exposure_s
+            Begin after lamp off and length of the exposures in seconds, shape (n,).
+        with_offset
+            Whether the offset of the channel is a part of it.
+        """
+        means, slopes = DECAY_LAWS[self.name].means(self.rate_per_s, self.shape, t_s, exposure_s)
+        by_rate = self.amplitude * slopes[:, 0] / self.rate_per_s
+        offset = np.full(len(t_s), float(with_offset))
+        jacobian = np.stack([means, by_rate, self.amplitude * slopes[:, 1], offset], axis=1)
+        shift = self.offsets[int(np.argmax(self.channel_weights))] if with_offset else 0.0
+        return self.amplitude * means + shift, curve_variance(jacobian, self.covariance)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for `fit.json`."""
+        return {
+            "name": self.name,
+            "amplitude": self.amplitude,
+            "rate_per_s": self.rate_per_s,
+            "shape": self.shape,
+            "covariance": self.covariance.tolist(),
+            "parameters": {
+                name: {"value": measured.value, "sigma": measured.sigma}
+                for name, measured in self.parameters.items()
+            },
+            "channel_weights": list(self.channel_weights),
+            "offsets": list(self.offsets),
+            "reduced_chi2": self.reduced_chi2,
+            "bic": self.bic,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRateSpectrum:
+    """A smooth non-negative spectrum of rates, Σ_i a_i e^(−k_i t) on a grid of k.
+
+    Attributes
+    ----------
+    rates_per_s, amplitudes
+        Rates of the grid in 1/s, rising, and amplitude ≥ 0 of each at lamp off in the brightest
+        channel, shape (m,).
+    covariance
+        Covariance of the amplitudes, those that vanish being held, and of the offset of the
+        brightest channel, shape (m + 1, m + 1).
+    n_parameters
+        Effective number of parameters, by the trace of the smoothed fit's hat matrix.
+    channel_weights, offsets, reduced_chi2, bic
+        As of `FittedLaw`.
+    """
+
+    rates_per_s: FloatArray
+    amplitudes: FloatArray
+    covariance: FloatArray
+    n_parameters: float
+    channel_weights: tuple[float, ...]
+    offsets: tuple[float, ...]
+    reduced_chi2: float
+    bic: float
+    name: str = RATE_SPECTRUM
+
+    @property
+    def formula(self) -> str:
+        """Range of the lifetimes that make up nine tenths of the signal at lamp off."""
+        total = np.cumsum(self.amplitudes) / self.amplitudes.sum()
+        fast, slow = (float(np.interp(part, total, self.rates_per_s)) for part in (0.95, 0.05))
+        return f"lifetimes from {1 / fast:.2g} s to {1 / slow:.2g} s"
+
+    def signal(
+        self, t_s: FloatArray, exposure_s: FloatArray, *, with_offset: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the signal and its variance; see `FittedLaw.signal`."""
+        means = exponential_means(self.rates_per_s, t_s, exposure_s)
+        jacobian = np.column_stack([means, np.full(len(t_s), float(with_offset))])
+        shift = self.offsets[int(np.argmax(self.channel_weights))] if with_offset else 0.0
+        return means @ self.amplitudes + shift, curve_variance(jacobian, self.covariance)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for `fit.json`."""
+        return {
+            "rates_per_s": self.rates_per_s.tolist(),
+            "amplitudes": self.amplitudes.tolist(),
+            "covariance": self.covariance.tolist(),
+            "n_parameters": self.n_parameters,
+            "channel_weights": list(self.channel_weights),
+            "offsets": list(self.offsets),
+            "reduced_chi2": self.reduced_chi2,
+            "bic": self.bic,
+        }
+
+
+def fitted_law(content: Mapping[str, Any]) -> FittedLaw:
+    """Return a law from the content of `fit.json`."""
+    own = {key: value for key, value in content.items() if key != "parameters"}
+    return FittedLaw(**_arrays(own, "covariance"))
+
+
+def fitted_rate_spectrum(content: Mapping[str, Any]) -> FittedRateSpectrum:
+    """Return a spectrum of rates from the content of `fit.json`."""
+    return FittedRateSpectrum(**_arrays(content, "rates_per_s", "amplitudes", "covariance"))
+
+
+def _arrays(content: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    """Return fields with arrays under some names; null is infinite, and no reduced χ² is NaN."""
+    infinite = {name: np.array(content[name], dtype=object) for name in names}
+    arrays = {
+        name: np.where(values == None, np.inf, values).astype(np.float64)  # noqa: E711
+        for name, values in infinite.items()
+    }
+    chi2 = content["reduced_chi2"]
+    return {
+        **content,
+        **arrays,
+        "channel_weights": tuple(content["channel_weights"]),
+        "offsets": tuple(content["offsets"]),
+        "reduced_chi2": math.nan if chi2 is None else float(chi2),
+    }
+
+
+def curve_variance(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the variance of values (n,) with derivatives (n, p); inf if one is undetermined."""
+    if not np.isfinite(covariance).all():
+        return np.full(len(jacobian), np.inf)
+    variance: FloatArray = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
+    return np.maximum(variance, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DecayForecast:
+    """Signal of a decay at times that need not have been measured, averaged over its laws.
+
+    Attributes
+    ----------
+    t_s
+        Begin of the exposures in seconds after lamp off, shape (n,).
+    value, sigma
+        Signal in the brightest channel without offset, and its σ with the differences of the laws
+        in it, shape (n,). Beyond three times the last measured time both are NaN.
+    low, high
+        Least and largest signal of the laws that describe the data, shape (n,).
+    """
+
+    t_s: FloatArray
+    value: FloatArray
+    sigma: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    def __str__(self) -> str:
+        """Return a table for people, with brackets alone where there is no σ."""
+        rows = [
+            [
+                duration_text(float(t_s)),
+                "–" if np.isnan(value) else with_uncertainty(float(value), float(sigma)),
+                f"{rounded(float(low), 3)} to {rounded(float(high), 3)}",
+            ]
+            for t_s, value, sigma, low, high in zip(
+                self.t_s, self.value, self.sigma, self.low, self.high, strict=True
+            )
+        ]
+        return "\n".join(aligned([["time", "signal", "by the laws that fit"], *rows]))

@@ -1,0 +1,131 @@
+"""Laws that are no sum of a few exponentials: chosen where they hold, with parameters and σ."""
+
+import math
+
+import numpy as np
+import pytest
+
+from labrig.errors import FitError
+from labrig.fit import DecayFit, fit_decay
+from labrig.material import DECAY_LAWS, exponential_means
+from labrig.results import FORECAST_SPANS, FittedDecay, FloatArray
+
+T_S = np.concatenate([np.arange(0.0, 60.0, 1.5), np.arange(60.0, 400.0, 12.0)])
+EXPOSURE_S = np.full(len(T_S), 0.5)
+#: Signal-to-noise ratio of the first frame, and noise without light.
+SNR, READ = 300.0, 1e-3
+
+
+def measured(signal: FloatArray, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Values with photon and read noise, and their σ."""
+    sigma = np.sqrt(signal / SNR**2 + READ**2)
+    return signal + sigma * np.random.default_rng(seed).standard_normal(len(signal)), sigma
+
+
+def fitted(name: str, shape: float, seed: int, law: str = "auto") -> DecayFit:
+    signal, _ = DECAY_LAWS[name].means(0.05, shape, T_S, EXPOSURE_S)
+    values, sigma = measured(signal, seed)
+    return fit_decay(T_S, values, sigma, exposure_s=EXPOSURE_S, law=law)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "right"),
+    [
+        ("becquerel", 1 / 3, {"becquerel"}),
+        # The second order is both.
+        ("becquerel", 0.5, {"becquerel", "otor"}),
+        ("otor", 0.3, {"otor"}),
+        ("stretched", 0.6, {"stretched"}),
+    ],
+)
+def test_the_law_is_chosen_by_which_the_signal_decays(
+    name: str, shape: float, right: set[str]
+) -> None:
+    fits = [fitted(name, shape, seed) for seed in range(100, 108)]
+    assert sum(fit.law in right for fit in fits) >= 7
+    assert all(fit.compared_laws[0].bic_above_best == 0 for fit in fits)
+
+
+def test_exponentials_stay_exponentials() -> None:
+    signal = exponential_means(np.array([0.2, 0.02]), T_S, EXPOSURE_S) @ [0.7, 0.3]
+    for seed in range(200, 208):
+        values, sigma = measured(signal, seed)
+        fit = fit_decay(T_S, values, sigma, exposure_s=EXPOSURE_S)
+        assert (fit.law, fit.n_states) == ("exponentials", 2)
+        assert fit.compared_laws[0].probability > 0.95
+
+
+def test_the_errors_of_rate_and_shape_are_as_large_as_their_sigma() -> None:
+    """At 20 % too large or too small a σ of 120 pulls is outside of these limits."""
+    pulls = []
+    for number, (name, shape) in enumerate(
+        [("becquerel", 0.4), ("otor", 0.3), ("stretched", 0.6)] * 20
+    ):
+        fit = fitted(name, shape, 300 + number)
+        law = next(law for law in fit.laws if law.name == name)
+        sigma = np.sqrt(np.diag(law.covariance))
+        pulls += [(law.rate_per_s - 0.05) / sigma[1], (law.shape - shape) / sigma[2]]
+    assert 0.84 < np.sqrt(np.mean(np.square(pulls))) < 1.19
+
+
+def test_parameters_are_those_of_the_papers() -> None:
+    fit = fitted("becquerel", 0.4, 1)
+    own = next(law for law in fit.laws if law.name == "becquerel").parameters
+    for name, expected in (
+        ("decay_time_s", 1 / (0.4 * 0.05)),
+        ("exponent", 2.5),
+        ("kinetic_order", 1 / 0.6),
+    ):
+        assert abs(own[name].value - expected) < 4 * own[name].sigma, name
+
+
+def test_beyond_three_times_the_measured_time_there_is_a_bracket_without_sigma() -> None:
+    fit = fitted("becquerel", 0.5, 2)
+    near_s, far_s = 0.9 * FORECAST_SPANS * T_S[-1], 1.2 * FORECAST_SPANS * T_S[-1]
+    forecast = fit.forecast([near_s, far_s])
+    assert np.isfinite([forecast.value[0], forecast.sigma[0]]).all()
+    assert np.isnan([forecast.value[1], forecast.sigma[1]]).all()
+    true = DECAY_LAWS["becquerel"].value(0.05 * np.array([near_s, far_s]), np.full(2, 0.5))
+    assert abs(forecast.value[0] - true[0]) < 4 * forecast.sigma[0]
+    assert (forecast.low < true).all()
+    assert (true < 1.2 * forecast.high).all()
+
+
+def test_the_errors_of_the_averaged_signal_are_as_large_as_their_sigma() -> None:
+    pulls = []
+    at_s = np.array([5.0, 150.0, 600.0])
+    for number, (name, shape) in enumerate([("becquerel", 0.35), ("stretched", 0.7)] * 25):
+        forecast = fitted(name, shape, 500 + number).forecast(at_s)
+        true = DECAY_LAWS[name].value(0.05 * at_s, np.full(3, shape))
+        pulls += list((forecast.value - true) / forecast.sigma)
+    assert 0.84 < np.sqrt(np.mean(np.square(pulls))) < 1.19
+
+
+def test_a_law_that_was_asked_for_is_taken_and_what_is_better_is_said() -> None:
+    fit = fitted("becquerel", 0.4, 3, law="exponentials")
+    assert fit.law == "exponentials"
+    assert any("descriptive only" in warning for warning in fit.warnings)
+    fit = fitted("stretched", 0.6, 4, law="becquerel")
+    assert fit.law == "becquerel"
+    assert any("not describe" in warning for warning in fit.warnings)
+
+
+def test_an_unknown_law_is_refused() -> None:
+    with pytest.raises(FitError, match="becquerel, otor"):
+        fit_decay(T_S, np.exp(-T_S), 0.01, law="power")
+
+
+def test_what_is_written_is_read_again() -> None:
+    from labrig.results.fitted_decay import _from_dict
+
+    fit = fitted("otor", 0.3, 5)
+    again = _from_dict(fit.to_dict())
+    assert isinstance(again, FittedDecay)
+    at_s = np.array([1.0, 100.0])
+    for law in ("exponentials", *(law.name for law in fit.other_laws)):
+        for old, new in zip(
+            fit.signal(at_s, 0 * at_s, law), again.signal(at_s, 0 * at_s, law), strict=True
+        ):
+            np.testing.assert_allclose(new, old)
+    assert again.law == fit.law
+    assert math.isclose(again.measured_until_s, fit.measured_until_s)
