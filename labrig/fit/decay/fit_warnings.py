@@ -17,7 +17,7 @@ from labrig.fit.decay.diagnostics import (
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.fit.least_squares import Ending, FloatArray
 from labrig.results import AlternativeModel, Candidate, DecayState, ScatterSigma
 
 RISING_SIGMAS = 5.0
@@ -126,6 +126,11 @@ def warnings_about(
         warnings.append(
             f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
             "signal: give a flicker measured elsewhere, or record more frames while it is bright"
+        )
+    if joint.least_squares.ending is Ending.CREEPING:
+        warnings.append(
+            "the fit still creeps: rates and amplitudes may trade off; ask for fewer states "
+            "(--states) or record longer"
         )
     requested = evidence.asked or evidence.n_fixed
     if fit.n_states < requested:
