@@ -8,7 +8,13 @@ from labrig.fit.bispectral import (
     separate_columns,
 )
 from labrig.fit.decay import DecayFit, fit_decay
-from labrig.fit.least_squares import EPSILON, FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import (
+    EPSILON,
+    Ending,
+    FloatArray,
+    LeastSquaresFit,
+    least_squares,
+)
 from labrig.fit.mixture import (
     HeldOutError,
     MixtureCandidate,
@@ -22,6 +28,7 @@ __all__ = [
     "EPSILON",
     "BispectralColumns",
     "DecayFit",
+    "Ending",
     "FloatArray",
     "HeldOutError",
     "LeastSquaresFit",

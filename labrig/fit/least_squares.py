@@ -6,16 +6,23 @@ normal equations, which square its condition), then carry the minimum to the pre
 arithmetic. The search solves a large problem by its normal equations, in a third of the time: a
 trial step need not be exact.
 
+From a start that is far off, which of several basins a search falls into is chance. There, and
+where the fit did not end at a minimum of full rank, SciPy's trust-region reflective search goes
+from the same start, too, and the lower of both ends is taken.
+
 References
 ----------
 J. J. Moré, *The Levenberg–Marquardt algorithm*, LNM 630 (1978); H. B. Nielsen, *Damping parameter
 in Marquardt's method*, IMM-REP-1999-05; Å. Björck, *Numerical methods for least squares problems*
-(1996).
+(1996); M. A. Branch, T. F. Coleman and Y. Li, *A subspace, interior, and conjugate gradient method
+for large-scale bound-constrained minimization problems*, SIAM J. Sci. Comput. 21 (1999).
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cache
 
 import numpy as np
@@ -33,6 +40,18 @@ EPSILON = float(np.finfo(np.float64).eps)
 SEARCH_STEP = 1e-7
 #: Relative step above which a stopped search has not converged.
 CONVERGED_STEP = 1e-6
+#: Gain of the next step, in parts of χ², above which a search has not converged, and the relative
+#: step below which that gain is rounding.
+CONVERGED_GAIN = 1e-8
+ROUNDED_STEP = 1e-10
+#: Number of evaluations after which a search begins anew, with the scales of the place it reached.
+SEARCH_EVALUATIONS = 500
+#: Ratio of χ² at the start to that at the end above which the start was far.
+FAR_START = 4.0
+#: Gain, in parts of χ², below which a search gains nothing.
+NO_GAIN = 1e-12
+#: Number of evaluations of the search that is made from a far start, too.
+SECOND_EVALUATIONS = 2000
 INITIAL_DAMPING = 1e-3
 #: Smallest factor of the damping after a step as good as predicted; Nielsen's 1/3 takes 50 % more
 #: steps.
@@ -41,6 +60,18 @@ MIN_DAMPING_FACTOR = 1 / 10
 LARGE_JACOBIAN = 100_000
 POLISH_STEPS = 60
 POLISH_PATIENCE = 3
+
+
+class Ending(Enum):
+    """How a fit ended."""
+
+    #: At a minimum that determines every parameter that no bound holds.
+    MINIMUM = "minimum"
+    #: Where some combination of the parameters changes no residual: it is not determined by the
+    #: data, or the search was lost on a plateau.
+    RANK_DEFICIENT = "rank deficient"
+    #: Still descending, along a flat valley or for want of evaluations.
+    CREEPING = "creeping"
 
 
 @dataclass(frozen=True)
@@ -63,8 +94,10 @@ class LeastSquaresFit:
         Numerical rank and 2-norm condition of the Jacobian with its columns scaled to length 1.
     at_bound
         Whether a bound holds the parameter, shape (p,), bool.
-    iterations, converged
-        Number of evaluations of the residuals, and whether the last step was negligible.
+    iterations
+        Number of evaluations of the residuals.
+    ending
+        How the fit ended.
     """
 
     parameters: FloatArray
@@ -77,7 +110,12 @@ class LeastSquaresFit:
     condition: float
     at_bound: NDArray[np.bool_]
     iterations: int
-    converged: bool
+    ending: Ending
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fit ended at a minimum that determines its parameters."""
+        return self.ending is Ending.MINIMUM
 
     @property
     def reduced_chi2(self) -> float:
@@ -88,16 +126,6 @@ class LeastSquaresFit:
     def sigma(self) -> FloatArray:
         """Standard uncertainties of the parameters for residuals of unit variance, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
-
-
-@dataclass
-class _Point:
-    """Current point of the search: parameters, residuals, Jacobian and χ²."""
-
-    x: FloatArray
-    residuals: FloatArray
-    jacobian: FloatArray
-    chi2: float
 
 
 def least_squares(
@@ -122,9 +150,10 @@ def least_squares(
     lower, upper
         Bounds, scalar or of shape (p,).
     max_iterations
-        Largest number of evaluations of `residuals` in the damped search.
+        Largest number of evaluations of `residuals` in a damped search.
     tolerance
-        Relative step at which to stop; 0 continues to the precision of the arithmetic.
+        Relative step at which to stop; 0 continues to the precision of the arithmetic and, from a
+        start far off, tries another way, too.
     least_gain
         Gain in χ² of a step at which the damped search ends, for fits that are only compared: along
         a flat valley it would creep for long without a gain that matters.
@@ -156,43 +185,159 @@ def least_squares(
     high = np.broadcast_to(np.asarray(upper, dtype=np.float64), x.shape)
     # A trial step may overflow an exponential; it is refused below, not reported.
     with np.errstate(all="ignore"):
-        point = _evaluate(residuals, np.clip(x, low, high))
-        if not (np.isfinite(point.chi2) and np.all(np.isfinite(point.jacobian))):
+        problem = _Problem(residuals, low, high)
+        at_start = problem.at(np.clip(x, low, high))
+        if not at_start.is_finite:
             raise FitError(
                 "expected finite residuals at the start of the fit, got infinite or undefined "
                 "ones; start nearer to the solution"
             )
-        point, iterations = _damped_search(
-            residuals, point, low, high, max_iterations, max(tolerance, SEARCH_STEP), least_gain
+        end = _fit_from(problem, at_start, max_iterations, tolerance, least_gain)
+        is_approximate = tolerance > 0 or least_gain > 0
+        is_far = at_start.chi2 > FAR_START * end.point.chi2
+        if not is_approximate and (is_far or end.ending is not Ending.MINIMUM):
+            end = _second_opinion(problem, at_start, end, max_iterations)
+        return _result(problem, end)
+
+
+@dataclass
+class _Point:
+    """Current point of the search: parameters, residuals, Jacobian and χ²."""
+
+    x: FloatArray
+    residuals: FloatArray
+    jacobian: FloatArray
+    chi2: float
+
+    @property
+    def is_finite(self) -> bool:
+        return math.isfinite(self.chi2) and bool(np.isfinite(self.jacobian).all())
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Residuals within a box."""
+
+    residuals: Residuals
+    low: FloatArray
+    high: FloatArray
+
+    def at(self, x: FloatArray) -> _Point:
+        r, jacobian = self.residuals(x)
+        return _Point(x, r, jacobian, float(r @ r))
+
+    def nearest(self, x: FloatArray) -> FloatArray:
+        return np.minimum(np.maximum(x, self.low), self.high)
+
+    def free(self, point: _Point) -> NDArray[np.bool_]:
+        """Return which parameters are inside the box, or pulled back into it by the gradient."""
+        low, high = self.low, self.high
+        inside = (low < point.x) & (point.x < high)
+        if inside.all():
+            return inside
+        gradient = point.jacobian.T @ point.residuals
+        is_held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
+        return ~is_held
+
+
+@dataclass(frozen=True)
+class _End:
+    """Where a fit ended, how, and after how many evaluations."""
+
+    point: _Point
+    ending: Ending
+    evaluations: int
+
+
+def _fit_from(
+    problem: _Problem, start: _Point, max_iterations: int, tolerance: float, least_gain: float
+) -> _End:
+    """Search and polish, again and again where damped steps were short too early."""
+    point, evaluations, search_step = start, 0, max(tolerance, SEARCH_STEP)
+    is_compared = tolerance >= CONVERGED_STEP or least_gain > 0
+    while True:
+        before, limit = point.chi2, min(SEARCH_EVALUATIONS, max_iterations - evaluations)
+        point, spent = _damped_search(problem, point, limit, search_step, least_gain)
+        point, ending = _polish(problem, point, tolerance)
+        evaluations += spent
+        gains = spent == limit or search_step > 0 or point.chi2 < before * (1 - NO_GAIN)
+        goes_on = ending is Ending.CREEPING and gains and not is_compared
+        if not goes_on or evaluations >= max_iterations:
+            return _End(point, ending, evaluations)
+        # Along a flat, curved valley damped steps are short long before its lowest place.
+        search_step = 0.0
+
+
+def _second_opinion(problem: _Problem, start: _Point, first: _End, max_iterations: int) -> _End:
+    """Return the lower of a fit's end and that of another search from the same start."""
+    point, evaluations = _reflective_search(problem, start, min(SECOND_EVALUATIONS, max_iterations))
+    evaluations += first.evaluations
+    if point.chi2 >= first.point.chi2 and first.ending is Ending.MINIMUM:
+        return replace(first, evaluations=evaluations)
+    second = _fit_from(problem, point, max_iterations, 0.0, 0.0)
+    lower = second if second.point.chi2 < first.point.chi2 else first
+    return replace(lower, evaluations=evaluations + second.evaluations)
+
+
+class _NoSlopeError(Exception):
+    """A search came to a point from which no direction descends."""
+
+
+def _reflective_search(
+    problem: _Problem, start: _Point, max_evaluations: int
+) -> tuple[_Point, int]:
+    """Return where SciPy's trust-region reflective search ends, and its number of evaluations."""
+    # Not above: it takes as long to load as a plan takes to be printed.
+    from scipy import optimize
+
+    fitted = problem.low < problem.high
+    latest, lowest, evaluations = start, start, 0
+
+    def at(part: FloatArray) -> _Point:
+        nonlocal latest, lowest, evaluations
+        x = start.x.copy()
+        x[fitted] = part
+        if not np.array_equal(x, latest.x):
+            latest, evaluations = problem.at(x), evaluations + 1
+            if latest.is_finite and latest.chi2 < lowest.chi2:
+                lowest = latest
+        return latest
+
+    def residuals(part: FloatArray) -> FloatArray:
+        point = at(part)
+        return point.residuals if point.is_finite else np.full_like(point.residuals, np.inf)
+
+    def slopes(part: FloatArray) -> FloatArray:
+        point = at(part)
+        if not (point.jacobian.T @ point.residuals)[fitted].any():
+            raise _NoSlopeError
+        return point.jacobian[:, fitted]
+
+    # SciPy refuses what is not finite a step away from a start at a bound.
+    with suppress(_NoSlopeError, ValueError, np.linalg.LinAlgError):
+        optimize.least_squares(
+            residuals,
+            start.x[fitted],
+            jac=slopes,
+            bounds=(problem.low[fitted], problem.high[fitted]),
+            x_scale="jac",
+            ftol=NO_GAIN,
+            # Where a parameter without effect is huge, every step is relatively short.
+            xtol=2 * EPSILON,
+            gtol=None,
+            max_nfev=max_evaluations,
         )
-        point, step = _polish(residuals, point, low, high, tolerance)
-        if step >= CONVERGED_STEP > tolerance and iterations < max_iterations and not least_gain:
-            # Along a flat, curved valley damped steps are short long before its lowest place.
-            remaining = max_iterations - iterations
-            point, extra = _damped_search(residuals, point, low, high, remaining, 0.0, 0.0)
-            point, step = _polish(residuals, point, low, high, tolerance)
-            iterations += extra
-        return _result(point, low, high, iterations, step < CONVERGED_STEP)
+    return lowest, evaluations
 
 
-def _evaluate(residuals: Residuals, x: FloatArray) -> _Point:
-    r, jacobian = residuals(x)
-    return _Point(x, r, jacobian, float(r @ r))
+def _column_lengths(columns: FloatArray) -> FloatArray:
+    lengths: FloatArray = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    return lengths
 
 
-def _free(point: _Point, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
-    """Return which parameters are free: inside the box, or pulled back into it by the gradient."""
-    inside = (low < point.x) & (point.x < high)
-    if inside.all():
-        return inside
-    gradient = point.jacobian.T @ point.residuals
-    is_held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
-    return ~is_held
-
-
-def _column_norms(columns: FloatArray) -> FloatArray:
-    norms: FloatArray = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-    return norms if norms.all() else np.where(norms > 0, norms, 1.0)
+def _or_1(lengths: FloatArray) -> FloatArray:
+    """Return lengths, 1 where they are 0."""
+    return lengths if lengths.all() else np.where(lengths > 0, lengths, 1.0)
 
 
 def _length(vector: FloatArray) -> float:
@@ -214,15 +359,16 @@ class _Linearised:
         R of J = Q R, shape (p, p); fewer rows if m < p.
     turned
         Rotated residuals Qᵀ r, shape (p,).
-    norms
-        Lengths of the columns of J, 1 where they are 0, shape (p,).
+    lengths, norms
+        Lengths of the columns of J, and the same with 1 where they are 0, shape (p,).
     """
 
     def __init__(self, factors: FloatArray) -> None:
         p = factors.shape[1] - 1
         self.triangle: FloatArray = factors[:, :p] * _upper(len(factors), p)
         self.rotated: FloatArray = factors[:, p]
-        self.norms = _column_norms(self.triangle)
+        self.lengths = _column_lengths(self.triangle)
+        self.norms = _or_1(self.lengths)
 
     @classmethod
     def by_qr(cls, point: _Point) -> "_Linearised":
@@ -299,44 +445,41 @@ def _stopped_at_bounds(
 
 
 def _damped_search(
-    residuals: Residuals,
-    point: _Point,
-    low: FloatArray,
-    high: FloatArray,
-    max_iterations: int,
-    tolerance: float,
-    least_gain: float,
+    problem: _Problem, point: _Point, max_iterations: int, tolerance: float, least_gain: float
 ) -> tuple[_Point, int]:
-    scale = np.zeros_like(point.x)
+    largest_norms = np.zeros_like(point.x)
     damping, growth, evaluations = INITIAL_DAMPING, 2.0, 1
     while evaluations < max_iterations:
-        free = _free(point, low, high)
+        free = problem.free(point)
         if not free.any():
             break
         linearised = _Linearised.by_normal_equations(point)
         # Moré: scales never shrink, so that a flat stretch does not set a parameter loose.
-        scale = np.maximum(scale, linearised.norms)
+        largest_norms = np.maximum(largest_norms, linearised.lengths)
+        scale = _or_1(largest_norms)
         directions = linearised.directions(free, scale)
+        if not directions[2].any():
+            break
         length = _length(point.x * scale) + EPSILON
         accepted = False
         while not accepted and evaluations < max_iterations:
             step = _damped_step(directions, damping)
             step = _stopped_at_bounds(
-                step, linearised, free, scale, damping, low - point.x, high - point.x
-            )
-            trial_x = np.minimum(np.maximum(point.x + step, low), high)
+                step, linearised, free, scale, damping,
+                problem.low - point.x, problem.high - point.x,
+            )  # fmt: skip
+            trial_x = problem.nearest(point.x + step)
             step = trial_x - point.x
             size = _length(step * scale) / length
-            if size < EPSILON:
+            # Not a number where all columns underflow.
+            if not size >= EPSILON:
                 return point, evaluations
-            trial = _evaluate(residuals, trial_x)
+            trial = problem.at(trial_x)
             evaluations += 1
             change = linearised.triangle @ step
             predicted = -float((2 * linearised.rotated + change) @ change)
             gain = (point.chi2 - trial.chi2) / predicted if predicted > 0 else -1.0
-            accepted = (
-                trial.chi2 < point.chi2 and gain > 1e-4 and bool(np.isfinite(trial.jacobian).all())
-            )
+            accepted = trial.chi2 < point.chi2 and gain > 1e-4 and trial.is_finite
             if accepted:
                 damping *= max(MIN_DAMPING_FACTOR, 1 - (2 * min(gain, 1.0) - 1) ** 3)
                 growth = 2.0
@@ -349,19 +492,17 @@ def _damped_search(
     return point, evaluations
 
 
-def _polish(
-    residuals: Residuals, point: _Point, low: FloatArray, high: FloatArray, tolerance: float
-) -> tuple[_Point, float]:
-    """Take undamped steps while they shrink; return the point and the smallest relative step.
+def _polish(problem: _Problem, point: _Point, tolerance: float) -> tuple[_Point, Ending]:
+    """Take undamped steps while they shrink; return the point and how it ended.
 
     Where residuals are large the steps shrink by a constant factor, alternating, hence the
     patience.
     """
-    least, idle = np.inf, 0
+    least, idle, ending = np.inf, 0, Ending.CREEPING
     for _ in range(POLISH_STEPS):
-        free = _free(point, low, high)
+        free = problem.free(point)
         if not free.any():
-            return point, 0.0
+            return point, Ending.MINIMUM
         linearised = _Linearised.by_qr(point)
         s, directions, along = linearised.directions(free, linearised.norms)
         kept = s > _rank_tolerance(point.jacobian) * s[0]
@@ -369,15 +510,20 @@ def _polish(
         size = _length(step * linearised.norms) / (_length(point.x * linearised.norms) + EPSILON)
         idle = 0 if size < 0.9 * least else idle + 1
         least = min(least, size)
+        if np.count_nonzero(kept) < np.count_nonzero(free):
+            ending = Ending.RANK_DEFICIENT
+        else:
+            is_still = along @ along < CONVERGED_GAIN * point.chi2 or least < ROUNDED_STEP
+            ending = Ending.MINIMUM if least < CONVERGED_STEP and is_still else Ending.CREEPING
         if idle == POLISH_PATIENCE or size < max(tolerance, EPSILON):
             break
-        trial = _evaluate(residuals, np.minimum(np.maximum(point.x + step, low), high))
+        trial = problem.at(problem.nearest(point.x + step))
         # χ² itself is rounded: near the minimum only the step can tell progress.
         descends = trial.chi2 <= point.chi2 * (1 + 1e-6) or size < 1e-8
-        if not (descends and np.isfinite(trial.jacobian).all()):
+        if not (descends and trial.is_finite):
             break
         point = trial
-    return point, least
+    return point, ending
 
 
 def _rank_tolerance(jacobian: FloatArray) -> float:
@@ -389,7 +535,7 @@ def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     The singular values (p,) are those of J with its columns scaled to length 1.
     """
-    scale = _column_norms(jacobian)
+    scale = _or_1(_column_lengths(jacobian))
     _, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
     kept = s > _rank_tolerance(jacobian) * s[0]
     inverse = vt[kept].T / s[kept]
@@ -403,9 +549,8 @@ def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
     return covariance, s
 
 
-def _result(
-    point: _Point, low: FloatArray, high: FloatArray, iterations: int, converged: bool
-) -> LeastSquaresFit:
+def _result(problem: _Problem, end: _End) -> LeastSquaresFit:
+    point = end.point
     covariance, s = parameter_covariance(point.jacobian)
     rank = int(np.count_nonzero(s > _rank_tolerance(point.jacobian) * s[0]))
     return LeastSquaresFit(
@@ -417,7 +562,7 @@ def _result(
         dof=len(point.residuals) - rank,
         rank=rank,
         condition=float(s[0] / s[-1]) if s[-1] > 0 else float("inf"),
-        at_bound=~_free(point, low, high) & ((point.x <= low) | (point.x >= high)),
-        iterations=iterations,
-        converged=converged,
+        at_bound=~problem.free(point),
+        iterations=end.evaluations,
+        ending=end.ending,
     )

@@ -11,7 +11,7 @@ from labrig.fit.decay.joint import JointFit, Shape, covariances_under, fit_joint
 from labrig.fit.decay.search import projection, search_rates
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.fit.least_squares import Ending, FloatArray
 from labrig.material import phi1
 
 #: Value of k T below which a difference of nearly equal numbers is replaced by its Taylor series.
@@ -188,7 +188,8 @@ def fit_states(
     start[2 * n_free :] = amplitudes[n_free:]
     limits = CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE
     fit = _fit_from(data, start, fixed, weights, offsets, *limits, CANDIDATE_GAIN)
-    if not fit.joint.least_squares.converged and fit.joint.chi2 < needed_chi2:
+    creeps = fit.joint.least_squares.ending is Ending.CREEPING
+    if creeps and fit.joint.chi2 < needed_chi2:
         joint = fit.joint
         fit = _fit_from(data, joint.shape, fixed, joint.weights, joint.offsets, *limits)
     vanished = fit.vanished

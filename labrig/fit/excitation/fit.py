@@ -16,7 +16,7 @@ from labrig.fit.excitation.levels import levels_at_off
 from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.start import channel_weights, starts
-from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import Ending, FloatArray, LeastSquaresFit, least_squares
 from labrig.fit.propagation import propagated_covariance
 from labrig.results import ChargingSeries, ConcentrationAtOff, ExcitedState, FittedExcitation
 
@@ -250,8 +250,13 @@ def _warnings(
     problem: ExcitationProblem, solution: LeastSquaresFit, states: Sequence[ExcitedState]
 ) -> list[str]:
     messages = []
-    if not solution.converged:
+    if solution.ending is Ending.CREEPING:
         messages.append("the fit still creeps: rates and levels may trade off; charge for longer")
+    elif solution.ending is Ending.RANK_DEFICIENT:
+        messages.append(
+            "the charges do not determine every rate and level: those have no finite σ; charge for "
+            "several durations, shorter and longer ones"
+        )
     worst = max(state.amplitude_sigma / max(state.amplitude, 1e-300) for state in states)
     if worst > LEVEL_KNOWN:
         messages.append(

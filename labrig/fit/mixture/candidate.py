@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
+from labrig.fit.least_squares import Ending, FloatArray
 from labrig.fit.mixture.entries import StokesEntries
 from labrig.fit.mixture.expectation_maximisation import LikelihoodFit, maximise_likelihood
 from labrig.fit.mixture.gaussians import Gaussians
@@ -92,7 +92,7 @@ def candidates(
             masked_mse(entries, likely_mixture),
             likely.iterations,
             spent,
-            fit.converged,
+            fit.ending is not Ending.CREEPING,
         )
         components += 1
 
