@@ -88,7 +88,8 @@ def _left(stand: Bench) -> dict[str, Any]:
     room, now_s = stand.room.room, stand.clock.now()
     doors = {"door": room.door, "shield": room._doors.shield}
     angles = {name: None if door is None else door.angle(now_s) for name, door in doors.items()}
-    return {"lamp_on": room.lamp_on, **angles, "changer": str(room.arrangements.last)}
+    lights = {"lamp_on": room.lamp_on, "leds_lit": sorted(room.leds.lit)}
+    return {**lights, **angles, "changer": str(room.arrangements.last)}
 
 
 def _die_writing(disk: Any, left_bytes: int) -> None:
