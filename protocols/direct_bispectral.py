@@ -36,6 +36,8 @@ from .steps.scenes import light
 LADDER = tuple(2.0**-step for step in range(10))
 #: Every so many steps of the ladder are tried by metering, with so many repetitions each.
 METERING_STEPS, METERING_REPETITIONS = 3, 2
+#: Repetitions of what is read to see that an LED has gone off, and that no other light is on.
+OFF_REPETITIONS = 2
 #: Part of the range that the brightest pixels may fill; the rest is room for drift.
 TARGET = 0.75
 #: Part of the range that ends metering: noise does not matter there.
@@ -48,11 +50,12 @@ Nanometres = Annotated[float, Field(ge=250, le=1100)]
 
 
 class DirectSpectra(StrEnum):
-    """Roles of spectra: with the lights off, of metering, and of what is lit."""
+    """Roles of spectra: of the dark, of metering, of what is lit, and just after it."""
 
     DARK = "direct-dark"
     LOOK = "direct-look"
     LIT = "direct-lit"
+    OFF = "direct-off"
 
 
 class DirectBispectral(ProtocolModel):
@@ -171,7 +174,7 @@ class LitUnit:
     light: str
 
     def run(self, session: Session) -> None:
-        """Light it, let the light settle, meter and read."""
+        """Light it, let the light settle, meter and read; then read what is left without an LED."""
         session.wait_until_warm("spectrometer")
         step = _step(self.protocol, self.stage)
         if not session.choose("in place", lambda: _is_in_place(session, step), worst=True):
@@ -181,6 +184,7 @@ class LitUnit:
         session.perform(ReadSpectrum(DirectSpectra.LIT, integration_s, self.protocol.repetitions))
         if self.protocol.filters is None:
             session.perform(LEDS_OFF)
+            session.perform(ReadSpectrum(DirectSpectra.OFF, integration_s, OFF_REPETITIONS))
 
     def _light(self, session: Session) -> None:
         if self.protocol.filters is not None:

@@ -122,6 +122,18 @@ class Skipped(FaultTime):
     name: str | None = None
 
 
+class OfLed(FaultTime):
+    """A fault of one LED.
+
+    Attributes
+    ----------
+    relay
+        Relay or output of the LED, as under `leds`; null: each of them.
+    """
+
+    relay: Annotated[int, Field(ge=1, le=12)] | None = None
+
+
 WhenT = TypeVar("WhenT", bound=FaultTime)
 
 
@@ -168,6 +180,10 @@ class Fault(_Part):
         The camera reports that there is no room for a photograph, on the PC or on its card.
     mercury_dead
         The mercury lamp has current, but no arc.
+    led_dark
+        The LED stays dark, whatever its relay or output reports: its wire has come off.
+    led_stuck
+        The LED, if it is lit or gets lit, stays lit, whatever its relay or output reports.
     ambient_light
         Light leaks into the room, of `level` times the warm lamp's at the sample.
     lvf_turned
@@ -213,6 +229,8 @@ class Fault(_Part):
     camera_busy: FaultTime | None = None
     camera_full: FaultTime | None = None
     mercury_dead: FaultTime | None = None
+    led_dark: OfLed | None = None
+    led_stuck: OfLed | None = None
     ambient_light: Leak | None = None
     lvf_turned: FaultTime | None = None
     filter_skipped: Skipped | None = None

@@ -86,6 +86,12 @@ class OpenRoom:
             "arduino": arduino,
         }
         relay_boards[self._lamp_board].states[LAMP_RELAY] = simulation.initial.lamp == "on"
+        units = _dc4100_units(simulation, self.room)
+        for relay in simulation.initial.leds:
+            if self._led_board == "dc4100":
+                units[f"dc4100-{1 + (relay - 1) // OUTPUTS}"].states[(relay - 1) % OUTPUTS] = True
+            else:
+                relay_boards[self._led_board].states[relay] = True
         changer = ChangerBoard(self.room.tasks)
         for task in simulation.initial.manual_steps:
             changer.do(task)
@@ -100,7 +106,7 @@ class OpenRoom:
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
-            for name, board in (relay_boards | _dc4100_units(simulation, self.room)).items()
+            for name, board in (relay_boards | units).items()
         }
         self.camera = SimulatedCamera(
             clock,

@@ -118,6 +118,8 @@ class Phosphor:
             ∫ v q r dt from `start_s` to `end_s`, with q the `rate_factor`.
         """
         state = np.array([level, np.zeros_like(level)])
+        if not level.any() and not self.excitation.any():
+            return state[0], state[1]
         corners = [start_s, *light.corners(start_s, end_s), end_s]
         for begin_s, stop_s in pairwise(corners):
             if stop_s > begin_s:

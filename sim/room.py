@@ -27,6 +27,7 @@ from .filters import Filters
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
 from .layout import Layout
+from .led_circuit import LedCircuit
 from .leds import Leds
 from .lights import Lights, VisibleLight, leak, room_light_spectrum
 from .optics import FOCAL_MM, bent_curves, measured_curves, vignetting
@@ -77,7 +78,7 @@ class Room:
         self._spheres = Spheres(simulation) if has_sphere else None
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
-        self._leds = Leds(simulation.leds)
+        self._led_circuit = LedCircuit(simulation.leds, simulation.initial.leds, faults, clock)
         self._room_light_spans = given(fault.light_left_on for fault in faults)
         leaks = [
             leak(fault_leak.level, [fault_leak])
@@ -113,7 +114,7 @@ class Room:
     @property
     def leds(self) -> Leds:
         """The bank of LEDs with its history up to now."""
-        return self._leds
+        return self._led_circuit.leds
 
     @property
     def door(self) -> Door | None:
@@ -135,12 +136,12 @@ class Room:
         self._circuit.ask(on)
 
     def switch_led(self, relay: int, on: bool) -> None:
-        """Move the contact of a relay now, to which an LED may be connected."""
-        self._leds = self._leds.switched(relay, on, self._clock.now())
+        """Ask a relay to move now, to which an LED may be connected."""
+        self._led_circuit.ask(relay, on)
 
     def dim_led(self, relay: int, fraction: float) -> None:
         """Change the brightness of an LED now, as a fraction of its full light."""
-        self._leds = self._leds.dimmed(relay, fraction, self._clock.now())
+        self._led_circuit.dim(relay, fraction)
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
         """Return the DNG of an exposure that is over.
@@ -281,7 +282,7 @@ class Room:
             self._circuit.lamp,
             self._circuit.mercury,
             self._filters.history(self._changer.arrangements),
-            self._leds,
+            self._led_circuit.leds,
         )
 
     def _lights(self) -> Lights:

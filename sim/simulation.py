@@ -145,6 +145,8 @@ class InitialState(Part):
     ----------
     lamp
         State of the lamp at the epoch: `off`, or `on` as a crash may have left it.
+    leds
+        Relays or outputs of the LEDs that are lit at the epoch, as a crash may have left them.
     door
         State of the trap door at the epoch: `closed` or `open`.
     concentration
@@ -154,6 +156,7 @@ class InitialState(Part):
     """
 
     lamp: Literal["off", "on"] = "off"
+    leds: tuple[int, ...] = ()
     door: Literal["closed", "open"] = "closed"
     concentration: Annotated[float, Field(ge=0, le=1)] = 0.0
     manual_steps: tuple[str, ...] = ()
@@ -293,6 +296,13 @@ class Simulation(Part):
             raise ValueError("expected 'door' and 'shield' on two channels of the servo board")
         if len({led.relay for led in self.leds}) < len(self.leds):
             raise ValueError("expected a relay of its own for each of 'leds'")
+        leds = {led.relay for led in self.leds}
+        spans = [span for fault in self.faults for span in (fault.led_dark, fault.led_stuck)]
+        if (
+            unknown := {*self.initial.leds, *(led.relay for led in given(spans) if led.relay)}
+            - leds
+        ):
+            raise ValueError(f"expected relays of 'leds', got {min(unknown)}, which has no LED")
         if self.led_board == "relays" and any(led.relay > RELAYS for led in self.leds):
             raise ValueError(f"expected relays 1 to {RELAYS} for 'leds': the board has no more")
         if self.lvf is None and any(fault.lvf_turned for fault in self.faults):

@@ -1,5 +1,7 @@
 """The command line; commands import what they need when they are called."""
 
+from functools import cache
+
 import typer
 from typer.core import TyperGroup
 
@@ -59,6 +61,7 @@ def main(
         raise typer.Exit
 
 
+@cache
 def command() -> TyperGroup:
     """Return the command line; its lists show each command's first sentence in full."""
     whole = typer.main.get_command(app)

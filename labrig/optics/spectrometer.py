@@ -177,13 +177,10 @@ class SpectrometerReading:
             facts["calibration"] = _spectrum_content(self.calibration)
         names = [f"raw_{number + 1}" for number in range(len(self.raw_counts))]
         rows = zip(self.wavelength_nm.tolist(), *self.raw_counts.tolist(), strict=True)
-        lines = [
-            FORMAT,
-            f"# {json.dumps(facts)}",
-            ",".join(["wavelength_nm", *names]),
-            *(",".join(repr(value).removesuffix(".0") for value in row) for row in rows),
-        ]
-        return "\n".join(lines) + "\n"
+        table = "".join([",".join(map(repr, row)) + "\n" for row in rows])
+        head = [FORMAT, f"# {json.dumps(facts)}", ",".join(["wavelength_nm", *names])]
+        # Whole numbers, as most counts are, without their point.
+        return "\n".join(head) + "\n" + table.replace(".0,", ",").replace(".0\n", "\n")
 
     def _linear(self) -> FloatArray:
         """Return counts above the dark pixels, divided by the relative response."""

@@ -19,7 +19,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -213,6 +213,7 @@ def leave_bench(run: Path, *, morning: bool) -> None:
     rig = read_yaml(run / "rig.yaml")
     rig["simulation"]["initial"] = {
         "lamp": "off" if morning else last.get("lamp", "off"),
+        "leds": [] if morning else _lit(rig, last),
         "door": "closed" if morning or last.get("door") != "open" else "open",
         "concentration": 0.0 if morning or "lamp" not in last else AGLOW,
         "manual_steps": [action.task for action in actions if action.task],
@@ -221,6 +222,16 @@ def leave_bench(run: Path, *, morning: bool) -> None:
         epoch = datetime.fromtimestamp(record.last_time + NIGHT_S, UTC)
         rig["simulation"]["epoch"] = epoch.isoformat()
     (run / "rig.yaml").write_text(yaml_text(rig))
+
+
+def _lit(rig: dict[str, Any], last: Mapping[str, str]) -> list[int]:
+    """Return the output of the LED that was lit last, as `simulation: leds:` counts them."""
+    leds = rig["devices"].get("leds", {}).get("channels", {})
+    name = last.get("leds", "off").removesuffix(" on")
+    if name not in leds:
+        return []
+    unit = int(str(leds[name].get("address") or rig["devices"]["leds"]["address"])[-1])
+    return [4 * (unit - 1) + leds[name]["output"]]
 
 
 def damage(run: Path, peace: Undisturbed) -> Iterator[str]:

@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -88,7 +89,10 @@ def _left(stand: Bench) -> dict[str, Any]:
     room, now_s = stand.room.room, stand.clock.now()
     doors = {"door": room.door, "shield": room._doors.shield}
     angles = {name: None if door is None else door.angle(now_s) for name, door in doors.items()}
-    return {"lamp_on": room.lamp_on, **angles, "changer": str(room.arrangements.last)}
+    lights = {"lamp_on": room.lamp_on, "leds_lit": sorted(room.leds.lit)}
+    # A unit that is done again puts its sample in anew; how often counts for nothing.
+    bench = replace(room.arrangements.last, placing=0)
+    return {**lights, **angles, "changer": str(bench)}
 
 
 def _die_writing(disk: Any, left_bytes: int) -> None:

@@ -27,6 +27,13 @@ SHORTER: dict[str, dict[str, Any]] = {
     "led_brightness": {
         "leds": ["455 nm", "530 nm"], "longest": "1 s", "exposures": 2, "repeats": 1,
     },
+    "led_fluorescence": {
+        "leds": ["430 nm", "455 nm", "530 nm"], "longest": "1 s", "exposures": 2, "repeats": 1,
+        "patches": {"felt": [0.6, 0.58, 0.3, 0.3]},
+    },
+    "angular_fluorescence": {
+        "angles": [30, 60, 90], "directions": ["vertical"], "repositionings": 3, "repeats": 1,
+    },
     "direct_bispectral": {
         "leds": ["430 nm", "530 nm"], "samples": ["yellow"], "repetitions": 4,
     },
@@ -51,8 +58,10 @@ NEEDED = {
 ANOTHER_DAY = "2026-01-02T00:02:00Z"
 RIGS = {
     "decay-eleven": "sim-eleven",
+    "angular_fluorescence": "sim-fluorescent",
     "direct_bispectral": "sim-fluorescent",
     "led_brightness": "sim-fluorescent",
+    "led_fluorescence": "sim-fluorescent",
 }
 
 

@@ -14,6 +14,8 @@ from labrig.errors import DataError
 from labrig.material import read_reradiation
 from labrig.optics import SpectrometerReading, read_spectrometer_reading
 from labrig.process import process_and_report
+from labrig.protocols.direct_bispectral import DirectSpectra
+from labrig.record import Attempt, SpectrumRecord
 from labrig.results import DirectBispectralResult, DirectColumns
 from tests.analyse.direct_bench import (
     MATERIALS,
@@ -138,13 +140,18 @@ def test_the_files_are_read_back_and_the_report_says_what_it_is(quick: Path) -> 
     assert "Beyond its band" in page
 
 
+def lit(attempt: Attempt) -> SpectrumRecord:
+    """The reading of an attempt with its light on."""
+    return [one for one in attempt.spectra if one.role == DirectSpectra.LIT][-1]
+
+
 def changed(part: Part, change: dict[str, Any]) -> Part:
     """A part some of whose units have other readings: by unit, the factor and the unit of more."""
     attempts = {attempt.unit: attempt for attempt in part.run.attempts}
     readings: dict[str, SpectrometerReading] = {}
     folder = part.run.folder / "frames"
     for unit, (factor, more) in change.items():
-        spectrum = attempts[unit].spectra[-1]
+        spectrum = lit(attempts[unit])
         reading = read_spectrometer_reading(spectrum.path)
         stage = unit.removeprefix("again ").partition(":")[0]
         dark = next(
@@ -155,7 +162,7 @@ def changed(part: Part, change: dict[str, Any]) -> Part:
         light = factor * (reading.raw_counts - dark.raw_counts.mean(axis=0))
         counts = dark.raw_counts[: len(light)] + light
         for other, part_of_it in more.items():
-            added = read_spectrometer_reading(attempts[other].spectra[-1].path)
+            added = read_spectrometer_reading(lit(attempts[other]).path)
             counts = counts + part_of_it * (added.raw_counts - dark.raw_counts.mean(axis=0))
         readings[unit] = replace(reading, raw_counts=np.rint(counts))
     new = []
@@ -164,10 +171,12 @@ def changed(part: Part, change: dict[str, Any]) -> Part:
             new.append(attempt)
             continue
         data = readings[attempt.unit].text().encode()
-        path = folder / f"{attempt.spectra[-1].path.stem}-changed.csv"
+        old = lit(attempt)
+        path = folder / f"{old.path.stem}-changed.csv"
         path.write_bytes(data)
-        last = replace(attempt.spectra[-1], path=path, **_checks(data))
-        new.append(replace(attempt, spectra=[*attempt.spectra[:-1], last]))
+        made = replace(old, path=path, **_checks(data))
+        spectra = [made if one is old else one for one in attempt.spectra]
+        new.append(replace(attempt, spectra=spectra))
     return replace(part, run=replace(part.run, attempts=new))
 
 
@@ -246,6 +255,26 @@ def test_what_the_room_adds_is_said_and_subtracted(tmp_path: Path) -> None:
     (line,) = result.warnings
     assert "with all lights off the spectrometer sees light" in line
     (columns,) = result.samples.values()
+    assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
+
+
+def test_light_that_comes_after_the_dark_is_said_and_subtracted(tmp_path: Path) -> None:
+    leak = {"ambient_light": {"level": "0.5 %", "at": "1 min"}}
+    run = record(tmp_path, QUICK | {"leds": ["430 nm"]}, faults=[leak])
+    result = analyse(part_of(run))
+    (line,) = result.warnings
+    assert "white: with all LEDs off the light was another than in the dark before" in line
+    (columns,) = result.samples.values()
+    assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
+
+
+def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Path) -> None:
+    stuck = {"led_stuck": {"relay": 5}}
+    run = record(tmp_path, QUICK | {"leds": ["490 nm", "430 nm"]}, faults=[stuck])
+    result = analyse(part_of(run))
+    assert sum("with all LEDs off the light was another" in line for line in result.warnings) == 1
+    (columns,) = result.samples.values()
+    assert columns.lights == ("430 nm",)
     assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
 
 

@@ -129,3 +129,23 @@ def test_an_open_door_keeps_them_from_the_sample() -> None:
 def test_leds_that_cannot_be(leds: list[dict[str, float]]) -> None:
     with pytest.raises(UsageError, match="leds"):
         validate({"sample": "blue-paint", "leds": leds}, Simulation, "rig.yaml")
+
+
+def test_a_dark_led_is_dark_and_a_stuck_one_stays_lit_until_the_fault_is_over() -> None:
+    faults = [
+        {"led_dark": {"relay": 2, "for": "20 s"}},
+        {"led_stuck": {"relay": 1, "at": "5 s", "for": "20 s"}},
+    ]
+    bench = Darkroom(leds=KEYS, faults=faults, initial={"leds": [1]})
+    assert bench.room.leds.lit == {1}
+    lit = []
+    for wait_s, relay, on in ((10.0, 1, False), (5.0, 2, True), (6.0, 2, True), (9.0, 2, False)):
+        bench.clock.spend(wait_s)
+        bench.room.switch_led(relay, on)
+        lit.append(set(bench.room.leds.lit))
+    assert lit == [{1}, {1}, {1, 2}, set()]
+
+
+def test_a_fault_of_an_led_needs_the_led() -> None:
+    with pytest.raises(ValueError, match="expected relays of 'leds', got 3, which has no LED"):
+        Darkroom(leds=KEYS, faults=[{"led_dark": {"relay": 3}}])

@@ -1,6 +1,6 @@
 """From readings of white and samples under narrow-band lights to columns of a matrix."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ from labrig.acquire import LEDS, RigFile
 from labrig.analyse.direct_bispectral.checks import (
     ambient_light,
     disorder,
+    left_light,
     light_beyond,
     other_light,
     part_beyond,
@@ -37,10 +38,12 @@ from labrig.results import DirectBispectralResult, DirectColumns, LightSpectrum,
 
 #: Significance in σ of a drift, and of light from a sample.
 SIGNIFICANT = 5.0
-#: Relative drift that is told.
-TOLD_DRIFT = 0.01
+#: Relative drift that is told, and part of a light that it has no more when it has gone out.
+TOLD_DRIFT, GONE = 0.01, 0.02
 #: Least distance in nm of two lights.
 APART_NM = 1.0
+#: Part of the white reference's light of which less is none.
+NOTHING = 0.005
 #: Part of a filter's largest transmittance at the ends of its pass band.
 PASSED = 0.05
 
@@ -69,7 +72,7 @@ def analyse(part: Part) -> DirectBispectralResult:
         The rig file does not name the white reference's reflectance.
     """
     run, protocol = part.run, part.protocol
-    require_intact(run, [DirectSpectra.DARK, DirectSpectra.LIT], part.overrides)
+    require_intact(run, [DirectSpectra.DARK, DirectSpectra.LIT, DirectSpectra.OFF], part.overrides)
     readings = _Readings(part)
     if not readings.lit:
         raise DataError(
@@ -83,7 +86,11 @@ def analyse(part: Part) -> DirectBispectralResult:
     whites = {light: spectra.pop((WHITE, light, False)) for light in protocol.lights
               if (WHITE, light, False) in spectra}  # fmt: skip
     whites, of_whites = _usable_whites(
-        protocol.lights, whites, part.rig, are_filters=protocol.filters is not None
+        protocol.lights,
+        whites,
+        {light for stage, light, again in readings.lit if stage == WHITE and not again},
+        part.rig,
+        are_filters=protocol.filters is not None,
     )
     warnings = [*ambient_light(list(readings.dark.values())), *warnings, *of_whites]
     if not whites:
@@ -102,8 +109,11 @@ def analyse(part: Part) -> DirectBispectralResult:
     for name in protocol.samples:
         lit = {light: spectra[name, light, False] for light in whites
                if (name, light, False) in spectra}  # fmt: skip
-        drift = _drift(lit.get(first), spectra.get((name, first, True)))
+        before = lit.get(first) if _came_back(lit.get(first), whites.get(first)) else None
+        drift = _drift(before, spectra.get((name, first, True)))
         warnings += _drift_warnings(name, first, drift)
+        unread = [light for light in whites if (name, light, False) not in readings.lit]
+        warnings += [f"{name}: was not read under {light}" for light in unread]
         scale_sigma = np.interp(output_nm, *scale)
         columns, of_columns = _columns(name, whites, lit, output_nm, scale_sigma, card,
                                        (white_drift, drift))  # fmt: skip
@@ -126,19 +136,23 @@ def analyse(part: Part) -> DirectBispectralResult:
 
 
 class _Readings:
-    """Readings of a run: lit ones by stage, light and whether again; dark ones by stage, time."""
+    """Readings of a run.
+
+    Lit ones, and those just after, by stage, light and whether again; dark ones by stage and time.
+    """
 
     def __init__(self, part: Part) -> None:
-        protocol, self.lit, self.dark = part.protocol, {}, {}
+        protocol, self.lit, self.off, self.dark = part.protocol, {}, {}, {}
         lit_units = {
             protocol.unit_name(stage, light, again): (stage, light, again)
             for stage in protocol.stages
             for light in protocol.lights
             for again in (False, True)
         }
-        for record in part.run.spectra(DirectSpectra.LIT):
-            if not part.overrides.excludes(record) and record.unit in lit_units:
-                self.lit[lit_units[record.unit]] = read_spectrometer_reading(record.path)
+        for role, readings in ((DirectSpectra.LIT, self.lit), (DirectSpectra.OFF, self.off)):
+            for record in part.run.spectra(role):
+                if not part.overrides.excludes(record) and record.unit in lit_units:
+                    readings[lit_units[record.unit]] = read_spectrometer_reading(record.path)
         stages = {f"{stage}: dark": stage for stage in protocol.stages}
         for record in part.run.spectra(DirectSpectra.DARK):
             if not part.overrides.excludes(record):
@@ -146,6 +160,7 @@ class _Readings:
                 self.dark[key] = read_spectrometer_reading(record.path)
 
     lit: dict[tuple[str, str, bool], SpectrometerReading]
+    off: dict[tuple[str, str, bool], SpectrometerReading]
     dark: dict[tuple[str, float], SpectrometerReading]
 
     @property
@@ -168,6 +183,7 @@ def _spectra(
 ) -> tuple[dict[tuple[str, str, bool], _Lit], list[str]]:
     """Return what came of all lights, of the white reference over its reflectance."""
     spectra, warnings = {}, []
+    left: dict[str, dict[str, float]] = {}
     for (stage, light, again), reading in readings.lit.items():
         dark = readings.dark.get((stage, round(reading.integration_s, 9)))
         where = f"{stage} under {light}"
@@ -180,11 +196,24 @@ def _spectra(
                 "shorter"
             )
             continue
+        off = readings.off.get((stage, light, again))
+        if off is not None and (part := left_light(reading, off, dark)):
+            left.setdefault(stage, {})[light] = part
+            dark = off
         spectrum = _lit_spectrum(reading, dark, noise)
         if stage == WHITE:
             spectrum = spectrum.divided_by(card.at(spectrum.wavelength_nm))
         spectra[stage, light, again] = _Lit(spectrum, reading.integration_s)
-    return spectra, warnings
+    return spectra, [*warnings, *(_left_line(stage, parts) for stage, parts in left.items())]
+
+
+def _left_line(stage: str, parts: Mapping[str, float]) -> str:
+    return (
+        f"{stage}: with all LEDs off the light was another than in the dark before, after "
+        f"{', '.join(parts)} (by up to {max(parts.values()):.1%} of that with the LED); it was "
+        "subtracted as if it had been steady: an LED stays lit, or another light is on; check the "
+        "LEDs' relays, darken the room"
+    )
 
 
 def _lit_spectrum(
@@ -222,13 +251,22 @@ def _lit_spectrum(
 
 
 def _usable_whites(
-    lights: Sequence[str], whites: Mapping[str, _Lit], rig: RigFile, *, are_filters: bool
+    lights: Sequence[str],
+    whites: Mapping[str, _Lit],
+    read: Container[str],
+    rig: RigFile,
+    *,
+    are_filters: bool,
 ) -> tuple[dict[str, _Lit], list[str]]:
-    """Return the lights that lit the white reference alone, and what is wrong with the others."""
+    """Return the lights that lit the white reference alone, and what is wrong with the others.
+
+    Of those that were read and are not among `whites` it has been said.
+    """
     warnings, lit = [], {}
     for name in lights:
         if name not in whites:
-            warnings.append(f"{name}: the white reference was not read under it; left out")
+            if name not in read:
+                warnings.append(f"{name}: the white reference was not read under it; left out")
             continue
         try:
             window_nm = light_window_nm(whites[name].spectrum)
@@ -307,7 +345,7 @@ def _drift(first: _Lit | None, again: _Lit | None) -> Measured:
     before, after = first.spectrum, again.spectrum
     weight = before.value / np.maximum(before.sigma, 1e-300) ** 2
     scale = float(weight @ before.value)
-    if not scale > 0:
+    if not scale > SIGNIFICANT * float(np.sqrt(weight**2 @ before.sigma**2)):
         return unknown
     ratio = float(weight @ after.value) / scale
     variance = weight**2 @ (after.sigma**2 + (ratio * before.sigma) ** 2)
@@ -317,11 +355,31 @@ def _drift(first: _Lit | None, again: _Lit | None) -> Measured:
     return Measured(ratio, float(np.sqrt(variance)) / abs(scale))
 
 
+def _came_back(lit: _Lit | None, white: _Lit | None) -> bool:
+    """Return whether a sample gave back enough of a light to tell a drift."""
+    if lit is None or white is None:
+        return False
+    power, of_white = (
+        np.trapezoid(one.spectrum.value, one.spectrum.wavelength_nm) for one in (lit, white)
+    )
+    return bool(power > NOTHING * of_white)
+
+
 def _is_drifted(drift: Measured) -> bool:
-    return bool(abs(drift.value - 1) > SIGNIFICANT * drift.sigma)
+    return _has_lit(drift) and bool(abs(drift.value - 1) > SIGNIFICANT * drift.sigma)
+
+
+def _has_lit(drift: Measured) -> bool:
+    """Return whether the light was there once more; a light that has gone out has not drifted."""
+    return drift.value > GONE
 
 
 def _drift_warnings(what: str, light: str, drift: Measured) -> Iterator[str]:
+    if drift.value <= GONE:
+        yield (
+            f"{what}: under {light}, read once more at the end, it gave no light any more: the LED "
+            "went out, check its plug; whether anything drifted or bleached is not known"
+        )
     if _is_drifted(drift) and abs(drift.value - 1) > TOLD_DRIFT:
         yield (
             f"{what}: under {light}, read once more at the end, it gave "
@@ -340,7 +398,7 @@ def _columns(
     drifts: tuple[Measured, Measured],
 ) -> tuple[DirectColumns | None, list[str]]:
     """Return the columns of a sample, None without any, and what is wrong with the others."""
-    warnings = [f"{name}: was not read under {light}" for light in whites if light not in lit]
+    warnings = []
     # What changed between the first reading and the last, evenly somewhere in between.
     changes = [abs(drift.value - 1) / np.sqrt(12) for drift in drifts if _is_drifted(drift)]
     used: list[str] = []

@@ -33,6 +33,8 @@ WHITE_REFLECTANCE = 1.1
 END_PART = 0.08
 #: Light in the dark that is told, in counts per second.
 TOLD_AMBIENT_PER_S = 2.0
+#: Part of a light that is told if it is there without the light.
+TOLD_LEFT = 2e-3
 
 
 def second_peak(name: str, light: LitSpectrum, window_nm: Window) -> str | None:
@@ -151,18 +153,39 @@ def ambient_light(darks: Sequence[SpectrometerReading]) -> Iterator[str]:
     if time_s <= 0:
         return
     grown = longest.corrected().counts - shortest.corrected().counts
-    lit = np.delete(grown, list(longest.dark_pixels))
-    number = max(int(END_PART * len(lit)), 2)
-    ends, middle = np.concatenate([lit[:number], lit[-number:]]), lit[number:-number]
-    # Averaged over neighbours, so that a broad light stands out of the pixels' scatter.
-    smooth = np.convolve(middle, np.full(number, 1 / number), mode="valid")
-    light = float(smooth.max() - ends.mean())
-    sigma = float(ends.std(ddof=1)) * np.sqrt(1 / number + 1 / len(ends))
+    light, sigma = _standing_out(np.delete(grown, list(longest.dark_pixels)))
     if light > max(SIGNIFICANT * sigma, TOLD_AMBIENT_PER_S * time_s):
         yield (
             f"with all lights off the spectrometer sees light ({light / time_s:.0f} counts a "
             "second); what stays the same is subtracted: darken the room, cover displays"
         )
+
+
+def left_light(
+    lit: SpectrometerReading, off: SpectrometerReading, dark: SpectrometerReading
+) -> float:
+    """Return the part of a light that is there when it is off; 0 where that is too little to tell.
+
+    A dark that had a light in it is too bright by that.
+    """
+    on, after = (
+        np.delete(reading.corrected(dark).counts, list(dark.dark_pixels)) for reading in (lit, off)
+    )
+    total, _ = _standing_out(on)
+    light, sigma = max(_standing_out(after), _standing_out(-after))
+    if light < max(SIGNIFICANT * sigma, TOLD_LEFT * total):
+        return 0.0
+    return light / max(total, light)
+
+
+def _standing_out(counts: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the strongest light in the middle of a range above that at its ends, and its σ."""
+    number = max(int(END_PART * len(counts)), 2)
+    ends, middle = np.concatenate([counts[:number], counts[-number:]]), counts[number:-number]
+    # Averaged over neighbours, so that a broad light stands out of the pixels' scatter.
+    smooth = np.convolve(middle, np.full(number, 1 / number), mode="valid")
+    light = float(smooth.max() - ends.mean())
+    return light, float(ends.std(ddof=1)) * float(np.sqrt(1 / number + 1 / len(ends)))
 
 
 def _integral(light: LitSpectrum, where: NDArray[np.bool_]) -> float:

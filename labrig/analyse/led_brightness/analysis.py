@@ -79,7 +79,7 @@ def analyse(part: Part) -> LedBrightnessResult:
     checked = check_leds(bank, of_cards, by_led, part.protocol.leds)
     bank, of_cards = _without_unseen(checked, bank, of_cards)
     measured = _measured(bank, of_cards, by_led, checked)
-    if not measured:
+    if all(led.value is None and led.light is None for led in measured):
         reasons = "; ".join(finding.text for finding in checked.findings)
         raise DataError(f"{part.run.folder}: no LED can be used: {reasons}")
     drift = _drift(part.protocol.shuffled()[0], values, spectra)

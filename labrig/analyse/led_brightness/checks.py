@@ -120,7 +120,7 @@ def _check_ambient(checked: Checked, values: Mapping[str, CameraValues]) -> None
         most = max(float(values[name].off.max()) for name in ambient)
         text = (
             f"with all LEDs off there was light, after {_listed(ambient)} (up to {most:.3g} DN/s); "
-            "it was subtracted as if it had been steady: darken the room"
+            "it was subtracted as if it had been steady: darken the room, see that no LED stays lit"
         )
         checked.found(LedFault.AMBIENT_LIGHT, ambient, text)
 
@@ -135,6 +135,14 @@ def _check_ranges(
             "and are left out; dim the LED, lower camera.iso or close the aperture"
         )
         checked.found(LedFault.CLIPPED, clipped, text)
+    if bright := [name for name, seen in values.items() if seen.is_off_clipped]:
+        checked.without_camera.update(bright)
+        text = (
+            f"with all LEDs off the camera's frames are clipped after {_listed(bright)}: an LED "
+            "stays lit, or another light is on; the camera's values are left out: check the LEDs' "
+            "relays, darken the room"
+        )
+        checked.found(LedFault.AMBIENT_LIGHT, bright, text)
     if saturated := [name for name, seen in spectra.items() if seen.is_saturated]:
         checked.without_spectrometer.update(saturated)
         text = (
@@ -169,6 +177,11 @@ def _check_lit(
         return
     checked.left_out.add(name)
     text = f"LED '{name}' did not light and is left out; check its current, plug and output"
+    if value.is_ambient or value.is_off_clipped:
+        text = (
+            f"LED '{name}' changes nothing, with all LEDs off it is as bright: it did not light or "
+            "stays lit, and is left out; check its plug, its output and its relay"
+        )
     checked.found(LedFault.NOT_LIT, [name], text)
 
 

@@ -56,6 +56,11 @@ class CameraValues:
         return bool(np.isnan(self.value).all())
 
     @property
+    def is_off_clipped(self) -> bool:
+        """Whether the frame with the LED off is not usable."""
+        return bool(np.isnan(self.off).all())
+
+    @property
     def is_seen(self) -> bool:
         """Whether some channel sees the LED."""
         return bool((self.value > SEEN_SIGMA * self.sigma).any())

@@ -7,12 +7,17 @@ from typing import Literal
 import numpy as np
 
 from labrig.analyse.inputs import Part
-from labrig.analyse.led_fluorescence.card_checks import unused_leds
-from labrig.analyse.led_fluorescence.lit_patches import LitPatch, lit_patches, mean_of
+from labrig.analyse.led_fluorescence.card_checks import exchanged, lines_of, unused_leds
+from labrig.analyse.led_fluorescence.lit_patches import (
+    SEEN_SIGMA,
+    LitPatch,
+    lit_patches,
+    mean_of,
+)
 from labrig.analyse.led_fluorescence.lit_system import lit_system
 from labrig.analyse.led_fluorescence.warnings import (
-    SEEN_SIGMA,
     bleaching_warnings,
+    exchanged_warnings,
     fact_warnings,
     left_warnings,
 )
@@ -60,8 +65,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
     UsageError
         The rig file lacks an LED, or the curves of camera or card.
     DataError
-        Frames are missing or damaged, LEDs are named in another order than they light, or fewer
-        than two of them can be used.
+        Frames are missing or damaged, or fewer than two LEDs can be used.
     """
     leds = part.protocol.leds
     lights = led_exposures(part.rig, "rig.yaml", part.inputs.leds)
@@ -74,29 +78,38 @@ def analyse(part: Part) -> LedFluorescenceResult:
     camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
     cards = lit_patches(part, LedFrames.CARD, CARD)
     samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE)
-    left_out = list(unused_leds(leds, spectra, camera, white, mean_of(cards)))
-    warnings = [unused.reason for unused in left_out]
-    warnings += [*left_warnings("card", cards, leds), *left_warnings("sample", samples, leds)]
-    used = [led for led in leds if led not in {unused.led for unused in left_out}]
-    used.sort(key=peak_nm.__getitem__)
-    if len(used) < 2:
-        raise DataError(f"expected two LEDs that can be used, got {len(used)} ({warnings[0]})")
-    rows = [leds.index(led) for led in used]
-    cards = {name: _without_rest(card.under(rows)) for name, card in cards.items()}
+    left_out = list(unused_leds(leds, spectra, camera, white, cards, samples))
+    places = exchanged(left_out)
+    left_out = [unused for unused in left_out if unused.led not in places]
+    warnings = [*lines_of(left_out), *exchanged_warnings(places)]
+    warnings += [*left_warnings("card", cards, leds), *left_warnings("samples", samples, leds)]
+    # The LED whose light it is, by the row of its frames.
+    light_of = {
+        row: places.get(led, led)
+        for row, led in enumerate(leds)
+        if led not in {unused.led for unused in left_out}
+    }
+    if len(light_of) < 2:
+        raise DataError(
+            f"expected two LEDs or more that can be used, got {len(light_of)}: "
+            f"{'; '.join(lines_of(left_out))}"
+        )
+    rows = sorted(light_of, key=lambda row: peak_nm[light_of[row]])
+    used = [light_of[row] for row in rows]
+    has_first = leds.index(part.protocol.shuffled()[0]) in rows
+    cards = {name: card.under(rows).without_rest() for name, card in cards.items()}
     card = mean_of(cards)
     system = lit_system([lights[led] for led in used], camera, white, card)
     estimator, patches = JointEstimator(system), {}
     for number, name in enumerate(samples):
-        sample = _without_rest(samples[name].under(rows))
-        if sample.is_clipped.any():
-            which = ", ".join(np.array(used)[sample.is_clipped])
-            raise DataError(f"{name}: clips at the shortest exposure under {which}; dim the LEDs")
+        sample = samples[name].under(rows).without_rest()
         even = sample.times(*_evenness(cards[name], card, system))
         fit = estimator.fit(name, even.value, even.variance, seed=number)
         per_led = fit_per_led(name, even.value, even.variance, system)
         patches[name] = _patch(fit, per_led, even, system)
         warnings += fact_warnings(name, fit, camera.channels)
-        warnings += bleaching_warnings(name, even.bleaching)
+        if has_first:
+            warnings += bleaching_warnings(name, even.bleaching)
     return LedFluorescenceResult(
         leds=tuple(used),
         led_peak_nm=np.array([peak_nm[led] for led in used]),
@@ -107,16 +120,6 @@ def analyse(part: Part) -> LedFluorescenceResult:
         patches=patches,
         run=part.run.folder.resolve().name,
         warnings=tuple(warnings),
-    )
-
-
-def _without_rest(patch: LitPatch) -> LitPatch:
-    """Return a patch without the light that is left when its LED is off, if there is any."""
-    is_left = patch.off > SEEN_SIGMA * patch.off_sigma
-    return replace(
-        patch,
-        value=np.where(is_left, patch.value - patch.off, patch.value),
-        variance=np.where(is_left, patch.variance + patch.off_sigma**2, patch.variance),
     )
 
 

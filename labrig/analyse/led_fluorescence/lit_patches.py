@@ -1,7 +1,7 @@
 """Values of patches under LEDs, from brackets of frames with and without light."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from labrig.record import FrameRole
 from labrig.reduce import reduce_patches
 from labrig.results import BoolArray, FloatArray, Measured, Series
 
+#: Significance in σ from which a light is seen.
+SEEN_SIGMA = 5.0
+
 
 @dataclass(frozen=True, eq=False)
 class LitPatch:
@@ -26,8 +29,9 @@ class LitPatch:
         Values in DN/s and their variances, with the frames' flicker, shape (m, k).
     off, off_sigma
         Values in DN/s just after each LED, and their σ, shape (m, k).
-    is_clipped
-        Whether even the shortest exposures were clipped, shape (m,).
+    is_clipped, is_off_clipped
+        Whether even the shortest exposures were clipped, and whether those without the LED were,
+        shape (m,).
     bleaching
         Value under the first LED at the end of the run over that at its begin; None if it was not
         lit again.
@@ -38,7 +42,26 @@ class LitPatch:
     off: FloatArray
     off_sigma: FloatArray
     is_clipped: BoolArray
+    is_off_clipped: BoolArray
     bleaching: Measured | None = None
+
+    @property
+    def is_left(self) -> BoolArray:
+        """Whether light is left when the LED is off, shape (m, k)."""
+        return np.asarray(self.off > SEEN_SIGMA * self.off_sigma)
+
+    @property
+    def is_seen(self) -> BoolArray:
+        """Whether some channel sees light, shape (m,)."""
+        return np.asarray((self.value > SEEN_SIGMA * np.sqrt(self.variance)).any(axis=1))
+
+    def without_rest(self) -> "LitPatch":
+        """Return the values without the light that is left when the LED is off, if there is any."""
+        return replace(
+            self,
+            value=np.where(self.is_left, self.value - self.off, self.value),
+            variance=np.where(self.is_left, self.variance + self.off_sigma**2, self.variance),
+        )
 
     def under(self, rows: Sequence[int]) -> "LitPatch":
         """Return the values under some of the LEDs."""
@@ -48,6 +71,7 @@ class LitPatch:
             self.off[rows],
             self.off_sigma[rows],
             self.is_clipped[rows],
+            self.is_off_clipped[rows],
             self.bleaching,
         )
 
@@ -56,9 +80,8 @@ class LitPatch:
         by = factor[:, np.newaxis]
         value = self.value * by
         variance = self.variance * by**2 + value**2 * relative_variance[:, np.newaxis]
-        return LitPatch(
-            value, variance, self.off * by, self.off_sigma * by, self.is_clipped, self.bleaching
-        )
+        off, off_sigma = self.off * by, self.off_sigma * by
+        return replace(self, value=value, variance=variance, off=off, off_sigma=off_sigma)
 
 
 def lit_patches(part: Part, role: LedFrames, begin: str) -> dict[str, LitPatch]:
@@ -89,6 +112,7 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
         np.mean([patch.off for patch in each], axis=0),
         np.mean([patch.off_sigma for patch in each], axis=0),
         np.any([patch.is_clipped for patch in each], axis=0),
+        np.any([patch.is_off_clipped for patch in each], axis=0),
     )
 
 
@@ -114,7 +138,9 @@ def _lit_patch(
     flicker: float,
 ) -> LitPatch:
     lit = {unit.unit[0]: _merged(unit, flicker) for unit in series.by_unit()}
-    off = {unit.unit[0]: (unit.values[0], unit.sigma[0]) for unit in left.by_unit()}
+    off = {
+        unit.unit[0]: (unit.values[0], unit.sigma[0], not unit.usable[0]) for unit in left.by_unit()
+    }
     if missing := [unit for unit in units if unit not in lit or unit not in off]:
         raise DataError(
             f"{part.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
@@ -124,7 +150,7 @@ def _lit_patch(
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
     bleaching = None if again is None else _ratio(again, lit[first[0]])
-    return LitPatch(columns[0], columns[1], offs[0], offs[1], columns[2], bleaching)
+    return LitPatch(columns[0], columns[1], offs[0], offs[1], columns[2], offs[2], bleaching)
 
 
 def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool]:

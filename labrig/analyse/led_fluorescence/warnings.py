@@ -15,25 +15,40 @@ from labrig.fit.fluorescence import (
 from labrig.number_format import plus_minus
 from labrig.results import Measured
 
-#: Significance in σ, and part of the lit value, from which light without an LED counts.
-SEEN_SIGMA, LEFT = 5.0, 0.002
+#: Part of the lit value from which light without an LED counts.
+LEFT = 0.002
 #: Change under the first LED from which a sample has bleached, if it is that many σ.
 BLEACHED, BLEACHED_SIGMA = 0.02, 3.0
 
 
+def exchanged_warnings(places: Mapping[str, str]) -> Iterator[str]:
+    """Yield a line if LEDs are lit in one another's places, by the LED that is lit for each."""
+    if places:
+        which = ", ".join(f"{light} for {led}" for led, light in places.items())
+        yield (
+            f"{', '.join(places)}: expected LEDs in the order of their names, got others by the "
+            f"card's colour ({which}); the frames count as those of the LED that was lit: correct "
+            "the rig file before the next run"
+        )
+
+
 def left_warnings(what: str, patches: Mapping[str, LitPatch], leds: Sequence[str]) -> Iterator[str]:
-    """Yield a line for each patch that is bright after some LED."""
+    """Yield a line if patches are bright after some LED."""
+    counted, most = np.zeros(len(leds), dtype=np.bool_), {}
     for name, patch in patches.items():
         brightest = patch.value.max(axis=1, keepdims=True)
-        counts = (patch.off > SEEN_SIGMA * patch.off_sigma) & (patch.off > LEFT * brightest)
-        rows = np.flatnonzero(counts.any(axis=1))
-        if len(rows):
-            part = float((patch.off / brightest)[counts].max())
-            which = ", ".join(leds[row] for row in rows.tolist())
-            yield (
-                f"{what} {name}: {part:.1%} of the light is left with all LEDs off (after "
-                f"{which}), and is subtracted: it glows, or another light is on"
-            )
+        counts = patch.is_left & (patch.off > LEFT * brightest)
+        if counts.any():
+            most[name] = float((patch.off / brightest)[counts].max())
+            counted |= counts.any(axis=1)
+    if most:
+        which = ", ".join(led for led, counts in zip(leds, counted, strict=True) if counts)
+        worst = max(most, key=lambda name: most[name])
+        yield (
+            f"{what}: with all LEDs off there was light after {which}, up to {most[worst]:.1%} of "
+            f"that with the LED ({worst}); it is subtracted: something glows, another light is on, "
+            "or an LED stays lit"
+        )
 
 
 def bleaching_warnings(name: str, bleaching: Measured | None) -> Iterator[str]:

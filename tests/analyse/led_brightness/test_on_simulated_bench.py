@@ -157,6 +157,24 @@ def test_an_led_that_does_not_light_is_left_out(
     assert result.uv_scale == "none"
 
 
+def stuck(rig: Rig) -> None:
+    without_spectrometer(rig)
+    rig["simulation"]["faults"] = [{"led_stuck": {"relay": 8}}]
+
+
+def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Path) -> None:
+    found = faults(result_of(recorded(tmp_path, stuck, leds=LONG)))
+    assert found[LedFault.NOT_LIT] == ("590 nm",)
+    assert "590 nm" in found[LedFault.AMBIENT_LIGHT]
+
+
+def test_an_led_that_stays_lit_and_clips_all_frames_is_one_clear_line(tmp_path: Path) -> None:
+    run = recorded(tmp_path, stuck, leds=["590 nm"], exposures=3)
+    with pytest.raises(DataError, match="an LED stays lit, or another light is on") as caught:
+        result_of(run)
+    assert "\n" not in str(caught.value)
+
+
 def test_if_none_lights_there_is_no_result(tmp_path: Path) -> None:
     def all_dark(rig: Rig) -> None:
         for led in rig["simulation"]["leds"]:

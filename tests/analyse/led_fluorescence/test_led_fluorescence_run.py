@@ -138,30 +138,85 @@ def _on_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:
     return change
 
 
-#: Fewer LEDs take less time.
-FEW = QUICK | {"leds": ["430 nm", "455 nm", "530 nm", "625 nm"]}
+#: Fewer LEDs and samples take less time.
+FEW = QUICK | {
+    "leds": ["430 nm", "455 nm", "530 nm", "625 nm"],
+    "patches": {"felt": QUICK["patches"]["felt"]},
+}
 RELAYS = {"430 nm": 1, "455 nm": 2, "530 nm": 3, "625 nm": 4}
 
 
-def test_an_led_that_does_not_light_is_left_out_and_named(tmp_path: Path) -> None:
-    result = analyse(part_of(record(tmp_path, FEW, _on_relays(RELAYS | {"625 nm": 5}))))
+def _with(**simulation: Any) -> Callable[[dict[str, Any]], None]:
+    def change(rig: dict[str, Any]) -> None:
+        _on_relays(RELAYS)(rig)
+        rig["simulation"] |= simulation
+
+    return change
+
+
+def _result(folder: Path, change: Callable[[dict[str, Any]], None]) -> LedFluorescenceResult:
+    result = analyse(part_of(record(folder, FEW, change)))
+    assert not any("\n" in line for line in result.warnings)
+    return result
+
+
+def _said(result: LedFluorescenceResult, what: str) -> bool:
+    return sum(what in line for line in result.warnings) == 1
+
+
+def _is_felt(result: LedFluorescenceResult) -> bool:
+    felt, true = result.patches["felt"], true_matrix("felt")
+    colour = next(colour for colour in felt.colours if colour.light == "D65")
+    off = appearance(true, read_light("D65")).lab - np.array(colour.lab)
+    return not felt.dyes and bool((np.abs(off) < 4 * np.array(colour.lab_sigma)).all())
+
+
+@pytest.mark.parametrize(
+    ("begin", "seen_on"), [("0 s", "card"), ("2 min", "samples")], ids=["card", "samples"]
+)
+def test_an_led_that_does_not_light_is_left_out_and_named(
+    tmp_path: Path, begin: str, seen_on: str
+) -> None:
+    result = _result(tmp_path, _with(faults=[{"led_dark": {"relay": 4, "at": begin}}]))
     assert result.leds == ("430 nm", "455 nm", "530 nm")
-    assert any("625 nm" in warning and "did not light" in warning for warning in result.warnings)
+    assert _said(result, f"625 nm: left out, frames of the {seen_on} are dark")
+    assert _is_felt(result)
 
 
-def test_leds_in_another_order_are_one_clear_line(tmp_path: Path) -> None:
-    swapped = _on_relays(RELAYS | {"455 nm": 3, "530 nm": 2})
-    with pytest.raises(DataError, match="530 nm is lit as 455 nm") as caught:
-        analyse(part_of(record(tmp_path, FEW, swapped)))
+def test_leds_in_another_order_count_as_what_they_are(tmp_path: Path) -> None:
+    result = _result(tmp_path, _on_relays(RELAYS | {"455 nm": 3, "530 nm": 2}))
+    assert result.leds == tuple(RELAYS)
+    assert _said(result, "455 nm, 530 nm: expected LEDs in the order of their names, got others")
+    assert _is_felt(result)
+
+
+def test_an_led_that_stays_lit_leaves_what_was_measured_before(tmp_path: Path) -> None:
+    """It is the last one of the card, and all samples are lit by it, too."""
+    stuck = _with(faults=[{"led_stuck": {"relay": 1, "at": "0 s"}}])
+    with pytest.raises(DataError, match="clip with all LEDs off; an LED stays lit") as caught:
+        _result(tmp_path, stuck)
     assert "\n" not in str(caught.value)
+
+
+def test_an_led_that_clips_is_left_out(tmp_path: Path) -> None:
+    def bright(rig: dict[str, Any]) -> None:
+        _on_relays(RELAYS)(rig)
+        rig["simulation"]["leds"][2]["level"] = "100 %"
+        rig["simulation"]["lamp"] = {"irradiance": 20.0}
+
+    run = record(tmp_path, FEW | {"camera": {"iso": 1600}}, bright)
+    result = analyse(part_of(run))
+    assert result.leds == ("430 nm", "455 nm", "625 nm")
+    assert _said(result, "530 nm: left out, frames of the card clip at the shortest exposure")
+    assert _is_felt(result)
 
 
 def test_light_that_leaks_in_is_subtracted(tmp_path: Path) -> None:
     def leaking(rig: dict[str, Any]) -> None:
         rig["simulation"]["faults"] = [{"ambient_light": {"level": "0.5 %", "at": "3 min"}}]
 
-    result = analyse(part_of(record(tmp_path, FEW, leaking)))
-    assert any("left with all LEDs off" in warning for warning in result.warnings)
+    result = _result(tmp_path, leaking)
+    assert _said(result, "samples: with all LEDs off there was light after")
     felt = result.patches["felt"]
     assert not felt.dyes
     true = true_matrix("felt").reflectance[5:30]
