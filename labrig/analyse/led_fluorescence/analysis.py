@@ -76,6 +76,11 @@ def analyse(part: Part) -> LedFluorescenceResult:
     samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE)
     left_out = list(unused_leds(leds, spectra, camera, white, mean_of(cards)))
     warnings = [unused.reason for unused in left_out]
+    if part.rig.optics.may_see_gloss:
+        warnings.append(
+            f"at {part.rig.optics.geometry_text} a surface's gloss reaches the camera, and is in "
+            "the reflectance: light from 45°, or cross polarisers"
+        )
     warnings += [*left_warnings("card", cards, leds), *left_warnings("sample", samples, leds)]
     used = [led for led in leds if led not in {unused.led for unused in left_out}]
     used.sort(key=peak_nm.__getitem__)
@@ -106,6 +111,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
         uv_scale=_uv_scale([peak_nm[led] for led in used], system),
         patches=patches,
         run=part.run.folder.resolve().name,
+        geometry=part.rig.optics.geometry_text,
         warnings=tuple(warnings),
     )
 
