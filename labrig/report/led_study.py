@@ -19,7 +19,7 @@ from labrig.report.chart import (
     linear_axis,
     logarithmic_axis,
 )
-from labrig.report.figure_style import CHANNEL, DASHED, INK, MARKERS, OTHER_CHANNELS, PAPER
+from labrig.report.figure_style import CHANNEL, DASHED, INK, MARKERS, MUTED, OTHER_CHANNELS, PAPER
 from labrig.report.page import Report
 from labrig.report.sections import Picture, Section, Table
 
@@ -220,7 +220,7 @@ def _error_chart(compared: ComparedLeds) -> Chart:
             if is_first:
                 legend.append((light, points))
             if index == 0:
-                entry = Points(INK, marker=marker, face=points.face, size_pt=5.0)
+                entry = Points(MUTED, marker=marker, face=points.face, size_pt=5.0)
                 legend.append((placement, entry))
     legend.sort(key=lambda entry: entry[0] not in compared.lights)
     numbers = sorted({len(one.peaks_nm) for one in compared.sets})
