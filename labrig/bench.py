@@ -40,7 +40,10 @@ TCP_CONNECT_TIMEOUT_S = 5.0
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig before its devices are opened: file, clock, simulated room, guard and ports."""
+    """A rig before its devices are opened: file, clock, simulated room, guard and ports.
+
+    Devices in `left_out`, keys of the rig file, are not opened.
+    """
 
     file: RigFile
     source: str
@@ -48,6 +51,7 @@ class Bench:
     room: "OpenRoom | None"
     guard: Guard | None = None
     ports: SerialPorts = field(default_factory=SerialPorts)
+    left_out: frozenset[str] = frozenset()
 
     @property
     def guarded_by(self) -> str:
@@ -72,7 +76,7 @@ class Bench:
 
     @contextmanager
     def devices(self) -> Iterator[Rig]:
-        """Open all devices, each at once brought to its safe state, and make them safe at the end.
+        """Open the devices, each at once brought to its safe state, and make them safe at the end.
 
         Ctrl-C and similar signals are handled at waits, and never prevent the safe state.
 
@@ -95,7 +99,8 @@ class Bench:
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
             stack.callback(rig.disconnect)
             stack.callback(self._make_safe, rig)
-            for key in in_safe_order(self.file.devices):
+            opened = [key for key in self.file.devices if key not in self.left_out]
+            for key in in_safe_order(opened):
                 entry = self.file.devices[key]
                 rig.connect(key, partial(_open, key, entry, connections, self.source))
             if self.guard is not None:

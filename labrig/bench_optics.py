@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
 from pydantic import BaseModel
 
 from labrig import resources
@@ -24,6 +25,8 @@ from labrig.yaml_file import did_you_mean
 
 FileT = TypeVar("FileT", bound=BaseModel)
 
+#: Wavelengths in nm between which all that is before a camera has to be known.
+SEEN_NM = (400.0, 700.0)
 #: Standard uncertainty in nm of the peak of an LED by its data sheet: makers sort them to 2–5 nm.
 DATA_SHEET_NM = 2.0
 #: Distance of an LED's centroid from its peak, in widths at half maximum (1 σ): blue and green ones
@@ -58,7 +61,8 @@ def camera_curves(
 
     The order is one of precedence. A filter's calibration determines the product of filter and
     camera, so light read through the filter takes both from it; it has also measured this body, not
-    another one of its model.
+    another one of its model. Other curves are multiplied by the transmittances of lens and
+    polariser that the rig file names.
 
     Raises
     ------
@@ -70,7 +74,42 @@ def camera_curves(
         return replace(
             calibrated, name=f"{calibrated.name}, as the filter's calibration found them"
         )
-    return read_camera(instead or _named(rig.optics.camera, "camera"))
+    camera = read_camera(instead or _named(rig.optics.camera, "camera"))
+    passed = np.ones_like(camera.wavelength_nm)
+    for part in (lens_transmittance(rig), polariser_transmittance(rig)):
+        if part is not None:
+            passed = passed * part.at(camera.wavelength_nm)
+    seen = passed[:, np.newaxis] * camera.sensitivity
+    if not (seen.max(axis=0) > 0).all():
+        raise UsageError(
+            f"{camera.name}: expected channels that see through lens and polariser, got one that "
+            "sees nothing; check 'lens' and 'polariser' under 'optics:'"
+        )
+    return replace(camera, sensitivity=seen / seen.max())
+
+
+def lens_transmittance(rig: RigFile) -> Transmittance | None:
+    """Read the transmittance of the camera's lens; None if it is in the camera's curves."""
+    named = rig.optics.lens
+    return None if named is None else _passing(resources.curve_path(named), "lens")
+
+
+def polariser_transmittance(rig: RigFile) -> Transmittance | None:
+    """Read the transmittance of one polariser; None if it is even, or there are none."""
+    named = rig.optics.polariser
+    return None if named is None else _passing(resources.curve_path(named), "polariser")
+
+
+def _passing(path: Path, key: str) -> Transmittance:
+    """Read the curve of something before a camera, which has to be known where the camera sees."""
+    curve = read_transmittance(path)
+    low_nm, high_nm = curve.wavelength_nm[[0, -1]]
+    if low_nm > SEEN_NM[0] or high_nm < SEEN_NM[1]:
+        raise UsageError(
+            f"{path}: expected the transmittance of the {key} from {SEEN_NM[0]:g} nm to "
+            f"{SEEN_NM[1]:g} nm, got {low_nm:g} nm to {high_nm:g} nm"
+        )
+    return curve
 
 
 def calibration(rig: RigFile, kind: CalibrationKind[FileT]) -> FileT | None:
@@ -117,7 +156,8 @@ def led_exposures(
 ) -> dict[str, LedExposure]:
     """Return spectrum and brightness of each LED of a rig: as calibrated, else by the rig file.
 
-    An LED that the calibration left out has the rig file's spectrum and no known brightness.
+    An LED that the calibration left out has the rig file's spectrum, through the polariser if there
+    is one, and no known brightness.
 
     Parameters
     ----------
@@ -141,7 +181,7 @@ def led_exposures(
             f"{source}: the calibration of the LEDs has '{others[0]}', the rig has "
             f"{', '.join(lights)}; run led_brightness on this rig, and name its run (optics: leds)"
         )
-    exposures = {}
+    exposures, polariser = {}, polariser_transmittance(rig)
     for name, light in lights.items():
         led = calibrated.get(name)
         if led is not None:
@@ -159,6 +199,9 @@ def led_exposures(
                 f"{source}: nothing is known of the light of LED '{name}'; give its 'centre' and "
                 "'fwhm', or a file 'spectrum'"
             )
+        if polariser is not None:
+            passed = spectrum.value * polariser.at(spectrum.wavelength_nm)
+            spectrum = replace(spectrum, value=passed, sigma=None)
         sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * (light.fwhm or 0.0))
         exposures[name] = LedExposure(replace(spectrum, name=name), 1.0, math.inf, sigma_nm)
     return exposures
@@ -172,8 +215,10 @@ def require_optics(rig: RigFile) -> None:
     UsageError
         A file is missing or malformed, or there is none of that name.
     """
+    lens_transmittance(rig)
+    polariser_transmittance(rig)
     if rig.optics.camera is not None:
-        read_camera(rig.optics.camera)
+        camera_curves(rig)
     if rig.optics.lamp is not None:
         lamp_spectrum(rig)
     if rig.optics.grey_card is not None:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any, Protocol, TypeVar
 
@@ -11,6 +11,7 @@ from labrig.acquire import (
     CAMERA,
     CHANGER,
     LIGHTS,
+    SPECTROMETER,
     Camera,
     Checkable,
     Plan,
@@ -72,6 +73,7 @@ def execute(
     Interrupted, LabrigError
         The run ended early, in the safe state; the text tells what is kept and how to continue.
     """
+    bench = replace(bench, left_out=_not_used(protocol, bench, laid_out))
     interrupted_units = folder.close_open_attempts(
         bench.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
     )
@@ -221,6 +223,23 @@ def _first_of_kind(error: BaseException | None, kind: type[ErrorT]) -> ErrorT | 
     while error is not None and not isinstance(error, kind):
         error = error.__context__
     return error
+
+
+def _not_used(protocol: ProtocolModel, bench: Bench, laid_out: Plan) -> frozenset[str]:
+    """Return the keys of devices that need not be opened: the plan is the same without them.
+
+    Only a spectrometer may be missing, as it has no light and moves nothing: whatever else is on
+    the bench has to be brought to its safe state.
+    """
+    key = SPECTROMETER.key
+    if key not in bench.file.devices:
+        return frozenset()
+    others = {name: entry for name, entry in bench.file.devices.items() if name != key}
+    try:
+        without = plan(protocol, bench.file.model_copy(update={"devices": others}), bench.source)
+    except ProtocolError:
+        return frozenset()
+    return frozenset({key}) if without.steps == laid_out.steps else frozenset()
 
 
 def _refuse_what_spoils(rig: Rig) -> None:

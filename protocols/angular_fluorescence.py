@@ -18,10 +18,12 @@ from labrig.acquire import (
     LedSwitch,
     ManualStep,
     ProtocolModel,
+    RigFile,
     Session,
     Shoot,
     Unit,
 )
+from labrig.errors import ProtocolError
 from labrig.quantity import Count, DurationS
 from labrig.region import Region
 
@@ -182,6 +184,16 @@ class AngularFluorescence(ProtocolModel):
             raise ValueError("expected 'reflected_led' for 'shape: sphere' only")
         if self.reflected_led in self.leds:
             raise ValueError(f"expected 'reflected_led' not among 'leds', got {self.reflected_led}")
+        return self
+
+    def suited_to(self, rig: RigFile) -> Self:
+        """Refuse a rig whose LEDs shine on a sphere from another angle than is told here."""
+        angles = rig.optics.angles_deg
+        if self.shape == "sphere" and angles is not None and sum(angles) != self.light.angle:
+            raise ProtocolError(
+                f"light.angle: expected {sum(angles)} degrees between light and camera, which is "
+                f"the rig's 'geometry: {rig.optics.geometry}', got {self.light.angle:g}"
+            )
         return self
 
     @property

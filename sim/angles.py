@@ -1,5 +1,6 @@
 """Directions in which samples throw light back: yarns under a light that turns, and spheres.
 
+Flat samples also mirror a part of the light, in a lobe as wide as their surface is rough.
 Cloth is brighter at its rim than a perfectly diffuse surface, since light is scattered by its
 outermost fibres: a part of it follows Lommel's and Seeliger's law.
 """
@@ -18,6 +19,10 @@ FloatArray = NDArray[np.float64]
 
 #: Angle in degrees by which the light is turned until a yarn reflects 1/e: its sheen.
 SHEEN_DEG = 60.0
+#: Slope of the facets of a glossy surface, root mean square, in Beckmann's distribution.
+ROUGHNESS = 0.12
+#: Mirrored light keeps its polarisation: what crossed polarisers pass of it, over diffuse light.
+LEAKED = 2e-3
 #: Part of the reflected light that follows Lommel's and Seeliger's law.
 FIBRES = 0.4
 #: Distance of the light from the centre of a sphere, in radii.
@@ -53,6 +58,17 @@ class Angles:
             self._simulation.reradiation_anisotropy, np.cos(np.radians(arrangement.light_deg))
         )
         return np.where(self._is_sphere, 1.0, kept) * self._placed(arrangement)
+
+    def mirrored(self, arrangement: Arrangement) -> FloatArray:
+        """Return the mirrored light relative to that in the middle of its lobe, shape (cells, 1).
+
+        Half-way between light and camera is the normal of the facets that mirror.
+        """
+        off_deg = min(abs(arrangement.light_deg / 2 - arrangement.tilt_deg), 89.0)
+        lobe = np.exp(-((np.tan(np.radians(off_deg)) / ROUGHNESS) ** 2))
+        if self._simulation.polarisers == "crossed":
+            lobe *= LEAKED
+        return np.where(self._is_sphere, 0.0, lobe) * self._placed(arrangement)
 
     def _placed(self, arrangement: Arrangement) -> float:
         """Return the brightness by the sample's position: a skewed number, as heights may be."""

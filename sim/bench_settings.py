@@ -164,18 +164,28 @@ class LvfSettings(Part):
 
 
 class LensSettings(Part):
-    """The camera's lens, which its files then name; only its falloff differs from another's.
+    """The camera's lens.
 
     Attributes
     ----------
     name
-        Name of the lens that the camera reports, for example `EF75mm`.
+        Name of the lens that the camera writes into its files, for example `EF75mm`; null: it
+        writes nothing.
     focal_mm
         Focal length in mm, on a full-format body, 36 mm wide.
+    uv_edge_nm
+        Wavelength in nm at which its glass transmits half of the light; it absorbs what is shorter.
+        Null: it absorbs as much as the camera's curves say.
     """
 
-    name: Annotated[str, Field(pattern="^[ -~]+$")]
+    name: Annotated[str, Field(pattern="^[ -~]+$")] | None = None
     focal_mm: Annotated[float, Field(ge=20, le=400)] = 75.0
+    uv_edge_nm: Annotated[float, Field(ge=320, le=450)] | None = None
+
+    @property
+    def notes(self) -> tuple[str, float] | None:
+        """Name and focal length in mm as the camera writes them into its files."""
+        return None if self.name is None else (self.name, self.focal_mm)
 
 
 class TemperatureSettings(Part):

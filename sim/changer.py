@@ -9,6 +9,7 @@ from labrig.errors import UsageError
 from .arrangement import (
     USUAL_LAMP_M,
     USUAL_LIGHT_DEG,
+    Arrangement,
     Arrangements,
     Card,
     LampKind,
@@ -60,7 +61,8 @@ class Changer:
         self._clock = clock
         self._freshen = freshen
         self._plug = plug
-        self.arrangements = Arrangements()
+        self._light_deg = simulation.light_deg
+        self.arrangements = Arrangements(states=(Arrangement(light_deg=simulation.light_deg),))
 
     @property
     def tasks(self) -> Mapping[str, Callable[..., None]]:
@@ -84,7 +86,7 @@ class Changer:
             "yarn vertical DEGREES": self._put_in_anew,
             "yarn horizontal DEGREES": self._put_in_anew,
             "sphere anew": lambda: self._put_in_anew(str(USUAL_LIGHT_DEG)),
-            "light back": lambda: self._change(light_deg=USUAL_LIGHT_DEG),
+            "light back": lambda: self._change(light_deg=self._light_deg),
             "sample NUMBER": self._face,
         }
 

@@ -59,6 +59,6 @@ def describe_room(content: Mapping[str, Any], source: str) -> RoomDescription:
     for patch in simulation.patches:
         read_any_material(patch.material)
     width, height = simulation.sensor.width, simulation.sensor.height
-    lens = None if simulation.lens is None else (simulation.lens.name, simulation.lens.focal_mm)
+    lens = None if simulation.lens is None else simulation.lens.notes
     file = encode_dng(np.zeros((height, width), np.uint16), Shot(0.0, 1.0, 100, 4.0, lens))
     return RoomDescription((width, height), len(file))

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 
 from labrig.clock import VirtualClock
 
-from .bench_settings import LedSettings
 from .faults import Fault, OfLed, given
 from .leds import Leds
 
@@ -17,8 +16,8 @@ class LedCircuit:
 
     Parameters
     ----------
-    bank
-        Settings of the LEDs.
+    leds
+        The LEDs, all dark.
     lit
         Relays that are closed when the room is opened.
     faults
@@ -29,7 +28,7 @@ class LedCircuit:
 
     def __init__(
         self,
-        bank: tuple[LedSettings, ...],
+        leds: Leds,
         lit: Iterable[int],
         faults: Sequence[Fault],
         clock: VirtualClock,
@@ -48,7 +47,7 @@ class LedCircuit:
             for span in self._stuck
             if span.relay is not None and span.at < 0 and span.is_on(0.0)
         }
-        self._leds = Leds(bank)
+        self._leds = leds
         self._settle(0.0)
 
     @property

@@ -57,11 +57,14 @@ class Leds:
     dimmings
         Time in seconds, relay and fraction of the full light, of every change of an LED's
         brightness; full before the first one.
+    passed
+        Part of the light that reaches the sample, of all wavelengths, shape (wavelengths,).
     """
 
     bank: tuple[LedSettings, ...] = ()
     states: tuple[tuple[float, frozenset[int]], ...] = ((0.0, frozenset()),)
     dimmings: tuple[tuple[float, int, float], ...] = ()
+    passed: FloatArray | float = 1.0
 
     @property
     def lit(self) -> frozenset[int]:
@@ -147,7 +150,10 @@ class Leds:
     def _spectra(self) -> dict[int, tuple[FloatArray, FloatArray]]:
         """Light of each LED when cold and when warm."""
         return {
-            led.relay: (led_spectrum(led), (1 - led.droop) * led_spectrum(led, led.shift_nm))
+            led.relay: (
+                self.passed * led_spectrum(led),
+                self.passed * (1 - led.droop) * led_spectrum(led, led.shift_nm),
+            )
             for led in self.bank
         }
 

@@ -44,6 +44,12 @@ REFLECTED = 12.5
 #: Reflectance of the black cloth around the samples.
 CLOTH_REFLECTANCE = 0.03
 
+#: Distance in nm over which a lens's glass absorbs e times less: an exponential edge (Urbach's).
+GLASS_EDGE_NM = 6.0
+#: Polariser of iodine in stretched film: part of unpolarised, or depolarised, light that it passes,
+#: wavelength of the half of that, and width of the edge in nm.
+FILM, FILM_EDGE_NM, FILM_WIDTH_NM = 0.4, 395.0, 7.0
+
 #: From the middle to the corner of a full-format frame, and the lens that a camera usually has.
 CORNER_MM = 21.75
 FOCAL_MM = 75.0
@@ -119,6 +125,21 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
     largest = next(strength for strength in STRENGTHS if excess(strength) > 0)
     result: FloatArray = peak * normalised(brentq(excess, 0.0, largest, xtol=1e-6))
     return result
+
+
+def glass(edge_nm: float | None) -> FloatArray:
+    """Return the transmittance of a lens that absorbs half at `edge_nm`, shape (wavelengths,)."""
+    if edge_nm is None:
+        return np.ones_like(WAVELENGTH_NM)
+    depth = np.log(2) * np.exp(np.minimum((edge_nm - WAVELENGTH_NM) / GLASS_EDGE_NM, 50.0))
+    return np.asarray(np.exp(-depth))
+
+
+def film(arrangement: str | None) -> FloatArray:
+    """Return the part of unpolarised light that a polariser passes, 1 without one."""
+    if arrangement is None:
+        return np.ones_like(WAVELENGTH_NM)
+    return np.asarray(FILM / (1 + np.exp((FILM_EDGE_NM - WAVELENGTH_NM) / FILM_WIDTH_NM)))
 
 
 def emission(material: Material) -> FloatArray:

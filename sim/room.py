@@ -30,7 +30,15 @@ from .layout import Layout
 from .led_circuit import LedCircuit
 from .leds import Leds
 from .lights import Lights, VisibleLight, leak, room_light_spectrum
-from .optics import FOCAL_MM, bent_curves, measured_curves, vignetting
+from .optics import (
+    FOCAL_MM,
+    CameraCurves,
+    bent_curves,
+    film,
+    glass,
+    measured_curves,
+    vignetting,
+)
 from .samples import Samples
 from .sensor import BAYER_RGGB, Sensor, SensorTemperature, gain_electrons_per_dn
 from .simulation import Simulation
@@ -78,7 +86,8 @@ class Room:
         self._spheres = Spheres(simulation) if has_sphere else None
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
-        self._led_circuit = LedCircuit(simulation.leds, simulation.initial.leds, faults, clock)
+        leds = Leds(simulation.leds, passed=film(simulation.polarisers))
+        self._led_circuit = LedCircuit(leds, simulation.initial.leds, faults, clock)
         self._room_light_spans = given(fault.light_left_on for fault in faults)
         leaks = [
             leak(fault_leak.level, [fault_leak])
@@ -97,6 +106,9 @@ class Room:
             if sensor.curves is None
             else measured_curves(sensor.curves)
         )
+        edge_nm = None if simulation.lens is None else simulation.lens.uv_edge_nm
+        before_sensor = glass(edge_nm) * film(simulation.polarisers)
+        self._curves = CameraCurves(before_sensor * self._curves.sensitivity)
         self._sensor = Sensor(
             self._rng(SENSOR_STREAM),
             self._falloff(sensor.height, sensor.width),
@@ -183,7 +195,7 @@ class Room:
             self._rng(FRAME_STREAM, round(self._clock.wall(start_s) * 1e6)),
         )
         lens = self._simulation.lens
-        lens_notes = None if lens is None else (lens.name, lens.focal_mm)
+        lens_notes = None if lens is None else lens.notes
         return encode_dng(
             mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, lens_notes)
         )

@@ -239,8 +239,14 @@ class Simulation(Part):
         Standard deviation by which a sample's brightness changes when it is put in anew, for
         example `1 %`.
     gloss
-        Fraction of the light that the samples mirror into the camera; crossed polarisers take most
-        of it away.
+        Fraction of the light that flat samples mirror into the camera where it stands in the
+        direction of the mirrored light: with the light beside it. It fades towards other angles,
+        and crossed polarisers take it away.
+    light_deg
+        Angle between LEDs and camera in degrees until the changer turns the light.
+    polarisers
+        Polarisers of the room: `crossed`, one before the LEDs and one, turned by 90 degrees, before
+        the lens; null: none. Each absorbs ultraviolet and more than half of all other light.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
@@ -279,6 +285,8 @@ class Simulation(Part):
     reradiation_anisotropy: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
     repositioning: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     gloss: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
+    light_deg: Annotated[int, Field(ge=0, le=150)] = 45
+    polarisers: Literal["crossed"] | None = None
     room_light: bool = True
 
     @field_validator("faults")

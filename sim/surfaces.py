@@ -28,7 +28,7 @@ class Surfaces:
     materials
         Material of every sample.
     gloss
-        Fraction of the light that they mirror into the camera.
+        Fraction of the light that they mirror, in the middle of the lobe.
     """
 
     def __init__(self, materials: Sequence[Material | ReradiationMatrix], gloss: float) -> None:
@@ -41,7 +41,7 @@ class Surfaces:
         }
 
     def thrown_back(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
-        """Return the light that comes back, as from a white of reflectance 1.
+        """Return the diffuse light that comes back, as from a white of reflectance 1.
 
         Parameters and shape are those of `reflected` and `reradiated`, whose sum it is.
         """
@@ -63,8 +63,13 @@ class Surfaces:
             Shape (cells, wavelengths).
         """
         nothing = np.zeros((1, light.shape[-1]))
-        reflectance: FloatArray = np.concatenate([nothing, self._reflectance + self._gloss])[patch]
+        reflectance: FloatArray = np.concatenate([nothing, self._reflectance])[patch]
         return reflectance * light
+
+    def mirrored(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
+        """Return the light in the middle of the lobe of what is mirrored, like `reflected`."""
+        glossy: FloatArray = np.where(patch > 0, self._gloss, 0.0)[:, np.newaxis]
+        return glossy * light
 
     def reradiated(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
         """Return the light that comes back at longer wavelengths, like `reflected`."""

@@ -84,6 +84,8 @@ class View:
             by_reradiation = self._surfaces.reradiated(light, self._layout.patch)
             thrown_back = self._angles.reflected(arrangement) * by_reflection
             thrown_back += self._angles.reradiated(arrangement) * by_reradiation
+            by_gloss = self._surfaces.mirrored(light, self._layout.patch)
+            thrown_back += self._angles.mirrored(arrangement) * by_gloss
             thrown_back = np.maximum(thrown_back, 0.0)
             glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
         thrown_back = thrown_back + CLOTH_REFLECTANCE * reflected.door

@@ -3,9 +3,9 @@
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from labrig import resources
 from labrig.acquire.roles import ROLES
@@ -15,6 +15,12 @@ from labrig.quantity import DurationS
 from labrig.yaml_file import did_you_mean, read_yaml, validate
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
+
+#: Difference in degrees between the angles of light and camera, on opposite sides of the surface's
+#: normal, from which a surface's gloss does not reach the camera.
+GLOSS_DEG = 30.0
+#: Largest angle of light or camera against the normal.
+LARGEST_DEG = 85
 
 
 class DeviceEntry(BaseModel):
@@ -90,6 +96,20 @@ class Optics(BaseModel):
     filters
         Folder with the colour filters' spectral transmittances, one file `NAME.csv` for each
         filter. Default: the shipped folder.
+    geometry
+        Angles of LEDs and camera against the normal of a flat sample, on opposite sides of it, in
+        whole degrees, such as `45/0`. What comes back there is a radiance factor, and it is without
+        gloss if the angles differ by 30° or more. Default: unknown.
+    lens
+        Spectral transmittance of the camera's lens, where the curves under `camera` were measured
+        without one: name of a shipped file, such as `photographic_lens`, or path of a file.
+        Default: the curves are those of camera and lens.
+    polarisers
+        Polarisers of the bench: `crossed`, one before the LEDs and one, turned by 90 degrees,
+        before the lens, so that no gloss reaches the camera. Default: none.
+    polariser
+        Spectral transmittance of one of these polarisers: path of a file. Default: the same at all
+        wavelengths.
     camera_file
         Camera calibration: its file `camera.yaml`, or the folder of the run of protocol
         `camera_calibration` that measured it.
@@ -116,6 +136,44 @@ class Optics(BaseModel):
     lamp: str | None = None
     grey_card: str | None = None
     filters: str | None = None
+    geometry: Annotated[str, Field(pattern=r"^\d{1,2}/\d{1,2}$")] | None = None
+    lens: str | None = None
+    polarisers: Literal["crossed"] | None = None
+    polariser: str | None = None
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> Self:
+        if self.geometry is not None and max(map(int, self.geometry.split("/"))) > LARGEST_DEG:
+            raise ValueError(
+                f"geometry: expected angles up to {LARGEST_DEG} degrees against the normal, such "
+                f"as 45/0, got {self.geometry}"
+            )
+        if self.polariser is not None and self.polarisers is None:
+            raise ValueError("expected 'polarisers: crossed' with the curve of a 'polariser'")
+        return self
+
+    @property
+    def angles_deg(self) -> tuple[int, int] | None:
+        """Angles of LEDs and camera against the normal in degrees; None if they are unknown."""
+        if self.geometry is None:
+            return None
+        light, camera = map(int, self.geometry.split("/"))
+        return light, camera
+
+    @property
+    def may_see_gloss(self) -> bool:
+        """Whether a surface's gloss is known to reach the camera."""
+        if self.angles_deg is None or self.polarisers is not None:
+            return False
+        light, camera = self.angles_deg
+        return abs(light - camera) < GLOSS_DEG
+
+    @property
+    def geometry_text(self) -> str:
+        """Geometry and polarisers, such as `45°/0°, crossed polarisers`; empty if unknown."""
+        angles = () if self.angles_deg is None else ("/".join(f"{at}°" for at in self.angles_deg),)
+        polarised = () if self.polarisers is None else ("crossed polarisers",)
+        return ", ".join((*angles, *polarised))
 
     def filter_files(self) -> dict[str, Path]:
         """Return the files of the colour filters' transmittances by name.

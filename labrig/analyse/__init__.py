@@ -1,6 +1,7 @@
 """From the frames of a run to its typed result: one module or package for each protocol."""
 
 from labrig.analyse.frames import verify_frames
+from labrig.analyse.hyperspectral import CubeList, matrix_from_cubes
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.series_fit import fit_series
@@ -8,6 +9,7 @@ from labrig.analyse.table_fit import FittedTable, TableFitOptions, fit_table
 from labrig.analyse.temperature import temperature_warnings
 
 __all__ = [
+    "CubeList",
     "FittedTable",
     "Inputs",
     "Overrides",
@@ -15,6 +17,7 @@ __all__ = [
     "TableFitOptions",
     "fit_series",
     "fit_table",
+    "matrix_from_cubes",
     "read_run_protocol",
     "temperature_warnings",
     "verify_frames",

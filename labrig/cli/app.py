@@ -11,6 +11,7 @@ from labrig.cli import (
     figures,
     fit,
     frame,
+    leds,
     material,
     optics,
     process,
@@ -41,6 +42,7 @@ app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)
 app.add_typer(driver.app, name="driver")
 app.add_typer(fit.app, name="fit")
+app.add_typer(leds.app, name="leds")
 app.add_typer(material.app, name="material")
 app.add_typer(optics.app, name="optics")
 app.add_typer(protocol.app, name="protocol")

@@ -86,6 +86,51 @@ def convert(
     typer.echo(f"written: {out}")
 
 
+@app.command("from-cubes")
+def from_cubes(
+    cubes: Annotated[
+        Path,
+        typer.Argument(
+            help="A .yaml that names the hyperspectral images, one for each light, and the regions "
+            "of sample and white."
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Argument(
+            help="File to write: .csv, .ark or .exr; .yaml writes a material file and the matrix "
+            "beside it."
+        ),
+    ],
+    lights_only: Annotated[
+        bool,
+        typer.Option(
+            "--lights-only",
+            help="One input band for each light; without it bands of 10 nm, between the lights "
+            "interpolated.",
+        ),
+    ] = False,
+) -> None:
+    """Make a re-radiation matrix from hyperspectral images, one for each light.
+
+    Images are ENVI files (.hdr), .npz or .npy.
+    """
+    from labrig.analyse import CubeList, matrix_from_cubes
+    from labrig.material import YAML, write_fluorescent, write_reradiation
+    from labrig.yaml_file import read_model
+
+    columns, name = matrix_from_cubes(read_model(cubes, CubeList), cubes)
+    matrix = columns.matrix(name) if lights_only else columns.interpolated(name)[0]
+    checked(str(cubes), matrix, is_corrected=False)
+    if out.suffix.lower() in YAML:
+        write_fluorescent(out, matrix)
+    else:
+        write_reradiation(out, matrix)
+    lights = ", ".join(f"{nm:.0f}" for nm in columns.input_nm)
+    typer.echo(f"{name}: {len(columns.lights)} lights at {lights} nm")
+    typer.echo(f"written: {out}")
+
+
 @app.command("apply")
 def apply(
     file: File,

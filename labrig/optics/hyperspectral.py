@@ -72,8 +72,8 @@ class HyperspectralCube:
         if len(self.wavelength_nm) < 2 or not (np.diff(self.wavelength_nm) > 0).all():
             raise ValueError("expected two or more wavelengths that rise")
 
-    def spectrum(self, region: Region) -> Spectrum:
-        """Return the mean spectrum of a region, and σ of the mean by the pixels' scatter.
+    def pixels(self, region: Region) -> FloatArray:
+        """Return the spectra of a region's pixels, shape (pixels, bands).
 
         Parameters
         ----------
@@ -93,6 +93,14 @@ class HyperspectralCube:
                 f"{self.name}: some value in the region is infinite or NaN; choose a region that "
                 "the camera covers"
             )
+        return pixels
+
+    def spectrum(self, region: Region) -> Spectrum:
+        """Return the mean spectrum of a region, and σ of the mean by the pixels' scatter.
+
+        Parameters and errors are those of `pixels`.
+        """
+        pixels = self.pixels(region)
         sigma = pixels.std(axis=0, ddof=1) / np.sqrt(len(pixels)) if len(pixels) > 1 else None
         return Spectrum(self.name, self.wavelength_nm, pixels.mean(axis=0), sigma)
 

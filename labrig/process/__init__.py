@@ -1,5 +1,6 @@
 """Processing of a run folder, or of a table: analysis, report and exports."""
 
+from labrig.process.led_study import report_led_study
 from labrig.process.mixture import report_mixture
 from labrig.process.result_changes import other_settings
 from labrig.process.run import Processed, draw_figures, process_and_report, process_run
@@ -11,6 +12,7 @@ __all__ = [
     "other_settings",
     "process_and_report",
     "process_run",
+    "report_led_study",
     "report_mixture",
     "report_table",
 ]

@@ -33,6 +33,11 @@ from .figure_style import (
 from .figures_pdf import (
     write_figures_pdf as write_figures_pdf,
 )
+from .led_study import (
+    ComparedLeds as ComparedLeds,
+    describe_leds as describe_leds,
+    led_study_report as led_study_report,
+)
 from .material_tables import (
     comparison_table as comparison_table,
     describe_phosphor as describe_phosphor,

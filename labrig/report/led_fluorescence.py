@@ -106,7 +106,10 @@ def _leds(result: LedFluorescenceResult) -> Section:
         rows,
         "Brightness: what a channel of sensitivity 1 would count of a perfect white.",
     )
-    return Section("LEDs", (UV_SCALE[result.uv_scale],), tables=(table,))
+    text = [UV_SCALE[result.uv_scale]]
+    if result.geometry:
+        text.append(f"Reflectance is the radiance factor at {result.geometry} (light/camera).")
+    return Section("LEDs", tuple(text), tables=(table,))
 
 
 def _patch_sections(

@@ -83,7 +83,7 @@ def _utc(frame: FrameRecord) -> str:
 def _titled(name: str) -> str:
     """Return the name of a protocol as title: `Camera calibration` for `camera_calibration`."""
     words = name.replace("_", " ").capitalize()
-    return words.replace("Lvf", "LVF")
+    return words.replace("Lvf", "LVF").replace("Led ", "LED ")
 
 
 @dataclass(frozen=True)

@@ -168,6 +168,9 @@ class LedFluorescenceResult(RunResult):
         without such an LED.
     patches
         The samples by name.
+    geometry
+        Angles of LEDs and camera, and polarisers, such as `45°/0°`; empty if the rig file does not
+        tell. The reflectance is the radiance factor of that geometry.
 
     Examples
     --------
@@ -186,6 +189,7 @@ class LedFluorescenceResult(RunResult):
     uv_scale: Literal["measured", "unknown", "none"]
     patches: Mapping[str, FluorescentPatch]
     run: str
+    geometry: str = ""
 
     def write_files(self, folder: Path) -> None:
         """Write a material file and its matrix for each sample, and a table of colours."""
@@ -193,6 +197,8 @@ class LedFluorescenceResult(RunResult):
             place = folder / name if len(self.patches) > 1 else folder
             place.mkdir(exist_ok=True)
             note = f"ultraviolet scale: {self.uv_scale}"
+            if self.geometry:
+                note += f"; radiance factors at {self.geometry}"
             origin = Provenance(
                 source="photographs under LEDs, with labrig", run=self.run, note=note
             )

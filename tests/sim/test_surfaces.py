@@ -10,6 +10,7 @@ from labrig.material import ReradiationMatrix, read_material, write_reradiation
 from labrig.sim.bench_settings import LedSettings
 from labrig.sim.lamp import CELL_NM, WAVELENGTH_NM
 from labrig.sim.leds import Leds, led_spectrum
+from labrig.sim.optics import film, glass
 from labrig.sim.surfaces import Surfaces, reradiation_on_grid
 from tests.sim.darkroom import Darkroom, colours
 
@@ -56,7 +57,49 @@ def test_gloss_mirrors_and_a_phosphor_reflects_half() -> None:
     light = narrow(500)
     surfaces = Surfaces([dye(0.0), read_material("blue-paint")], gloss=0.04)
     back = surfaces.thrown_back(light, np.array([1, 2]))
-    assert_allclose(back, np.array([[0.34], [0.54]]) * light)
+    assert_allclose(back, np.array([[0.3], [0.5]]) * light)
+    mirrored = surfaces.mirrored(light, np.array([0, 1, 2]))
+    assert_allclose(mirrored, np.array([[0.0], [0.04], [0.04]]) * light)
+
+
+@pytest.mark.parametrize(
+    ("light_deg", "polarisers", "mirrored"),
+    [(0, None, 1.0), (10, None, 0.59), (45, None, 0.0), (0, "crossed", 0.0), (45, "crossed", 0.0)],
+)
+def test_gloss_stays_away_at_45_degrees_and_behind_crossed_polarisers(
+    tmp_path: Path, light_deg: int, polarisers: str | None, mirrored: float
+) -> None:
+    write_reradiation(tmp_path / "plain.csv", dye(0.0))
+
+    def green(gloss: float) -> float:
+        bench = Darkroom(
+            sample=[{"material": str(tmp_path / "plain.csv"), "region": [0.0, 0.0, 1.0, 1.0]}],
+            leds=[{"relay": 1, "centre": 530, "fwhm": 30, "level": "2 %"}],
+            light_deg=light_deg, polarisers=polarisers, gloss=gloss,
+            sensor={"width": 96, "height": 64, "flicker": 0.0},
+        )  # fmt: skip
+        bench.room.switch_led(1, True)
+        seen = colours(bench.shoot(1 / 100, 100 if polarisers is None else 400))
+        return float(seen.mean(axis=(0, 1))[1])
+
+    # Of 30 % that the surface reflects diffusely, more where the light is steeper.
+    sheen = np.exp((45 - light_deg) / 60)
+    assert green(0.1) / green(0.0) - 1 == pytest.approx(mirrored * 0.1 / (0.3 * sheen), abs=0.006)
+
+
+def test_polarisers_and_the_lens_take_ultraviolet_and_more_than_half_of_other_light() -> None:
+    passed = film("crossed")
+    blue, green = (int(np.argmin(abs(WAVELENGTH_NM - nm))) for nm in (370.0, 550.0))
+    assert passed[blue] < 0.02 < passed[green] < 0.5
+    lens = glass(390.0)
+    assert np.interp([375.0, 390.0, 420.0], WAVELENGTH_NM, lens) == pytest.approx(
+        [0.0, 0.5, 1.0], abs=0.03
+    )
+    led = LedSettings(relay=1, centre=450)
+    bank = Leds((led,), passed=passed).switched(1, True, 1.0)
+    assert_allclose(bank.irradiance(2.0), passed * led_spectrum(led))
+    assert (film(None) == 1).all()
+    assert (glass(None) == 1).all()
 
 
 def test_a_frame_shows_the_fluorescent_light(tmp_path: Path) -> None:

@@ -428,7 +428,7 @@ def _columns(
         relative,
         [whites[light].window_nm for light in used],
     )
-    return _direct_columns([used[place] for place in columns.order], columns, drifts[1]), warnings
+    return direct_columns([used[place] for place in columns.order], columns, drifts[1]), warnings
 
 
 def _card_sigma(card: Transmittance, at_nm: FloatArray) -> FloatArray:
@@ -443,9 +443,10 @@ def _typical_sigma(curve: Spectrum | Transmittance) -> float:
     return float("nan") if curve.sigma is None else float(np.median(curve.sigma / curve.value))
 
 
-def _direct_columns(
+def direct_columns(
     lights: Sequence[str], columns: BispectralColumns, drift: Measured
 ) -> DirectColumns:
+    """Return columns with reflected and re-radiated light taken apart; `lights` in their order."""
     separated = separate_columns(columns)
     return DirectColumns(
         lights=tuple(lights),

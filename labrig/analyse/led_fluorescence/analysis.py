@@ -82,6 +82,11 @@ def analyse(part: Part) -> LedFluorescenceResult:
     places = exchanged(left_out)
     left_out = [unused for unused in left_out if unused.led not in places]
     warnings = [*lines_of(left_out), *exchanged_warnings(places)]
+    if part.rig.optics.may_see_gloss:
+        warnings.append(
+            f"at {part.rig.optics.geometry_text} a surface's gloss reaches the camera, and is in "
+            "the reflectance: light from 45°, or cross polarisers"
+        )
     warnings += [*left_warnings("card", cards, leds), *left_warnings("samples", samples, leds)]
     # The LED whose light it is, by the row of its frames.
     light_of = {
@@ -119,6 +124,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
         uv_scale=_uv_scale([peak_nm[led] for led in used], system),
         patches=patches,
         run=part.run.folder.resolve().name,
+        geometry=part.rig.optics.geometry_text,
         warnings=tuple(warnings),
     )
 

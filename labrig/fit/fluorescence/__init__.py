@@ -8,6 +8,15 @@ from labrig.fit.fluorescence.colour import PredictedColour, predicted_colour
 from labrig.fit.fluorescence.estimate import fit_fluorescence
 from labrig.fit.fluorescence.joint import JointEstimator
 from labrig.fit.fluorescence.per_led import fit_per_led
+from labrig.fit.fluorescence.placement import (
+    RECOMMENDED_NM,
+    LedSet,
+    even_peaks_nm,
+    moved_leds,
+    require_peaks,
+    study_set,
+    usual_led,
+)
 from labrig.fit.fluorescence.result import (
     EstimatedFluorophore,
     EstimateFact,
@@ -24,6 +33,7 @@ from labrig.fit.fluorescence.study import LedStudy, gaussian_led, study_leds
 from labrig.fit.fluorescence.system import Exposure, FluorescenceSystem, fluorescence_system
 
 __all__ = [
+    "RECOMMENDED_NM",
     "EstimateFact",
     "EstimatedFluorophore",
     "Exposure",
@@ -32,6 +42,7 @@ __all__ = [
     "FluorescenceSystem",
     "FluorophoreNumber",
     "JointEstimator",
+    "LedSet",
     "LedStudy",
     "Method",
     "MoreThanWhite",
@@ -39,10 +50,15 @@ __all__ = [
     "Surfaces",
     "UnexplainedValues",
     "UnknownBrightness",
+    "even_peaks_nm",
     "fit_fluorescence",
     "fit_per_led",
     "fluorescence_system",
     "gaussian_led",
+    "moved_leds",
     "predicted_colour",
+    "require_peaks",
     "study_leds",
+    "study_set",
+    "usual_led",
 ]
