@@ -247,6 +247,14 @@ class FluorescenceSystem:
     ) -> Self:
         """Return the system whose errors z have some mean and covariance root · rootᵀ."""
         before, count = self.response, len(self.modes.reflected)
+        sigma = np.linalg.norm(root[count:], axis=1) * UNKNOWN
+        is_loose = np.zeros_like(self.is_loose)
+        is_loose[loose] = sigma > LOOSE
+        # What stays loose is left to the fit of the surface, which sees its light's colour only. Its
+        # most likely factor means nothing, and may even be negative.
+        kept_mean, kept_root = mean.copy(), root.copy()
+        kept_mean[count:][sigma > LOOSE] = 0.0
+        kept_root[count:][sigma > LOOSE] = 0.0
         lit = [UNKNOWN * _only(part, loose) for part in (before.reflected, before.absorbed)]
         dark = np.zeros((len(loose), *before.seen.shape))
         modes = [
@@ -259,18 +267,12 @@ class FluorescenceSystem:
         ]
         response = _Response(
             *(
-                part + np.tensordot(mean, mode, 1)
+                part + np.tensordot(kept_mean, mode, 1)
                 for part, mode in zip(
                     (before.reflected, before.absorbed, before.seen), modes, strict=True
                 )
             )
         )
-        sigma = np.linalg.norm(root[count:], axis=1) * UNKNOWN
-        is_loose = np.zeros_like(self.is_loose)
-        is_loose[loose] = sigma > LOOSE
-        # What stays loose is left to the fit of the surface, which sees its light's colour only.
-        kept_root = root.copy()
-        kept_root[count:][sigma > LOOSE] = 0.0
         left = [np.tensordot(kept_root.T, mode, 1) for mode in modes]
         scale = [white_sigma * part[np.newaxis] for part in (response.reflected, response.absorbed)]
         left = [
