@@ -85,14 +85,16 @@ def analyse(part: Part) -> LedFluorescenceResult:
     cards = {name: _without_rest(card.under(rows)) for name, card in cards.items()}
     card = mean_of(cards)
     system = lit_system([lights[led] for led in used], camera, white, card)
-    estimator, patches = JointEstimator(system), {}
+    # Frames show all samples at once, but not the card.
+    flicker = np.hypot(card.flicker, mean_of(samples).under(rows).flicker)
+    estimator, patches = JointEstimator(system.with_drift(flicker)), {}
     for number, name in enumerate(samples):
         sample = _without_rest(samples[name].under(rows))
         if sample.is_clipped.any():
             which = ", ".join(np.array(used)[sample.is_clipped])
             raise DataError(f"{name}: clips at the shortest exposure under {which}; dim the LEDs")
         even = sample.times(*_evenness(cards[name], card, system))
-        fit = estimator.fit(name, even.value, even.variance, seed=number)
+        fit = estimator.fit(name, even.value, even.own_variance, seed=number)
         per_led = fit_per_led(name, even.value, even.variance, system)
         patches[name] = _patch(fit, per_led, even, system)
         warnings += fact_warnings(name, fit, camera.channels)
@@ -130,7 +132,7 @@ def _evenness(
     weight = mean.value / mean.variance
     at_patch = (weight * here.value).sum(axis=1)
     factor = (weight * mean.value).sum(axis=1) / at_patch
-    variance = (weight**2 * here.variance).sum(axis=1) / at_patch**2
+    variance = (weight**2 * here.own_variance).sum(axis=1) / at_patch**2
     seen = ~system.is_loose
     if seen.any():
         scatter = np.var(factor[seen]) if seen.sum() > 1 else 0.0

@@ -1,7 +1,7 @@
 """Values of patches under LEDs, from brackets of frames with and without light."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from labrig.record import FrameRole
 from labrig.reduce import reduce_patches
 from labrig.results import BoolArray, FloatArray, Measured, Series
 
+#: Least part of a variance that channels do not have in common: each frame weighs a little
+#: differently in them.
+LEAST_OWN = 0.01
+
 
 @dataclass(frozen=True, eq=False)
 class LitPatch:
@@ -24,6 +28,8 @@ class LitPatch:
     ----------
     value, variance
         Values in DN/s and their variances, with the frames' flicker, shape (m, k).
+    flicker
+        Relative σ by flicker that all channels and all patches have in common, shape (m,).
     off, off_sigma
         Values in DN/s just after each LED, and their σ, shape (m, k).
     is_clipped
@@ -38,7 +44,14 @@ class LitPatch:
     off: FloatArray
     off_sigma: FloatArray
     is_clipped: BoolArray
+    flicker: FloatArray
     bleaching: Measured | None = None
+
+    @property
+    def own_variance(self) -> FloatArray:
+        """Variances of the values without the flicker that is common, shape (m, k)."""
+        own = self.variance - np.square(self.flicker[:, np.newaxis] * self.value)
+        return np.maximum(own, LEAST_OWN * self.variance)
 
     def under(self, rows: Sequence[int]) -> "LitPatch":
         """Return the values under some of the LEDs."""
@@ -48,6 +61,7 @@ class LitPatch:
             self.off[rows],
             self.off_sigma[rows],
             self.is_clipped[rows],
+            self.flicker[rows],
             self.bleaching,
         )
 
@@ -56,8 +70,8 @@ class LitPatch:
         by = factor[:, np.newaxis]
         value = self.value * by
         variance = self.variance * by**2 + value**2 * relative_variance[:, np.newaxis]
-        return LitPatch(
-            value, variance, self.off * by, self.off_sigma * by, self.is_clipped, self.bleaching
+        return replace(
+            self, value=value, variance=variance, off=self.off * by, off_sigma=self.off_sigma * by
         )
 
 
@@ -89,6 +103,7 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
         np.mean([patch.off for patch in each], axis=0),
         np.mean([patch.off_sigma for patch in each], axis=0),
         np.any([patch.is_clipped for patch in each], axis=0),
+        np.min([patch.flicker for patch in each], axis=0),
     )
 
 
@@ -124,24 +139,27 @@ def _lit_patch(
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
     bleaching = None if again is None else _ratio(again, lit[first[0]])
-    return LitPatch(columns[0], columns[1], offs[0], offs[1], columns[2], bleaching)
+    return LitPatch(*columns[:2], *offs, *columns[2:], bleaching)
 
 
-def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool]:
-    """Merge a bracket: values (k,), variances (k,), and whether all frames are clipped."""
+def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool, float]:
+    """Merge a bracket: values (k,), variances (k,), whether all frames are clipped, and flicker."""
     usable = unit.usable
     if not usable.any():
-        return unit.values[0], np.square(unit.sigma[0]), True
+        return unit.values[0], np.square(unit.sigma[0]), True, 0.0
     value, variance = unit.values[usable], np.square(unit.sigma[usable])
     # Flicker is that of the mean: of each value itself, it would prefer the low ones.
     mean = (value / variance).sum(axis=0) / (1 / variance).sum(axis=0)
     weight = 1 / (variance + np.square(flicker * mean))
     mean = (weight * value).sum(axis=0) / weight.sum(axis=0)
-    return mean, 1 / weight.sum(axis=0), False
+    # Channels weigh the frames differently: common is what the one with least flicker has.
+    common = flicker * np.linalg.norm(weight, axis=0) / weight.sum(axis=0)
+    return mean, 1 / weight.sum(axis=0), False, float(common.min())
 
 
 def _ratio(
-    after: tuple[FloatArray, FloatArray, bool], before: tuple[FloatArray, FloatArray, bool]
+    after: tuple[FloatArray, FloatArray, bool, float],
+    before: tuple[FloatArray, FloatArray, bool, float],
 ) -> Measured:
     """Return the ratio of two brackets, of the channels together."""
     weight = before[0] / before[1]
