@@ -94,7 +94,9 @@ def test_a_white_tells_brightnesses_and_wavelengths() -> None:
     assert (np.abs(colour.lab - exact.lab) < 3 * np.hypot(colour.lab_sigma, exact.lab_sigma)).all()
 
 
-def benches(count: int) -> Iterator[tuple[FluorescenceSystem, FluorescenceSystem, np.random.Generator]]:
+def benches(
+    count: int,
+) -> Iterator[tuple[FluorescenceSystem, FluorescenceSystem, np.random.Generator]]:
     """Benches as they are and as they are told by a card, and generators of what is done there.
 
     LEDs are told by peak and width and are lopsided, the card's file is wrong by a wave.

@@ -1,5 +1,6 @@
 """Re-radiation matrices of the patches of a fluorescence run."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
@@ -182,16 +183,16 @@ def _dye(fluorophore: EstimatedFluorophore) -> MeasuredDye:
 
 def _colour(fit: FluorescenceFit, light: Spectrum, excitable: BoolArray) -> ColourUnderLight:
     colour = predicted_colour(fit, light)
-    depends = False
+    depends, sigma = False, colour.lab_sigma
     if excitable.any():
         emission = fit.fluorophores[0].emission.value[:, np.newaxis]
         reradiation = np.where(excitable, EXCITED * emission, fit.matrix.reradiation)
         brighter = appearance(replace(fit.matrix, reradiation=reradiation), light)
         depends = float(delta_e(brighter.lab, colour.lab)) > DEPENDS
+        # Anything from the estimate to that strong a dye is as probable.
+        sigma = np.hypot(sigma, (brighter.lab - colour.lab) / math.sqrt(3))
     lightness, a, b = colour.lab.tolist()
-    return ColourUnderLight(
-        light.name, (lightness, a, b), tuple(colour.lab_sigma.tolist()), depends
-    )
+    return ColourUnderLight(light.name, (lightness, a, b), tuple(sigma.tolist()), depends)
 
 
 def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) -> BoolArray:

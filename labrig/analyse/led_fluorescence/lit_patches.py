@@ -139,7 +139,8 @@ def _lit_patch(
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
     bleaching = None if again is None else _ratio(again, lit[first[0]])
-    return LitPatch(*columns[:2], *offs, *columns[2:], bleaching)
+    value, variance, is_clipped, common = columns
+    return LitPatch(value, variance, offs[0], offs[1], is_clipped, common, bleaching)
 
 
 def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool, float]:

@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import solve_triangular
 
 from labrig.errors import UsageError
-from labrig.fit.leds import changed_spectrum
 from labrig.fit.least_squares import FloatArray
+from labrig.fit.leds import changed_spectrum
 from labrig.fit.spectrum import CurveError, curve_modes
 from labrig.optics import (
     CameraResponse,
@@ -45,8 +45,9 @@ SHIFT_NM, SHAPE_STEP = 0.5, 0.5
 LIGHT_STEP_NM = 1.0
 #: Relative brightness error that stands for "unknown"; much more would cost digits.
 UNKNOWN = 30.0
-#: Relative error of the brightness from which its light tells the colour of what it excites only.
-LOOSE = 0.5
+#: Relative error of the brightness from which its light tells the colour of what it excites only:
+#: less still says whether that is little or much.
+LOOSE = 1.0
 #: Fraction of a light's strongest input band from which another one counts as lit by it.
 LIT = 0.1
 #: Least part of a light's power that must lie within the input bands.
@@ -80,7 +81,7 @@ class Exposure:
     skew_sigma: float = 0.0
 
     def changes(self) -> Iterator[tuple[float, Spectrum, Spectrum]]:
-        """Yield (1 / step, spectrum a step ahead, spectrum a step behind) of each error of shape."""
+        """Yield, of each error of shape, σ over two steps, and spectra a step ahead and behind."""
         sigmas = self.wavelength_sigma_nm, self.width_sigma, self.skew_sigma
         for kind, sigma in enumerate(sigmas):
             if sigma > 0:
@@ -302,8 +303,8 @@ class FluorescenceSystem:
         sigma = np.linalg.norm(root[count:], axis=1) * UNKNOWN
         is_loose = np.zeros_like(self.is_loose)
         is_loose[loose] = sigma > LOOSE
-        # What stays loose is left to the fit of the surface, which sees its light's colour only. Its
-        # most likely factor means nothing, and may even be negative.
+        # What stays loose is left to the fit of the surface, which sees its light's colour only.
+        # Its most likely factor means nothing, and may even be negative.
         kept_mean, kept_root = mean.copy(), root.copy()
         kept_mean[count:][sigma > LOOSE] = 0.0
         kept_root[count:][sigma > LOOSE] = 0.0
