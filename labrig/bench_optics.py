@@ -46,12 +46,15 @@ class LedExposure:
         Brightness b on a scale common to all LEDs, and σ; b is 1 and σ infinite where unknown.
     wavelength_sigma_nm
         Standard uncertainty in nm of an error that all wavelengths have in common.
+    is_nominal
+        Whether the spectrum is a curve by peak and width from a data sheet.
     """
 
     light: Spectrum
     brightness: float
     brightness_sigma: float
     wavelength_sigma_nm: float
+    is_nominal: bool = False
 
 
 def camera_curves(
@@ -203,7 +206,9 @@ def led_exposures(
             passed = spectrum.value * polariser.at(spectrum.wavelength_nm)
             spectrum = replace(spectrum, value=passed, sigma=None)
         sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * (light.fwhm or 0.0))
-        exposures[name] = LedExposure(replace(spectrum, name=name), 1.0, math.inf, sigma_nm)
+        exposures[name] = LedExposure(
+            replace(spectrum, name=name), 1.0, math.inf, sigma_nm, light.spectrum is None
+        )
     return exposures
 
 

@@ -1,7 +1,7 @@
 """The system of lights and camera, its white reference, bad input, and the fit light by light."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from labrig.errors import UsageError
 from labrig.fit.fluorescence import (
     Exposure,
+    FluorescenceSystem,
     JointEstimator,
     fit_fluorescence,
     fit_per_led,
@@ -18,16 +19,19 @@ from labrig.fit.fluorescence import (
     predicted_colour,
 )
 from labrig.fit.spectrum import CurveError
+from labrig.material import appearance
 from labrig.optics import CameraResponse, Spectrum, Transmittance, read_camera, read_light
 from tests.fit.fluorescent_samples import (
     CAMERA,
     CENTRES_NM,
+    FEW_NM,
     INPUT_NM,
     OUTPUT_NM,
     Dye,
     led,
     lights,
     photographed,
+    smooth_reflectance,
     surface,
     system_of,
 )
@@ -35,6 +39,8 @@ from tests.fit.fluorescent_samples import (
 EVEN = np.full(len(OUTPUT_NM), 0.4)
 GREEN = Dye(0.4, 450, 510)
 WHITE = np.ones(len(OUTPUT_NM))
+#: Relative change of lights between card and surface.
+FLICKER = 0.007
 DARK = np.zeros((len(OUTPUT_NM), len(INPUT_NM)))
 
 
@@ -86,6 +92,52 @@ def test_a_white_tells_brightnesses_and_wavelengths() -> None:
         fit_fluorescence("", *photographed(real, surface(EVEN, GREEN), rng), real), read_light("A")
     )
     assert (np.abs(colour.lab - exact.lab) < 3 * np.hypot(colour.lab_sigma, exact.lab_sigma)).all()
+
+
+def benches(
+    count: int,
+) -> Iterator[tuple[FluorescenceSystem, FluorescenceSystem, np.random.Generator]]:
+    """Benches as they are and as they are told by a card, and generators of what is done there.
+
+    LEDs are told by peak and width and are lopsided, the card's file is wrong by a wave.
+    """
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        told, real = [], []
+        for nm in FEW_NM:
+            width, skew = 11 * np.exp(0.2 * rng.standard_normal()), rng.normal(0, 0.2)
+            off = np.arange(-60.0, 61.0)
+            shape = np.exp(-((off / (width * (1 + skew * np.sign(off)))) ** 2) / 2)
+            shifted = nm + 1.5 * rng.standard_normal() + off
+            real.append(Exposure(Spectrum(f"{nm:g} nm", shifted, shape)))
+            normal = Spectrum(f"{nm:g} nm", nm + off, np.exp(-((off / 11) ** 2) / 2))
+            told.append(Exposure(normal, 1.0, math.inf, 1.5, 0.2, 0.2))
+        truth = system_of(real)
+        wave = np.sin((OUTPUT_NM + rng.uniform(0, 300)) / 50)
+        card = 0.9 * (1 + 0.01 * rng.standard_normal() + 0.014 * wave)
+        value, variance = photographed(truth, surface(card), rng)
+        flat = Transmittance("card", np.array([300.0, 800.0]), np.array([0.9, 0.9]))
+        course = CurveError(0.01, 0.0, 100.0)
+        system = system_of(told).informed_by_white(value, variance, flat, 0.01, course)
+        yield truth, system.with_drift(np.full(len(FEW_NM), FLICKER)), rng
+
+
+def test_errors_of_a_bench_are_in_sigma() -> None:
+    lamps, pulls = [read_light("D65"), read_light("A")], []
+    for truth, system, rng in benches(12):
+        estimator = JointEstimator(system)
+        for _ in range(2):
+            emitted_nm = rng.uniform(440, 620)
+            dye = Dye(rng.uniform(0.1, 0.6), emitted_nm - rng.uniform(30, 60), emitted_nm)
+            real = surface(0.8 * smooth_reflectance(rng), dye)
+            value, variance = photographed(truth, real, rng, 0.001)
+            flicker = 1 + FLICKER * rng.standard_normal((len(FEW_NM), 1))
+            fit = estimator.fit("", flicker * value, variance)
+            for lamp in lamps:
+                colour = predicted_colour(fit, lamp)
+                pulls.append((colour.lab - appearance(real, lamp).lab) / colour.lab_sigma)
+    # A σ that is 20 % too large or too small is outside.
+    assert 0.86 < np.sqrt(np.square(pulls).mean()) < 1.17
 
 
 def flat_camera() -> CameraResponse:

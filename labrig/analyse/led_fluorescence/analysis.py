@@ -1,5 +1,6 @@
 """Re-radiation matrices of the patches of a fluorescence run."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
@@ -105,11 +106,13 @@ def analyse(part: Part) -> LedFluorescenceResult:
     cards = {name: card.under(rows).without_rest() for name, card in cards.items()}
     card = mean_of(cards)
     system = lit_system([lights[led] for led in used], camera, white, card)
-    estimator, patches = JointEstimator(system), {}
+    # Frames show all samples at once, but not the card.
+    flicker = np.hypot(card.flicker, mean_of(samples).under(rows).flicker)
+    estimator, patches = JointEstimator(system.with_drift(flicker)), {}
     for number, name in enumerate(samples):
         sample = samples[name].under(rows).without_rest()
         even = sample.times(*_evenness(cards[name], card, system))
-        fit = estimator.fit(name, even.value, even.variance, seed=number)
+        fit = estimator.fit(name, even.value, even.own_variance, seed=number)
         per_led = fit_per_led(name, even.value, even.variance, system)
         patches[name] = _patch(fit, per_led, even, system)
         warnings += fact_warnings(name, fit, camera.channels)
@@ -139,7 +142,7 @@ def _evenness(
     weight = mean.value / mean.variance
     at_patch = (weight * here.value).sum(axis=1)
     factor = (weight * mean.value).sum(axis=1) / at_patch
-    variance = (weight**2 * here.variance).sum(axis=1) / at_patch**2
+    variance = (weight**2 * here.own_variance).sum(axis=1) / at_patch**2
     seen = ~system.is_loose
     if seen.any():
         scatter = np.var(factor[seen]) if seen.sum() > 1 else 0.0
@@ -189,16 +192,16 @@ def _dye(fluorophore: EstimatedFluorophore) -> MeasuredDye:
 
 def _colour(fit: FluorescenceFit, light: Spectrum, excitable: BoolArray) -> ColourUnderLight:
     colour = predicted_colour(fit, light)
-    depends = False
+    depends, sigma = False, colour.lab_sigma
     if excitable.any():
         emission = fit.fluorophores[0].emission.value[:, np.newaxis]
         reradiation = np.where(excitable, EXCITED * emission, fit.matrix.reradiation)
         brighter = appearance(replace(fit.matrix, reradiation=reradiation), light)
         depends = float(delta_e(brighter.lab, colour.lab)) > DEPENDS
+        # Anything from the estimate to that strong a dye is as probable.
+        sigma = np.hypot(sigma, (brighter.lab - colour.lab) / math.sqrt(3))
     lightness, a, b = colour.lab.tolist()
-    return ColourUnderLight(
-        light.name, (lightness, a, b), tuple(colour.lab_sigma.tolist()), depends
-    )
+    return ColourUnderLight(light.name, (lightness, a, b), tuple(sigma.tolist()), depends)
 
 
 def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) -> BoolArray:

@@ -17,6 +17,9 @@ from labrig.results import BoolArray, FloatArray, Measured, Series
 
 #: Significance in σ from which a light is seen.
 SEEN_SIGMA = 5.0
+#: Least part of a variance that channels do not have in common: each frame weighs a little
+#: differently in them.
+LEAST_OWN = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,8 @@ class LitPatch:
     ----------
     value, variance
         Values in DN/s and their variances, with the frames' flicker, shape (m, k).
+    flicker
+        Relative σ by flicker that all channels and all patches have in common, shape (m,).
     off, off_sigma
         Values in DN/s just after each LED, and their σ, shape (m, k).
     is_clipped, is_off_clipped
@@ -43,7 +48,14 @@ class LitPatch:
     off_sigma: FloatArray
     is_clipped: BoolArray
     is_off_clipped: BoolArray
+    flicker: FloatArray
     bleaching: Measured | None = None
+
+    @property
+    def own_variance(self) -> FloatArray:
+        """Variances of the values without the flicker that is common, shape (m, k)."""
+        own = self.variance - np.square(self.flicker[:, np.newaxis] * self.value)
+        return np.maximum(own, LEAST_OWN * self.variance)
 
     @property
     def is_left(self) -> BoolArray:
@@ -72,6 +84,7 @@ class LitPatch:
             self.off_sigma[rows],
             self.is_clipped[rows],
             self.is_off_clipped[rows],
+            self.flicker[rows],
             self.bleaching,
         )
 
@@ -113,6 +126,7 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
         np.mean([patch.off_sigma for patch in each], axis=0),
         np.any([patch.is_clipped for patch in each], axis=0),
         np.any([patch.is_off_clipped for patch in each], axis=0),
+        np.min([patch.flicker for patch in each], axis=0),
     )
 
 
@@ -150,24 +164,29 @@ def _lit_patch(
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
     bleaching = None if again is None else _ratio(again, lit[first[0]])
-    return LitPatch(columns[0], columns[1], offs[0], offs[1], columns[2], offs[2], bleaching)
+    value, variance, is_clipped, common = columns
+    dark, dark_sigma, is_off_clipped = offs
+    return LitPatch(value, variance, dark, dark_sigma, is_clipped, is_off_clipped, common, bleaching)
 
 
-def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool]:
-    """Merge a bracket: values (k,), variances (k,), and whether all frames are clipped."""
+def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool, float]:
+    """Merge a bracket: values (k,), variances (k,), whether all frames are clipped, and flicker."""
     usable = unit.usable
     if not usable.any():
-        return unit.values[0], np.square(unit.sigma[0]), True
+        return unit.values[0], np.square(unit.sigma[0]), True, 0.0
     value, variance = unit.values[usable], np.square(unit.sigma[usable])
     # Flicker is that of the mean: of each value itself, it would prefer the low ones.
     mean = (value / variance).sum(axis=0) / (1 / variance).sum(axis=0)
     weight = 1 / (variance + np.square(flicker * mean))
     mean = (weight * value).sum(axis=0) / weight.sum(axis=0)
-    return mean, 1 / weight.sum(axis=0), False
+    # Channels weigh the frames differently: common is what the one with least flicker has.
+    common = flicker * np.linalg.norm(weight, axis=0) / weight.sum(axis=0)
+    return mean, 1 / weight.sum(axis=0), False, float(common.min())
 
 
 def _ratio(
-    after: tuple[FloatArray, FloatArray, bool], before: tuple[FloatArray, FloatArray, bool]
+    after: tuple[FloatArray, FloatArray, bool, float],
+    before: tuple[FloatArray, FloatArray, bool, float],
 ) -> Measured:
     """Return the ratio of two brackets, of the channels together."""
     weight = before[0] / before[1]

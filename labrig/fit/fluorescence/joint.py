@@ -47,6 +47,9 @@ HOPELESS = 9.0
 RELATIVE_ERROR, ABSOLUTE_ERROR = 1e-3, 2e-4
 #: Reduced χ² that correct errors hardly exceed, and how often errors are made larger where it does.
 LARGE_CHI2, ROUNDS = 2.0, 2
+#: Relative error of a value under a light of unknown brightness: of camera curves that were not
+#: measured on this body, and of an emission that is only like its shape.
+LOOSE_COLOUR = 0.1
 #: Relative error of a value before the errors of lights and curves are known for a surface.
 CRUDE_ERROR = 0.03
 
@@ -175,10 +178,12 @@ class JointEstimator:
         noise = np.diag(variance + floor)
         channels = system.shape[1]
         for light in np.flatnonzero(system.is_loose).tolist():
-            # Any multiple of its three values is as probable.
-            direction = np.zeros_like(target)
-            direction[light * channels : (light + 1) * channels] = UNKNOWN
-            noise += np.outer(direction * target, direction * target)
+            # Any multiple of its values is as probable, and of their errors by curves and emission,
+            # which are added here: those of a surface that is hardly excited would hold it there.
+            seen = np.zeros_like(target)
+            seen[light * channels : (light + 1) * channels] = 1.0
+            seen *= target
+            noise += UNKNOWN**2 * np.outer(seen, seen) + np.diag((LOOSE_COLOUR * seen) ** 2)
         measured = Measured(target, noise, np.zeros_like(noise))
         if not len(system.modes.reflected):
             return measured

@@ -15,8 +15,16 @@ REFLECTANCE, LEVEL_SIGMA, REFLECTANCE_NM = 0.5, 0.5, 90.0
 REFLECTANCE_SIGMAS = (0.2, 0.1, 0.4)
 #: Standard deviations of the excitation, a fraction of the incident light, that are tried.
 EXCITATION_SIGMAS = (0.03, 0.1, 0.3, 0.7)
-#: The excitation ends this far below the emission's peak, within a few times a width, in nm.
+#: The excitation ends this far below the emission's peak, within a few times a width, in nm: of
+#: dyes that emit in the blue farther than of others, and with a spread. Of the 47 dyes of the index
+#: of McNamara and Boswell with peaks from 380 nm to 460 nm it falls to one half about 40 nm below
+#: the peak, of the 459 from 490 nm on at 5 nm to 11 nm.
 STOKES_NM, STOKES_WIDTH_NM = 15.0, 8.0
+BLUE_STOKES_NM, BLUE_SPREAD_NM = 40.0, 13.0
+#: Peaks in nm below which a dye emits in the blue, and above which it does not.
+BLUE_NM = (455.0, 500.0)
+#: Points of the spread of a normal density and their weights, by Gauss and Hermite.
+SPREAD, SPREAD_WEIGHT = np.polynomial.hermite_e.hermegauss(5)
 #: How far below the peak it begins to fall, and over which distance by e, in nm.
 PLATEAU_NM, DECAY_NM = 60.0, 90.0
 #: Where most materials begin to absorb ultraviolet themselves, over which width, and what is left,
@@ -50,12 +58,16 @@ def excitation_covariance(input_nm: FloatArray, peak_nm: float) -> FloatArray:
     """
     below_nm = peak_nm - input_nm
     fall = np.exp(-np.maximum(below_nm - PLATEAU_NM, 0.0) / DECAY_NM)
-    usual = fall * _step((below_nm - STOKES_NM) / STOKES_WIDTH_NM)
     passed = _step((input_nm - ULTRAVIOLET_NM) / ULTRAVIOLET_WIDTH_NM)
-    usual *= ULTRAVIOLET_LEFT + (1 - ULTRAVIOLET_LEFT) * passed
+    fall_usual = fall * (ULTRAVIOLET_LEFT + (1 - ULTRAVIOLET_LEFT) * passed)
+    blue = float(np.interp(peak_nm, BLUE_NM, (1.0, 0.0)))
+    away_nm = BLUE_STOKES_NM - STOKES_NM + BLUE_SPREAD_NM * SPREAD[:, np.newaxis]
+    end_nm = STOKES_NM + blue * away_nm
+    usual = fall_usual * _step((below_nm - end_nm) / STOKES_WIDTH_NM)
+    weight = SPREAD_WEIGHT / SPREAD_WEIGHT.sum()
     envelope = np.sqrt(fall * _step((below_nm - BEYOND_NM) / STOKES_WIDTH_NM))
     deviation = np.outer(envelope, envelope) * _smooth(input_nm, EXCITATION_NM)
-    return USUAL_PART * np.outer(usual, usual) + (1 - USUAL_PART) * deviation
+    return np.asarray(USUAL_PART * (usual.T * weight) @ usual + (1 - USUAL_PART) * deviation)
 
 
 def stokes_edge(input_nm: FloatArray, output_nm: FloatArray) -> FloatArray:

@@ -14,15 +14,17 @@ under the same lights tells most of them.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import solve_triangular
 
 from labrig.errors import UsageError
 from labrig.fit.least_squares import FloatArray
+from labrig.fit.leds import changed_spectrum
 from labrig.fit.spectrum import CurveError, curve_modes
 from labrig.optics import (
     CameraResponse,
@@ -36,14 +38,16 @@ from labrig.optics import (
 
 INPUT_NM = np.arange(300.0, 781.0, 10.0)
 OUTPUT_NM = np.arange(380.0, 781.0, 10.0)
-#: Step in nm of the derivative of a light's spectrum by its wavelength.
-SHIFT_NM = 0.5
+#: Step in nm of the derivative of a light's spectrum by its wavelength, and in standard deviations
+#: of that by its width and skew.
+SHIFT_NM, SHAPE_STEP = 0.5, 0.5
 #: Step in nm on which lights are averaged: LEDs are no finer, and lines keep their power.
 LIGHT_STEP_NM = 1.0
 #: Relative brightness error that stands for "unknown"; much more would cost digits.
 UNKNOWN = 30.0
-#: Relative error of the brightness from which its light tells the colour of what it excites only.
-LOOSE = 0.5
+#: Relative error of the brightness from which its light tells the colour of what it excites only:
+#: less still says whether that is little or much.
+LOOSE = 1.0
 #: Fraction of a light's strongest input band from which another one counts as lit by it.
 LIT = 0.1
 #: Least part of a light's power that must lie within the input bands.
@@ -64,12 +68,29 @@ class Exposure:
         known, as of ultraviolet LEDs that no camera sees.
     wavelength_sigma_nm
         Standard deviation of an error of all its wavelengths in nm.
+    width_sigma, skew_sigma
+        Standard deviations of width and skew, as `labrig.fit.leds.changed_spectrum` has them, of a
+        spectrum that is a curve by peak and width only.
     """
 
     light: Spectrum
     brightness: float = 1.0
     brightness_sigma: float = 0.0
     wavelength_sigma_nm: float = 0.0
+    width_sigma: float = 0.0
+    skew_sigma: float = 0.0
+
+    def changes(self) -> Iterator[tuple[float, Spectrum, Spectrum]]:
+        """Yield, of each error of shape, σ over two steps, and spectra a step ahead and behind."""
+        sigmas = self.wavelength_sigma_nm, self.width_sigma, self.skew_sigma
+        for kind, sigma in enumerate(sigmas):
+            if sigma > 0:
+                step = SHIFT_NM if kind == 0 else SHAPE_STEP * sigma
+                yield sigma / (2 * step), self._changed(kind, step), self._changed(kind, -step)
+
+    def _changed(self, kind: int, step: float) -> Spectrum:
+        shift_nm, wider, skew = (step if number == kind else 0.0 for number in range(3))
+        return changed_spectrum(self.light, shift_nm, 1 + wider, skew)
 
     def __post_init__(self) -> None:
         name = self.light.name
@@ -78,7 +99,7 @@ class Exposure:
                 f"light '{name}': expected a brightness above 0, got {self.brightness}; give 1 and "
                 "an infinite brightness_sigma where it is not known"
             )
-        for what in ("brightness_sigma", "wavelength_sigma_nm"):
+        for what in ("brightness_sigma", "wavelength_sigma_nm", "width_sigma", "skew_sigma"):
             if not getattr(self, what) >= 0:
                 raise UsageError(
                     f"light '{name}': expected {what} of 0 or more, got {getattr(self, what)}"
@@ -190,6 +211,7 @@ class FluorescenceSystem:
         variance: ArrayLike,
         white: Transmittance | None = None,
         white_sigma: float = 0.0,
+        white_error: CurveError | None = None,
     ) -> Self:
         """Return the system that the values of a white reference under the same lights leave.
 
@@ -202,6 +224,8 @@ class FluorescenceSystem:
             Reflectance of the reference, which must not fluoresce; None stands for 1.
         white_sigma
             Standard deviation of the reference's reflectance, relative and common to all lights.
+        white_error
+            Error of the reflectance's course over wavelength; None takes it for exact.
 
         Returns
         -------
@@ -229,13 +253,42 @@ class FluorescenceSystem:
         free = np.zeros((len(loose), *self.shape))
         free[np.arange(len(loose)), loose] = UNKNOWN * expected[loose]
         change = np.concatenate([change, free]).reshape(len(change) + len(loose), -1)
-        sigma = np.sqrt(variances / scale**2).ravel()
-        target = (values / scale - expected).ravel() / sigma
-        whitened = (change / sigma).T
+        noise = np.diag((variances / scale**2).ravel())
+        for (course,) in _courses(white_error, self.output_nm, reflectance):
+            course_change = (self.response.reflected @ course).ravel()
+            noise += np.outer(course_change, course_change)
+        lower = np.linalg.cholesky(noise)
+        target = solve_triangular(lower, (values / scale - expected).ravel(), lower=True)
+        whitened = solve_triangular(lower, change.T, lower=True)
         precision = np.eye(len(change)) + whitened.T @ whitened
         root = np.linalg.inv(np.linalg.cholesky(precision)).T
         mean = root @ (root.T @ (whitened.T @ target))
         return self._updated(brightness, loose, mean, root, white_sigma)
+
+    def with_drift(self, sigma: ArrayLike) -> Self:
+        """Return the system whose lights changed between the white reference and the surface.
+
+        Parameters
+        ----------
+        sigma
+            Relative standard deviation of each light's brightness, common to the channels: of
+            shutter and lamp from frame to frame, of lamps that warm and age, shape (m,).
+        """
+        relative = np.asarray(sigma, dtype=np.float64)
+        lights = np.flatnonzero(relative > 0)
+        by_light = relative[lights][:, np.newaxis, np.newaxis]
+        more = _Response(
+            by_light[..., np.newaxis] * _only(self.response.reflected, lights),
+            by_light * _only(self.response.absorbed, lights),
+            np.zeros((len(lights), *self.response.seen.shape)),
+        )
+        modes = _Response(
+            *(
+                np.concatenate([getattr(self.modes, part), getattr(more, part)])
+                for part in ("reflected", "absorbed", "seen")
+            )
+        )
+        return replace(self, modes=modes)
 
     def _updated(
         self,
@@ -247,6 +300,14 @@ class FluorescenceSystem:
     ) -> Self:
         """Return the system whose errors z have some mean and covariance root · rootᵀ."""
         before, count = self.response, len(self.modes.reflected)
+        sigma = np.linalg.norm(root[count:], axis=1) * UNKNOWN
+        is_loose = np.zeros_like(self.is_loose)
+        is_loose[loose] = sigma > LOOSE
+        # What stays loose is left to the fit of the surface, which sees its light's colour only.
+        # Its most likely factor means nothing, and may even be negative.
+        kept_mean, kept_root = mean.copy(), root.copy()
+        kept_mean[count:][sigma > LOOSE] = 0.0
+        kept_root[count:][sigma > LOOSE] = 0.0
         lit = [UNKNOWN * _only(part, loose) for part in (before.reflected, before.absorbed)]
         dark = np.zeros((len(loose), *before.seen.shape))
         modes = [
@@ -259,18 +320,12 @@ class FluorescenceSystem:
         ]
         response = _Response(
             *(
-                part + np.tensordot(mean, mode, 1)
+                part + np.tensordot(kept_mean, mode, 1)
                 for part, mode in zip(
                     (before.reflected, before.absorbed, before.seen), modes, strict=True
                 )
             )
         )
-        sigma = np.linalg.norm(root[count:], axis=1) * UNKNOWN
-        is_loose = np.zeros_like(self.is_loose)
-        is_loose[loose] = sigma > LOOSE
-        # What stays loose is left to the fit of the surface, which sees its light's colour only.
-        kept_root = root.copy()
-        kept_root[count:][sigma > LOOSE] = 0.0
         left = [np.tensordot(kept_root.T, mode, 1) for mode in modes]
         scale = [white_sigma * part[np.newaxis] for part in (response.reflected, response.absorbed)]
         left = [
@@ -366,8 +421,8 @@ def fluorescence_system(
     def seen(sensitivity: FloatArray) -> FloatArray:
         return np.asarray((weights[:, np.newaxis] * in_output).T @ sensitivity)
 
-    def absorbed(light: Spectrum, shift_nm: float = 0.0) -> FloatArray:
-        return band_integrals(light.wavelength_nm + shift_nm, light.value, in_edges) / _power(light)
+    def absorbed(light: Spectrum) -> FloatArray:
+        return band_integrals(light.wavelength_nm, light.value, in_edges) / _power(light)
 
     response = _Response(
         reflected(lights, curves),
@@ -380,17 +435,14 @@ def fluorescence_system(
             _Response(reflected(lights, change), np.zeros_like(response.absorbed), seen(change))
         )
     for number, exposure in enumerate(exposures):
-        if exposure.wavelength_sigma_nm > 0:
-            per_nm = exposure.wavelength_sigma_nm / (2 * SHIFT_NM)
-            ahead, behind = (_at(spectra[number], nodes - s) for s in (SHIFT_NM, -SHIFT_NM))
+        for per_step, ahead, behind in exposure.changes():
             moved = _Response(
                 np.zeros_like(response.reflected), np.zeros_like(response.absorbed),
                 np.zeros_like(response.seen),
             )  # fmt: skip
-            moved.reflected[number] = per_nm * reflected((ahead - behind)[np.newaxis], curves)[0]
-            moved.absorbed[number] = per_nm * (
-                absorbed(exposure.light, SHIFT_NM) - absorbed(exposure.light, -SHIFT_NM)
-            )
+            power = _at(ahead.resampled(grid_nm), nodes) - _at(behind.resampled(grid_nm), nodes)
+            moved.reflected[number] = per_step * reflected(power[np.newaxis], curves)[0]
+            moved.absorbed[number] = per_step * (absorbed(ahead) - absorbed(behind))
             modes.append(moved)
     brightness = np.array([exposure.brightness for exposure in exposures])
     relative = np.array([exposure.brightness_sigma for exposure in exposures]) / brightness
@@ -447,6 +499,12 @@ def require_scale(system: FluorescenceSystem) -> None:
 def _power(light: Spectrum, ends_nm: tuple[float, float] | None = None) -> float:
     ends = light.wavelength_nm[[0, -1]] if ends_nm is None else ends_nm
     return float(band_integrals(light.wavelength_nm, light.value, ends)[0])
+
+
+def _courses(error: CurveError | None, nm: FloatArray, curve: FloatArray) -> Iterator[FloatArray]:
+    """Yield changes (1, o) of a curve, each one σ of an independent error."""
+    for mode in curve_modes(error, nm, curve[:, np.newaxis], np.array([curve.max()])):
+        yield mode.T
 
 
 def _at(light: Spectrum, nodes_nm: FloatArray) -> FloatArray:
