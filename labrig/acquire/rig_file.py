@@ -90,6 +90,12 @@ class Optics(BaseModel):
     filters
         Folder with the colour filters' spectral transmittances, one file `NAME.csv` for each
         filter. Default: the shipped folder.
+    emission_library
+        Measured emissions that dyes of fluorescent samples may have: a folder of re-radiation
+        matrices or of tables of spectra, or one such file.
+    direct
+        Run of the protocol `direct_bispectral` on samples of the same names, with which estimated
+        re-radiation is compared.
     camera_file
         Camera calibration: its file `camera.yaml`, or the folder of the run of protocol
         `camera_calibration` that measured it.
@@ -116,6 +122,8 @@ class Optics(BaseModel):
     lamp: str | None = None
     grey_card: str | None = None
     filters: str | None = None
+    emission_library: str | None = None
+    direct: str | None = None
 
     def filter_files(self) -> dict[str, Path]:
         """Return the files of the colour filters' transmittances by name.

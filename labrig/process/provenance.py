@@ -35,6 +35,8 @@ class Provenance(BaseModel):
         Regions of the patches by name, as they were used.
     states
         Number of states that was fitted, or `auto`.
+    method
+        Method of estimating re-radiation; null for protocols that have none.
     fixed_rates_per_s
         Rates in 1/s that the user held fixed.
     camera
@@ -53,6 +55,7 @@ class Provenance(BaseModel):
     libraries: dict[str, str]
     regions: dict[str, Region]
     states: str | int
+    method: str | None
     fixed_rates_per_s: tuple[float, ...]
     camera: str | None
     frames: dict[str, int]
@@ -83,6 +86,7 @@ def provenance(
         libraries=library_versions(),
         regions=overrides.patches(protocol) if patches else dict(overrides.regions),
         states=overrides.states or getattr(protocol, "states", "auto"),
+        method=overrides.method or getattr(protocol, "method", None),
         fixed_rates_per_s=overrides.fixed_rates_per_s,
         camera=camera,
         frames=dict(Counter(frame.role for frame in frames if not overrides.excludes(frame))),

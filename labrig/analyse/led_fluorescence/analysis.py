@@ -1,15 +1,18 @@
 """Re-radiation matrices of the patches of a fluorescence run."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from labrig.analyse.inputs import Part
 from labrig.analyse.led_fluorescence.card_checks import unused_leds
+from labrig.analyse.led_fluorescence.direct import direct_measurement, missing_samples
 from labrig.analyse.led_fluorescence.lit_patches import LitPatch, lit_patches, mean_of
 from labrig.analyse.led_fluorescence.lit_system import lit_system
+from labrig.analyse.led_fluorescence.methods import method_differences, reradiation_under_lights
+from labrig.analyse.led_fluorescence.mixture import mixture_of
 from labrig.analyse.led_fluorescence.warnings import (
     SEEN_SIGMA,
     bleaching_warnings,
@@ -26,13 +29,15 @@ from labrig.fit.fluorescence import (
     fit_per_led,
     predicted_colour,
 )
-from labrig.material import appearance
+from labrig.material import appearance, read_emissions
 from labrig.optics import Spectrum, delta_e, read_light
 from labrig.protocols.led_fluorescence import SAMPLE, LedFrames
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.results import (
     BoolArray,
     ColourUnderLight,
+    DirectBispectralResult,
+    EstimateMethod,
     FloatArray,
     FluorescentPatch,
     LedFluorescenceResult,
@@ -58,7 +63,8 @@ def analyse(part: Part) -> LedFluorescenceResult:
     Raises
     ------
     UsageError
-        The rig file lacks an LED, or the curves of camera or card.
+        The rig file lacks an LED, or the curves of camera or card, or names an emission library or
+        a direct measurement that is none.
     DataError
         Frames are missing or damaged, LEDs are named in another order than they light, or fewer
         than two of them can be used.
@@ -85,17 +91,26 @@ def analyse(part: Part) -> LedFluorescenceResult:
     cards = {name: _without_rest(card.under(rows)) for name, card in cards.items()}
     card = mean_of(cards)
     system = lit_system([lights[led] for led in used], camera, white, card)
-    estimator, patches = JointEstimator(system), {}
+    named = part.rig.optics.emission_library
+    estimator = JointEstimator(system, () if named is None else read_emissions(named))
+    method: EstimateMethod = part.overrides.method or part.protocol.method
+    direct = direct_measurement(part.rig)
+    if direct is not None:
+        warnings += missing_samples(direct, samples)
+    patches = {}
     for number, name in enumerate(samples):
         sample = _without_rest(samples[name].under(rows))
         if sample.is_clipped.any():
             which = ", ".join(np.array(used)[sample.is_clipped])
             raise DataError(f"{name}: clips at the shortest exposure under {which}; dim the LEDs")
         even = sample.times(*_evenness(cards[name], card, system))
-        fit = estimator.fit(name, even.value, even.variance, seed=number)
-        per_led = fit_per_led(name, even.value, even.variance, system)
-        patches[name] = _patch(fit, per_led, even, system)
-        warnings += fact_warnings(name, fit, camera.channels)
+        estimates = _Estimates(
+            estimator.fit(name, even.value, even.variance, seed=number),
+            fit_per_led(name, even.value, even.variance, system),
+            method,
+        )
+        patches[name] = _patch(estimates, even, system, direct)
+        warnings += fact_warnings(name, estimates.chosen, camera.channels)
         warnings += bleaching_warnings(name, even.bleaching)
     return LedFluorescenceResult(
         leds=tuple(used),
@@ -139,14 +154,38 @@ def _evenness(
     return factor, variance
 
 
+@dataclass(frozen=True, eq=False)
+class _Estimates:
+    """Estimates of one sample, and the method that is asked for."""
+
+    joint: FluorescenceFit
+    per_led: FluorescenceFit
+    method: EstimateMethod
+
+    @property
+    def chosen(self) -> FluorescenceFit:
+        return self.joint if self.method == "joint" else self.per_led
+
+    @property
+    def other(self) -> FluorescenceFit:
+        return self.per_led if self.method == "joint" else self.joint
+
+
 def _patch(
-    fit: FluorescenceFit, per_led: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem
+    estimates: _Estimates,
+    lit: LitPatch,
+    system: FluorescenceSystem,
+    direct: DirectBispectralResult | None,
 ) -> FluorescentPatch:
-    excitable = _excitable(fit, lit, system)
+    fit, joint, per_led = estimates.chosen, estimates.joint, estimates.per_led
+    excitable, is_extrapolated = _excitable(fit, lit, system), _extrapolated(system)
+    columns = None if direct is None else direct.samples.get(fit.matrix.name)
+    read = None if columns is None else columns.interpolated(fit.matrix.name)[0]
     return FluorescentPatch(
+        method=estimates.method,
         matrix=MatrixOnBands.of(fit.matrix),
-        per_led=MatrixOnBands.of(per_led.matrix),
-        is_extrapolated=_extrapolated(system),
+        other=MatrixOnBands.of(estimates.other.matrix),
+        is_extrapolated=is_extrapolated,
         dyes=tuple(_dye(fluorophore) for fluorophore in fit.fluorophores),
         probability=tuple(number.probability for number in fit.numbers),
         value=lit.value,
@@ -156,6 +195,12 @@ def _patch(
         reduced_chi2=fit.reduced_chi2,
         colours=tuple(_colour(fit, read_light(light), excitable) for light in LIGHTS),
         bleaching=lit.bleaching,
+        mixture=mixture_of(fit.matrix, is_extrapolated) if fit.fluorophores else None,
+        direct=None if read is None else MatrixOnBands.of(read),
+        under_lights=reradiation_under_lights(
+            joint, per_led, [exposure.light for exposure in system.exposures], direct
+        ),
+        differences=method_differences(joint.matrix, per_led.matrix, read),
     )
 
 
@@ -167,29 +212,32 @@ def _extrapolated(system: FluorescenceSystem) -> BoolArray:
 
 def _dye(fluorophore: EstimatedFluorophore) -> MeasuredDye:
     emission, excitation = fluorophore.emission, fluorophore.excitation
-    assert emission.sigma is not None
-    assert excitation.sigma is not None
     return MeasuredDye(
         emission.value,
-        emission.sigma,
+        _sigma(emission),
         excitation.value,
-        excitation.sigma,
+        _sigma(excitation),
         Measured(fluorophore.quantum_yield, fluorophore.quantum_yield_sigma),
     )
 
 
+def _sigma(spectrum: Spectrum) -> FloatArray:
+    """Return σ of a spectrum, NaN where its method has none."""
+    return np.full_like(spectrum.value, np.nan) if spectrum.sigma is None else spectrum.sigma
+
+
 def _colour(fit: FluorescenceFit, light: Spectrum, excitable: BoolArray) -> ColourUnderLight:
-    colour = predicted_colour(fit, light)
+    found, sigma = appearance(fit.matrix, light).lab, np.full(3, np.nan)
+    if fit.surfaces is not None:
+        sigma = predicted_colour(fit, light).lab_sigma
     depends = False
     if excitable.any():
         emission = fit.fluorophores[0].emission.value[:, np.newaxis]
         reradiation = np.where(excitable, EXCITED * emission, fit.matrix.reradiation)
         brighter = appearance(replace(fit.matrix, reradiation=reradiation), light)
-        depends = float(delta_e(brighter.lab, colour.lab)) > DEPENDS
-    lightness, a, b = colour.lab.tolist()
-    return ColourUnderLight(
-        light.name, (lightness, a, b), tuple(colour.lab_sigma.tolist()), depends
-    )
+        depends = float(delta_e(brighter.lab, found)) > DEPENDS
+    lightness, a, b = found.tolist()
+    return ColourUnderLight(light.name, (lightness, a, b), tuple(sigma.tolist()), depends)
 
 
 def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) -> BoolArray:
@@ -198,9 +246,10 @@ def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) 
     These are bands of lights of unknown brightness, under which it shows more than their own light.
     """
     loose = np.flatnonzero(system.is_loose)
-    if not fit.fluorophores:
+    if not (fit.fluorophores and len(loose)):
         return np.zeros(len(system.input_nm), dtype=np.bool_)
-    known = system.response.absorbed[~system.is_loose].sum(axis=0)
+    # Measured spectra of LEDs have noise of either sign beside their light.
+    known = np.maximum(system.response.absorbed[~system.is_loose].sum(axis=0), 0.0)
     dark = np.zeros_like(fit.matrix.reradiation)
     reflected = system.values(fit.matrix.reflectance, dark) * system.brightness[:, np.newaxis]
     more = fit.predicted - reflected > SEEN_SIGMA * np.sqrt(lit.variance)
