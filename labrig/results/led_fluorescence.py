@@ -141,8 +141,8 @@ class FluorescentPatch:
     bleaching
         Signal under the first LED at the end of the run over that at its begin.
     mixture
-        Mixture of normal densities of the measured part of the matrix; None where nothing is
-        re-radiated above the noise.
+        Mixture of normal densities of the measured part of the matrix; None without a dye, or where
+        the LEDs excited none.
     direct
         Matrix as a spectrometer measured it, NaN where it did not; None without it.
     under_lights

@@ -18,6 +18,7 @@ from labrig.analyse.led_fluorescence.warnings import (
     bleaching_warnings,
     fact_warnings,
     left_warnings,
+    per_led_warnings,
 )
 from labrig.bench_optics import camera_curves, card_reflectance, led_exposures
 from labrig.errors import DataError, UsageError
@@ -111,6 +112,8 @@ def analyse(part: Part) -> LedFluorescenceResult:
         )
         patches[name] = _patch(estimates, even, system, direct)
         warnings += fact_warnings(name, estimates.chosen, camera.channels)
+        if method == "per-led":
+            warnings += per_led_warnings(name, estimates.chosen)
         warnings += bleaching_warnings(name, even.bleaching)
     return LedFluorescenceResult(
         leds=tuple(used),

@@ -11,7 +11,8 @@ from labrig.results import BoolArray, MixtureOfMatrix
 
 #: Components of a mixture: with more it follows little but noise (Hua et al. 2021).
 COMPONENTS = 3
-#: Least part of the strongest entry that counts as re-radiation where a method has no σ.
+#: Least part of the strongest entry that counts as re-radiation. An estimate is smooth, and errors
+#: of its entries have the same sign: σ of each would leave out what belongs to the dye.
 LEAST_PART = 0.01
 
 
@@ -26,22 +27,15 @@ def mixture_of(matrix: ReradiationMatrix, is_extrapolated: BoolArray) -> Mixture
         Input bands whose numbers are extrapolated and are left out, shape (i,).
     """
     unknown = np.broadcast_to(is_extrapolated, matrix.reradiation.shape)
-    sigma = matrix.reradiation_sigma
-    lit = replace(
-        matrix,
-        reradiation=np.where(unknown, np.nan, matrix.reradiation),
-        reradiation_sigma=None if sigma is None else np.where(unknown, np.nan, sigma),
-    )
-    threshold = None
-    if sigma is None:
-        per_band = lit.reradiation * lit.output_width_nm[:, np.newaxis]
-        threshold = LEAST_PART * float(np.nanmax(np.where(lit.is_stokes, per_band, 0.0)))
-        if not threshold > 0:
-            return None
+    lit = replace(matrix, reradiation=np.where(unknown, np.nan, matrix.reradiation))
+    per_band = lit.reradiation * lit.output_width_nm[:, np.newaxis]
+    threshold = LEAST_PART * float(np.nanmax(np.where(lit.is_stokes, per_band, 0.0)))
+    if not threshold > 0:
+        return None
     try:
         fit = fit_mixture(lit, COMPONENTS, threshold=threshold)
     except (DataError, UsageError):
-        # No entry is above the noise, or too few for as many numbers.
+        # Too few entries for as many numbers.
         return None
     edges = matrix.input_edges_nm
     bands = np.flatnonzero(~is_extrapolated)
