@@ -136,7 +136,7 @@ def values_chart(patch: FluorescentPatch, result: LedFluorescenceResult) -> Char
 def methods_charts(patch: FluorescentPatch) -> dict[str, Chart]:
     """Return a chart of the re-radiation by all methods for each light, by its name.
 
-    Lights that excite little, by all methods, are left out.
+    Lights that excite little, by all LEDs together and as a spectrometer read it, are left out.
     """
     strongest = {each.light: _strongest(each) for each in patch.under_lights}
     top = max(strongest.values(), default=0.0)
