@@ -13,6 +13,7 @@ from labrig import resources
 from labrig.acquire import RigFile, led_lights
 from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
 from labrig.errors import UsageError
+from labrig.material import read_emissions
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -230,6 +231,8 @@ def require_optics(rig: RigFile) -> None:
         card_reflectance(rig)
     if rig.optics.filters is not None:
         rig.optics.filter_files()
+    if rig.optics.emission_library is not None:
+        read_emissions(rig.optics.emission_library)
     for kind in kinds():
         calibration(rig, kind)
 

@@ -46,10 +46,14 @@ class LedFluorescence(LedSettings):
     patches
         Regions of the samples by name: `[x, y, width, height]` in pixels, or all four as fractions
         of the frame.
+    method
+        Method of estimating the re-radiation: `joint`, all LEDs together, or `per-led`, each LED by
+        itself, as in the thesis. The other one stands beside it in the result.
     """
 
     protocol: Literal["led_fluorescence"] = "led_fluorescence"
     patches: Patches = Field({"sample": (0.4, 0.4, 0.2, 0.2)}, min_length=1)
+    method: Literal["joint", "per-led"] = "joint"
 
     def units(self) -> Sequence[Unit]:
         """Return darks, card and samples under every LED, the first LED once more."""

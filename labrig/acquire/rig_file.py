@@ -110,6 +110,12 @@ class Optics(BaseModel):
     polariser
         Spectral transmittance of one of these polarisers: path of a file. Default: the same at all
         wavelengths.
+    emission_library
+        Measured emissions that dyes of fluorescent samples may have: a folder of re-radiation
+        matrices or of tables of spectra, or one such file.
+    direct
+        Run of the protocol `direct_bispectral` on samples of the same names, with which estimated
+        re-radiation is compared.
     camera_file
         Camera calibration: its file `camera.yaml`, or the folder of the run of protocol
         `camera_calibration` that measured it.
@@ -174,6 +180,9 @@ class Optics(BaseModel):
         angles = () if self.angles_deg is None else ("/".join(f"{at}°" for at in self.angles_deg),)
         polarised = () if self.polarisers is None else ("crossed polarisers",)
         return ", ".join((*angles, *polarised))
+
+    emission_library: str | None = None
+    direct: str | None = None
 
     def filter_files(self) -> dict[str, Path]:
         """Return the files of the colour filters' transmittances by name.

@@ -4,13 +4,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
 from labrig.errors import UsageError
 from labrig.record import FileRecord
 from labrig.region import Region, parse_region
-from labrig.results import AUTO, require_law
+from labrig.results import AUTO, EstimateMethod, require_law
 from labrig.yaml_file import did_you_mean
 
 
@@ -66,6 +66,8 @@ class Overrides:
         Camera curves for the report's colours instead of the rig file's.
     optics
         Keys of the rig file's `optics:` to replace: calibrations that were made later.
+    method
+        Method of estimating re-radiation; None takes the protocol's.
     """
 
     regions: Mapping[str, Region] = field(default_factory=dict)
@@ -75,6 +77,7 @@ class Overrides:
     law: str = AUTO
     camera: str | None = None
     optics: Mapping[str, str] = field(default_factory=dict)
+    method: EstimateMethod | None = None
 
     @classmethod
     def parse(
@@ -86,6 +89,7 @@ class Overrides:
         camera: str | None = None,
         optics: Sequence[str] = (),
         law: str = AUTO,
+        method: str | None = None,
     ) -> Self:
         """Parse the texts of a command line.
 
@@ -105,11 +109,13 @@ class Overrides:
             Calibrations as `KEY=PATH` of the rig file's `optics:`.
         law
             Law that describes a decay, or `auto`.
+        method
+            Method of estimating re-radiation.
 
         Raises
         ------
         UsageError
-            A region, a rate or a calibration is malformed, or there is no such law.
+            A region, a rate or a calibration is malformed, or there is no such law or method.
         """
         require_law(law)
         if invalid := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
@@ -126,6 +132,7 @@ class Overrides:
             law,
             camera,
             dict(_parse_calibration(text) for text in optics),
+            None if method is None else _parse_method(method),
         )
 
     def bench(self, run: Path) -> RigFile:
@@ -159,6 +166,23 @@ class Overrides:
             patches[name] = region
         return patches
 
+    def check_method(self, protocol: Any) -> None:
+        """Refuse a method for a protocol that has none to choose from.
+
+        Raises
+        ------
+        UsageError
+            Neither the protocol nor a part of its chain has methods.
+        """
+        if self.method is None:
+            return
+        chain = [part.protocol for part in protocol.chain()] if hasattr(protocol, "chain") else []
+        if not any(hasattr(each, "method") for each in (protocol, *chain)):
+            raise UsageError(
+                f"--method: expected a protocol with several methods, such as "
+                f"led_fluorescence, got {protocol.protocol}; leave --method out"
+            )
+
     def excludes(self, frame: FileRecord) -> bool:
         """Return whether `frame` is to be left out."""
         return bool(self.excluded & _names(frame))
@@ -186,6 +210,14 @@ def _parse_calibration(text: str) -> tuple[str, str]:
             f"{did_you_mean(key, list(Optics.model_fields))}"
         )
     return key, str(Path(named).resolve()) if Path(named).exists() else named
+
+
+def _parse_method(text: str) -> EstimateMethod:
+    methods: tuple[EstimateMethod, ...] = get_args(EstimateMethod)
+    for method in methods:
+        if text == method:
+            return method
+    raise UsageError(f"--method: expected {' or '.join(methods)}, got '{text}'")
 
 
 def _names(frame: FileRecord) -> set[str]:

@@ -49,6 +49,14 @@ def process(
             "run, such as lvf=PATH. Repeatable.",
         ),
     ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method",
+            help="How led_fluorescence estimates re-radiation: 'joint', all LEDs together, or "
+            "'per-led', one LED by itself as in McEvoy's thesis.",
+        ),
+    ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     verify: Annotated[
         bool,
@@ -69,7 +77,7 @@ def process(
     from labrig.record import read_run
 
     overrides = Overrides.parse(
-        roi or [], exclude or [], states, rate or [], camera, optics or [], law
+        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method
     )
     folder = find_run(run, runs)
     if verify:

@@ -35,6 +35,8 @@ class Provenance(BaseModel):
         Regions of the patches by name, as they were used.
     states
         Number of states that was fitted, or `auto`.
+    method
+        Method of estimating re-radiation; null for protocols that have none.
     fixed_rates_per_s
         Rates in 1/s that the user held fixed.
     law
@@ -55,6 +57,7 @@ class Provenance(BaseModel):
     libraries: dict[str, str]
     regions: dict[str, Region]
     states: str | int
+    method: str | None
     fixed_rates_per_s: tuple[float, ...]
     law: str
     camera: str | None
@@ -86,6 +89,7 @@ def provenance(
         libraries=library_versions(),
         regions=overrides.patches(protocol) if patches else dict(overrides.regions),
         states=overrides.states or getattr(protocol, "states", "auto"),
+        method=overrides.method or getattr(protocol, "method", None),
         fixed_rates_per_s=overrides.fixed_rates_per_s,
         law=overrides.law,
         camera=camera,

@@ -174,6 +174,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 
 def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Processed:
     """Process a run that no other process processes meanwhile."""
+    overrides.check_method(protocol)
     rig, run = overrides.bench(folder), read_run(folder)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])

@@ -142,6 +142,9 @@ def spectra_chart(spectra: Sequence[MatrixSpectrum], x_label: str) -> Chart:
     """Return the chart of spectra, measured and of a mixture."""
     labelled = tuple(spectra_marks(spectra))
     values = [spectrum.value for spectrum in spectra]
+    values += [
+        spectrum.value + spectrum.sigma for spectrum in spectra if spectrum.sigma is not None
+    ]
     values += [spectrum.model for spectrum in spectra if spectrum.model is not None]
     ends_nm = np.array([spectrum.wavelength_nm[[0, -1]] for spectrum in spectra])
     left, right = float(ends_nm.min()), float(ends_nm.max())

@@ -130,6 +130,14 @@ from .measured import (
 from .phosphor import (
     PhosphorResult as PhosphorResult,
 )
+from .reradiation_methods import (
+    EstimateMethod as EstimateMethod,
+    MeasuringMethod as MeasuringMethod,
+    MethodDifference as MethodDifference,
+    MixtureOfMatrix as MixtureOfMatrix,
+    ReradiatedSpectrum as ReradiatedSpectrum,
+    ReradiationUnderLight as ReradiationUnderLight,
+)
 from .run_result import (
     AnyResult as AnyResult,
     RunResult as RunResult,

@@ -2,13 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import ClassVar, Literal
 
 from labrig.material import Provenance, ReradiationMatrix, write_fluorescent
 from labrig.results.measured import BoolArray, FloatArray, Measured
+from labrig.results.reradiation_methods import (
+    EstimateMethod,
+    MethodDifference,
+    MixtureOfMatrix,
+    ReradiationUnderLight,
+)
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
+from labrig.results.text_files import write_csv, write_json
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +71,10 @@ class MeasuredDye:
     Attributes
     ----------
     emission, emission_sigma
-        Emission with unit integral in 1/nm and its σ, shape (o,).
+        Emission with unit integral in 1/nm and its σ, shape (o,); NaN: the method has no σ.
     excitation, excitation_sigma
         Fraction of the light of each input band that the dye would emit over all of its emission,
-        and its σ, shape (i,).
+        and its σ, shape (i,); NaN: the method has no σ.
     quantum_yield
         Photons emitted per photon that does not come back at its own wavelength; NaN where no light
         tells it.
@@ -91,7 +98,7 @@ class ColourUnderLight:
     lab
         L*, a*, b* with a perfect white under the light.
     lab_sigma
-        Their standard deviations.
+        Their standard deviations; NaN: the method has none.
     depends_on_uv
         Whether the colour changes with the brightness of ultraviolet lights that is not known.
     """
@@ -108,17 +115,19 @@ class FluorescentPatch:
 
     Attributes
     ----------
-    matrix
-        Matrix by all LEDs together, with σ.
-    per_led
-        Matrix by the method of the thesis, each LED by itself; None if that was not asked for.
+    method
+        Method of `matrix` and of all that follows from it: "joint", all LEDs together, with σ, or
+        "per-led", the thesis's, each LED by itself, without.
+    matrix, other
+        Matrix by this method, and by the other one.
     is_extrapolated
         Whether no LED of known brightness reached an input band, shape (i,): there the numbers are
         extrapolated, and may be off by more than their σ.
     dyes
-        The dyes by rising wavelength of their emission, of the most probable number of them.
+        The dyes by rising wavelength of their emission, of the most probable number of them; always
+        one per LED.
     probability
-        Probability of each number of dyes from 0 on.
+        Probability of each number of dyes from 0 on; none per LED.
     value, sigma
         Values of each channel under each LED in DN/s, as if it shone evenly, and their σ, (m, k).
     predicted
@@ -126,15 +135,26 @@ class FluorescentPatch:
     pull
         `value` less `predicted` over their σ, with that of lights and curves, shape (m, k).
     reduced_chi2
-        χ² per degree of freedom.
+        χ² per degree of freedom; NaN per LED, which has more parameters than values.
     colours
         Colours under some lights.
     bleaching
         Signal under the first LED at the end of the run over that at its begin.
+    mixture
+        Mixture of normal densities of the measured part of the matrix; None without a dye, or where
+        the LEDs excited none.
+    direct
+        Matrix as a spectrometer measured it, NaN where it did not; None without it.
+    under_lights
+        Re-radiation by each method under each light: those of the direct measurement, else the
+        LEDs.
+    differences
+        Colour differences between the methods.
     """
 
+    method: EstimateMethod
     matrix: MatrixOnBands
-    per_led: MatrixOnBands | None
+    other: MatrixOnBands
     is_extrapolated: BoolArray
     dyes: tuple[MeasuredDye, ...]
     probability: tuple[float, ...]
@@ -145,6 +165,20 @@ class FluorescentPatch:
     reduced_chi2: float
     colours: tuple[ColourUnderLight, ...]
     bleaching: Measured | None
+    mixture: MixtureOfMatrix | None
+    direct: MatrixOnBands | None
+    under_lights: tuple[ReradiationUnderLight, ...]
+    differences: tuple[MethodDifference, ...]
+
+    @property
+    def joint(self) -> MatrixOnBands:
+        """The matrix by all LEDs together."""
+        return self.matrix if self.method == "joint" else self.other
+
+    @property
+    def per_led(self) -> MatrixOnBands:
+        """The matrix by the thesis's method, each LED by itself."""
+        return self.matrix if self.method == "per-led" else self.other
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -192,17 +226,19 @@ class LedFluorescenceResult(RunResult):
     geometry: str = ""
 
     def write_files(self, folder: Path) -> None:
-        """Write a material file and its matrix for each sample, and a table of colours."""
+        """Write a material file, its matrix and mixture for each sample, and a table of colours."""
         for name, patch in self.patches.items():
             place = folder / name if len(self.patches) > 1 else folder
             place.mkdir(exist_ok=True)
-            note = f"ultraviolet scale: {self.uv_scale}"
+            note = f"method: {patch.method}; ultraviolet scale: {self.uv_scale}"
             if self.geometry:
                 note += f"; radiance factors at {self.geometry}"
             origin = Provenance(
                 source="photographs under LEDs, with labrig", run=self.run, note=note
             )
             write_fluorescent(place / "material.yaml", patch.matrix.named(name), origin)
+            if patch.mixture is not None:
+                write_json(place / "mixture.json", patch.mixture.to_dict())
         write_csv(
             folder / "colours.csv",
             ("patch", "light", "L", "a", "b", "L_sigma", "a_sigma", "b_sigma", "depends_on_uv"),
@@ -210,7 +246,8 @@ class LedFluorescenceResult(RunResult):
                 (
                     name,
                     colour.light,
-                    *(f"{number:.4f}" for number in (*colour.lab, *colour.lab_sigma)),
+                    *(f"{number:.4f}" for number in colour.lab),
+                    *("" if isnan(sigma) else f"{sigma:.4f}" for sigma in colour.lab_sigma),
                     str(colour.depends_on_uv).lower(),
                 )
                 for name, patch in self.patches.items()

@@ -1,13 +1,15 @@
 """Colours of matrices estimated from photographs under LEDs, over the measured ones.
 
-    python -m tests.acceptance.led_matrices [CASE ...] [--dark] [--seed 0]
+    python -m tests.acceptance.led_matrices [CASE ...] [--dark] [--seed 0] [--library WHICH]
 
 Every measured matrix that re-radiates is photographed by a simulation that shares nothing with the
 fit: integrals in steps of 1 nm, the matrix interpolated between its bands, measured spectra of
 LEDs, a DSLR's shot and read noise in a bracket of three exposures. The fit gets the values, their
 variances, and spectra and curves that may be wrong. Printed are ΔE2000 under D65 and A against the
 matrix, errors of L*, a*, b* over their σ, and the time a surface takes. Also: surfaces without
-fluorescence, and in how many of them some is found.
+fluorescence, and in how many of them some is found. With --library the fit also has a library of
+emissions: of all these surfaces but the one that is photographed (`others`), of that one, too
+(`own`), or emissions that no surface has, two narrow lines each (`wrong`).
 
 The truth is the measured matrix as corrected, on its Stokes side, noise and all.
 """
@@ -38,10 +40,11 @@ from labrig.material import (
     appearance,
     compare_colours,
     corrected,
+    emission_spectrum,
     matrix_files,
     read_reradiation,
 )
-from labrig.optics import CameraResponse, read_camera, read_light, read_spectrum
+from labrig.optics import CameraResponse, Spectrum, read_camera, read_light, read_spectrum
 
 DATA = Path(__file__).parents[3] / "shared/data"
 LED_FILE = DATA / "light_sources/photobiology/leds.csv"
@@ -199,6 +202,43 @@ def on_stokes_side(matrix: ReradiationMatrix) -> ReradiationMatrix:
     )
 
 
+def library(which: str, surfaces: Sequence[ReradiationMatrix], name: str) -> list[Spectrum]:
+    """Return a library of emissions for the surface of that name."""
+    if which == "wrong":
+        nm = surfaces[0].output_nm
+        return [
+            Spectrum(f"{peak:g} nm", nm, _lines(nm, peak)) for peak in np.arange(420.0, 681, 10)
+        ]
+    return [
+        emission_spectrum(surface) for surface in surfaces if which == "own" or surface.name != name
+    ]
+
+
+def _lines(nm: FloatArray, peak: float) -> FloatArray:
+    away = np.array([[-35.0], [35.0]])
+    return np.asarray(np.exp(-(((nm - peak - away) / 8) ** 2) / 2).sum(axis=0))
+
+
+def with_library(
+    system: FluorescenceSystem, which: str, surfaces: Sequence[ReradiationMatrix]
+) -> Callable[..., FluorescenceFit]:
+    """Return the fit of one surface with a library."""
+    common = {
+        name: library(which, surfaces, name)
+        for name in ({surface.name for surface in surfaces} if which == "others" else {""})
+    }
+    estimators: dict[str, JointEstimator] = {}
+
+    def fit(name: str, value: FloatArray, variance: FloatArray) -> FluorescenceFit:
+        key = name if which == "others" else ""
+        if key not in estimators:
+            estimators.clear()
+            estimators[key] = JointEstimator(system, common[key])
+        return estimators[key].fit(name, value, variance)
+
+    return fit
+
+
 def estimator(case: Case, system: FluorescenceSystem) -> Callable[..., FluorescenceFit]:
     """Return the fit of one surface."""
     if case.method == "per-led":
@@ -223,13 +263,14 @@ def without_fluorescence(
     return replace(like, matrix=matrix, fluorophores=())
 
 
-def run(name: str, surfaces: Sequence[ReradiationMatrix], seed: int) -> None:
+def run(name: str, surfaces: Sequence[ReradiationMatrix], seed: int, which: str) -> None:
     """Print one case."""
     case, rng = CASES[name], np.random.default_rng(seed)
     photographs = Photographs(case, rng)
     lights = [read_light(light) for light in LIGHTS]
-    fit = estimator(case, told_system(case, read_camera(CAMERA), photographs))
-    differences, pulls, misfits, dyes = [], [], [], []
+    system = told_system(case, read_camera(CAMERA), photographs)
+    fit = with_library(system, which, surfaces) if which else estimator(case, system)
+    differences, pulls, misfits, dyes, sigmas, shapes = [], [], [], [], [], []
     taken_s = 0.0
     for surface in surfaces:
         value, variance = photographs.of(surface)
@@ -241,6 +282,8 @@ def run(name: str, surfaces: Sequence[ReradiationMatrix], seed: int) -> None:
         differences.append([one.delta_e for one in compare_colours(found.matrix, surface, lights)])
         if found.surfaces is not None:
             colours = [predicted_colour(found, light) for light in lights]
+            sigmas.append([np.linalg.norm(colour.lab_sigma) for colour in colours])
+            shapes.append(emission_error(found.matrix, surface))
             pulls.append([
                 (colour.lab - appearance(surface, light).lab) / colour.lab_sigma
                 for colour, light in zip(colours, lights, strict=True)
@@ -257,6 +300,16 @@ def run(name: str, surfaces: Sequence[ReradiationMatrix], seed: int) -> None:
         f"{1000 * taken_s / len(surfaces):4.0f} ms",
         flush=True,
     )
+    if sigmas:
+        d65, a = np.median(sigmas, axis=0)
+        print(f"{'':18} median σ of L*a*b* {d65:.2f} {a:.2f}; of emissions, median share of the "
+              f"light at a wrong wavelength {np.median(shapes):.3f}")  # fmt: skip
+
+
+def emission_error(found: ReradiationMatrix, true: ReradiationMatrix) -> float:
+    """Return the part of an emission that lies at another wavelength than in the other matrix."""
+    first, second = (emission_spectrum(matrix).value for matrix in (found, true))
+    return float(np.abs(first / max(first.sum(), 1e-300) - second / second.sum()).sum() / 2)
 
 
 def main() -> None:
@@ -265,12 +318,13 @@ def main() -> None:
     parser.add_argument("cases", nargs="*", choices=[[], *CASES], default=[])
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--dark", action="store_true", help="surfaces that do not re-radiate")
+    parser.add_argument("--library", choices=("others", "own", "wrong"), default="")
     asked = parser.parse_args()
     surfaces = not_reradiating() if asked.dark else reradiating()
     print(f"{len(surfaces)} surfaces: ΔE2000 D65 A, median, 90 %, largest; of textiles; errors of "
           f"L*a*b* over σ; χ²; number with 0 to 3 dyes; time")  # fmt: skip
     for name in asked.cases or CASES:
-        run(name, surfaces, asked.seed)
+        run(name, surfaces, asked.seed, asked.library)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from labrig.errors import UsageError
+from labrig.fit import FloatArray
 from labrig.fit.fluorescence import (
     Exposure,
     ExtrapolatedExcitation,
@@ -229,6 +230,26 @@ def test_a_library_helps_where_the_emission_is_in_it() -> None:
         fit_fluorescence(
             "odd", value, variance, SYSTEM, library=[Spectrum("dark", OUTPUT_NM, 0 * peaks)]
         )
+
+
+def test_a_wrong_library_does_no_harm(quick_estimator: JointEstimator) -> None:
+    value, variance = photographed(FEW, surface(EVEN, GREEN), np.random.default_rng(8))
+    library = [
+        Spectrum(f"{peak} nm", OUTPUT_NM, _two_lines(peak)) for peak in (450, 500, 550, 600, 650)
+    ]
+    without = quick_estimator.fit("green", value, variance)
+    fit = JointEstimator(FEW, library).fit("green", value, variance)
+    assert likely_number(fit) == likely_number(without) == 1
+    apart = np.abs(fit.fluorophores[0].emission.value - without.fluorophores[0].emission.value)
+    assert apart.max() < 0.1 * without.fluorophores[0].emission.value.max()
+    lamp = read_light("D65")
+    sigma, other = (predicted_colour(each, lamp).lab_sigma for each in (fit, without))
+    assert_allclose(sigma, other, rtol=0.3)
+
+
+def _two_lines(peak: float) -> FloatArray:
+    away = np.array([[-35.0], [35.0]])
+    return np.asarray(np.exp(-(((OUTPUT_NM - peak - away) / 8) ** 2) / 2).sum(axis=0))
 
 
 def test_a_predicted_colour_is_that_of_the_drawn_surfaces(green_fit: FluorescenceFit) -> None:

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from labrig.analyse.inputs import Part
 from labrig.analyse.led_fluorescence.card_checks import exchanged, lines_of, unused_leds
+from labrig.analyse.led_fluorescence.direct import direct_measurement, missing_samples
 from labrig.analyse.led_fluorescence.lit_patches import (
     SEEN_SIGMA,
     LitPatch,
@@ -16,11 +17,14 @@ from labrig.analyse.led_fluorescence.lit_patches import (
     mean_of,
 )
 from labrig.analyse.led_fluorescence.lit_system import lit_system
+from labrig.analyse.led_fluorescence.methods import method_differences, reradiation_under_lights
+from labrig.analyse.led_fluorescence.mixture import mixture_of
 from labrig.analyse.led_fluorescence.warnings import (
     bleaching_warnings,
     exchanged_warnings,
     fact_warnings,
     left_warnings,
+    per_led_warnings,
 )
 from labrig.bench_optics import camera_curves, card_reflectance, led_exposures
 from labrig.errors import DataError, UsageError
@@ -32,13 +36,15 @@ from labrig.fit.fluorescence import (
     fit_per_led,
     predicted_colour,
 )
-from labrig.material import appearance
+from labrig.material import appearance, read_emissions
 from labrig.optics import Spectrum, delta_e, read_light
 from labrig.protocols.led_fluorescence import SAMPLE, LedFrames
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.results import (
     BoolArray,
     ColourUnderLight,
+    DirectBispectralResult,
+    EstimateMethod,
     FloatArray,
     FluorescentPatch,
     LedFluorescenceResult,
@@ -64,7 +70,8 @@ def analyse(part: Part) -> LedFluorescenceResult:
     Raises
     ------
     UsageError
-        The rig file lacks an LED, or the curves of camera or card.
+        The rig file lacks an LED, or the curves of camera or card, or names an emission library or
+        a direct measurement that is none.
     DataError
         Frames are missing or damaged, or fewer than two LEDs can be used.
     """
@@ -108,14 +115,26 @@ def analyse(part: Part) -> LedFluorescenceResult:
     system = lit_system([lights[led] for led in used], camera, white, card)
     # Frames show all samples at once, but not the card.
     flicker = np.hypot(card.flicker, mean_of(samples).under(rows).flicker)
-    estimator, patches = JointEstimator(system.with_drift(flicker)), {}
+    named = part.rig.optics.emission_library
+    library = () if named is None else read_emissions(named)
+    estimator = JointEstimator(system.with_drift(flicker), library)
+    method: EstimateMethod = part.overrides.method or part.protocol.method
+    direct = direct_measurement(part.rig)
+    if direct is not None:
+        warnings += missing_samples(direct, samples)
+    patches = {}
     for number, name in enumerate(samples):
         sample = samples[name].under(rows).without_rest()
         even = sample.times(*_evenness(cards[name], card, system))
-        fit = estimator.fit(name, even.value, even.own_variance, seed=number)
-        per_led = fit_per_led(name, even.value, even.variance, system)
-        patches[name] = _patch(fit, per_led, even, system)
-        warnings += fact_warnings(name, fit, camera.channels)
+        estimates = _Estimates(
+            estimator.fit(name, even.value, even.own_variance, seed=number),
+            fit_per_led(name, even.value, even.variance, system),
+            method,
+        )
+        patches[name] = _patch(estimates, even, system, direct)
+        warnings += fact_warnings(name, estimates.chosen, camera.channels)
+        if method == "per-led":
+            warnings += per_led_warnings(name, estimates.chosen)
         if has_first:
             warnings += bleaching_warnings(name, even.bleaching)
     return LedFluorescenceResult(
@@ -151,14 +170,38 @@ def _evenness(
     return factor, variance
 
 
+@dataclass(frozen=True, eq=False)
+class _Estimates:
+    """Estimates of one sample, and the method that is asked for."""
+
+    joint: FluorescenceFit
+    per_led: FluorescenceFit
+    method: EstimateMethod
+
+    @property
+    def chosen(self) -> FluorescenceFit:
+        return self.joint if self.method == "joint" else self.per_led
+
+    @property
+    def other(self) -> FluorescenceFit:
+        return self.per_led if self.method == "joint" else self.joint
+
+
 def _patch(
-    fit: FluorescenceFit, per_led: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem
+    estimates: _Estimates,
+    lit: LitPatch,
+    system: FluorescenceSystem,
+    direct: DirectBispectralResult | None,
 ) -> FluorescentPatch:
-    excitable = _excitable(fit, lit, system)
+    fit, joint, per_led = estimates.chosen, estimates.joint, estimates.per_led
+    excitable, is_extrapolated = _excitable(fit, lit, system), _extrapolated(system)
+    columns = None if direct is None else direct.samples.get(fit.matrix.name)
+    read = None if columns is None else columns.interpolated(fit.matrix.name)[0]
     return FluorescentPatch(
+        method=estimates.method,
         matrix=MatrixOnBands.of(fit.matrix),
-        per_led=MatrixOnBands.of(per_led.matrix),
-        is_extrapolated=_extrapolated(system),
+        other=MatrixOnBands.of(estimates.other.matrix),
+        is_extrapolated=is_extrapolated,
         dyes=tuple(_dye(fluorophore) for fluorophore in fit.fluorophores),
         probability=tuple(number.probability for number in fit.numbers),
         value=lit.value,
@@ -168,6 +211,12 @@ def _patch(
         reduced_chi2=fit.reduced_chi2,
         colours=tuple(_colour(fit, read_light(light), excitable) for light in LIGHTS),
         bleaching=lit.bleaching,
+        mixture=mixture_of(fit.matrix, is_extrapolated) if fit.fluorophores else None,
+        direct=None if read is None else MatrixOnBands.of(read),
+        under_lights=reradiation_under_lights(
+            joint, per_led, [exposure.light for exposure in system.exposures], direct
+        ),
+        differences=method_differences(joint.matrix, per_led.matrix, read),
     )
 
 
@@ -179,28 +228,33 @@ def _extrapolated(system: FluorescenceSystem) -> BoolArray:
 
 def _dye(fluorophore: EstimatedFluorophore) -> MeasuredDye:
     emission, excitation = fluorophore.emission, fluorophore.excitation
-    assert emission.sigma is not None
-    assert excitation.sigma is not None
     return MeasuredDye(
         emission.value,
-        emission.sigma,
+        _sigma(emission),
         excitation.value,
-        excitation.sigma,
+        _sigma(excitation),
         Measured(fluorophore.quantum_yield, fluorophore.quantum_yield_sigma),
     )
 
 
+def _sigma(spectrum: Spectrum) -> FloatArray:
+    """Return σ of a spectrum, NaN where its method has none."""
+    return np.full_like(spectrum.value, np.nan) if spectrum.sigma is None else spectrum.sigma
+
+
 def _colour(fit: FluorescenceFit, light: Spectrum, excitable: BoolArray) -> ColourUnderLight:
-    colour = predicted_colour(fit, light)
-    depends, sigma = False, colour.lab_sigma
+    found, sigma = appearance(fit.matrix, light).lab, np.full(3, np.nan)
+    if fit.surfaces is not None:
+        sigma = predicted_colour(fit, light).lab_sigma
+    depends = False
     if excitable.any():
         emission = fit.fluorophores[0].emission.value[:, np.newaxis]
         reradiation = np.where(excitable, EXCITED * emission, fit.matrix.reradiation)
         brighter = appearance(replace(fit.matrix, reradiation=reradiation), light)
-        depends = float(delta_e(brighter.lab, colour.lab)) > DEPENDS
+        depends = float(delta_e(brighter.lab, found)) > DEPENDS
         # Anything from the estimate to that strong a dye is as probable.
-        sigma = np.hypot(sigma, (brighter.lab - colour.lab) / math.sqrt(3))
-    lightness, a, b = colour.lab.tolist()
+        sigma = np.hypot(sigma, (brighter.lab - found) / math.sqrt(3))
+    lightness, a, b = found.tolist()
     return ColourUnderLight(light.name, (lightness, a, b), tuple(sigma.tolist()), depends)
 
 
@@ -210,9 +264,10 @@ def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) 
     These are bands of lights of unknown brightness, under which it shows more than their own light.
     """
     loose = np.flatnonzero(system.is_loose)
-    if not fit.fluorophores:
+    if not (fit.fluorophores and len(loose)):
         return np.zeros(len(system.input_nm), dtype=np.bool_)
-    known = system.response.absorbed[~system.is_loose].sum(axis=0)
+    # Measured spectra of LEDs have noise of either sign beside their light.
+    known = np.maximum(system.response.absorbed[~system.is_loose].sum(axis=0), 0.0)
     dark = np.zeros_like(fit.matrix.reradiation)
     reflected = system.values(fit.matrix.reflectance, dark) * system.brightness[:, np.newaxis]
     more = fit.predicted - reflected > SEEN_SIGMA * np.sqrt(lit.variance)

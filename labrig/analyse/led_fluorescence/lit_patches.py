@@ -166,7 +166,9 @@ def _lit_patch(
     bleaching = None if again is None else _ratio(again, lit[first[0]])
     value, variance, is_clipped, common = columns
     dark, dark_sigma, is_off_clipped = offs
-    return LitPatch(value, variance, dark, dark_sigma, is_clipped, is_off_clipped, common, bleaching)
+    return LitPatch(
+        value, variance, dark, dark_sigma, is_clipped, is_off_clipped, common, bleaching
+    )
 
 
 def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool, float]:

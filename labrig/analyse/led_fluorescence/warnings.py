@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from labrig.analyse.led_fluorescence.lit_patches import LitPatch
+from labrig.errors import DataError
 from labrig.fit.fluorescence import (
     ExtrapolatedExcitation,
     FluorescenceFit,
@@ -12,6 +13,7 @@ from labrig.fit.fluorescence import (
     UnexplainedValues,
     UnknownBrightness,
 )
+from labrig.material import physical_warnings
 from labrig.number_format import plus_minus
 from labrig.results import Measured
 
@@ -61,6 +63,17 @@ def bleaching_warnings(name: str, bleaching: Measured | None) -> Iterator[str]:
             f"{name}: at the end of the run the first LED gave "
             f"{plus_minus(bleaching.value, bleaching.sigma)} of what it gave at its begin; the "
             "sample bleaches, or the LED drifts"
+        )
+
+
+def per_led_warnings(name: str, fit: FluorescenceFit) -> Iterator[str]:
+    """Yield a line if no surface can have the matrix of one LED by itself, which nothing bounds."""
+    try:
+        physical_warnings(fit.matrix)
+    except DataError as error:
+        yield (
+            f"{name}: the method per-led gives a matrix that no surface has, and other commands "
+            f"refuse its file ({error}); take --method joint"
         )
 
 

@@ -306,8 +306,9 @@ class Hypotheses:
 
     @cached_property
     def _usual_shapes(self) -> np.ndarray:
-        """The most probable shape of each peak, indices (p,)."""
-        peaks, log_prior = self.shapes.peak_nm, self.shapes.log_prior
+        """The most probable shape of each peak, indices (p,); a library may have none that fits."""
+        free = ~self.shapes.is_measured
+        peaks, log_prior = self.shapes.peak_nm[free], self.shapes.log_prior[free]
         return np.array(
             [
                 np.flatnonzero(peaks == peak)[np.argmax(log_prior[peaks == peak])]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.fit.least_squares import FloatArray
@@ -39,12 +40,15 @@ class EmissionShapes:
         Mean in each output band, in 1/nm, shape (s, o).
     log_prior
         Logarithm of its prior probability, shape (s,).
+    is_measured
+        Whether it is an emission of the library, shape (s,).
     """
 
     names: tuple[str, ...]
     peak_nm: FloatArray
     value: FloatArray
     log_prior: FloatArray
+    is_measured: NDArray[np.bool_]
 
 
 def emission_shapes(output_nm: FloatArray, library: Sequence[Spectrum] = ()) -> EmissionShapes:
@@ -106,4 +110,5 @@ def emission_shapes(output_nm: FloatArray, library: Sequence[Spectrum] = ()) -> 
         np.array(peaks),
         table / (table @ np.diff(edges))[:, np.newaxis],
         np.log(probability),
+        np.arange(len(names)) >= len(names) - len(library),
     )

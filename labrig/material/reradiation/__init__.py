@@ -18,6 +18,10 @@ from labrig.material.reradiation.conditional import (
 from labrig.material.reradiation.correction import (
     corrected,
 )
+from labrig.material.reradiation.emission import (
+    emission_spectrum,
+    read_emissions,
+)
 from labrig.material.reradiation.evidence import (
     reradiates,
 )
@@ -62,9 +66,11 @@ __all__ = [
     "colour_pair",
     "compare_colours",
     "corrected",
+    "emission_spectrum",
     "instrument_noise",
     "matrix_files",
     "physical_warnings",
+    "read_emissions",
     "read_reradiation",
     "read_spectral_image",
     "reradiates",

@@ -1,14 +1,18 @@
 """Fluorescent samples on the simulated bench with LEDs, against the truth."""
 
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from labrig.analyse import Overrides
 from labrig.analyse.led_fluorescence import analyse
-from labrig.errors import DataError
+from labrig.analyse.led_fluorescence.methods import method_differences
+from labrig.errors import DataError, UsageError
 from labrig.material import (
     ReradiationMatrix,
     appearance,
@@ -18,7 +22,7 @@ from labrig.material import (
 )
 from labrig.optics import read_light
 from labrig.process import process_and_report
-from labrig.results import LedFluorescenceResult
+from labrig.results import FluorescentPatch, LedFluorescenceResult
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of
 from tests.results.made import assert_read_back
@@ -66,7 +70,6 @@ def test_no_fluorescence_assumed_or_one_led_by_itself_is_far_worse(
 ) -> None:
     lights = [read_light("D65"), read_light("A")]
     for name, patch in result.patches.items():
-        assert patch.per_led is not None
         together, alone = (
             [
                 each.delta_e
@@ -81,7 +84,9 @@ def test_what_ultraviolet_excites_has_no_scale_and_is_said(result: LedFluorescen
     assert result.uv_scale == "unknown"
     assert result.is_brightness_known.tolist() == [False] + [True] * 8
     paper, felt = result.patches["paper"], result.patches["felt"]
-    assert all(colour.depends_on_uv for colour in paper.colours)
+    # The table of FL2 begins at 380 nm: nothing that 365 nm excites matters under it.
+    depends = {colour.light: colour.depends_on_uv for colour in paper.colours}
+    assert depends == {"D65": True, "A": True, "FL2": False}
     assert not any(colour.depends_on_uv for colour in felt.colours)
     assert any("365 nm" in warning and "not known" in warning for warning in result.warnings)
 
@@ -99,6 +104,12 @@ def test_the_result_is_read_back_and_written_as_materials(run: Path) -> None:
     assert isinstance(done.result, LedFluorescenceResult)
     assert_read_back(done.result)
     folder = done.report.parent
+    for name in ("yellow", "orange"):
+        written = json.loads((folder / name / "mixture.json").read_text())
+        # 365 nm shone, but nobody knows how brightly.
+        assert 385 <= written["measured_input_nm"][0] < 410
+        assert_same_excitation(done.result.patches[name])
+    assert not (folder / "felt" / "mixture.json").exists()
     for name, patch in done.result.patches.items():
         material = read_fluorescent(folder / name / "material.yaml")
         assert material.name == name
@@ -111,7 +122,45 @@ def test_the_result_is_read_back_and_written_as_materials(run: Path) -> None:
     assert "felt" not in unknown
     page = done.report.read_text()
     assert "uv_scale: unknown" in page
-    assert page.count("<h2>") >= 13
+    assert page.count('class="patch"') == 4
+    assert "Left half as photographed" in page
+    assert "one LED by itself" in page
+
+
+def assert_same_excitation(patch: FluorescentPatch) -> None:
+    """The mixture re-radiates as much as the matrix does of light that the LEDs had."""
+    matrix, lit = patch.matrix.named(""), ~patch.is_extrapolated
+    assert patch.mixture is not None
+    model = patch.mixture.mixture.to_matrix(matrix.input_nm, matrix.output_nm)
+    light = [each.reradiated_fraction[lit].sum() for each in (model, matrix)]
+    assert light[0] == pytest.approx(light[1], rel=0.1)
+
+
+def test_methods_are_asked_about_the_same_light(result: LedFluorescenceResult) -> None:
+    yellow = result.patches["yellow"]
+    assert [each.light for each in yellow.under_lights] == list(result.leds)
+    blue = next(each for each in yellow.under_lights if each.light == "455 nm")
+    column = yellow.matrix.reradiation[:, 14:18]
+    assert column.min(axis=1)[15] <= blue.joint.value[15] <= column.max(axis=1)[15]
+    assert blue.joint.sigma is not None
+    assert blue.per_led.sigma is None
+    lights = {(each.first, each.second, each.light) for each in yellow.differences}
+    assert lights == {("joint", "per-led", "D65"), ("joint", "per-led", "A")}
+
+
+def test_a_direct_measurement_is_compared_where_it_measured() -> None:
+    true = true_matrix("yellow")
+    wrong = replace(true, reradiation=0.5 * true.reradiation)
+    holed = true.reradiation.copy()
+    holed[:, :10] = np.nan
+    read = replace(true, reradiation=holed)
+    found = {
+        (each.first, each.second, each.light): each.delta_e
+        for each in method_differences(true, wrong, read)
+    }
+    assert found["joint", "direct", "D65"] == pytest.approx(0.0, abs=1e-9)
+    assert found["per-led", "direct", "A"] == pytest.approx(found["joint", "per-led", "A"], rel=0.5)
+    assert found["per-led", "direct", "A"] > 3
 
 
 def _on_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:
@@ -183,6 +232,22 @@ def test_an_led_that_does_not_light_is_left_out_and_named(
     assert _is_felt(result)
 
 
+def test_the_thesis_method_that_was_asked_for_stands_before_that_of_all_leds(
+    tmp_path: Path,
+) -> None:
+    done = process_and_report(record(tmp_path, FEW), Overrides(method="per-led"))
+    result = done.result
+    assert isinstance(result, LedFluorescenceResult)
+    for patch in result.patches.values():
+        assert patch.method == "per-led"
+        assert patch.matrix.reradiation_sigma is None
+        assert patch.joint.reradiation_sigma is not None
+        assert np.isnan(patch.colours[0].lab_sigma).all()
+    assert_read_back(result)
+    assert "method: per-led" in (done.report.parent / "provenance.yaml").read_text()
+    assert all("without σ" in line for line in done.lines)
+
+
 def test_leds_in_another_order_count_as_what_they_are(tmp_path: Path) -> None:
     result = _result(tmp_path, _on_relays(RELAYS | {"455 nm": 3, "530 nm": 2}))
     assert result.leds == tuple(RELAYS)
@@ -221,3 +286,16 @@ def test_light_that_leaks_in_is_subtracted(tmp_path: Path) -> None:
     assert not felt.dyes
     true = true_matrix("felt").reflectance[5:30]
     assert np.abs(felt.matrix.reflectance[5:30] - true).max() < 0.05
+
+
+def test_a_method_is_refused_where_there_is_none_to_choose() -> None:
+    class Decay:
+        protocol = "decay"
+
+    with pytest.raises(
+        UsageError, match="--method: expected a protocol with several methods"
+    ) as no:
+        Overrides(method="joint").check_method(Decay())
+    assert "\n" not in str(no.value)
+    with pytest.raises(UsageError, match="expected joint or per-led, got 'thesis'"):
+        Overrides.parse([], [], method="thesis")
