@@ -241,8 +241,8 @@ class Room:
         lamps = self._lamps()
         off_s = lamps.last_switch_off(self._clock.now())
         level = effective = None
-        cells = self._samples.cells
-        faster = cells.rate_factor(self._clock.now() if off_s is None else off_s)
+        off_or_now_s = self._clock.now() if off_s is None else off_s
+        faster = self._samples.cells.rate_factor(off_or_now_s)
         if off_s is not None:
             arrangements = self._changer.arrangements
             level_at_off = self._samples.level_at(off_s, self._lights(), arrangements)
@@ -250,8 +250,7 @@ class Room:
                 level_at_off, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
             )
             level = self._samples.of_cells(level_at_off)
-            growth = np.exp(faster * cells.k_r_per_s * SETTLED_S)
-            effective = self._samples.of_cells(level_later) * growth
+            effective = self._samples.extrapolated(level_at_off, level_later, off_s)
         electrons_per_s = self._curves.glow_electrons_per_s(self._samples.radiance_at_one, f_number)
         return Truth(
             lamp_off_s=off_s,

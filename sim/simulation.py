@@ -27,6 +27,7 @@ from .bench_settings import (
 from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
+from .kinetics_settings import KineticsSettings
 
 #: Largest number of a relay of the Numato board.
 RELAYS = 7
@@ -65,12 +66,15 @@ class Patch(Part):
     shape
         Shape of the sample: `flat`, or a `sphere` as large as fits into the region, lit from the
         left.
+    kinetics
+        How its traps fill and empty; null: by the rate equation of first order in a thin layer.
     """
 
     material: str
     region: Region = MIDDLE
     shape: Literal["flat", "sphere"] = "flat"
     initial_charge: Charge | None = None
+    kinetics: KineticsSettings | None = None
 
 
 class SensorSettings(Part):
