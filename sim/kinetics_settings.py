@@ -63,6 +63,12 @@ class KineticsSettings(Part):
         Optical density of the whole sample, decadic, where it absorbs exciting light most; at other
         wavelengths it is as much less as the excitation rates are. The light gets weaker on its way
         down, and all depths glow alike.
+    excitation
+        Shape of the excitation spectrum within the material's bands: `steps`, the same in all of a
+        band, or `smooth`, with the bands' means.
+    excitation_beyond
+        Excitation rates below the first and above the last band, down to 300 nm and up to 780 nm,
+        as a fraction of those of these bands.
     """
 
     model: Literal["first_order", "general_order", "otor", "trap_depths"] = "first_order"
@@ -75,6 +81,8 @@ class KineticsSettings(Part):
     width_ev: Annotated[float, Field(gt=0, le=0.3)] = 0.05
     frequency_per_s: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     optical_density: Annotated[float, Field(ge=0, le=6)] = 0.0
+    excitation: Literal["steps", "smooth"] = "steps"
+    excitation_beyond: Annotated[Fraction, Field(ge=0, le=10)] = 0.0
 
     @model_validator(mode="after")
     def _keys_of_the_model(self) -> Self:

@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 
 from labrig.errors import UsageError
 from labrig.material import Material, State
@@ -351,8 +352,25 @@ def _excitation(
     cells = band_cells(material.bands_nm)
     length = float(np.linalg.norm(cells @ spectrum))
     scale = irradiance * material.irradiance_norm.value / length
-    row = scale * (np.asarray(state.k_e_per_s) @ cells)
-    return row
+    k_e_per_s = np.asarray(state.k_e_per_s)
+    if kinetics is None:
+        row = scale * (k_e_per_s @ cells)
+        return row
+    return scale * _over_wavelengths(k_e_per_s, material.bands_nm, kinetics)
+
+
+def _over_wavelengths(
+    k_e_per_s: FloatArray, bands_nm: Sequence[float], kinetics: KineticsSettings
+) -> FloatArray:
+    """Return excitation rates on the grid, whose means over the bands are `k_e_per_s`."""
+    low_nm, high_nm = CELL_EDGES_NM[[0, -1]]
+    edges = np.array([min(low_nm, bands_nm[0] - 1), *bands_nm, max(high_nm, bands_nm[-1] + 1)])
+    beyond = kinetics.excitation_beyond * k_e_per_s[[0, -1]]
+    rates = np.array([beyond[0], *k_e_per_s, beyond[1]])
+    if kinetics.excitation == "steps":
+        return np.asarray(rates @ band_cells(edges))
+    running = PchipInterpolator(edges, np.concatenate([[0.0], np.cumsum(rates * np.diff(edges))]))
+    return np.asarray(np.diff(running(CELL_EDGES_NM)) / CELL_NM)
 
 
 def _holding(level: float, k_r_per_s: float, kinetics: KineticsSettings | None) -> float:
@@ -363,7 +381,7 @@ def _holding(level: float, k_r_per_s: float, kinetics: KineticsSettings | None) 
     return law.generation(level, rate_in_the_middle(kinetics, k_r_per_s))
 
 
-def band_cells(bands_nm: Sequence[float]) -> FloatArray:
+def band_cells(bands_nm: Sequence[float] | FloatArray) -> FloatArray:
     """Return the fraction of every cell of the grid in every band, shape (bands, wavelengths)."""
     edges = np.asarray(bands_nm)
     low = np.maximum(edges[:-1, None], CELL_EDGES_NM[None, :-1])

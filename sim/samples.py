@@ -192,6 +192,6 @@ class Samples:
         """Return the cells' states with their excitation below the LVF."""
         if turned not in self._below_lvf:
             assert self._lvf is not None
-            passed = Lvf(self._lvf).seen(self._lvf.on_sample, turned)[self._piece]
+            passed = Lvf(self._lvf).below(self._lvf.on_sample, turned)[self._piece]
             self._below_lvf[turned] = replace(self.cells, excitation=self.cells.excitation * passed)
         return self._below_lvf[turned]

@@ -11,13 +11,13 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import least_squares
 
 from labrig.errors import UsageError
-from labrig.material import Material
+from labrig.material import Material, read_material
 from labrig.material.file import IrradianceNorm, State
 from labrig.sim.bench_settings import TemperatureSettings
 from labrig.sim.kinetics import BOLTZMANN_EV_K, RATES_K
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import WAVELENGTH_NM
-from labrig.sim.phosphor import Phosphor, phosphor
+from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import Simulation
 from labrig.sim.temperature import rate_factor
 from labrig.yaml_file import validate
@@ -306,3 +306,23 @@ def test_a_fluorescent_sample_has_no_traps() -> None:
     patch = {"material": "yellow-textile", "kinetics": {"optical_density": 1}}
     with pytest.raises(UsageError, match="expected 'kinetics' with a phosphor"):
         Darkroom(sample=[patch])
+
+
+def test_excitation_varies_within_bands_and_reaches_beyond_them() -> None:
+    material = read_material("blue-paint")
+    assert material.bands_nm is not None
+    steps, smooth, wide = (
+        phosphor([material], [None], 1.0, [settings]).excitation[0]
+        for settings in (
+            None,
+            KineticsSettings(excitation="smooth"),
+            KineticsSettings(excitation_beyond=0.5),
+        )
+    )
+    cells = band_cells(material.bands_nm)
+    assert cells @ smooth == pytest.approx(cells @ steps, rel=1e-9, abs=1e-12)
+    assert np.abs(smooth - steps).max() > 0.2 * steps.max()
+    inside = (WAVELENGTH_NM > 400) & (WAVELENGTH_NM < 700)
+    assert wide[inside] == pytest.approx(steps[inside])
+    assert wide[WAVELENGTH_NM < 400] == pytest.approx(0.5 * steps[inside][0])
+    assert not steps[~inside].any()
