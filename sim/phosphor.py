@@ -21,7 +21,7 @@ from scipy.interpolate import PchipInterpolator
 from labrig.errors import UsageError
 from labrig.material import Material, State
 
-from .kinetics import Traps, depths_of, law_of, layers_of, rate_in_the_middle
+from .kinetics import Law, Traps, depths_of, law_of, layers_of, rate_in_the_middle
 from .kinetics_settings import KineticsSettings
 from .lamp import BURNING_K, CELL_EDGES_NM, CELL_NM, filament_spectrum
 from .traps import Drive, integrate
@@ -157,11 +157,8 @@ class Phosphor:
         """Integrate each law's traps by themselves; see `evolve`."""
         assert self.traps is not None
         after, exposure_s = np.empty_like(level), np.empty_like(level)
-        for number in np.unique(self.traps.law).tolist():
-            own = np.flatnonzero(self.traps.law == number)
-            some = self.of(own, self.patch[own])
-            if number < 0:
-                some = replace(some, traps=None)
+        for own, law, some in self._by_law:
+            if law is None:
                 after[own], exposure_s[own] = some.evolve(
                     level[own], start_s, end_s, light, visible
                 )
@@ -171,10 +168,29 @@ class Phosphor:
                 if stop_s > begin_s:
                     is_dark = light.dark(begin_s, stop_s)
                     drive = partial(some._drive, None if is_dark else light, visible)
-                    law = self.traps.laws[number]
                     state = integrate(law, state, begin_s, stop_s, drive)
             after[own], exposure_s[own] = state[0], state[1] / some.k_r_per_s
         return after, exposure_s
+
+    @cached_property
+    def _by_law(self) -> list[tuple[NDArray[np.intp], Law | None, "Phosphor"]]:
+        """Indices of the traps of each law, that law, and these traps; None: the rate equation."""
+        assert self.traps is not None
+        groups = []
+        for number in np.unique(self.traps.law).tolist():
+            own = np.flatnonzero(self.traps.law == number)
+            some = self.of(own, self.patch[own])
+            is_plain = number < 0
+            law = None if is_plain else self.traps.laws[number]
+            groups.append((own, law, replace(some, traps=None) if is_plain else some))
+        return groups
+
+    @cached_property
+    def _excited(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        """The rows of the excitation matrix that differ from those before, and each trap's."""
+        differs = np.any(self.excitation[1:] != self.excitation[:-1], axis=1)
+        row = np.concatenate([[0], np.cumsum(differs)])
+        return self.excitation[np.concatenate([[True], differs])], row
 
     def _drive(
         self, light: Light | None, visible: Callable[[float], float], times_s: FloatArray
@@ -183,10 +199,11 @@ class Phosphor:
         assert self.traps is not None
         each_s = times_s.tolist()
         faster = np.array([self.rate_factor(at_s) for at_s in each_s])
-        escape = self.k_r_per_s[:, None] * faster ** self.traps.activation[:, None]
+        escape = self.k_r_per_s * faster[:, None] ** self.traps.activation
         generation = np.zeros_like(escape)
         if light is not None:
-            generation = self.excitation @ light.irradiance(times_s).T
+            rows, row = self._excited
+            generation = (light.irradiance(times_s) @ rows.T)[:, row]
         return Drive(generation, escape, np.array([visible(at_s) for at_s in each_s]))
 
     def _smooth(
