@@ -63,7 +63,8 @@ class Patch(Part):
     initial_charge
         Concentration r that a long charge under this room's lamp reaches, 0 to 1, instead of the
         one that follows from the excitation rates. Null: it follows from them, and is 0.5 for
-        states without excitation rates.
+        states without excitation rates. With `kinetics` it is that of traps of `depth_ev` at the
+        surface.
     shape
         Shape of the sample: `flat`, or a `sphere` as large as fits into the region, lit from the
         left.

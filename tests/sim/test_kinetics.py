@@ -326,3 +326,21 @@ def test_excitation_varies_within_bands_and_reaches_beyond_them() -> None:
     assert wide[inside] == pytest.approx(steps[inside])
     assert wide[WAVELENGTH_NM < 400] == pytest.approx(0.5 * steps[inside][0])
     assert not steps[~inside].any()
+
+
+def test_a_usual_sample_beside_an_unusual_one_stays_as_it_is() -> None:
+    usual = {"material": "double-wide", "region": [0.0, 0.1, 0.5, 0.8]}
+    thick = {"material": "blue-paint", "region": [0.5, 0.1, 0.5, 0.8]}
+    kinetics = {"model": "trap_depths", "retrapping": 0.2, "optical_density": 1}
+    truths = []
+    for beside in (thick, {**thick, "kinetics": kinetics}):
+        bench = Darkroom(sample=[usual, beside])
+        bench.charge(300.0)
+        truths.append((bench.room.truth().patches[0].states, bench.shoot(1.0, 400)[20:44, 4:40]))
+    (expected, clean), (states, frame) = truths
+    assert frame.mean() == pytest.approx(clean.mean(), rel=1e-4)
+    for state, other in zip(states, expected, strict=True):
+        assert state.k_r_per_s == other.k_r_per_s
+        assert state.emission == other.emission
+        assert state.concentration == pytest.approx(other.concentration, rel=1e-6)
+        assert state.amplitude_dn_per_s == pytest.approx(other.amplitude_dn_per_s, rel=1e-6)
