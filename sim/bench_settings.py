@@ -144,6 +144,10 @@ class LvfSettings(Part):
         the wavelength.
     leakage
         Transmittance outside of the pass band, at all wavelengths, for example `0.1 %`.
+    spread
+        How far light below the filter reaches along the strip when it lies on the sample, by the
+        lamp's penumbra and by scattering in the sample, 1 σ as a fraction of the strip's length,
+        for example `0.5 %`.
     """
 
     before_camera: StripSettings = StripSettings(region=(0.06, 0.28, 0.88, 0.4), tilt=1.5)
@@ -152,6 +156,7 @@ class LvfSettings(Part):
     bend_nm: float = 4.0
     fwhm_nm: Annotated[float, Field(ge=5, le=100)] = 25.0
     leakage: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.001
+    spread: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
 
     @model_validator(mode="after")
     def _rises(self) -> Self:
@@ -186,6 +191,29 @@ class LensSettings(Part):
     def notes(self) -> tuple[str, float] | None:
         """Name and focal length in mm as the camera writes them into its files."""
         return None if self.name is None else (self.name, self.focal_mm)
+
+
+class ImagingSettings(Part):
+    """What keeps a photograph from being the scene; none of it unless given.
+
+    Attributes
+    ----------
+    glare
+        Veiling glare of the lens: fraction of the frame's mean light that lies evenly over all of
+        it, of photographic lenses 0.3 % to 3 %.
+    defocus_px
+        Blur of the picture, 1 σ in pixels.
+    texture
+        Standard deviation of the brightness of surfaces from pixel to pixel, for example `3 %`. It
+        moves with a sample that is put in anew.
+    texture_px
+        Size of the texture's grain, 1 σ in pixels.
+    """
+
+    glare: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
+    defocus_px: Annotated[float, Field(ge=0, le=50)] = 0.0
+    texture: Annotated[Fraction, Field(ge=0, le=0.3)] = 0.0
+    texture_px: Annotated[float, Field(ge=0, le=50)] = 1.0
 
 
 class TemperatureSettings(Part):

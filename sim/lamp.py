@@ -216,6 +216,8 @@ class Lamp:
         if self.settings.afterglow:
             afterglow = self.settings.afterglow * self._glowing(time_s)
             light += afterglow[..., None] * BURNING_SPECTRUM
+        if self.settings.cooling_per_hour:
+            light = light * _reddened(self.settings.cooling_per_hour * np.asarray(time_s) / 3600.0)
         return light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
@@ -263,6 +265,16 @@ class Lamp:
         hours = np.asarray(time_s) / 3600.0
         aged = np.exp(math.log1p(-self.settings.drift_per_hour) * hours)
         return aged * (1 - self.settings.warm_up_deficit * (1 - self._warmth(time_s)))
+
+
+def _reddened(cooler_k: FloatArray) -> FloatArray:
+    """Return a cooler burning filament's light over that of a new one, (..., wavelengths).
+
+    Wien's approximation; 1 at 560 nm.
+    """
+    per_k = 1 / (BURNING_K - cooler_k) - 1 / BURNING_K
+    factor: FloatArray = np.exp(C2_NM_K * per_k[..., None] * (1 / 560.0 - 1 / WAVELENGTH_NM))
+    return factor
 
 
 def _approach(phase: _Phase, begin: float, time_s: FloatArray, constant_s: float) -> FloatArray:

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from labrig.region import Region, region_pixels
 
@@ -76,6 +77,14 @@ class Lvf:
         rising, falling = self._rising, self._rising[::-1]
         pieces = rising if strip.rising != turned else falling
         return np.concatenate([np.zeros((1, pieces.shape[1])), pieces])
+
+    def below(self, strip: StripSettings, turned: bool) -> FloatArray:
+        """Return the light on the sample below all pieces of a strip, shaped as by `seen`."""
+        passed = self.seen(strip, turned)
+        if self._settings.spread:
+            width = self._settings.spread * PIECES
+            passed[1:] = gaussian_filter1d(passed[1:], width, axis=0, mode="nearest")
+        return passed
 
     @cached_property
     def _rising(self) -> FloatArray:

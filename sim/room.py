@@ -24,6 +24,7 @@ from .door import Door
 from .doors import Doors, Pulses, no_pulses
 from .faults import FaultTime, given
 from .filters import Filters
+from .imaging import Imaging
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
 from .layout import Layout
@@ -40,11 +41,12 @@ from .optics import (
     vignetting,
 )
 from .samples import Samples
-from .sensor import BAYER_RGGB, Sensor, SensorTemperature, gain_electrons_per_dn
+from .sensor import BAYER_RGGB, Course, Sensor, SensorTemperature, gain_electrons_per_dn
 from .simulation import Simulation
 from .surfaces import Surfaces
 from .truth import Truth, true_lvf, true_patches
 from .view import View
+from .wander import Wander
 
 FloatArray = NDArray[np.float64]
 
@@ -53,6 +55,7 @@ TICK_S = 1e-6
 
 #: Streams of random numbers drawn from the seed, so that one does not shift another.
 CURVES_STREAM, SENSOR_STREAM, FRAME_STREAM, LIVE_STREAM = 0, 1, 2, 3
+FLICKER_STREAM, BLACK_STREAM = 30, 31
 
 
 class Room:
@@ -115,7 +118,11 @@ class Room:
             sensor.flicker,
             crosstalk=sensor.crosstalk,
             row_noise=sensor.row_noise,
+            nonlinearity=sensor.nonlinearity,
+            flicker_course=self._flicker_course(),
+            black_course_dn=self._black_course_dn(),
         )
+        self._imaging = Imaging(simulation.imaging, simulation.seed)
         self._sensor_temperature = SensorTemperature()
 
     @property
@@ -185,20 +192,21 @@ class Room:
             part = rgb[:, BAYER_RGGB].reshape(-1)[painted]
             if self._spheres is not None and arrangement.card == "sample":
                 part = self._shaded(part, self._spheres, arrangement, reflected, f_number)
+            part = self._imaging.textured(part, arrangement)
             light = part if light is None else light + part
         assert light is not None
+        wall_s = self._clock.wall(start_s)
         mosaic = self._sensor.expose(
-            light,
+            self._imaging.imaged(light),
             exposure_s,
             iso,
             self._sensor_temperature.expose(start_s, exposure_s),
-            self._rng(FRAME_STREAM, round(self._clock.wall(start_s) * 1e6)),
+            self._rng(FRAME_STREAM, round(wall_s * 1e6)),
+            wall_s,
         )
         lens = self._simulation.lens
         lens_notes = None if lens is None else lens.notes
-        return encode_dng(
-            mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, lens_notes)
-        )
+        return encode_dng(mosaic, Shot(wall_s, exposure_s, iso, f_number, lens_notes))
 
     def white_exposure(self, start_s: float, end_s: float) -> FloatArray:
         """Return ∫ irradiance dt at a white reference beside the samples, on `WAVELENGTH_NM`.
@@ -254,8 +262,8 @@ class Room:
         lamps = self._lamps()
         off_s = lamps.last_switch_off(self._clock.now())
         level = effective = None
-        cells = self._samples.cells
-        faster = cells.rate_factor(self._clock.now() if off_s is None else off_s)
+        off_or_now_s = self._clock.now() if off_s is None else off_s
+        faster = self._samples.cells.rate_factor(off_or_now_s)
         if off_s is not None:
             arrangements = self._changer.arrangements
             level_at_off = self._samples.level_at(off_s, self._lights(), arrangements)
@@ -263,8 +271,7 @@ class Room:
                 level_at_off, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
             )
             level = self._samples.of_cells(level_at_off)
-            growth = np.exp(faster * cells.k_r_per_s * SETTLED_S)
-            effective = self._samples.of_cells(level_later) * growth
+            effective = self._samples.extrapolated(level_at_off, level_later, off_s)
         electrons_per_s = self._curves.glow_electrons_per_s(self._samples.radiance_at_one, f_number)
         return Truth(
             lamp_off_s=off_s,
@@ -303,6 +310,17 @@ class Room:
             self._lamps(), self._room_light_spans, doors.trap_door, doors.shield, self._leaks
         )
 
+    def _flicker_course(self) -> Course | None:
+        over_s = self._simulation.sensor.flicker_over
+        return None if over_s is None else Wander(self._rng(FLICKER_STREAM), over_s)
+
+    def _black_course_dn(self) -> Course | None:
+        sensor = self._simulation.sensor
+        if not sensor.black_wander_dn:
+            return None
+        wander = Wander(self._rng(BLACK_STREAM), sensor.black_wander_over)
+        return lambda wall_s: sensor.black_wander_dn * wander(wall_s)
+
     def _falloff(self, height: int, width: int) -> FloatArray:
         lens = self._simulation.lens
         return vignetting(height, width, FOCAL_MM if lens is None else lens.focal_mm)
@@ -325,7 +343,8 @@ class Room:
         """Return the expected electrons in the middle of the lens, shape (places, 3)."""
         level = self._samples.level_at(start_s, lights, self._changer.arrangements)
         glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
-        radiance_s = self._view.radiance_s(arrangement, glow_s, reflected)
+        opened = lights.openness((start_s + end_s) / 2)
+        radiance_s = self._view.radiance_s(arrangement, glow_s, reflected, opened)
         return self._curves.glow_electrons_per_s(radiance_s, f_number).astype(np.float32)
 
     def _shaded(

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.errors import UsageError
 from labrig.material import Material, State, read_any_material
 
 from .arrangement import Arrangement, Arrangements
+from .lamp import SETTLED_S
 from .layout import Layout
 from .lights import Lights
 from .lvf import Lvf
@@ -48,6 +50,9 @@ class Samples:
         Material of every patch: a phosphor, or the matrix of a fluorescent material.
     cells : Phosphor
         States of the cells; `patch` is the cell to which a state belongs.
+    state, share : ndarray, shape (states,)
+        Index of a cell's state among those of all materials, and the fraction of it: all, or with
+        other kinetics that of some traps.
     radiance_at_one : ndarray, shape (states, wavelengths)
         Λ k_r of every state of the cells: its radiance at r = 1 (eq. 3).
     """
@@ -58,21 +63,28 @@ class Samples:
             material if isinstance(material, Material) else DARK for material in self.materials
         ]
         charges = [patch.initial_charge for patch in simulation.patches]
+        kinetics = [patch.kinetics for patch in simulation.patches]
+        for patch, material in zip(simulation.patches, self.materials, strict=True):
+            if patch.kinetics is not None and not isinstance(material, Material):
+                raise UsageError(
+                    f"{material.name}: expected 'kinetics' with a phosphor, got it with a "
+                    "re-radiation matrix, which has no states"
+                )
         self._patches = replace(
-            phosphor(phosphors, charges, simulation.lamp.irradiance),
+            phosphor(phosphors, charges, simulation.lamp.irradiance, kinetics),
             rate_factor=rate_factor(simulation.temperature),
         )
         patch_states = [np.flatnonzero(self._patches.patch == n) for n in range(len(phosphors))]
         states = [patch_states[patch - 1] for patch in layout.patch[1:]]
         self._state_of_cells = np.concatenate(states)
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
-        self.cells = replace(
-            self._patches,
-            k_r_per_s=self._patches.k_r_per_s[self._state_of_cells],
-            excitation=self._patches.excitation[self._state_of_cells],
-            patch=cell,
-        )
+        self.cells = self._patches.of(self._state_of_cells, cell)
         emitted = np.concatenate([emission(material) for material in phosphors])
+        state, share = np.arange(len(emitted)), np.ones(len(emitted))
+        if (traps := self._patches.traps) is not None:
+            state, share = traps.state, traps.share
+            emitted = emitted[state] * share[:, None]
+        self.state, self.share = state[self._state_of_cells], share[self._state_of_cells]
         self.radiance_at_one: FloatArray = (emitted * self._patches.k_r_per_s[:, None])[
             self._state_of_cells
         ]
@@ -121,6 +133,31 @@ class Samples:
             states = replace(states, excitation=np.zeros_like(states.excitation))
         return states.evolve(level, start_s, end_s, light, visible)
 
+    def extrapolated(self, at_off: FloatArray, later: FloatArray, off_s: float) -> FloatArray:
+        """Return the concentrations of all cells, extrapolated from the dark back to lamp off.
+
+        Parameters
+        ----------
+        at_off, later
+            Concentrations at `off_s`, and `SETTLED_S` after it.
+        off_s
+            Time of the lamp off, in seconds.
+
+        Returns
+        -------
+        ndarray, shape (states,)
+            With kinetics of their own, the present emission in the dark per rate instead.
+        """
+        faster = self.cells.rate_factor(off_s)
+        k_r_per_s, traps = self.cells.k_r_per_s, self.cells.traps
+        if traps is None:
+            return self.of_cells(later) * np.exp(faster * k_r_per_s * SETTLED_S)
+        effective = traps.relative_emission(self.of_cells(at_off), k_r_per_s, faster)
+        plain = traps.law < 0
+        growth = np.exp(faster * k_r_per_s[plain] * SETTLED_S)
+        effective[plain] = self.of_cells(later)[plain] * growth
+        return effective
+
     def of_cells(self, level: FloatArray) -> FloatArray:
         """Return the concentrations for every state of every cell, shape (states,)."""
         return level if len(level) == len(self._state_of_cells) else level[self._state_of_cells]
@@ -155,6 +192,6 @@ class Samples:
         """Return the cells' states with their excitation below the LVF."""
         if turned not in self._below_lvf:
             assert self._lvf is not None
-            passed = Lvf(self._lvf).seen(self._lvf.on_sample, turned)[self._piece]
+            passed = Lvf(self._lvf).below(self._lvf.on_sample, turned)[self._piece]
             self._below_lvf[turned] = replace(self.cells, excitation=self.cells.excitation * passed)
         return self._below_lvf[turned]

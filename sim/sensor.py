@@ -5,6 +5,7 @@ noise falls steeply up to ISO 1600. They are not a measurement of a specimen.
 """
 
 import math
+from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 Mosaic = NDArray[np.uint16]
+#: Function of the time in seconds since 1970.
+Course = Callable[[float], float]
 
 #: Colour channel (0 R, 1 G, 2 B) of the four places of a Bayer cell, row by row.
 BAYER_RGGB = (0, 1, 1, 2)
@@ -102,6 +105,13 @@ class Sensor:
     row_noise
         Standard deviation of the offset that all pixels of a row share, in multiples of a pixel's
         read noise.
+    nonlinearity
+        Fraction of the signal that is missing near saturation, of a smaller one in proportion less.
+    flicker_course
+        Function of a frame's time that returns its flicker, in multiples of `flicker`; None: every
+        frame has one of its own.
+    black_course_dn
+        Function of a frame's time that returns the wander of its black level in DN.
     """
 
     def __init__(
@@ -112,6 +122,9 @@ class Sensor:
         *,
         crosstalk: float = 0.0,
         row_noise: float = 0.0,
+        nonlinearity: float = 0.0,
+        flicker_course: Course | None = None,
+        black_course_dn: Course | None = None,
     ) -> None:
         height, width = falloff.shape
         response = falloff * (1 + PRNU * rng.standard_normal((height, width)))
@@ -125,6 +138,9 @@ class Sensor:
         self._flicker = flicker
         self._crosstalk = crosstalk
         self._row_noise = row_noise
+        self._nonlinearity = nonlinearity
+        self._flicker_course = flicker_course
+        self._black_course_dn = black_course_dn
 
     def expose(
         self,
@@ -133,6 +149,7 @@ class Sensor:
         iso: float,
         temperature_c: float,
         rng: np.random.Generator,
+        at_s: float = 0.0,
     ) -> Mosaic:
         """Return one exposure, read out.
 
@@ -146,6 +163,8 @@ class Sensor:
             Temperature of the sensor in degrees Celsius.
         rng
             Random generator of this frame alone.
+        at_s
+            Time of the exposure in seconds since 1970, for what wanders.
 
         Returns
         -------
@@ -153,7 +172,10 @@ class Sensor:
             Mosaic of the frame in DN.
         """
         gain = gain_electrons_per_dn(iso)
-        common = max(1 + self._flicker * rng.standard_normal(), 0.0)
+        flicker = rng.standard_normal()
+        if self._flicker_course is not None:
+            flicker = self._flicker_course(at_s)
+        common = max(1 + self._flicker * flicker, 0.0)
         dark_e = DARK_ELECTRONS_PER_S * exposure_s * 2 ** ((temperature_c - AMBIENT_C) / DOUBLING_C)
         electrons = light_electrons * self._response
         electrons *= np.float32(common)
@@ -163,6 +185,8 @@ class Sensor:
         # More would be cut off below anyway; it only has to stay a finite number on the way.
         np.minimum(electrons, 4 * full_well, out=electrons)
         electrons = _shot_noise(electrons, rng)
+        if self._nonlinearity:
+            electrons *= 1 - np.float32(self._nonlinearity) / full_well * electrons
         np.minimum(electrons, full_well, out=electrons)
         if self._crosstalk:
             electrons = _shared_with_neighbours(electrons, self._crosstalk)
@@ -174,6 +198,8 @@ class Sensor:
         noise *= np.float32(read_noise_electrons(iso) / gain)
         electrons += noise
         electrons += self._zero_dn
+        if self._black_course_dn is not None:
+            electrons += np.float32(self._black_course_dn(at_s))
         electrons += np.float32(0.5)
         return np.clip(electrons, 0, MAX_DN).astype(np.uint16)
 

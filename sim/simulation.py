@@ -17,6 +17,7 @@ from labrig.region import Region
 
 from .bench_settings import (
     DoorSettings,
+    ImagingSettings,
     LedSettings,
     LensSettings,
     LvfSettings,
@@ -27,6 +28,7 @@ from .bench_settings import (
 from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
+from .kinetics_settings import KineticsSettings
 
 #: Largest number of a relay of the Numato board.
 RELAYS = 7
@@ -61,16 +63,20 @@ class Patch(Part):
     initial_charge
         Concentration r that a long charge under this room's lamp reaches, 0 to 1, instead of the
         one that follows from the excitation rates. Null: it follows from them, and is 0.5 for
-        states without excitation rates.
+        states without excitation rates. With `kinetics` it is that of traps of `depth_ev` at the
+        surface.
     shape
         Shape of the sample: `flat`, or a `sphere` as large as fits into the region, lit from the
         left.
+    kinetics
+        How its traps fill and empty; null: by the rate equation of first order in a thin layer.
     """
 
     material: str
     region: Region = MIDDLE
     shape: Literal["flat", "sphere"] = "flat"
     initial_charge: Charge | None = None
+    kinetics: KineticsSettings | None = None
 
 
 class SensorSettings(Part):
@@ -84,11 +90,21 @@ class SensorSettings(Part):
         Height of the sensor in pixels, even.
     flicker
         Standard deviation of the exposure from frame to frame, as a fraction, for example `0.7 %`.
+    flicker_over
+        Time over which the flicker of frames is alike, for example `30 s`: its correlation falls to
+        1/e, as that of an AR(1) process. Null: every frame has a flicker of its own.
     crosstalk
         Fraction of a pixel's charge that appears in each of its four neighbours instead.
     row_noise
         Standard deviation of the offset that all pixels of a row share, in multiples of a pixel's
         read noise.
+    black_wander_dn
+        Standard deviation of the black level, which wanders slowly, in DN.
+    black_wander_over
+        Time in which the black level wanders to another value, for example `10 min`.
+    nonlinearity
+        Fraction of the signal that is missing near saturation, for example `1 %`; of a smaller
+        signal in proportion less.
     curves
         Spectral sensitivities of the simulated camera, a file in rawtoaces' format; null: those
         shipped of a Canon EOS 5D Mark II, changed by as much as laboratories disagree about them.
@@ -97,8 +113,12 @@ class SensorSettings(Part):
     width: Pixels = 1404
     height: Pixels = 936
     flicker: Fraction = 0.007
+    flicker_over: Annotated[DurationS, Field(gt=0)] | None = None
     crosstalk: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     row_noise: Annotated[Fraction, Field(ge=0)] = 0.0
+    black_wander_dn: Annotated[float, Field(ge=0, le=100)] = 0.0
+    black_wander_over: Annotated[DurationS, Field(gt=0)] = 600.0
+    nonlinearity: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     curves: str | None = None
 
 
@@ -119,6 +139,9 @@ class LampSettings(Part):
     drift_per_hour
         Fraction of the light that is lost by ageing and dust in an hour of the room's clock, for
         example `0.2 %`.
+    cooling_per_hour
+        Fall of the burning filament's colour temperature in an hour of the room's clock, in K: the
+        light becomes redder, at the same brightness at 560 nm. Negative: it becomes bluer.
     board
         Board that switches the lamp: `relays`, relay 0 of the Numato board, `lcus`, relay 1 of the
         LCUS board, or `arduino`, relay 0 of the Arduino, which then has the LEDs, too.
@@ -133,6 +156,7 @@ class LampSettings(Part):
     warm_up: Annotated[DurationS, Field(gt=0)] = 150.0
     warm_up_deficit: Annotated[Fraction, Field(ge=0, lt=1)] = 0.03
     drift_per_hour: Annotated[Fraction, Field(ge=0, lt=1)] = 0.002
+    cooling_per_hour: Annotated[float, Field(ge=-20, le=20)] = 0.0
     board: Literal["relays", "lcus", "arduino"] = "relays"
     afterglow: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     afterglow_fades: Annotated[DurationS, Field(gt=0)] = 60.0
@@ -247,6 +271,11 @@ class Simulation(Part):
     polarisers
         Polarisers of the room: `crossed`, one before the LEDs and one, turned by 90 degrees, before
         the lens; null: none. Each absorbs ultraviolet and more than half of all other light.
+    imaging
+        Veiling glare and defocus of the lens, and texture of the surfaces.
+    inter_reflection
+        Irradiance of every surface by the light of all surfaces in the frame, over that of a dome
+        as bright as they are on average, for example `2 %`.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
@@ -287,6 +316,8 @@ class Simulation(Part):
     gloss: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     light_deg: Annotated[int, Field(ge=0, le=150)] = 45
     polarisers: Literal["crossed"] | None = None
+    imaging: ImagingSettings = ImagingSettings()
+    inter_reflection: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.0
     room_light: bool = True
 
     @field_validator("faults")

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from labrig.material import Material
 
 from .bench_settings import StripSettings
+from .kinetics_settings import KineticsSettings
 from .layout import Layout
 from .lvf import Lvf, in_pixels
 from .samples import Samples
@@ -31,17 +32,20 @@ class TrueState(_Part):
     Attributes
     ----------
     k_r_per_s
-        Re-radiation rate in 1/s, at the room's temperature at lamp off.
+        Re-radiation rate in 1/s, at the room's temperature at lamp off; with `kinetics` that of the
+        material's file, for traps of the usual depth.
     k_e_per_s, reradiation
         Excitation rate and Λ of every band, as in the material's file.
     emission
         Λ on the room's `wavelength_nm`.
     concentration
         r at the moment of the last lamp off; null if the lamp was never switched off. Where an LVF
-        has lain on the patch, the mean over its pixels; so is the amplitude.
+        has lain on the patch, the mean over its pixels; of `kinetics` the mean over all traps. So
+        is the amplitude.
     amplitude_dn_per_s
         Signal of the state in R, G, B per second of exposure, extrapolated from the dark back to
-        lamp off (the fade charges a little more), in the middle of the lens.
+        lamp off (the fade charges a little more), in the middle of the lens. Of traps that do not
+        decay exponentially: the signal at lamp off if it had become dark at once.
     """
 
     k_r_per_s: float
@@ -53,11 +57,18 @@ class TrueState(_Part):
 
 
 class TruePatch(_Part):
-    """One sample and its states by falling rate; a fluorescent material has none."""
+    """One sample and its states by falling rate; a fluorescent material has none.
+
+    Attributes
+    ----------
+    kinetics
+        Law of its traps; null: the rate equation of first order.
+    """
 
     material: str
     region: tuple[float, float, float, float]
     bands_nm: tuple[float, ...] | None
+    kinetics: KineticsSettings | None
     states: tuple[TrueState, ...]
 
 
@@ -157,6 +168,7 @@ def true_patches(
             material=material.name,
             region=placed.region,
             bands_nm=material.bands_nm if isinstance(material, Material) else None,
+            kinetics=placed.kinetics,
             states=_true_states(
                 number, material, samples, layout, level, effective, dn_per_s, faster
             )
@@ -179,26 +191,34 @@ def _true_states(
     dn_per_s: FloatArray,
     faster: float,
 ) -> tuple[TrueState, ...]:
-    k_r = samples.cells.k_r_per_s
     cells = np.flatnonzero(layout.patch == number)
     pixels = layout.pixels[cells]
     weight = pixels / pixels.sum() if pixels.any() else np.full(len(cells), 1 / len(cells))
-    # One row a state, one column a cell.
+    # One row a state, or one of the traps of which it consists; one column a cell.
     index = np.flatnonzero(np.isin(samples.cells.patch, cells)).reshape(len(cells), -1).T
+    k_r, share = samples.cells.k_r_per_s[index[:, 0]], samples.share[index[:, 0]]
+    state_of = samples.state[index[:, 0]] - samples.state[index[0, 0]]
+    rates = np.array([state.k_r_per_s for state in material.states])
     states = []
-    for rank in np.argsort(-k_r[index[:, 0]], kind="stable"):
-        indices, state = index[rank], material.states[rank]
+    for rank in np.argsort(-rates, kind="stable").tolist():
+        rows, state = np.flatnonzero(state_of == rank), material.states[rank]
         amplitude = None
         if effective is not None:
-            red, green, blue = dn_per_s[indices[0]] * float(weight @ effective[indices])
+            red, green, blue = sum(
+                dn_per_s[index[row, 0]] * float(weight @ effective[index[row]]) for row in rows
+            )
             amplitude = (red, green, blue)
+        concentration = None
+        if level is not None:
+            concentration = sum(share[row] * float(weight @ level[index[row]]) for row in rows)
+        emission = samples.radiance_at_one[index[rows[0], 0]] / (k_r * share)[rows[0]]
         states.append(
             TrueState(
-                k_r_per_s=faster * k_r[indices[0]],
+                k_r_per_s=faster * rates[rank],
                 k_e_per_s=state.k_e_per_s,
                 reradiation=state.reradiation,
-                emission=tuple(samples.radiance_at_one[indices[0]] / k_r[indices[0]]),
-                concentration=None if level is None else float(weight @ level[indices]),
+                emission=tuple(emission),
+                concentration=concentration,
                 amplitude_dn_per_s=amplitude,
             )
         )

@@ -4,12 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .angles import Angles
-from .arrangement import Arrangement, LvfPlace
+from .arrangement import Arrangement
 from .cards import reflectances
 from .layout import Layout, Places
 from .lights import VisibleLight
 from .lvf import Lvf
 from .optics import CLOTH_REFLECTANCE, REFLECTED
+from .sensor import BAYER_RGGB
 from .simulation import Simulation
 from .surfaces import Surfaces
 
@@ -38,7 +39,11 @@ class View:
         self._lvf = None if simulation.lvf is None else Lvf(simulation.lvf)
 
     def radiance_s(
-        self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
+        self,
+        arrangement: Arrangement,
+        glow_s: FloatArray,
+        reflected: VisibleLight,
+        opened: float = 1.0,
     ) -> FloatArray:
         """Return ∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
 
@@ -48,17 +53,26 @@ class View:
             Arrangement of the bench, which does not change meanwhile.
         glow_s : ndarray, shape (cells, wavelengths)
             ∫ visible glow dt of each cell.
-        seen
+        reflected
             Light that the camera sees by reflection.
+        opened
+            Fraction of the samples that the camera sees.
         """
         places = self._layout.places(arrangement)
-        radiance = self._samples(arrangement, glow_s, reflected)[places.cell]
-        self._cover(radiance, arrangement, places, reflected)
+        radiance = self._uncovered_and_covered(arrangement, places, glow_s, reflected)
+        if self._simulation.inter_reflection:
+            light = self._from_all_surfaces(radiance, places)
+            again = VisibleLight(np.zeros_like(light), opened * light, (1 - opened) * light, light)
+            dark_s = np.zeros_like(glow_s)
+            radiance += self._uncovered_and_covered(arrangement, places, dark_s, again)
         through = self._layout.looked_through(arrangement)
         if through == "away":
             return radiance
-        passed = self._passed(through, arrangement.turned)[places.piece]
-        radiance *= passed
+        settings = self._simulation.lvf
+        assert settings is not None
+        assert self._lvf is not None
+        strip = settings.on_sample if through == "on sample" else settings.before_camera
+        radiance *= self._lvf.seen(strip, arrangement.turned)[places.piece]
         return radiance
 
     def reradiated_s(self, arrangement: Arrangement, reflected: VisibleLight) -> FloatArray:
@@ -68,13 +82,27 @@ class View:
         seen: FloatArray = self._reflected * self._angles.reradiated(arrangement) * reradiated
         return seen[self._layout.places(arrangement).cell]
 
+    def _uncovered_and_covered(
+        self, arrangement: Arrangement, places: Places, glow_s: FloatArray, reflected: VisibleLight
+    ) -> FloatArray:
+        """Return ∫ radiance dt of all places before a filter at the lens."""
+        radiance = self._samples(arrangement, glow_s, reflected)[places.cell]
+        self._cover(radiance, arrangement, places, reflected)
+        return radiance
+
+    def _from_all_surfaces(self, radiance: FloatArray, places: Places) -> FloatArray:
+        """Return the light that all surfaces in the frame throw on each, shape (wavelengths,)."""
+        pixels = np.bincount(places.painted.ravel() // len(BAYER_RGGB), minlength=len(radiance))
+        mean: FloatArray = pixels @ radiance / pixels.sum()
+        return self._simulation.inter_reflection * mean / self._reflected
+
     def _samples(
         self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
     ) -> FloatArray:
         """Return the radiance of uncovered cells, shape (cells, wavelengths); cell 0 is cloth."""
         light = reflected.sample + reflected.sample_stray
         if arrangement.lvf == "on sample":
-            passed = self._passed("on sample", arrangement.turned)[self._layout.piece]
+            passed = self._below_lvf(arrangement.turned)[self._layout.piece]
             light = passed * reflected.sample + reflected.sample_stray
         if arrangement.card == "blank":
             glow_s = np.zeros_like(glow_s)
@@ -108,7 +136,7 @@ class View:
         if arrangement.lvf == "on sample":
             # The filter lies on the card as it would on the sample.
             piece = self._layout.piece[places.cell[covered]]
-            card = self._passed("on sample", arrangement.turned)[piece] * card
+            card = self._below_lvf(arrangement.turned)[piece] * card
         if self._simulation.door is None:
             radiance[covered] = self._reflected * card * reflected.cloth
         else:
@@ -119,10 +147,9 @@ class View:
         """Return the radiance of a sample relative to one that faces the camera."""
         return float(1 - self._simulation.anisotropy * (1 - np.cos(np.radians(tilt_deg))))
 
-    def _passed(self, place: LvfPlace, turned: bool) -> FloatArray:
-        """Return the transmittance of the pieces of the strip there, (pieces, wavelengths)."""
+    def _below_lvf(self, turned: bool) -> FloatArray:
+        """Return the light below the pieces of the LVF on the sample, (pieces, wavelengths)."""
         settings = self._simulation.lvf
         assert settings is not None
         assert self._lvf is not None
-        strip = settings.on_sample if place == "on sample" else settings.before_camera
-        return self._lvf.seen(strip, turned)
+        return self._lvf.below(settings.on_sample, turned)

@@ -115,3 +115,14 @@ def test_mistakes_are_named(text: str, said: str) -> None:
     with pytest.raises(UsageError) as refusal:
         parsed(text)
     assert said in str(refusal.value)
+
+
+def test_the_manuals_harder_rooms_can_be_opened() -> None:
+    page = Path(__file__).parents[2] / "docs" / "explanation" / "harder_rooms.md"
+    blocks = page.read_text(encoding="utf-8").split("```yaml\n")[1:]
+    rooms = [parse_yaml(block.partition("```")[0], str(page)) for block in blocks]
+    assert len(rooms) == 2
+    for room in rooms:
+        assert isinstance(room, dict)
+        simulation = validate(room["simulation"], Simulation, str(page))
+        assert simulation != Simulation(sample=simulation.sample)
