@@ -13,7 +13,7 @@ from labrig.optics import Spectrum, edges_from_centres
 #: Peaks in nm, full widths at half maximum in nm, and skews of the shapes that are tried.
 PEAKS_NM = np.arange(400.0, 721.0, 10.0)
 WIDTHS_NM = (35.0, 50.0, 70.0, 95.0)
-SKEWS = (0.0, 0.3)
+SKEWS = (0.0, 0.2, 0.4)
 #: Dyes' widths and skews, log-normal and normal: median and standard deviation.
 MEDIAN_WIDTH_NM, LOG_WIDTH_SIGMA = 55.0, 0.35
 MEAN_SKEW, SKEW_SIGMA = 0.15, 0.25
