@@ -9,7 +9,7 @@ from typing import TypeVar
 from pydantic import BaseModel
 
 from labrig import resources
-from labrig.acquire import RigFile, led_lights
+from labrig.acquire import RigFile, illuminant_lights, led_lights
 from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
 from labrig.errors import UsageError
 from labrig.optics import (
@@ -160,6 +160,39 @@ def led_exposures(
                 "'fwhm', or a file 'spectrum'"
             )
         sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * (light.fwhm or 0.0))
+        exposures[name] = LedExposure(replace(spectrum, name=name), 1.0, math.inf, sigma_nm)
+    return exposures
+
+
+def illuminant_exposures(rig: RigFile, source: str) -> dict[str, LedExposure]:
+    """Return the light of each lamp of a rig's bank behind its filter, of unknown brightness.
+
+    Parameters
+    ----------
+    rig, source
+        Rig file, and its name or path for messages.
+
+    Raises
+    ------
+    UsageError
+        The rig has no bank of lamps, nothing is known of the light of one, or its filter is
+        unknown.
+    """
+    lamps = illuminant_lights(rig, source)
+    if not lamps:
+        raise UsageError(f"{source}: expected 'illuminants' under 'devices', found none")
+    exposures = {}
+    for name, lamp in lamps.items():
+        spectrum = lamp.relative_spectrum()
+        if spectrum is None:
+            raise UsageError(
+                f"{source}: nothing is known of the light of lamp '{name}'; give its 'spectrum', "
+                "or its 'centre' and 'fwhm'"
+            )
+        if lamp.filter is not None:
+            (passed,) = filter_transmittances(rig, [lamp.filter])
+            spectrum = replace(spectrum, value=spectrum.value * passed.at(spectrum.wavelength_nm))
+        sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * lamp.fwhm) if lamp.fwhm else 0.0
         exposures[name] = LedExposure(replace(spectrum, name=name), 1.0, math.inf, sigma_nm)
     return exposures
 

@@ -34,7 +34,8 @@ from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
 #: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`, `sim://room/spectrometer`; with
-#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`.
+#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`, and with a bank of lamps
+#: `sim://room/lamps`.
 NAME = "room"
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
@@ -100,7 +101,7 @@ class OpenRoom:
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
-            for name, board in (relay_boards | _dc4100_units(simulation, self.room)).items()
+            for name, board in [*relay_boards.items(), *self._further_boards(simulation)]
         }
         self.camera = SimulatedCamera(
             clock,
@@ -133,6 +134,16 @@ class OpenRoom:
     def usb(self, device: str) -> usb.backend.IBackend | None:
         """Return the USB bus on which `device` is alone; None if there is no such device."""
         return {"camera": self.camera.backend, "spectrometer": self.spectrometer}.get(device)
+
+    def _further_boards(
+        self, simulation: Simulation
+    ) -> list[tuple[str, NumatoBoard | Dc4100Board]]:
+        """Return addresses and boards that have LEDs or lamps alone."""
+        lamps = [("lamps", NumatoBoard(RELAYS, self.room.switch_illuminant))]
+        return [
+            *_dc4100_units(simulation, self.room).items(),
+            *(lamps if simulation.illuminants else []),
+        ]
 
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
         if (board, relay) == (self._lamp_board, LAMP_RELAY):

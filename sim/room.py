@@ -24,6 +24,7 @@ from .door import Door
 from .doors import Doors, Pulses, no_pulses
 from .faults import FaultTime, given
 from .filters import Filters
+from .illuminants import Illuminants
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
 from .layout import Layout
@@ -87,6 +88,9 @@ class Room:
         self._leaks = (*always, *leaks)
         self._doors = Doors(simulation, clock, pulses)
         self._filters = Filters(simulation.filters, simulation.filters_bent, simulation.seed)
+        lamps = simulation.illuminants
+        passed = tuple(self._filters.transmission(lamp.filter) for lamp in lamps)
+        self._illuminants = Illuminants(lamps=lamps, passed=passed)
         self._changer = Changer(
             simulation, self._filters, clock, freshen=self._freshen, plug=self._circuit.plug
         )
@@ -137,6 +141,10 @@ class Room:
     def switch_led(self, relay: int, on: bool) -> None:
         """Move the contact of a relay now, to which an LED may be connected."""
         self._leds = self._leds.switched(relay, on, self._clock.now())
+
+    def switch_illuminant(self, relay: int, on: bool) -> None:
+        """Move the contact of a relay now, to which a broadband lamp may be connected."""
+        self._illuminants = self._illuminants.switched(relay, on, self._clock.now())
 
     def dim_led(self, relay: int, fraction: float) -> None:
         """Change the brightness of an LED now, as a fraction of its full light."""
@@ -282,6 +290,7 @@ class Room:
             self._circuit.mercury,
             self._filters.history(self._changer.arrangements),
             self._leds,
+            self._illuminants,
         )
 
     def _lights(self) -> Lights:

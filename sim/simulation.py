@@ -17,6 +17,7 @@ from labrig.region import Region
 
 from .bench_settings import (
     DoorSettings,
+    IlluminantSettings,
     LedSettings,
     LensSettings,
     LvfSettings,
@@ -197,6 +198,8 @@ class Simulation(Part):
     led_board
         Board that switches the LEDs: `relays`, the Numato board, or the Arduino if that switches
         the lamp; or `dc4100`, Thorlabs units at `sim://room/dc4100-1` to `sim://room/dc4100-3`.
+    illuminants
+        Broadband lamps, each on its relay of a Numato board of their own at `sim://room/lamps`.
     door
         Trap door: closed, the sample faces the lamp; open, the camera. Null: none, and the sample
         always faces both.
@@ -261,6 +264,7 @@ class Simulation(Part):
     lamp: LampSettings = LampSettings()
     leds: tuple[LedSettings, ...] = ()
     led_board: Literal["relays", "dc4100"] = "relays"
+    illuminants: tuple[IlluminantSettings, ...] = ()
     door: DoorSettings | None = None
     shield: DoorSettings | None = None
     servo: ServoBoardSettings = ServoBoardSettings()
@@ -293,6 +297,8 @@ class Simulation(Part):
             raise ValueError("expected 'door' and 'shield' on two channels of the servo board")
         if len({led.relay for led in self.leds}) < len(self.leds):
             raise ValueError("expected a relay of its own for each of 'leds'")
+        if len({lamp.relay for lamp in self.illuminants}) < len(self.illuminants):
+            raise ValueError("expected a relay of its own for each of 'illuminants'")
         if self.led_board == "relays" and any(led.relay > RELAYS for led in self.leds):
             raise ValueError(f"expected relays 1 to {RELAYS} for 'leds': the board has no more")
         if self.lvf is None and any(fault.lvf_turned for fault in self.faults):

@@ -8,7 +8,12 @@ import numpy as np
 
 from labrig.analyse.inputs import Part
 from labrig.analyse.led_fluorescence.card_checks import unused_leds
-from labrig.analyse.led_fluorescence.lit_patches import LitPatch, lit_patches, mean_of
+from labrig.analyse.led_fluorescence.lit_patches import (
+    LitPatch,
+    lit_patches,
+    mean_of,
+    without_rest,
+)
 from labrig.analyse.led_fluorescence.lit_system import lit_system
 from labrig.analyse.led_fluorescence.warnings import (
     SEEN_SIGMA,
@@ -72,8 +77,9 @@ def analyse(part: Part) -> LedFluorescenceResult:
         led: float(light.wavelength_nm[light.value.argmax()]) for led, light in spectra.items()
     }
     camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
-    cards = lit_patches(part, LedFrames.CARD, CARD)
-    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE)
+    first = part.protocol.shuffled()[0]
+    cards = lit_patches(part, LedFrames.CARD, CARD, leds)
+    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE, leds, first)
     left_out = list(unused_leds(leds, spectra, camera, white, mean_of(cards)))
     warnings = [unused.reason for unused in left_out]
     warnings += [*left_warnings("card", cards, leds), *left_warnings("sample", samples, leds)]
@@ -82,12 +88,12 @@ def analyse(part: Part) -> LedFluorescenceResult:
     if len(used) < 2:
         raise DataError(f"expected two LEDs that can be used, got {len(used)} ({warnings[0]})")
     rows = [leds.index(led) for led in used]
-    cards = {name: _without_rest(card.under(rows)) for name, card in cards.items()}
+    cards = {name: without_rest(card.under(rows)) for name, card in cards.items()}
     card = mean_of(cards)
     system = lit_system([lights[led] for led in used], camera, white, card)
     estimator, patches = JointEstimator(system), {}
     for number, name in enumerate(samples):
-        sample = _without_rest(samples[name].under(rows))
+        sample = without_rest(samples[name].under(rows))
         if sample.is_clipped.any():
             which = ", ".join(np.array(used)[sample.is_clipped])
             raise DataError(f"{name}: clips at the shortest exposure under {which}; dim the LEDs")
@@ -107,16 +113,6 @@ def analyse(part: Part) -> LedFluorescenceResult:
         patches=patches,
         run=part.run.folder.resolve().name,
         warnings=tuple(warnings),
-    )
-
-
-def _without_rest(patch: LitPatch) -> LitPatch:
-    """Return a patch without the light that is left when its LED is off, if there is any."""
-    is_left = patch.off > SEEN_SIGMA * patch.off_sigma
-    return replace(
-        patch,
-        value=np.where(is_left, patch.value - patch.off, patch.value),
-        variance=np.where(is_left, patch.variance + patch.off_sigma**2, patch.variance),
     )
 
 

@@ -39,6 +39,7 @@ def unused_leds(
     camera: CameraResponse,
     white: Transmittance,
     card: LitPatch,
+    kind: str = "LED",
 ) -> Iterator[UnusedLed]:
     """Yield the LEDs that cannot be used, by the colour of a card under each.
 
@@ -52,6 +53,8 @@ def unused_leds(
         Curves of the camera, and reflectance of the card.
     card
         Values of the card.
+    kind
+        What the lights are called in messages, if not LEDs.
 
     Raises
     ------
@@ -63,13 +66,13 @@ def unused_leds(
     swapped = []
     for row, led in enumerate(leds):
         if card.is_clipped[row]:
-            yield UnusedLed(led, f"{led}: the card clips at the shortest exposure; dim the LED")
+            yield UnusedLed(led, f"{led}: the card clips at the shortest exposure; dim the {kind}")
             continue
         if not is_visible[row]:
             continue
         signal, sigma = card.value[row], np.sqrt(card.variance[row])
         if not (signal > SEEN_SIGMA * sigma).any():
-            yield UnusedLed(led, f"{led}: the card is dark, the LED did not light")
+            yield UnusedLed(led, f"{led}: the card is dark, the {kind} did not light")
             continue
         match = match_channels(led, signal, card.variance[row], spectra, camera, white)
         if not match.is_odd(led):
@@ -77,13 +80,13 @@ def unused_leds(
         if (other := match.other(led)) is not None:
             swapped.append(f"{other} is lit as {led}")
         elif match.pair is not None:
-            reason = f"{led}: the card has the colour of two LEDs, {match.pair} is lit, too"
+            reason = f"{led}: the card has the colour of two {kind}s, {match.pair} is lit, too"
             yield UnusedLed(led, reason)
         else:
-            yield UnusedLed(led, f"{led}: the card has another colour than this LED")
+            yield UnusedLed(led, f"{led}: the card has another colour than this {kind}")
     if swapped:
         raise DataError(
-            f"expected LEDs in the order of their names, got others by the card's colour "
+            f"expected {kind}s in the order of their names, got others by the card's colour "
             f"({', '.join(swapped)}); correct the rig file's channels, then process the run again"
         )
 

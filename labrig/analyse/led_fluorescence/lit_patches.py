@@ -1,7 +1,7 @@
-"""Values of patches under LEDs, from brackets of frames with and without light."""
+"""Values of patches under LEDs or lamps, from brackets of frames with and without light."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,11 +9,14 @@ from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.errors import DataError
-from labrig.protocols.led_fluorescence import LedFrames
 from labrig.protocols.steps.led_scenes import AGAIN
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches
+from labrig.region import Region
 from labrig.results import BoolArray, FloatArray, Measured, Series
+
+#: Significance in σ from which light that is left without a light counts.
+SEEN_SIGMA = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +64,30 @@ class LitPatch:
         )
 
 
-def lit_patches(part: Part, role: LedFrames, begin: str) -> dict[str, LitPatch]:
-    """Return each patch under all LEDs, in the protocol's order of them.
+def lit_patches(
+    part: Part,
+    role: str,
+    begin: str,
+    lights: Sequence[str],
+    first: str | None = None,
+    patches: Mapping[str, Region] | None = None,
+) -> dict[str, LitPatch]:
+    """Return each patch under all lights, in their order.
+
+    Parameters
+    ----------
+    part
+        The run.
+    role
+        Role of the frames with a light on; `-off` is added for those with all lights off.
+    begin
+        Begin of the names of the units, which end with the light.
+    lights
+        Names of the lights.
+    first
+        Light under which the patches were photographed once more at the end; None for none.
+    patches
+        Regions of the patches; None for those of the protocol.
 
     Raises
     ------
@@ -71,13 +96,23 @@ def lit_patches(part: Part, role: LedFrames, begin: str) -> dict[str, LitPatch]:
     """
     camera = part.inputs.camera
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
-    lit, left = _series(part, role), _series(part, LedFrames(f"{role}-off"))
-    units = [f"{begin}{led}" for led in part.protocol.leds]
-    first = part.protocol.shuffled()[0]
+    lit, left = (_series(part, each, patches) for each in (role, f"{role}-off"))
+    units = [f"{begin}{light}" for light in lights]
+    again = None if first is None else (f"{begin}{first}", f"{AGAIN}{first}")
     return {
-        name: _lit_patch(part, series, left[name], units, (f"{begin}{first}", first), flicker)
+        name: _lit_patch(part, series, left[name], units, again, flicker)
         for name, series in lit.items()
     }
+
+
+def without_rest(patch: LitPatch) -> LitPatch:
+    """Return a patch without the light that is left when its lights are off, if there is any."""
+    is_left = patch.off > SEEN_SIGMA * patch.off_sigma
+    return replace(
+        patch,
+        value=np.where(is_left, patch.value - patch.off, patch.value),
+        variance=np.where(is_left, patch.variance + patch.off_sigma**2, patch.variance),
+    )
 
 
 def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
@@ -92,7 +127,7 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
     )
 
 
-def _series(part: Part, role: str) -> dict[str, Series]:
+def _series(part: Part, role: str, patches: Mapping[str, Region] | None) -> dict[str, Series]:
     run, camera = part.run, part.inputs.camera
     frames = steady_frames(run, part.overrides, role)
     if not frames:
@@ -102,7 +137,8 @@ def _series(part: Part, role: str) -> dict[str, Series]:
         )
     require_calibrated_camera(camera, run, run.frames(role))
     darks = steady_frames(run, part.overrides, FrameRole.DARK)
-    return reduce_patches(frames, part.overrides.patches(part.protocol), darks, camera=camera)
+    regions = part.overrides.patches(part.protocol) if patches is None else patches
+    return reduce_patches(frames, regions, darks, camera=camera)
 
 
 def _lit_patch(
@@ -110,7 +146,7 @@ def _lit_patch(
     series: Series,
     left: Series,
     units: Sequence[str],
-    first: tuple[str, str],
+    again: tuple[str, str] | None,
     flicker: float,
 ) -> LitPatch:
     lit = {unit.unit[0]: _merged(unit, flicker) for unit in series.by_unit()}
@@ -120,10 +156,11 @@ def _lit_patch(
             f"{part.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
             f"resume {part.run.folder}"
         )
-    again = lit.get(f"{AGAIN}{first[1]}")
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
-    bleaching = None if again is None else _ratio(again, lit[first[0]])
+    bleaching = None
+    if again is not None and again[1] in lit:
+        bleaching = _ratio(lit[again[1]], lit[again[0]])
     return LitPatch(columns[0], columns[1], offs[0], offs[1], columns[2], bleaching)
 
 

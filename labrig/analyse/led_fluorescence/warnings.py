@@ -21,17 +21,19 @@ SEEN_SIGMA, LEFT = 5.0, 0.002
 BLEACHED, BLEACHED_SIGMA = 0.02, 3.0
 
 
-def left_warnings(what: str, patches: Mapping[str, LitPatch], leds: Sequence[str]) -> Iterator[str]:
-    """Yield a line for each patch that is bright after some LED."""
+def left_warnings(
+    what: str, patches: Mapping[str, LitPatch], lights: Sequence[str], kind: str = "LED"
+) -> Iterator[str]:
+    """Yield a line for each patch that is bright after some light of a kind, as LEDs."""
     for name, patch in patches.items():
         brightest = patch.value.max(axis=1, keepdims=True)
         counts = (patch.off > SEEN_SIGMA * patch.off_sigma) & (patch.off > LEFT * brightest)
         rows = np.flatnonzero(counts.any(axis=1))
         if len(rows):
             part = float((patch.off / brightest)[counts].max())
-            which = ", ".join(leds[row] for row in rows.tolist())
+            which = ", ".join(lights[row] for row in rows.tolist())
             yield (
-                f"{what} {name}: {part:.1%} of the light is left with all LEDs off (after "
+                f"{what} {name}: {part:.1%} of the light is left with all {kind}s off (after "
                 f"{which}), and is subtracted: it glows, or another light is on"
             )
 

@@ -64,12 +64,16 @@ class Exposure:
         known, as of ultraviolet LEDs that no camera sees.
     wavelength_sigma_nm
         Standard deviation of an error of all its wavelengths in nm.
+    spectrum_error
+        Error of its spectrum's shape, smooth over wavelength, as of a lamp that is another one than
+        that of the file; None for none.
     """
 
     light: Spectrum
     brightness: float = 1.0
     brightness_sigma: float = 0.0
     wavelength_sigma_nm: float = 0.0
+    spectrum_error: CurveError | None = None
 
     def __post_init__(self) -> None:
         name = self.light.name
@@ -295,7 +299,7 @@ def fluorescence_system(
     Parameters
     ----------
     exposures
-        The lights, two or more.
+        The lights, one or more; an estimate needs two.
     camera
         The camera, with its curves on their own wavelengths.
     curve_error
@@ -311,7 +315,7 @@ def fluorescence_system(
     Raises
     ------
     UsageError
-        There are fewer than two lights, a light lies outside of the input bands, or the camera's
+        There are no lights, a light lies outside of the input bands, or the camera's
         curves lie outside of the output bands.
 
     Examples
@@ -327,11 +331,8 @@ def fluorescence_system(
     ((3, 3), [0.015, 0.198, 0.048])
     """
     inputs, outputs = (np.asarray(nm, dtype=np.float64) for nm in (input_nm, output_nm))
-    if len(exposures) < 2:
-        raise UsageError(
-            f"expected two or more lights, got {len(exposures)}: one light tells nothing of what "
-            "others excite; photograph the surface under more"
-        )
+    if not exposures:
+        raise UsageError("expected one or more lights, got none")
     in_edges, out_edges = edges_from_centres(inputs), edges_from_centres(outputs)
     low_nm, high_nm = camera.wavelength_nm[[0, -1]]
     if high_nm <= out_edges[0] or low_nm >= out_edges[-1]:
@@ -353,6 +354,10 @@ def fluorescence_system(
     hats = hat_functions(outputs, np.clip(nodes, outputs[0], outputs[-1]))
     in_output = np.asarray(
         (nodes[:, np.newaxis] >= out_edges[:-1]) & (nodes[:, np.newaxis] < out_edges[1:]),
+        dtype=np.float64,
+    )
+    in_input = np.asarray(
+        (nodes[:, np.newaxis] >= in_edges[:-1]) & (nodes[:, np.newaxis] < in_edges[1:]),
         dtype=np.float64,
     )
     curves = camera.at(nodes)
@@ -392,6 +397,15 @@ def fluorescence_system(
                 absorbed(exposure.light, SHIFT_NM) - absorbed(exposure.light, -SHIFT_NM)
             )
             modes.append(moved)
+        light = lights[number][:, np.newaxis]
+        for change in curve_modes(exposure.spectrum_error, nodes, light, light.max(axis=0)):
+            bent = _Response(
+                np.zeros_like(response.reflected), np.zeros_like(response.absorbed),
+                np.zeros_like(response.seen),
+            )  # fmt: skip
+            bent.reflected[number] = reflected(change.T, curves)[0]
+            bent.absorbed[number] = (weights * change[:, 0]) @ in_input
+            modes.append(bent)
     brightness = np.array([exposure.brightness for exposure in exposures])
     relative = np.array([exposure.brightness_sigma for exposure in exposures]) / brightness
     for number in np.flatnonzero((relative > 0) & (relative <= LOOSE)).tolist():
@@ -436,7 +450,12 @@ def checked_values(
 
 
 def require_scale(system: FluorescenceSystem) -> None:
-    """Raise UsageError if no light has a known brightness."""
+    """Raise UsageError if there are fewer than two lights, or none has a known brightness."""
+    if len(system.exposures) < 2:
+        raise UsageError(
+            f"expected two or more lights, got {len(system.exposures)}: one light tells nothing of "
+            "what others excite; photograph the surface under more"
+        )
     if system.is_loose.all():
         raise UsageError(
             "expected one light or more of known brightness, got none; photograph a white "

@@ -1,0 +1,265 @@
+"""Photographs of samples under lamps beside what their matrices predict."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from labrig.analyse.inputs import Part
+from labrig.analyse.led_fluorescence.card_checks import unused_leds
+from labrig.analyse.led_fluorescence.lit_patches import (
+    LitPatch,
+    lit_patches,
+    mean_of,
+    without_rest,
+)
+from labrig.analyse.led_fluorescence.warnings import left_warnings
+from labrig.analyse.validate_illuminants.chart import ODD_CHART, chart_values
+from labrig.analyse.validate_illuminants.colours import (
+    ColourScale,
+    camera_matrix,
+    chart_matrix,
+    difference,
+)
+from labrig.analyse.validate_illuminants.materials import matrices_of
+from labrig.analyse.validate_illuminants.prediction import (
+    PredictedValues,
+    predicted_values,
+    with_scales_of_samples,
+)
+from labrig.bench_optics import (
+    LedExposure,
+    camera_curves,
+    card_reflectance,
+    illuminant_exposures,
+)
+from labrig.errors import DataError, UsageError
+from labrig.optics import CameraResponse, is_narrow
+from labrig.protocols.steps.led_scenes import CARD
+from labrig.protocols.validate_illuminants import SAMPLE, IlluminantFrames
+from labrig.results import (
+    FloatArray,
+    LampComparison,
+    LampPatch,
+    SeenColour,
+    ValidateIlluminantsResult,
+)
+
+#: Mean χ² per channel and pull from which photographs differ from their predictions.
+ODD_CHI2, ODD_PULL = 2.0, 4.0
+
+
+def analyse(part: Part) -> ValidateIlluminantsResult:
+    """Compare photographs under each lamp with predictions.
+
+    Raises
+    ------
+    UsageError
+        The rig file lacks a lamp, or the curves of camera or card; or the protocol names no
+        matrices, or those of other patches.
+    DataError
+        Frames are missing or damaged, lamps are named in another order than they light, none can be
+        used, or there is no colour chart where one is expected.
+    """
+    protocol, names = part.protocol, part.protocol.lamps
+    matrices = matrices_of(protocol)
+    lights = illuminant_exposures(part.rig, "rig.yaml")
+    if unknown := [lamp for lamp in names if lamp not in lights]:
+        raise UsageError(f"rig.yaml: expected lamps called {', '.join(unknown)}, got none")
+    camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
+    cards = lit_patches(part, IlluminantFrames.CARD, CARD, names)
+    samples = lit_patches(part, IlluminantFrames.SAMPLE, SAMPLE, names)
+    spectra = {name: lights[name].light for name in names}
+    left_out = list(unused_leds(names, spectra, camera, white, mean_of(cards), "lamp"))
+    warnings = [unused.reason for unused in left_out]
+    out = {unused.led for unused in left_out}
+    for number, name in enumerate(names):
+        clipped = [patch for patch, lit in samples.items() if lit.is_clipped[number]]
+        if clipped and name not in out:
+            out.add(name)
+            warnings.append(
+                f"{name}: {', '.join(clipped)} clips at the shortest exposure; dim the lamp"
+            )
+    warnings += left_warnings("card", cards, names, "lamp")
+    warnings += left_warnings("sample", samples, names, "lamp")
+    rows = [number for number, name in enumerate(names) if name not in out]
+    if not rows:
+        raise DataError(f"expected a lamp that can be used, got none ({warnings[0]})")
+    used = [names[row] for row in rows]
+    cards = {name: without_rest(card.under(rows)) for name, card in cards.items()}
+    samples = {name: without_rest(sample.under(rows)) for name, sample in samples.items()}
+    lamps = [lights[name] for name in used]
+    predicted = with_scales_of_samples(
+        {
+            name: predicted_values(matrix, lamps, camera, white, cards[name])
+            for name, matrix in matrices.items()
+        },
+        samples,
+        cards,
+    )
+    colours = _colours(part, lights, camera, used, next(iter(predicted.values())).white)
+    warnings += _chart_warnings(colours)
+    compared = {
+        lamp: _lamp(row, lamps[row], samples, predicted, colours) for row, lamp in enumerate(used)
+    }
+    warnings += _verdict_warnings(compared)
+    has_sigma = all(
+        matrix.reflectance_sigma is not None and matrix.reradiation_sigma is not None
+        for matrix in matrices.values()
+    )
+    return ValidateIlluminantsResult(
+        channels=camera.channels,
+        fluorescence=_origin(protocol.fluorescence),
+        has_matrix_sigma=has_sigma,
+        balance=colours.balance,
+        colours_from=colours.source,
+        chart_delta_e=colours.chart_delta_e,
+        lamps=compared,
+        warnings=tuple(warnings),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Colours:
+    """How the camera's values become colours.
+
+    `matrices` are those by lamp; `balance` is the lamp whose white is white, with X, Y, Z
+    `white_xyz` on the scale of its matrix.
+    """
+
+    balance: str
+    white_xyz: FloatArray
+    matrices: Mapping[str, FloatArray]
+    source: Literal["curves", "chart"]
+    chart_delta_e: tuple[float, float] | None
+
+
+def _colours(
+    part: Part,
+    lights: Mapping[str, LedExposure],
+    camera: CameraResponse,
+    used: Sequence[str],
+    white: FloatArray,
+) -> _Colours:
+    balance = part.protocol.balanced
+    if balance not in used:
+        raise DataError(
+            f"the lamp '{balance}', in whose light white is to be white, cannot be used; name "
+            f"another one as 'balance' ({', '.join(used)})"
+        )
+    light = lights[balance].light
+    if is_narrow(light):
+        raise UsageError(
+            f"the lamp '{balance}' has no white; name a lamp of white light as 'balance'"
+        )
+    if part.protocol.chart:
+        matrix, off = chart_matrix(chart_values(part, balance), light)
+        white_xyz = matrix @ white[used.index(balance)]
+        return _Colours(balance, white_xyz, dict.fromkeys(used, matrix), "chart", off)
+    matrices = {
+        lamp: camera_matrix(camera, light if is_narrow(lights[lamp].light) else lights[lamp].light)
+        for lamp in used
+    }
+    white_xyz = matrices[balance] @ white[used.index(balance)]
+    return _Colours(balance, white_xyz, matrices, "curves", None)
+
+
+def _lamp(
+    row: int,
+    lamp: LedExposure,
+    samples: Mapping[str, LitPatch],
+    predicted: Mapping[str, PredictedValues],
+    colours: _Colours,
+) -> LampComparison:
+    has_white = bool(next(iter(predicted.values())).is_scaled[row]) and not is_narrow(lamp.light)
+    patches = {
+        name: _patch(row, lamp.light.name, has_white, samples[name], values, colours, number)
+        for number, (name, values) in enumerate(predicted.items())
+    }
+    chi2 = float(np.mean([patch.reduced_chi2 for patch in patches.values()]))
+    pulls = np.concatenate([patch.pull for patch in patches.values()])
+    largest = float(pulls[np.abs(pulls).argmax()])
+    first = next(iter(predicted.values()))
+    return LampComparison(
+        brightness=float(first.brightness[row]),
+        scale="card" if first.is_scaled[row] else "samples",
+        white="lamp" if has_white else "D65",
+        reduced_chi2=chi2,
+        largest_pull=largest,
+        verdict="differs" if chi2 > ODD_CHI2 or abs(largest) > ODD_PULL else "agrees",
+        patches=patches,
+    )
+
+
+def _patch(
+    row: int,
+    lamp: str,
+    has_white: bool,
+    sample: LitPatch,
+    predicted: PredictedValues,
+    colours: _Colours,
+    number: int,
+) -> LampPatch:
+    value, variance = sample.value[row], sample.variance[row]
+    whole, reflected = predicted.whole[row], predicted.reflected[row]
+    covariance = predicted.covariance[row] + np.diag(variance)
+    residual = value - whole
+    matrix = colours.matrices[lamp]
+    scale = (
+        ColourScale.under(matrix, predicted.white[row], colours.white_xyz)
+        if has_white
+        else ColourScale.without_white(matrix, whole, colours.white_xyz)
+    )
+    delta, by_errors = difference(scale, value, whole, covariance, (row, number))
+    without, _ = difference(scale, value, reflected, covariance, (row, number, 1))
+
+    def colour(values: FloatArray) -> SeenColour:
+        return SeenColour(scale.lab(values), scale.picture_xyz(values))
+
+    return LampPatch(
+        value=value,
+        sigma=np.sqrt(variance),
+        predicted=whole,
+        predicted_sigma=np.sqrt(np.diagonal(predicted.covariance[row])),
+        reflected=reflected,
+        pull=residual / np.sqrt(np.diagonal(covariance)),
+        reduced_chi2=float(residual @ np.linalg.solve(covariance, residual)) / len(value),
+        measured=colour(value),
+        whole=colour(whole),
+        reflected_only=colour(reflected),
+        reradiated_only=colour(predicted.reradiated[row]),
+        delta_e=delta,
+        delta_e_by_errors=by_errors,
+        delta_e_reflected=without,
+    )
+
+
+def _chart_warnings(colours: _Colours) -> Iterator[str]:
+    """Yield a line if what was taken for a colour chart has other colours."""
+    off = colours.chart_delta_e
+    if off is not None and off[0] > ODD_CHART:
+        yield (
+            f"chart: its patches are {off[0]:.1f} off in ΔE2000 on average; it is no ColorChecker "
+            f"of 24 patches or unevenly lit, or '{colours.balance}' is not the rig file's lamp"
+        )
+
+
+def _verdict_warnings(lamps: Mapping[str, LampComparison]) -> Iterator[str]:
+    """Yield a line for each lamp under which photographs differ from their predictions."""
+    for lamp, comparison in lamps.items():
+        if comparison.verdict == "differs":
+            patches = comparison.patches
+            worst = max(patches, key=lambda name: float(np.abs(patches[name].pull).max()))
+            yield (
+                f"{lamp}: photographs differ from their predictions by more than their errors "
+                f"(mean χ² per channel {comparison.reduced_chi2:.1f}); most does {worst}, by "
+                f"{abs(comparison.largest_pull):.1f} σ"
+            )
+
+
+def _origin(named: str | dict[str, str]) -> str:
+    if isinstance(named, str):
+        return f"run {Path(named).name}"
+    return "materials " + ", ".join(f"{Path(file).stem} ({name})" for name, file in named.items())
