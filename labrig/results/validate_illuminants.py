@@ -22,8 +22,8 @@ class SeenColour:
     lab
         L*, a*, b* with the white of the lamp, see `LampComparison.white`, shape (3,).
     xyz
-        X, Y, Z for a picture, where the white of the lamp has Y = 1 and the light is as it is: a
-        white under the lamp `balance` is D65, one under another lamp has that one's colour, (3,).
+        X, Y, Z for a picture, shape (3,): a white under the lamp `balance` is a screen's, one under
+        another lamp has that lamp's colour, and Y = 1.
     """
 
     lab: FloatArray
@@ -84,8 +84,8 @@ class LampComparison:
         What tells it: the `card`, or the `samples` themselves where the camera hardly sees the
         lamp; then one number for all of them is fitted.
     white
-        White of the colours: a perfect one under the `lamp`; or, where the lamp shows no white,
-        `D65` with the predicted sample at half of its luminance.
+        White of the colours: a perfect one under the `lamp`; or, where the lamp shows no white, a
+        screen's, `D65`, on a scale on which the brightest predicted sample all but clips.
     reduced_chi2
         Mean of the samples' χ² per channel.
     largest_pull
@@ -115,8 +115,8 @@ class ValidateIlluminantsResult(RunResult):
         Names of the k channels.
     fluorescence
         What the predictions are from: a run, or the materials.
-    has_matrix_sigma
-        Whether the matrix of every sample has a σ, which then is in that of the predictions.
+    without_matrix_sigma
+        Samples whose matrix has no σ; that of the others is in the σ of their predictions.
     balance
         Lamp under which a white is white in the pictures.
     colours_from
@@ -137,7 +137,7 @@ class ValidateIlluminantsResult(RunResult):
 
     channels: tuple[str, ...]
     fluorescence: str
-    has_matrix_sigma: bool
+    without_matrix_sigma: tuple[str, ...]
     balance: str
     colours_from: Literal["curves", "chart"]
     chart_delta_e: tuple[float, float] | None

@@ -105,14 +105,15 @@ def analyse(part: Part) -> ValidateIlluminantsResult:
         lamp: _lamp(row, lamps[row], samples, predicted, colours) for row, lamp in enumerate(used)
     }
     warnings += _verdict_warnings(compared)
-    has_sigma = all(
-        matrix.reflectance_sigma is not None and matrix.reradiation_sigma is not None
-        for matrix in matrices.values()
+    without_sigma = tuple(
+        name
+        for name, matrix in matrices.items()
+        if matrix.reflectance_sigma is None or matrix.reradiation_sigma is None
     )
     return ValidateIlluminantsResult(
         channels=camera.channels,
         fluorescence=_origin(protocol.fluorescence),
-        has_matrix_sigma=has_sigma,
+        without_matrix_sigma=without_sigma,
         balance=colours.balance,
         colours_from=colours.source,
         chart_delta_e=colours.chart_delta_e,
@@ -159,7 +160,7 @@ def _colours(
         white_xyz = matrix @ white[used.index(balance)]
         return _Colours(balance, white_xyz, dict.fromkeys(used, matrix), "chart", off)
     matrices = {
-        lamp: camera_matrix(camera, light if is_narrow(lights[lamp].light) else lights[lamp].light)
+        lamp: camera_matrix(camera, None if is_narrow(lights[lamp].light) else lights[lamp].light)
         for lamp in used
     }
     white_xyz = matrices[balance] @ white[used.index(balance)]
@@ -174,10 +175,17 @@ def _lamp(
     colours: _Colours,
 ) -> LampComparison:
     has_white = bool(next(iter(predicted.values())).is_scaled[row]) and not is_narrow(lamp.light)
-    patches = {
-        name: _patch(row, lamp.light.name, has_white, samples[name], values, colours, number)
-        for number, (name, values) in enumerate(predicted.items())
-    }
+    matrix = colours.matrices[lamp.light.name]
+    every = np.array([values.whole[row] for values in predicted.values()])
+    exposed = ColourScale.exposed(matrix, every, colours.white_xyz)
+    patches = {}
+    for number, (name, values) in enumerate(predicted.items()):
+        scale = (
+            ColourScale.under(matrix, values.white[row], colours.white_xyz)
+            if has_white
+            else exposed
+        )
+        patches[name] = _patch(row, samples[name], values, scale, (row, number))
     chi2 = float(np.mean([patch.reduced_chi2 for patch in patches.values()]))
     pulls = np.concatenate([patch.pull for patch in patches.values()])
     largest = float(pulls[np.abs(pulls).argmax()])
@@ -195,25 +203,17 @@ def _lamp(
 
 def _patch(
     row: int,
-    lamp: str,
-    has_white: bool,
     sample: LitPatch,
     predicted: PredictedValues,
-    colours: _Colours,
-    number: int,
+    scale: ColourScale,
+    seed: tuple[int, int],
 ) -> LampPatch:
     value, variance = sample.value[row], sample.variance[row]
     whole, reflected = predicted.whole[row], predicted.reflected[row]
     covariance = predicted.covariance[row] + np.diag(variance)
     residual = value - whole
-    matrix = colours.matrices[lamp]
-    scale = (
-        ColourScale.under(matrix, predicted.white[row], colours.white_xyz)
-        if has_white
-        else ColourScale.without_white(matrix, whole, colours.white_xyz)
-    )
-    delta, by_errors = difference(scale, value, whole, covariance, (row, number))
-    without, _ = difference(scale, value, reflected, covariance, (row, number, 1))
+    delta, by_errors = difference(scale, value, whole, covariance, seed)
+    without, _ = difference(scale, value, reflected, covariance, (*seed, 1))
 
     def colour(values: FloatArray) -> SeenColour:
         return SeenColour(scale.lab(values), scale.picture_xyz(values))

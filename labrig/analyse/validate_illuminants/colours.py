@@ -22,27 +22,28 @@ from labrig.results import FloatArray, Measured
 #: Reflectances that a camera's matrix is for: smooth, σ of their level and course, and distance in
 #: nm at which they are independent.
 LEVEL_SIGMA, COURSE_SIGMA, COURSE_NM = 0.5, 0.25, 50.0
+#: Width in nm of the structure of emissions.
+EMISSION_NM = 20.0
 STEP_NM = 5.0
-#: Luminance of a prediction of a white's where the lamp itself shows no white.
-HALF = 0.5
 #: Number of draws of errors.
 DRAWS = 400
 PATCHES = tuple(f"patch_{number:02d}" for number in range(1, 25))
 
 
-def camera_matrix(camera: CameraResponse, light: Spectrum) -> FloatArray:
-    """Return the matrix (3, k) from values to X, Y, Z under a light, best for smooth reflectances.
+def camera_matrix(camera: CameraResponse, light: Spectrum | None) -> FloatArray:
+    """Return the matrix (3, k) from values to X, Y, Z, best for what may come back of a light.
 
-    It minimises the mean squared error over reflectances of a normal density (R. L. Lee and
-    M. D. Fairchild call such a set that of maximum ignorance with smoothness).
+    It minimises the mean squared error over smooth reflectances of a normal density; without a
+    light, over spectra as dyes emit.
     """
     nm = np.arange(camera.wavelength_nm[0], camera.wavelength_nm[-1] + STEP_NM / 2, STEP_NM)
-    power = light.at(nm)
+    power = np.ones_like(nm) if light is None else light.at(nm)
     eye = observer(CIE_1931)
     seen = power * np.array([np.interp(nm, eye.wavelength_nm, f) for f in eye.functions.T])
     counted = power * camera.at(nm).T
-    off = (nm[:, np.newaxis] - nm) / COURSE_NM
-    covariance = LEVEL_SIGMA**2 + COURSE_SIGMA**2 * np.exp(-(off**2) / 2)
+    level, course_nm = (0.0, EMISSION_NM) if light is None else (LEVEL_SIGMA, COURSE_NM)
+    off = (nm[:, np.newaxis] - nm) / course_nm
+    covariance = level**2 + COURSE_SIGMA**2 * np.exp(-(off**2) / 2)
     matrix = np.linalg.solve(counted @ covariance @ counted.T, counted @ covariance @ seen.T).T
     return np.asarray(matrix)
 
@@ -116,13 +117,22 @@ class ColourScale:
         return cls(matrix / xyz[1], xyz / xyz[1], _adapted(balance))
 
     @classmethod
-    def without_white(cls, matrix: FloatArray, predicted: FloatArray, balance: FloatArray) -> Self:
-        """Return the scale on which predicted values (k,) have half a D65 white's luminance."""
-        luminance = float((matrix @ predicted)[1])
-        factor = HALF / luminance if luminance > 0 else 1.0
-        adapted = _adapted(balance)
+    def exposed(cls, matrix: FloatArray, predicted: FloatArray, balance: FloatArray) -> Self:
+        """Return the scale of a photograph in which the brightest of some samples all but clips.
+
+        Parameters
+        ----------
+        matrix
+            Matrix of the camera, on any scale.
+        predicted
+            Values of the samples, shape (n, k).
+        balance
+            X, Y, Z, on any scale, of the white that is white in pictures.
+        """
         white = white_xyz("D65", observer(CIE_1931))
-        return cls(factor * adapted[:, np.newaxis] * matrix, white, np.ones(3))
+        adapted = _adapted(balance)[:, np.newaxis] * matrix
+        brightest = float((predicted @ adapted.T / white).max())
+        return cls(adapted / brightest if brightest > 0 else adapted, white, np.ones(3))
 
     def lab(self, values: FloatArray) -> FloatArray:
         """Return L*, a*, b* of values (…, k), shape (…, 3)."""

@@ -104,8 +104,14 @@ def predicted_values(
     reflected = scale * system.values(reflectance, dark)
     reradiated = scale * system.values(np.zeros_like(reflectance), reradiation)
     m, k = system.shape
-    both = system.covariance(reflectance, reradiation) + _of_matrix(matrix, system)
-    by_lamp = np.einsum("mkml->mkl", both.reshape(m, k, m, k))
+    both = system.covariance(reflectance, reradiation) + _of_reflectance(matrix, system)
+    alone = system.covariance(np.zeros_like(reflectance), reradiation)
+    # What is reflected of tails of a spectrum has another error, see `with_scales_of_samples`.
+    kinds = [
+        np.einsum("mkml->mkl", (kind + _of_reradiation(matrix, system)).reshape(m, k, m, k))
+        for kind in (both, alone)
+    ]
+    by_lamp = np.where(is_scaled[:, np.newaxis, np.newaxis], *kinds)
     covariance = by_lamp * scale[:, :, np.newaxis] ** 2
     tails = _tails(system, reflectance, white) * card.value
     reflected = np.where(is_scaled[:, np.newaxis], reflected, tails)
@@ -190,26 +196,30 @@ def _tails(system: FluorescenceSystem, reflectance: FloatArray, white: Transmitt
     return np.asarray((reflectance @ seen) / (white.at(system.output_nm) @ seen))
 
 
-def _of_matrix(matrix: ReradiationMatrix, system: FluorescenceSystem) -> FloatArray:
-    """Return the covariance (mk, mk) of the values per brightness by errors of the matrix."""
+def _of_reflectance(matrix: ReradiationMatrix, system: FluorescenceSystem) -> FloatArray:
+    """Return the covariance (mk, mk) of the values per brightness by errors of the reflectance."""
     m, k = system.shape
-    covariance = np.zeros((m * k, m * k))
-    if matrix.reflectance_sigma is not None:
-        root = np.nan_to_num(matrix.reflectance_sigma)[:, np.newaxis] * _root(
-            matrix.output_nm, REFLECTANCE_NM
-        )
-        change = (system.response.reflected @ root).reshape(m * k, -1)
-        covariance += change @ change.T
-    if matrix.reradiation_sigma is not None:
-        sigma = np.where(matrix.is_stokes, np.nan_to_num(matrix.reradiation_sigma), 0.0)
-        by_output = _root(matrix.output_nm, EMISSION_NM)
-        by_input = _root(matrix.input_nm, EXCITATION_NM)
-        seen = system.response.seen[:, np.newaxis, :] * by_output[:, :, np.newaxis]
-        absorbed = system.response.absorbed[:, :, np.newaxis] * by_input
-        change = np.einsum("oak,oi,mib->mkab", seen, sigma, absorbed, optimize=True)
-        change = change.reshape(m * k, -1)
-        covariance += change @ change.T
-    return covariance
+    if matrix.reflectance_sigma is None:
+        return np.zeros((m * k, m * k))
+    sigma = np.nan_to_num(matrix.reflectance_sigma)[:, np.newaxis]
+    root = sigma * _root(matrix.output_nm, REFLECTANCE_NM)
+    change = (system.response.reflected @ root).reshape(m * k, -1)
+    return np.asarray(change @ change.T)
+
+
+def _of_reradiation(matrix: ReradiationMatrix, system: FluorescenceSystem) -> FloatArray:
+    """Return the covariance (mk, mk) of the values per brightness by errors of re-radiation."""
+    m, k = system.shape
+    if matrix.reradiation_sigma is None:
+        return np.zeros((m * k, m * k))
+    sigma = np.where(matrix.is_stokes, np.nan_to_num(matrix.reradiation_sigma), 0.0)
+    by_output = _root(matrix.output_nm, EMISSION_NM)
+    by_input = _root(matrix.input_nm, EXCITATION_NM)
+    seen = system.response.seen[:, np.newaxis, :] * by_output[:, :, np.newaxis]
+    absorbed = system.response.absorbed[:, :, np.newaxis] * by_input
+    change = np.einsum("oak,oi,mib->mkab", seen, sigma, absorbed, optimize=True)
+    change = change.reshape(m * k, -1)
+    return np.asarray(change @ change.T)
 
 
 def _root(nm: FloatArray, correlation_nm: float) -> FloatArray:
