@@ -120,6 +120,11 @@ class Room:
         return self._leds
 
     @property
+    def illuminants(self) -> Illuminants:
+        """The bank of broadband lamps with its history up to now."""
+        return self._illuminants
+
+    @property
     def door(self) -> Door | None:
         """The trap door with its history up to now; None where there is none."""
         return self._doors.trap_door

@@ -34,8 +34,8 @@ def _of_run(run: str, patches: list[str]) -> dict[str, ReradiationMatrix]:
         raise UsageError(f"{run}: expected a run of led_fluorescence, got one of {result.kind}")
     if missing := [name for name in patches if name not in result.patches]:
         raise UsageError(
-            f"{run}: expected a patch '{missing[0]}', got {', '.join(result.patches)}; give the "
-            "patches the names that they had there"
+            f"{run}: expected a patch '{missing[0]}', got {', '.join(result.patches) or 'none'}; "
+            "give the patches the names that they had there"
         )
     return {name: result.patches[name].matrix.named(name) for name in patches}
 
