@@ -33,7 +33,7 @@ SKEW_SHARE = 0.14
 
 @dataclass(frozen=True, eq=False)
 class LedExposure:
-    """An LED as a light for a fit.
+    """An LED, or another lamp, as a light for a fit.
 
     Attributes
     ----------
@@ -43,12 +43,15 @@ class LedExposure:
         Brightness b on a scale common to all LEDs, and σ; b is 1 and σ infinite where unknown.
     wavelength_sigma_nm
         Standard uncertainty in nm of an error that all wavelengths have in common.
+    is_lamp
+        Whether it is a broadband lamp, whose spectrum is that of another one of its kind.
     """
 
     light: Spectrum
     brightness: float
     brightness_sigma: float
     wavelength_sigma_nm: float
+    is_lamp: bool = False
 
 
 def camera_curves(
@@ -193,7 +196,9 @@ def illuminant_exposures(rig: RigFile, source: str) -> dict[str, LedExposure]:
             (passed,) = filter_transmittances(rig, [lamp.filter])
             spectrum = replace(spectrum, value=spectrum.value * passed.at(spectrum.wavelength_nm))
         sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * lamp.fwhm) if lamp.fwhm else 0.0
-        exposures[name] = LedExposure(replace(spectrum, name=name), 1.0, math.inf, sigma_nm)
+        exposures[name] = LedExposure(
+            replace(spectrum, name=name), 1.0, math.inf, sigma_nm, is_lamp=True
+        )
     return exposures
 
 

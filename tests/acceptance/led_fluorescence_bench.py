@@ -1,10 +1,12 @@
 """All measured re-radiating matrices as samples on the simulated bench with LEDs, in one capture.
 
     python -m tests.acceptance.led_fluorescence_bench FOLDER [--seed N] [--calibrated]
+        [--lamps daylight halogen] [--width 702]
 
 The bench is `sim-fluorescent`: lopsided LEDs that droop and are not where the rig file says, and
 a camera whose curves are bent. With --calibrated, `led_brightness` runs first and gives spectra
-and brightnesses; without, the rig file's data-sheet values count. ΔE2000 of the estimated matrix,
+and brightnesses; without, the rig file's data-sheet values count. With --lamps, photographs under
+these broadband lamps join the estimate. ΔE2000 of the estimated matrix,
 of the thesis's method and of the sample without fluorescence, against the matrix in the room;
 errors of colours over their σ.
 """
@@ -43,6 +45,8 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--calibrated", action="store_true")
+    parser.add_argument("--lamps", nargs="*", default=[])
+    parser.add_argument("--width", type=int, default=1404)
     asked = parser.parse_args()
     true = {
         path.stem.lower(): path
@@ -53,6 +57,7 @@ def main() -> None:
     rig = yaml.safe_load((resources.folder("config") / "sim-fluorescent.yaml").read_text())
     rig["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     rig["simulation"]["seed"] = asked.seed
+    rig["simulation"]["sensor"] = {"width": asked.width, "height": asked.width * 2 // 3}
     rig["simulation"]["sample"] = [
         {"material": str(true[name]), "region": region} for name, region in regions.items()
     ]
@@ -62,7 +67,8 @@ def main() -> None:
         process_run(run)
         rig["optics"]["leds"] = str(run.resolve())
     patches = {name: _inside(region) for name, region in regions.items()}
-    run = _recorded(asked.folder, rig, {"protocol": "led_fluorescence", "patches": patches})
+    protocol = {"protocol": "led_fluorescence", "patches": patches, "lamps": asked.lamps}
+    run = _recorded(asked.folder, rig, protocol)
     result = process_run(run)
     assert isinstance(result, LedFluorescenceResult)
     _compare(result, {name: read_reradiation(path) for name, path in true.items()})

@@ -1,13 +1,13 @@
 """Re-radiation matrices of the patches of a fluorescence run."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from labrig.analyse.inputs import Part
-from labrig.analyse.led_fluorescence.card_checks import unused_leds
+from labrig.analyse.led_fluorescence.card_checks import UnusedLed, unused_leds
 from labrig.analyse.led_fluorescence.lit_patches import (
     LitPatch,
     lit_patches,
@@ -21,7 +21,13 @@ from labrig.analyse.led_fluorescence.warnings import (
     fact_warnings,
     left_warnings,
 )
-from labrig.bench_optics import camera_curves, card_reflectance, led_exposures
+from labrig.bench_optics import (
+    LedExposure,
+    camera_curves,
+    card_reflectance,
+    illuminant_exposures,
+    led_exposures,
+)
 from labrig.errors import DataError, UsageError
 from labrig.fit.fluorescence import (
     EstimatedFluorophore,
@@ -32,7 +38,7 @@ from labrig.fit.fluorescence import (
     predicted_colour,
 )
 from labrig.material import appearance
-from labrig.optics import Spectrum, delta_e, read_light
+from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
 from labrig.protocols.led_fluorescence import SAMPLE, LedFrames
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.results import (
@@ -68,10 +74,8 @@ def analyse(part: Part) -> LedFluorescenceResult:
         Frames are missing or damaged, LEDs are named in another order than they light, or fewer
         than two of them can be used.
     """
-    leds = part.protocol.leds
-    lights = led_exposures(part.rig, "rig.yaml", part.inputs.leds)
-    if unknown := [led for led in leds if led not in lights]:
-        raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
+    leds = [*part.protocol.leds, *part.protocol.lamps]
+    lights = _lights(part)
     spectra = {led: replace(lights[led].light, name=led) for led in leds}
     peak_nm = {
         led: float(light.wavelength_nm[light.value.argmax()]) for led, light in spectra.items()
@@ -80,17 +84,19 @@ def analyse(part: Part) -> LedFluorescenceResult:
     first = part.protocol.shuffled()[0]
     cards = lit_patches(part, LedFrames.CARD, CARD, leds)
     samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE, leds, first)
-    left_out = list(unused_leds(leds, spectra, camera, white, mean_of(cards)))
+    left_out = list(_unused(part, spectra, camera, white, mean_of(cards)))
     warnings = [unused.reason for unused in left_out]
     warnings += [*left_warnings("card", cards, leds), *left_warnings("sample", samples, leds)]
     used = [led for led in leds if led not in {unused.led for unused in left_out}]
-    used.sort(key=peak_nm.__getitem__)
-    if len(used) < 2:
-        raise DataError(f"expected two LEDs that can be used, got {len(used)} ({warnings[0]})")
+    used.sort(key=lambda led: (lights[led].is_lamp, peak_nm[led]))
+    by_led = [row for row, led in enumerate(used) if not lights[led].is_lamp]
+    if len(by_led) < 2:
+        raise DataError(f"expected two LEDs that can be used, got {len(by_led)} ({warnings[0]})")
     rows = [leds.index(led) for led in used]
     cards = {name: without_rest(card.under(rows)) for name, card in cards.items()}
     card = mean_of(cards)
     system = lit_system([lights[led] for led in used], camera, white, card)
+    only_leds = lit_system([lights[used[row]] for row in by_led], camera, white, card.under(by_led))
     estimator, patches = JointEstimator(system), {}
     for number, name in enumerate(samples):
         sample = without_rest(samples[name].under(rows))
@@ -99,7 +105,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
             raise DataError(f"{name}: clips at the shortest exposure under {which}; dim the LEDs")
         even = sample.times(*_evenness(cards[name], card, system))
         fit = estimator.fit(name, even.value, even.variance, seed=number)
-        per_led = fit_per_led(name, even.value, even.variance, system)
+        per_led = fit_per_led(name, even.value[by_led], even.variance[by_led], only_leds)
         patches[name] = _patch(fit, per_led, even, system)
         warnings += fact_warnings(name, fit, camera.channels)
         warnings += bleaching_warnings(name, even.bleaching)
@@ -114,6 +120,42 @@ def analyse(part: Part) -> LedFluorescenceResult:
         run=part.run.folder.resolve().name,
         warnings=tuple(warnings),
     )
+
+
+def _unused(
+    part: Part,
+    spectra: Mapping[str, Spectrum],
+    camera: CameraResponse,
+    white: Transmittance,
+    card: LitPatch,
+) -> Iterator[UnusedLed]:
+    """Yield LEDs and lamps that cannot be used."""
+    leds, lamps = part.protocol.leds, part.protocol.lamps
+    rows = range(len(leds)), range(len(leds), len(leds) + len(lamps))
+    for names, own, kind in zip((leds, lamps), rows, ("LED", "lamp"), strict=True):
+        if names:
+            among = {name: spectra[name] for name in names}
+            yield from unused_leds(names, among, camera, white, card.under(own), kind)
+
+
+def _lights(part: Part) -> dict[str, LedExposure]:
+    """Return the lights of the protocol by name, LEDs and lamps.
+
+    Raises
+    ------
+    UsageError
+        The rig file lacks one of them.
+    """
+    protocol = part.protocol
+    lights = led_exposures(part.rig, "rig.yaml", part.inputs.leds)
+    if unknown := [led for led in protocol.leds if led not in lights]:
+        raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
+    if not protocol.lamps:
+        return lights
+    lamps = illuminant_exposures(part.rig, "rig.yaml")
+    if unknown := [lamp for lamp in protocol.lamps if lamp not in lamps]:
+        raise UsageError(f"rig.yaml: expected lamps called {', '.join(unknown)}, got none")
+    return lights | {lamp: lamps[lamp] for lamp in protocol.lamps}
 
 
 def _evenness(
@@ -156,8 +198,12 @@ def _patch(
 
 
 def _extrapolated(system: FluorescenceSystem) -> BoolArray:
-    """Return which input bands no LED of known brightness lit, shape (i,)."""
-    known = system.response.absorbed[~system.is_loose]
+    """Return which input bands no LED of known brightness lit, shape (i,).
+
+    A lamp lights all of them, and tells their sum only.
+    """
+    is_lamp = [exposure.spectrum_error is not None for exposure in system.exposures]
+    known = system.response.absorbed[~system.is_loose & ~np.array(is_lamp)]
     return np.asarray(~(known > LIT * known.max(axis=1, keepdims=True)).any(axis=0))
 
 

@@ -1,4 +1,4 @@
-"""The equations of LEDs and camera, as a card under the same LEDs makes them known."""
+"""The equations of LEDs, lamps and camera, as a card under the same LEDs makes them known."""
 
 import math
 from collections.abc import Sequence
@@ -10,12 +10,21 @@ from labrig.analyse.led_fluorescence.lit_patches import LitPatch
 from labrig.bench_optics import LedExposure
 from labrig.fit.fluorescence import Exposure, FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
+from labrig.fit.spectrum import CurveError
 from labrig.optics import CameraResponse, Transmittance
 
 #: Relative σ of a grey card's reflectance.
 CARD_SIGMA = 0.01
+#: Error of a lamp's spectrum by a file of another lamp of its kind.
+LAMP_ERROR = CurveError(relative=0.08, added=0.01, correlation_nm=40.0)
 #: Least relative σ of a brightness that was calibrated in another run: LEDs age and drift.
 DRIFT = 0.01
+
+
+def exposure_of(light: LedExposure) -> Exposure:
+    """Return a light of unknown brightness, with the errors of its spectrum."""
+    error = LAMP_ERROR if light.is_lamp else None
+    return Exposure(light.light, 1.0, math.inf, light.wavelength_sigma_nm, error)
 
 
 def lit_system(
@@ -35,7 +44,7 @@ def lit_system(
     card
         Values of the card under the LEDs.
     """
-    unknown = [Exposure(led.light, 1.0, math.inf, led.wavelength_sigma_nm) for led in lights]
+    unknown = [exposure_of(led) for led in lights]
     bare = fluorescence_system(unknown, camera, CURVES_OF_MODEL)
     by_card = bare.informed_by_white(card.value, card.variance, white, CARD_SIGMA)
     calibrated = np.array([np.isfinite(led.brightness_sigma) for led in lights])

@@ -5,25 +5,20 @@ of the matrix. A result keeps σ of each number of the matrix only; neighbouring
 err together, over the distances below, as their estimates do.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from labrig.analyse.led_fluorescence.lit_patches import LitPatch
+from labrig.analyse.led_fluorescence.lit_system import CARD_SIGMA, exposure_of
 from labrig.bench_optics import LedExposure
-from labrig.fit.fluorescence import Exposure, FluorescenceSystem, fluorescence_system
+from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
-from labrig.fit.spectrum import CurveError
 from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse, Transmittance
 from labrig.results import FloatArray
 
-#: Relative σ of a grey card's reflectance.
-CARD_SIGMA = 0.01
-#: Error of a lamp's spectrum by a file of another lamp of its kind.
-LAMP_ERROR = CurveError(relative=0.08, added=0.01, correlation_nm=40.0)
 #: Least light of the card, over that under the brightest lamp, each per power of the lamp, from
 #: which the card tells how bright a lamp is. A dark one shows the tails of its spectrum.
 VISIBLE = 0.01
@@ -87,9 +82,7 @@ def predicted_values(
     card
         Values of the card in the sample's place.
     """
-    exposures = [
-        Exposure(lamp.light, 1.0, math.inf, lamp.wavelength_sigma_nm, LAMP_ERROR) for lamp in lamps
-    ]
+    exposures = [exposure_of(lamp) for lamp in lamps]
     bare = fluorescence_system(
         exposures, camera, CURVES_OF_MODEL, matrix.input_nm, matrix.output_nm
     )
