@@ -46,7 +46,7 @@ class Illuminant(LedLight):
     >>> from labrig.acquire import Illuminant
     >>> lamp = Illuminant.model_validate({"spectrum": "halogen_3000k", "settling": "10 min"})
     >>> lamp.settling, lamp.relative_spectrum().at([450.0, 650.0]).round(2).tolist()
-    (600.0, [0.42, 1.36])
+    (600.0, [0.39, 1.49])
     """
 
     settling: Annotated[DurationS, Field(ge=0, le=7200)] = 0.0
