@@ -166,3 +166,14 @@ def test_light_that_leaks_in_is_subtracted(tmp_path: Path) -> None:
     assert not felt.dyes
     true = true_matrix("felt").reflectance[5:30]
     assert np.abs(felt.matrix.reflectance[5:30] - true).max() < 0.05
+
+
+def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Path) -> None:
+    result = analyse(part_of(record(tmp_path, FEW | {"lamps": ["halogen"], "repeats": 1})))
+    assert result.leds == ("430 nm", "455 nm", "530 nm", "625 nm", "halogen")
+    yellow, felt = result.patches["yellow"], result.patches["felt"]
+    assert yellow.value.shape == (5, 3)
+    assert len(yellow.dyes) == 1
+    assert not felt.dyes
+    assert yellow.is_extrapolated.any(), "a lamp does not count as light of a wavelength"
+    assert yellow.per_led is not None

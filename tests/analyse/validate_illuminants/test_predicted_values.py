@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from labrig.analyse.led_fluorescence.lit_patches import LitPatch
-from labrig.analyse.led_fluorescence.lit_system import exposure_of
-from labrig.analyse.validate_illuminants.prediction import CARD_SIGMA, predicted_values
+from labrig.analyse.led_fluorescence.lit_system import CARD_SIGMA, exposure_of
+from labrig.analyse.validate_illuminants.prediction import predicted_values
 from labrig.bench_optics import LedExposure
 from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
