@@ -107,9 +107,12 @@ def _of_patches(values: list[float]) -> str:
 
 def _overview_text(result: ValidateIlluminantsResult) -> Iterator[str]:
     yield f"Predicted from {result.fluorescence}."
+    missing = result.without_matrix_sigma
     matrix = "and of the matrices, whose neighbouring numbers are taken to err together"
-    if result.without_matrix_sigma:
-        matrix += f" (there is none of {', '.join(result.without_matrix_sigma)})"
+    if len(missing) == len(next(iter(result.lamps.values())).patches):
+        matrix = "not of the matrices, which have none"
+    elif missing:
+        matrix += f" ({', '.join(missing)}: there is none)"
     yield (
         "σ is that of the photographs (noise, flicker), of the lamps' spectra (8 %, smooth), the "
         f"camera's curves and the card, as far as the card leaves them open, {matrix}. Not in it: "
