@@ -188,7 +188,7 @@ class LedFluorescenceResult(RunResult):
     Attributes
     ----------
     leds
-        Names of the m LEDs that were used.
+        Names of the m lights that were used: LEDs, then lamps.
     led_peak_nm
         Their peaks in nm, shape (m,).
     channels
