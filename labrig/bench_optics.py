@@ -13,7 +13,6 @@ from labrig import resources
 from labrig.acquire import RigFile, illuminant_lights, led_lights
 from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
 from labrig.errors import UsageError
-from labrig.material import read_emissions
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -275,6 +274,8 @@ def require_optics(rig: RigFile) -> None:
     if rig.optics.filters is not None:
         rig.optics.filter_files()
     if rig.optics.emission_library is not None:
+        from labrig.material import read_emissions  # brings scipy, which is slow to load
+
         read_emissions(rig.optics.emission_library)
     for kind in kinds():
         calibration(rig, kind)
