@@ -158,6 +158,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
         patches=patches,
         run=part.run.folder.resolve().name,
         geometry=part.rig.optics.geometry_text,
+        lamps=tuple(used[len(by_led) :]),
         warnings=tuple(warnings),
     )
 

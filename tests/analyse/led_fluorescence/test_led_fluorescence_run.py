@@ -304,9 +304,14 @@ def test_a_method_is_refused_where_there_is_none_to_choose() -> None:
 def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Path) -> None:
     patches = {name: QUICK["patches"][name] for name in ("yellow", "felt")}
     asked = FEW | {"lamps": ["halogen"], "patches": patches, "repeats": 1}
-    part = part_of(record(tmp_path, asked))
-    result = analyse(part)
+    run = record(tmp_path, asked)
+    done = process_and_report(run)
+    part, result = part_of(run), done.result
+    assert isinstance(result, LedFluorescenceResult)
+    assert_read_back(result)
+    assert "LED or lamp" in done.report.read_text()
     assert result.leds == ("430 nm", "455 nm", "530 nm", "625 nm", "halogen")
+    assert result.lamps == ("halogen",)
     assert all("and 400 nm where no LED" not in line for line in result.warnings), "lamps tell sums"
     yellow, felt = result.patches["yellow"], result.patches["felt"]
     assert yellow.value.shape == (5, 3)
