@@ -17,7 +17,7 @@ from labrig.acquire import Connections, Finding, LedLight
 from labrig.errors import DeviceError, UnclearAnswerError, UsageError
 from labrig.quantity import Fraction
 
-from .led_switches import LedSwitches
+from .light_switches import LedSwitches
 from .serial_line import SerialLine
 
 BAUDRATE = 115200

@@ -10,10 +10,9 @@ import numpy as np
 from pydantic import BaseModel
 
 from labrig import resources
-from labrig.acquire import RigFile, led_lights
+from labrig.acquire import RigFile, illuminant_lights, led_lights
 from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
 from labrig.errors import UsageError
-from labrig.material import read_emissions
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -37,7 +36,7 @@ SKEW_SHARE = 0.14
 
 @dataclass(frozen=True, eq=False)
 class LedExposure:
-    """An LED as a light for a fit.
+    """An LED, or another lamp, as a light for a fit.
 
     Attributes
     ----------
@@ -49,6 +48,8 @@ class LedExposure:
         Standard uncertainty in nm of an error that all wavelengths have in common.
     is_nominal
         Whether the spectrum is a curve by peak and width from a data sheet.
+    is_lamp
+        Whether it is a broadband lamp, whose spectrum is that of another one of its kind.
     """
 
     light: Spectrum
@@ -56,6 +57,7 @@ class LedExposure:
     brightness_sigma: float
     wavelength_sigma_nm: float
     is_nominal: bool = False
+    is_lamp: bool = False
 
 
 def camera_curves(
@@ -213,6 +215,46 @@ def led_exposures(
     return exposures
 
 
+def illuminant_exposures(rig: RigFile, source: str) -> dict[str, LedExposure]:
+    """Return the light of each lamp of a rig's bank behind its filter, of unknown brightness.
+
+    Parameters
+    ----------
+    rig, source
+        Rig file, and its name or path for messages.
+
+    Raises
+    ------
+    UsageError
+        The rig has no bank of lamps, nothing is known of the light of one, or its filter is
+        unknown.
+    """
+    lamps = illuminant_lights(rig, source)
+    if not lamps:
+        raise UsageError(f"{source}: expected 'illuminants' under 'devices', found none")
+    exposures = {}
+    for name, lamp in lamps.items():
+        spectrum = lamp.relative_spectrum()
+        if spectrum is None:
+            raise UsageError(
+                f"{source}: nothing is known of the light of lamp '{name}'; give its 'spectrum', "
+                "or its 'centre' and 'fwhm'"
+            )
+        if lamp.filter is not None:
+            (passed,) = filter_transmittances(rig, [lamp.filter])
+            spectrum = replace(spectrum, value=spectrum.value * passed.at(spectrum.wavelength_nm))
+        sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * lamp.fwhm) if lamp.fwhm else 0.0
+        exposures[name] = LedExposure(
+            replace(spectrum, name=name),
+            1.0,
+            math.inf,
+            sigma_nm,
+            is_nominal=lamp.spectrum is None,
+            is_lamp=True,
+        )
+    return exposures
+
+
 def require_optics(rig: RigFile) -> None:
     """Read all that a rig file names under `optics:`, since a run needs it hours later only.
 
@@ -232,6 +274,8 @@ def require_optics(rig: RigFile) -> None:
     if rig.optics.filters is not None:
         rig.optics.filter_files()
     if rig.optics.emission_library is not None:
+        from labrig.material import read_emissions  # brings scipy, which is slow to load
+
         read_emissions(rig.optics.emission_library)
     for kind in kinds():
         calibration(rig, kind)

@@ -6,9 +6,9 @@ the part of the light that comes back at other wavelengths than those of the LED
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from labrig.acquire import Unit
 
@@ -18,8 +18,11 @@ from .steps.led_scenes import (
     CARD_REASON,
     ON_CARD,
     ON_SAMPLE,
+    LampNames,
+    LampUnit,
     LedSettings,
     LedUnit,
+    LitUnit,
 )
 from .steps.patch_names import Patches
 from .steps.scenes import Arranged, PutBackUnit, StillDarkUnit
@@ -43,6 +46,9 @@ class LedFluorescence(LedSettings):
 
     Attributes
     ----------
+    lamps
+        Names of broadband lamps of the rig's bank, for example `[halogen]`, under which card and
+        samples are photographed after the LEDs; their values join the estimate. Default: none.
     patches
         Regions of the samples by name: `[x, y, width, height]` in pixels, or all four as fractions
         of the frame.
@@ -52,14 +58,25 @@ class LedFluorescence(LedSettings):
     """
 
     protocol: Literal["led_fluorescence"] = "led_fluorescence"
+    lamps: LampNames = ()
     patches: Patches = Field({"sample": (0.4, 0.4, 0.2, 0.2)}, min_length=1)
     method: Literal["joint", "per-led"] = "joint"
 
+    @model_validator(mode="after")
+    def _different_names(self) -> Self:
+        if shared := set(self.leds) & set(self.lamps):
+            raise ValueError(
+                f"expected LEDs and lamps of different names, got '{min(shared)}' twice"
+            )
+        return self
+
     def units(self) -> Sequence[Unit]:
-        """Return darks, card and samples under every LED, the first LED once more."""
+        """Return darks, card and samples under every LED and lamp, the first LED once more."""
         order = self.shuffled()
-        cards = [self._card(led) for led in order]
-        samples = [self._sample(led, SAMPLE) for led in order]
+        cards: list[LitUnit] = [self._card(led) for led in order]
+        cards += [self._lamp(lamp, CARD) for lamp in self.lamps]
+        samples: list[LitUnit] = [self._sample(led, SAMPLE) for led in order]
+        samples += [self._lamp(lamp, SAMPLE) for lamp in self.lamps]
         again = [self._sample(order[0], AGAIN)]
         sample = "it is photographed under every LED"
         return [
@@ -75,6 +92,12 @@ class LedFluorescence(LedSettings):
     def _card(self, led: str) -> LedUnit:
         roles = LedFrames.CARD, LedFrames.CARD_OFF
         return LedUnit(self.bracketing, led, f"{CARD}{led}", *roles)
+
+    def _lamp(self, lamp: str, begin: str) -> LampUnit:
+        card = LedFrames.CARD, LedFrames.CARD_OFF
+        sample = LedFrames.SAMPLE, LedFrames.SAMPLE_OFF
+        roles = card if begin == CARD else sample
+        return LampUnit(self.bracketing, lamp, f"{begin}{lamp}", *roles)
 
     def _sample(self, led: str, begin: str) -> LedUnit:
         roles = LedFrames.SAMPLE, LedFrames.SAMPLE_OFF

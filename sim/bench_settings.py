@@ -1,6 +1,6 @@
 """Settings of the parts between lamp, sample and camera in a rig file's `simulation:`."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -91,6 +91,43 @@ class LedSettings(Part):
     droop: Annotated[Fraction, Field(ge=0, lt=1)] = 0.0
     shift_nm: Annotated[float, Field(ge=-20, le=20)] = 0.0
     warm_up: Annotated[DurationS, Field(gt=0)] = 20.0
+
+
+class IlluminantSettings(Part):
+    """A broadband lamp on a relay of the Numato board at `sim://room/lamps`.
+
+    Attributes
+    ----------
+    relay
+        Relay that switches the lamp, counted from 0.
+    kind
+        What lights it: a filament (`halogen`), a `xenon` arc in a projector, a `daylight`
+        simulator, or an `ultraviolet` black light.
+    temperature
+        Temperature of the filament in K.
+    centre
+        Wavelength of the strongest light of a black light, in nm.
+    fwhm
+        Full width at half maximum of a black light's band, in nm.
+    level
+        Irradiance of the warm lamp as a fraction of the warm halogen lamp's visible light.
+    warm_up
+        Time constant with which the lamp becomes warm, for example `60 s`.
+    warm_up_deficit
+        Fraction of the light that is missing when the lamp is cold, for example `10 %`.
+    filter
+        Name of the colour filter before it; null: none.
+    """
+
+    relay: Annotated[int, Field(ge=0, le=7)]
+    kind: Literal["halogen", "xenon", "daylight", "ultraviolet"]
+    temperature: Annotated[float, Field(ge=2000, le=3400)] = 2880.0
+    centre: Nanometres = 366.0
+    fwhm: Annotated[float, Field(ge=5, le=100)] = 17.0
+    level: Annotated[Fraction, Field(gt=0)] = 0.3
+    warm_up: Annotated[DurationS, Field(gt=0)] = 60.0
+    warm_up_deficit: Annotated[Fraction, Field(ge=0, lt=1)] = 0.1
+    filter: str | None = None
 
 
 class ServoBoardSettings(Part):

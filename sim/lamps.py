@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from .illuminants import Illuminants
 from .lamp import Lamp
 from .leds import Leds
 from .mercury import Mercury
@@ -25,12 +26,15 @@ class FilteredLamps:
         Begin in seconds and transmittance (wavelengths,) of each filter; the first from 0 on.
     leds
         LEDs, whose light does not pass the filter.
+    illuminants
+        Broadband lamps with filters of their own.
     """
 
     halogen: Lamp
     mercury: Mercury
     filters: tuple[tuple[float, FloatArray], ...]
     leds: Leds = field(default_factory=Leds)
+    illuminants: Illuminants = field(default_factory=Illuminants)
 
     def until(self, time_s: float) -> "FilteredLamps":
         """Return the lamps without switches after `time_s`."""
@@ -39,25 +43,25 @@ class FilteredLamps:
             halogen=self.halogen.until(time_s),
             mercury=self.mercury.until(time_s),
             leds=self.leds.until(time_s),
+            illuminants=self.illuminants.until(time_s),
         )
 
     def last_switch_off(self, time_s: float) -> float | None:
         """Return the time at which a lamp was last switched off, up to and including `time_s`."""
-        lights = (self.halogen, self.mercury, self.leds)
-        off = [light.last_switch_off(time_s) for light in lights]
+        off = [light.last_switch_off(time_s) for light in self._lights]
         return max((off_s for off_s in off if off_s is not None), default=None)
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
         """Return the times strictly between at which the light is not smooth."""
         changes = {since_s for since_s, _ in self.filters if start_s < since_s < end_s}
         changes.update(self.halogen.corners(start_s, end_s), self.mercury.corners(start_s, end_s))
-        changes.update(self.leds.corners(start_s, end_s))
+        for bank in self._banks:
+            changes.update(bank.corners(start_s, end_s))
         return sorted(changes)
 
     def dark(self, start_s: float, end_s: float) -> bool:
         """Return whether there is no light at all from `start_s` to `end_s`."""
-        lights = (self.halogen, self.mercury, self.leds)
-        return all(light.dark(start_s, end_s) for light in lights)
+        return all(light.dark(start_s, end_s) for light in self._lights)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
         """Return the relative spectral irradiance at the sample, shape (..., wavelengths)."""
@@ -65,7 +69,9 @@ class FilteredLamps:
         if self.mercury.was_on:
             light = light + self.mercury.irradiance(time_s)
         light = light * self._passed(time_s)
-        return light + self.leds.irradiance(time_s) if self.leds.were_lit else light
+        for bank in self._banks:
+            light = light + bank.irradiance(time_s)
+        return light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """Return ∫ irradiance dt over an interval, shape (wavelengths,)."""
@@ -76,7 +82,18 @@ class FilteredLamps:
             if self.mercury.was_on:
                 light = light + self.mercury.exposure(begin_s, stop_s)
             total += light * self._passed(begin_s)
-        return total + self.leds.exposure(start_s, end_s) if self.leds.were_lit else total
+        for bank in self._banks:
+            total = total + bank.exposure(start_s, end_s)
+        return total
+
+    @property
+    def _banks(self) -> tuple[Leds, ...]:
+        """Banks of which a light has ever been lit."""
+        return tuple(bank for bank in (self.leds, self.illuminants) if bank.were_lit)
+
+    @property
+    def _lights(self) -> tuple[Lamp | Mercury | Leds, ...]:
+        return self.halogen, self.mercury, self.leds, self.illuminants
 
     def _passed(self, time_s: float | FloatArray) -> FloatArray:
         since_s = [since_s for since_s, _ in self.filters]

@@ -2,11 +2,12 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,24 +22,42 @@ FloatArray = NDArray[np.float64]
 OHNO_FWHM = 0.9215
 
 
+class Banked(Protocol):
+    """A light of a bank: its relay, and the time constant with which it warms."""
+
+    @property
+    def relay(self) -> int:
+        """Relay that switches it."""
+
+    @property
+    def warm_up(self) -> float:
+        """Time constant in seconds."""
+
+
 def led_spectrum(led: LedSettings, shift_nm: float = 0.0) -> FloatArray:
-    """Return a lit, cold LED's irradiance, relative as a `Lamp`'s, shape (wavelengths,).
+    """Return a lit, cold LED's irradiance, relative as a `Lamp`'s, shape (wavelengths,)."""
+    if led.spectrum is not None:
+        curve = read_curve(Path(led.spectrum))
+        shape = np.interp(WAVELENGTH_NM - shift_nm, WAVELENGTH_NM, curve)
+    else:
+        shape = led_shape(led.centre + shift_nm, led.fwhm, led.asymmetry)
+    spectrum: FloatArray = led.level * BURNING_LIGHT / shape.sum() * shape
+    return spectrum
+
+
+def led_shape(centre_nm: float, fwhm_nm: float, asymmetry: float) -> FloatArray:
+    """Return a band with a peak of 1, shape (wavelengths,).
 
     Its shape is that of Y. Ohno, *Spectral design considerations for white LED color rendering*
     (Optical Engineering 44, 2005), each side with its own width: narrower at the top than a normal
     curve, and with wider wings.
     """
-    if led.spectrum is not None:
-        curve = read_curve(Path(led.spectrum))
-        shape = np.interp(WAVELENGTH_NM - shift_nm, WAVELENGTH_NM, curve)
-    else:
-        off_nm = WAVELENGTH_NM - led.centre - shift_nm
-        short_nm = 2 * led.fwhm / OHNO_FWHM / (1 + led.asymmetry)
-        width_nm = np.where(off_nm < 0, short_nm, short_nm * led.asymmetry)
-        peak = np.exp(-((off_nm / width_nm) ** 2))
-        shape = (peak + 2 * peak**5) / 3
-    spectrum: FloatArray = led.level * BURNING_LIGHT / shape.sum() * shape
-    return spectrum
+    off_nm = WAVELENGTH_NM - centre_nm
+    short_nm = 2 * fwhm_nm / OHNO_FWHM / (1 + asymmetry)
+    width_nm = np.where(off_nm < 0, short_nm, short_nm * asymmetry)
+    peak = np.exp(-((off_nm / width_nm) ** 2))
+    shape: FloatArray = (peak + 2 * peak**5) / 3
+    return shape
 
 
 @dataclass(frozen=True)
@@ -66,6 +85,11 @@ class Leds:
     dimmings: tuple[tuple[float, int, float], ...] = ()
     passed: FloatArray | float = 1.0
 
+    @cached_property
+    def members(self) -> "Sequence[Banked]":
+        """Settings of all lights of the bank."""
+        return self.bank
+
     @property
     def lit(self) -> frozenset[int]:
         """Relays whose LEDs are lit."""
@@ -76,14 +100,14 @@ class Leds:
         """Whether any LED has ever been lit."""
         return len(self.states) > 1
 
-    def switched(self, relay: int, on: bool, at_s: float) -> "Leds":
+    def switched(self, relay: int, on: bool, at_s: float) -> Self:
         """Return the bank after a relay has moved; one that has no LED does nothing."""
         relays = self.lit | {relay} if on else self.lit - {relay}
-        if relays == self.lit or relay not in {led.relay for led in self.bank}:
+        if relays == self.lit or relay not in {light.relay for light in self.members}:
             return self
         return replace(self, states=(*self.states, (at_s, relays)))
 
-    def dimmed(self, relay: int, fraction: float, at_s: float) -> "Leds":
+    def dimmed(self, relay: int, fraction: float, at_s: float) -> Self:
         """Return the bank after the brightness of an LED was changed, lit or not."""
         return replace(
             self,
@@ -91,7 +115,7 @@ class Leds:
             dimmings=(*self.dimmings, (at_s, relay, fraction)),
         )
 
-    def until(self, time_s: float) -> "Leds":
+    def until(self, time_s: float) -> Self:
         """Return the bank without switches after `time_s`."""
         return replace(self, states=tuple(state for state in self.states if state[0] <= time_s))
 
@@ -138,16 +162,16 @@ class Leds:
     def _place(self, time_s: float) -> int:
         return bisect_right(self.states, time_s, key=lambda state: state[0]) - 1
 
-    def _lit(self, state: int) -> Iterator[tuple[LedSettings, float, FloatArray, FloatArray]]:
+    def _lit(self, state: int) -> Iterator[tuple[Banked, float, FloatArray, FloatArray]]:
         """Yield the LEDs of a state: warmth at its begin, light of the cold and of the warm one."""
-        for led in self.bank:
+        for led in self.members:
             if led.relay in self.states[state][1]:
                 brightness = self._brightness(led.relay, self.states[state][0])
-                cold, warm = self._spectra[led.relay]
+                cold, warm = self.spectra[led.relay]
                 yield led, self._warmth[state][led.relay], brightness * cold, brightness * warm
 
     @cached_property
-    def _spectra(self) -> dict[int, tuple[FloatArray, FloatArray]]:
+    def spectra(self) -> dict[int, tuple[FloatArray, FloatArray]]:
         """Light of each LED when cold and when warm."""
         return {
             led.relay: (
@@ -160,10 +184,10 @@ class Leds:
     @cached_property
     def _warmth(self) -> list[dict[int, float]]:
         """Warmth of each LED at the begin of each state, from 0 to 1."""
-        warmth = [{led.relay: 0.0 for led in self.bank}]
+        warmth = [{led.relay: 0.0 for led in self.members}]
         for (since_s, relays), (until_s, _) in pairwise(self.states):
             warmth.append({})
-            for led in self.bank:
+            for led in self.members:
                 goal = float(led.relay in relays)
                 remains = math.exp((since_s - until_s) / led.warm_up)
                 warmth[-1][led.relay] = goal + (warmth[-2][led.relay] - goal) * remains

@@ -34,7 +34,8 @@ from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
 #: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`, `sim://room/spectrometer`; with
-#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`.
+#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`, and with a bank of lamps
+#: `sim://room/lamps`.
 NAME = "room"
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
@@ -87,6 +88,11 @@ class OpenRoom:
         }
         relay_boards[self._lamp_board].states[LAMP_RELAY] = simulation.initial.lamp == "on"
         units = _dc4100_units(simulation, self.room)
+        lamps = (
+            {"lamps": NumatoBoard(RELAYS, self.room.switch_illuminant)}
+            if simulation.illuminants
+            else {}
+        )
         for relay in simulation.initial.leds:
             if self._led_board == "dc4100":
                 units[f"dc4100-{1 + (relay - 1) // OUTPUTS}"].states[(relay - 1) % OUTPUTS] = True
@@ -106,7 +112,7 @@ class OpenRoom:
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
-            for name, board in (relay_boards | units).items()
+            for name, board in (relay_boards | units | lamps).items()
         }
         self.camera = SimulatedCamera(
             clock,

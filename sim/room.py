@@ -24,6 +24,7 @@ from .door import Door
 from .doors import Doors, Pulses, no_pulses
 from .faults import FaultTime, given
 from .filters import Filters
+from .illuminants import Illuminants
 from .imaging import Imaging
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
@@ -100,6 +101,9 @@ class Room:
         self._leaks = (*always, *leaks)
         self._doors = Doors(simulation, clock, pulses)
         self._filters = Filters(simulation.filters, simulation.filters_bent, simulation.seed)
+        lamps = simulation.illuminants
+        filters = tuple(self._filters.transmission(lamp.filter) for lamp in lamps)
+        self._illuminants = Illuminants(lamps=lamps, filters=filters)
         self._changer = Changer(
             simulation, self._filters, clock, freshen=self._freshen, plug=self._circuit.plug
         )
@@ -136,6 +140,11 @@ class Room:
         return self._led_circuit.leds
 
     @property
+    def illuminants(self) -> Illuminants:
+        """The bank of broadband lamps with its history up to now."""
+        return self._illuminants
+
+    @property
     def door(self) -> Door | None:
         """The trap door with its history up to now; None where there is none."""
         return self._doors.trap_door
@@ -157,6 +166,10 @@ class Room:
     def switch_led(self, relay: int, on: bool) -> None:
         """Ask a relay to move now, to which an LED may be connected."""
         self._led_circuit.ask(relay, on)
+
+    def switch_illuminant(self, relay: int, on: bool) -> None:
+        """Move the contact of a relay now, to which a broadband lamp may be connected."""
+        self._illuminants = self._illuminants.switched(relay, on, self._clock.now())
 
     def dim_led(self, relay: int, fraction: float) -> None:
         """Change the brightness of an LED now, as a fraction of its full light."""
@@ -302,6 +315,7 @@ class Room:
             self._circuit.mercury,
             self._filters.history(self._changer.arrangements),
             self._led_circuit.leds,
+            self._illuminants,
         )
 
     def _lights(self) -> Lights:

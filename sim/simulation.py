@@ -17,6 +17,7 @@ from labrig.region import Region
 
 from .bench_settings import (
     DoorSettings,
+    IlluminantSettings,
     ImagingSettings,
     LedSettings,
     LensSettings,
@@ -224,6 +225,8 @@ class Simulation(Part):
     led_board
         Board that switches the LEDs: `relays`, the Numato board, or the Arduino if that switches
         the lamp; or `dc4100`, Thorlabs units at `sim://room/dc4100-1` to `sim://room/dc4100-3`.
+    illuminants
+        Broadband lamps, each on its relay of a Numato board of their own at `sim://room/lamps`.
     door
         Trap door: closed, the sample faces the lamp; open, the camera. Null: none, and the sample
         always faces both.
@@ -299,6 +302,7 @@ class Simulation(Part):
     lamp: LampSettings = LampSettings()
     leds: tuple[LedSettings, ...] = ()
     led_board: Literal["relays", "dc4100"] = "relays"
+    illuminants: tuple[IlluminantSettings, ...] = ()
     door: DoorSettings | None = None
     shield: DoorSettings | None = None
     servo: ServoBoardSettings = ServoBoardSettings()
@@ -342,6 +346,8 @@ class Simulation(Part):
             - leds
         ):
             raise ValueError(f"expected relays of 'leds', got {min(unknown)}, which has no LED")
+        if len({lamp.relay for lamp in self.illuminants}) < len(self.illuminants):
+            raise ValueError("expected a relay of its own for each of 'illuminants'")
         if self.led_board == "relays" and any(led.relay > RELAYS for led in self.leds):
             raise ValueError(f"expected relays 1 to {RELAYS} for 'leds': the board has no more")
         if self.lvf is None and any(fault.lvf_turned for fault in self.faults):

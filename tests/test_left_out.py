@@ -42,7 +42,8 @@ def test_a_protocol_without_spectra_does_without_the_spectrometer(
     ended = labrig("run", blank, "--rig", rig, "--runs", tmp_path, "--no-process", "--yes")
     assert ended.code == 0, ended.err
     attempts = read_run(ended.run_folder).attempts
-    assert all(it.start["devices"].keys() == {"leds", "camera", "changer"} for it in attempts)
+    opened = {"leds", "illuminants", "camera", "changer"}
+    assert all(it.start["devices"].keys() == opened for it in attempts)
     assert "spectrometer:" in (ended.run_folder / "rig.yaml").read_text()
 
 

@@ -25,7 +25,7 @@ SHIPPED = [
 ]
 #: Mappings whose keys are names that a person chooses, and a chain's parts: those are checked by
 #: their own protocols when the file is read.
-FREE = ("patches", "parts", "channels")
+FREE = ("patches", "parts", "channels", "lamps", "fluorescence")
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,8 @@
-"""Numato boards: relays that switch a lamp or LEDs, analogue inputs that read a thermometer."""
+"""Numato boards: relays that switch lamps or LEDs, analogue inputs that read a thermometer."""
 
+from .lamp_bank import NumatoLampBank
 from .led_bank import NumatoLedBank
 from .relay import NumatoRelay
 from .thermometer import NumatoThermometer
 
-__all__ = ["NumatoLedBank", "NumatoRelay", "NumatoThermometer"]
+__all__ = ["NumatoLampBank", "NumatoLedBank", "NumatoRelay", "NumatoThermometer"]

@@ -5,6 +5,7 @@ board and their public sample code.
 """
 
 import re
+from dataclasses import dataclass
 
 from labrig.acquire import Connections
 from labrig.errors import UnclearAnswerError
@@ -93,3 +94,27 @@ class Board:
         """End a half-typed command by a bare return, and discard the answer."""
         self._line.write(b"\r")
         self._line.drain()
+
+
+@dataclass(frozen=True)
+class BoardRelay:
+    """One relay of a board.
+
+    Attributes
+    ----------
+    board
+        The board.
+    number
+        Number of the relay, counted from 0.
+    """
+
+    board: Board
+    number: int
+
+    def switch(self, *, on: bool) -> None:
+        """Switch the relay, and read it back."""
+        self.board.switch(self.number, on=on)
+
+    def is_on(self) -> bool:
+        """Return the state of the relay in the board's register."""
+        return self.board.is_on(self.number)

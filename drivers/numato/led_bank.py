@@ -1,15 +1,14 @@
 """LEDs behind relays of a Numato board, one lit at a time; every relay is read back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from labrig.acquire import Connections, LedLight
 
-from ..led_switches import LedSwitches
-from .board import CHANNELS, Board
+from ..light_switches import LedSwitches
+from .board import CHANNELS, Board, BoardRelay
 
 Name = Annotated[str, Field(min_length=1)]
 Number = Annotated[int, Field(ge=0, lt=len(CHANNELS))]
@@ -32,18 +31,6 @@ def _led(value: Any) -> Any:
 
 
 Led = Annotated[RelayLed, BeforeValidator(_led, json_schema_input_type=Number | RelayLed)]
-
-
-@dataclass(frozen=True)
-class _Relay:
-    board: Board
-    number: int
-
-    def switch(self, *, on: bool) -> None:
-        self.board.switch(self.number, on=on)
-
-    def is_on(self) -> bool:
-        return self.board.is_on(self.number)
 
 
 class NumatoLedBank(LedSwitches):
@@ -83,7 +70,7 @@ class NumatoLedBank(LedSwitches):
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._relays = {name: led.relay for name, led in settings.relays.items()}
         self._board = Board(address, connections)
-        relays = {name: _Relay(self._board, relay) for name, relay in self._relays.items()}
+        relays = {name: BoardRelay(self._board, relay) for name, relay in self._relays.items()}
         super().__init__(self._board.name, relays, settings.relays, self._board.resynchronise)
 
     @classmethod

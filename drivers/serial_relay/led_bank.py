@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from labrig.acquire import Connections, Finding, LedLight
 
-from ..led_switches import LedSwitches
+from ..light_switches import LedSwitches
 from .board import Board, Relay, findings
 from .settings import BoardSettings, SwitchCommands
 from .wire_text import wire_text

@@ -3,7 +3,7 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.connections import Connections, SerialPort
-from labrig.acquire.loading import led_lights, load_driver, read_protocol
+from labrig.acquire.loading import illuminant_lights, led_lights, load_driver, read_protocol
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -54,6 +54,7 @@ __all__ = [
     "Unit",
     "at",
     "frame_bytes",
+    "illuminant_lights",
     "in_safe_order",
     "led_lights",
     "lights_that_read_back",

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from labrig.acquire.protocol import ProtocolModel
-from labrig.acquire.rig_file import RigFile
-from labrig.acquire.roles import LEDS, ROLES, LedLight
+from labrig.acquire.rig_file import RigFile, with_absolute_paths
+from labrig.acquire.roles import ILLUMINANTS, LEDS, ROLES, Illuminant, LedLight
 from labrig.errors import UsageError
 from labrig.plugins import DRIVERS, PROTOCOLS, load, names
 from labrig.yaml_file import read_yaml, validate
@@ -87,8 +87,49 @@ def led_lights(rig: RigFile, source: str) -> dict[str, LedLight]:
     return dict(driver.declared_leds(settings))
 
 
+def illuminant_lights(rig: RigFile, source: str) -> dict[str, Illuminant]:
+    """Return what a rig file says of the light of its bank of lamps, without opening any device.
+
+    Parameters
+    ----------
+    rig
+        Rig file with the devices.
+    source
+        Name or path of the rig file, for messages.
+
+    Returns
+    -------
+    dict of str to Illuminant
+        Spectrum, filter and settling time of each lamp by its name, in the rig file's order; empty
+        if the rig has no such bank.
+
+    Raises
+    ------
+    UsageError
+        If there is no such driver, or a key of the lamps is unknown or invalid.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig import resources
+    >>> from labrig.acquire import illuminant_lights
+    >>> path = resources.find("config", "rig", "sim-fluorescent")
+    >>> lamps = illuminant_lights(labrig.read_rig_file(path), "sim-fluorescent")
+    >>> [(name, lamp.settling) for name, lamp in lamps.items()][:2]
+    [('daylight', 600.0), ('halogen', 600.0)]
+    """
+    entry = rig.devices.get(ILLUMINANTS.key)
+    if entry is None:
+        return {}
+    driver = load_driver(ILLUMINANTS.key, entry.driver, source)
+    place = f"{source}, devices.{ILLUMINANTS.key}"
+    return dict(driver.declared_lamps(validate(entry.settings(), driver.Settings, place)))
+
+
 def read_protocol(path: str | Path) -> ProtocolModel:
     """Read a protocol file and validate it with the model that its key `protocol` names.
+
+    Files and folders that it names relative to its own folder have absolute paths in the result.
 
     Parameters
     ----------
@@ -115,7 +156,7 @@ def read_protocol(path: str | Path) -> ProtocolModel:
     ['dark', 'meter', 'decay-1']
     """
     path = Path(path)
-    content = read_yaml(path)
+    content = with_absolute_paths(read_yaml(path), path.resolve().parent)
     kind = content.get("protocol")
     if not isinstance(kind, str):
         raise UsageError(

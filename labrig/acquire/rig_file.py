@@ -273,7 +273,7 @@ def read_rig_file(path: str | Path) -> RigFile:
     ('numato_relay', 'canon_eos_5d_mark_ii')
     """
     path = Path(path)
-    content = _with_absolute_paths(read_yaml(path), path.resolve().parent)
+    content = with_absolute_paths(read_yaml(path), path.resolve().parent)
     rig = validate(content, RigFile, str(path))
     for key in rig.devices:
         if key not in ROLES:
@@ -283,11 +283,12 @@ def read_rig_file(path: str | Path) -> RigFile:
     return rig
 
 
-def _with_absolute_paths(value: Any, folder: Path) -> Any:
+def with_absolute_paths(value: Any, folder: Path) -> Any:
+    """Return the content of a YAML file in which paths of files beside it are absolute."""
     if isinstance(value, dict):
-        return {key: _with_absolute_paths(inner, folder) for key, inner in value.items()}
+        return {key: with_absolute_paths(inner, folder) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_with_absolute_paths(inner, folder) for inner in value]
+        return [with_absolute_paths(inner, folder) for inner in value]
     if isinstance(value, str) and _looks_like_a_path(value) and (folder / value).exists():
         return str(folder / value)
     return value

@@ -4,6 +4,9 @@ from .channels import (
     PixelMask as PixelMask,
     measure as measure,
 )
+from .colour_chart import (
+    find_colour_chart as find_colour_chart,
+)
 from .dark import (
     DarkModel as DarkModel,
     fit_dark as fit_dark,

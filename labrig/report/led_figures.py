@@ -111,7 +111,7 @@ def _chart(
 
 def values_chart(patch: FluorescentPatch, result: LedFluorescenceResult) -> Chart:
     """Return the chart of the values under the LEDs whose brightness is known."""
-    known = result.is_brightness_known
+    known = result.is_brightness_known & ~result.is_lamp
     nm, scale = result.led_peak_nm[known], result.brightness[known]
     marks: list[Mark] = []
     legend = []

@@ -189,9 +189,14 @@ def _strongest(matrix: ReradiationMatrix, patch: FluorescentPatch) -> int:
 
 def _leds(result: LedFluorescenceResult) -> Section:
     rows = tuple(
-        (led, f"{peak_nm:.0f}", f"{brightness:.4g}" if known else "not known")
-        for led, peak_nm, brightness, known in zip(
+        (
+            led,
+            "–" if is_lamp else f"{peak_nm:.0f}",
+            f"{brightness:.4g}" if known else "not known",
+        )
+        for led, is_lamp, peak_nm, brightness, known in zip(
             result.leds,
+            result.is_lamp,
             result.led_peak_nm,
             result.brightness,
             result.is_brightness_known,
@@ -199,7 +204,7 @@ def _leds(result: LedFluorescenceResult) -> Section:
         )
     )
     table = Table(
-        ("LED", "peak / nm", "brightness / (DN/s)"),
+        ("LED or lamp" if result.lamps else "LED", "peak / nm", "brightness / (DN/s)"),
         rows,
         "Brightness: what a channel of sensitivity 1 would count of a perfect white.",
     )

@@ -168,3 +168,9 @@ from .series_table import (
 from .table_columns import (
     TableLayout as TableLayout,
 )
+from .validate_illuminants import (
+    LampComparison as LampComparison,
+    LampPatch as LampPatch,
+    SeenColour as SeenColour,
+    ValidateIlluminantsResult as ValidateIlluminantsResult,
+)

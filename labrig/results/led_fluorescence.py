@@ -6,6 +6,8 @@ from math import isnan
 from pathlib import Path
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from labrig.material import Provenance, ReradiationMatrix, write_fluorescent
 from labrig.results.measured import BoolArray, FloatArray, Measured
 from labrig.results.reradiation_methods import (
@@ -188,7 +190,7 @@ class LedFluorescenceResult(RunResult):
     Attributes
     ----------
     leds
-        Names of the m LEDs that were used.
+        Names of the m lights that were used: LEDs, then lamps.
     led_peak_nm
         Their peaks in nm, shape (m,).
     channels
@@ -202,6 +204,8 @@ class LedFluorescenceResult(RunResult):
         without such an LED.
     patches
         The samples by name.
+    lamps
+        Names of those lights that are broadband lamps.
     geometry
         Angles of LEDs and camera, and polarisers, such as `45°/0°`; empty if the rig file does not
         tell. The reflectance is the radiance factor of that geometry.
@@ -224,6 +228,12 @@ class LedFluorescenceResult(RunResult):
     patches: Mapping[str, FluorescentPatch]
     run: str
     geometry: str = ""
+    lamps: tuple[str, ...] = ()
+
+    @property
+    def is_lamp(self) -> BoolArray:
+        """Whether a light is a broadband lamp, which has no wavelength of its own, shape (m,)."""
+        return np.isin(self.leds, self.lamps)
 
     def write_files(self, folder: Path) -> None:
         """Write a material file, its matrix and mixture for each sample, and a table of colours."""

@@ -1,13 +1,24 @@
-"""Scenes lit by one LED after another, each followed by a frame with all LEDs off."""
+"""Scenes lit by one LED or lamp after another, each followed by a frame with all lights off."""
 
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from labrig.acquire import LEDS, LEDS_OFF, LedSwitch, ProtocolModel, Session, Shoot
+from labrig.acquire import (
+    ILLUMINANTS,
+    ILLUMINANTS_OFF,
+    LEDS,
+    LEDS_OFF,
+    IlluminantSwitch,
+    LedSwitch,
+    ProtocolModel,
+    Session,
+    Shoot,
+)
 from labrig.quantity import Count, DurationS
 
 from .camera_settings import CameraSettings
@@ -24,14 +35,18 @@ CARD, AGAIN = "card ", "again "
 CARD_REASON = "its light under every LED tells how bright the LED is"
 
 
-def _once(names: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(names)) < len(names):
-        raise ValueError(f"expected every LED once, got {', '.join(names)}")
-    return names
+def _once(kind: str) -> AfterValidator:
+    def check(names: tuple[str, ...]) -> tuple[str, ...]:
+        if len(set(names)) < len(names):
+            raise ValueError(f"expected every {kind} once, got {', '.join(names)}")
+        return names
+
+    return AfterValidator(check)
 
 
-#: Names of LEDs of the rig.
-LedNames = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_once)]
+#: Names of LEDs of the rig, and of lamps of its bank.
+LedNames = Annotated[tuple[str, ...], Field(min_length=1), _once("LED")]
+LampNames = Annotated[tuple[str, ...], _once("lamp")]
 
 
 def shuffled(names: Sequence[str], seed: int) -> list[str]:
@@ -80,41 +95,48 @@ class LedSettings(ProtocolModel):
 
 
 @dataclass(frozen=True)
-class LedUnit:
-    """The scene under one LED.
+class LitUnit(ABC):
+    """The scene under one light of a bank.
 
     Attributes
     ----------
     bracketing
         Bracketing of the scene's photographs.
-    led
-        Name of the LED.
+    lit_by
+        Name of the light.
     name, role, off_role
-        Name of the unit, and roles of its frames with the LED on and off.
+        Name of the unit, and roles of its frames with the light on and off.
     """
 
     bracketing: Bracketing
-    led: str
+    lit_by: str
     name: str
     role: str
     off_role: str
 
     def run(self, session: Session) -> None:
-        """Light the LED, let it settle, photograph; then photograph what is left without it."""
+        """Light the scene, let the light settle, photograph; then photograph what is left."""
         session.wait_until_warm("camera")
-        session.perform(LedSwitch(self.led))
-        session.wait(session.rig[LEDS].settling_s(self.led), f"the {self.led} LED settles")
+        self.light(session)
         self.measure_lit(session)
-        session.perform(LEDS_OFF)
+        self.darken(session)
         self.measure_dark(session)
 
+    @abstractmethod
+    def light(self, session: Session) -> None:
+        """Switch the light on and wait until it is steady."""
+
+    @abstractmethod
+    def darken(self, session: Session) -> None:
+        """Switch the light off."""
+
     def measure_lit(self, session: Session) -> None:
-        """Photograph the scene with the LED on."""
-        # A camera sees no ultraviolet: what is dark here is judged with the LED's spectrum.
-        self.bracketing.photograph(session, self.name, self.role, self.led, may_be_dark=True)
+        """Photograph the scene with the light on."""
+        # A camera sees no ultraviolet: what is dark here is judged with the light's spectrum.
+        self.bracketing.photograph(session, self.name, self.role, self.lit_by, may_be_dark=True)
 
     def measure_dark(self, session: Session) -> None:
-        """Photograph what is left with the LED off."""
+        """Photograph what is left with the light off."""
         settings = self.bracketing.settings(
             session.choose("exposure off", lambda: self._longest_s(session), self._worst_s)
         )
@@ -127,3 +149,30 @@ class LedUnit:
     def _longest_s(self, session: Session) -> float:
         frames = [frame for frame in session.frames(self.role) if frame.unit == self.name]
         return max(frame.exposure_s for frame in frames)
+
+
+class LedUnit(LitUnit):
+    """The scene under one LED."""
+
+    def light(self, session: Session) -> None:
+        """Switch the LED on and wait until it is steady."""
+        session.perform(LedSwitch(self.lit_by))
+        session.wait(session.rig[LEDS].settling_s(self.lit_by), f"the {self.lit_by} LED settles")
+
+    def darken(self, session: Session) -> None:
+        """Switch the LED off."""
+        session.perform(LEDS_OFF)
+
+
+class LampUnit(LitUnit):
+    """The scene under one lamp of the bank."""
+
+    def light(self, session: Session) -> None:
+        """Switch the lamp on and wait until it is warm."""
+        session.perform(IlluminantSwitch(self.lit_by))
+        warm_up_s = session.rig[ILLUMINANTS].settling_s(self.lit_by)
+        session.wait(warm_up_s, f"the {self.lit_by} lamp warms up")
+
+    def darken(self, session: Session) -> None:
+        """Switch the lamp off."""
+        session.perform(ILLUMINANTS_OFF)

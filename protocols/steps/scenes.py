@@ -29,13 +29,14 @@ from .exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET
 from .sample_pose import face_lamp
 from .sanity_checks import SanityChecks
 
-Stage = Literal["sample", "grey card"]
+Stage = Literal["sample", "grey card", "colorchecker"]
 LvfPlace = Literal["away", "before camera", "on sample"]
 LampKind = Literal["halogen", "mercury"]
 
 _STAGE = {
     "sample": "take the card away, so that the sample lies in its place",
     "grey card": "lay the grey card where lamp and camera both see it",
+    "colorchecker": "lay the ColorChecker where lamp and camera see all of it",
 }
 _LVF = {
     "away": "take the variable filter out",

@@ -1,14 +1,16 @@
 """All measured re-radiating matrices as samples on the simulated bench with LEDs, in one capture.
 
     python -m tests.acceptance.led_fluorescence_bench FOLDER [--seed N] [--calibrated]
+        [--lamps daylight halogen] [--width 702]
     python -m tests.acceptance.led_fluorescence_bench FOLDER --patches 100
 
 The bench is `sim-fluorescent`: lopsided LEDs that droop and are not where the rig file says, and
 a camera whose curves are bent. From seed 2 on, other LEDs are drawn: peaks off by 1 nm rms as of
 bins of 2 to 5 nm, widths by 10 %, asymmetries by 15 %; the seed also bends the curves. With
 --calibrated, `led_brightness` runs first and gives spectra and brightnesses; without, the rig
-file's data-sheet values count. ΔE2000 of the estimated matrix, of the thesis's method and of the
-sample without fluorescence, against the matrix in the room; errors of colours over their σ.
+file's data-sheet values count. With --lamps, photographs under these broadband lamps join the
+estimate. ΔE2000 of the estimated matrix, of the thesis's method and of the sample without
+fluorescence, against the matrix in the room; errors of colours over their σ.
 
 The matrix in the room has no anti-Stokes side, where an instrument finds its noise only.
 
@@ -56,6 +58,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--calibrated", action="store_true")
     parser.add_argument("--patches", type=int)
+    parser.add_argument("--lamps", nargs="*", default=[])
+    parser.add_argument("--width", type=int, default=1404)
     asked = parser.parse_args()
     files = [
         path
@@ -68,6 +72,7 @@ def main() -> None:
     rig = yaml.safe_load((resources.folder("config") / "sim-fluorescent.yaml").read_text())
     rig["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     rig["simulation"]["seed"] = asked.seed
+    rig["simulation"]["sensor"] = {"width": asked.width, "height": asked.width * 2 // 3}
     rig["simulation"]["sample"] = [
         {"material": str(true[name]), "region": region} for name, region in regions.items()
     ]
@@ -79,7 +84,8 @@ def main() -> None:
         process_run(run)
         rig["optics"]["leds"] = str(run.resolve())
     patches = {name: _inside(region) for name, region in regions.items()}
-    run = _recorded(asked.folder, rig, {"protocol": "led_fluorescence", "patches": patches})
+    protocol = {"protocol": "led_fluorescence", "patches": patches, "lamps": asked.lamps}
+    run = _recorded(asked.folder, rig, protocol)
     start_s, start_cpu_s = time.perf_counter(), time.process_time()
     result = analyse(part_of(run))
     wall_s, cpu_s = time.perf_counter() - start_s, time.process_time() - start_cpu_s

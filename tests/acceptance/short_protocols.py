@@ -31,6 +31,10 @@ SHORTER: dict[str, dict[str, Any]] = {
         "leds": ["430 nm", "455 nm", "530 nm"], "longest": "1 s", "exposures": 2, "repeats": 1,
         "patches": {"felt": [0.6, 0.58, 0.3, 0.3]},
     },
+    "validate_illuminants": {
+        "lamps": ["daylight", "halogen"], "longest": "1 s", "exposures": 1, "repeats": 1,
+        "patches": {"felt": [0.6, 0.58, 0.3, 0.3]}, "fluorescence": {"felt": "grey-felt"},
+    },
     "angular_fluorescence": {
         "angles": [30, 60, 90], "directions": ["vertical"], "repositionings": 3, "repeats": 1,
     },
@@ -62,6 +66,7 @@ RIGS = {
     "direct_bispectral": "sim-fluorescent",
     "led_brightness": "sim-fluorescent",
     "led_fluorescence": "sim-fluorescent",
+    "validate_illuminants": "sim-fluorescent",
 }
 
 

@@ -278,7 +278,7 @@ def test_a_band_has_its_width() -> None:
 
 
 def test_the_guard_watches_them() -> None:
-    assert {"lamp", "leds"} == LIGHTS
+    assert {"lamp", "leds", "illuminants"} == LIGHTS
 
 
 def test_a_rig_with_leds_only_is_guarded(rig: Path) -> None:

@@ -40,6 +40,8 @@ def record(
     rig["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     rig["simulation"]["sensor"] = {"width": 96, "height": 64}
     rig["devices"]["camera"].pop("warm_up")
+    if not protocol.get("lamps") and protocol["protocol"] != "validate_illuminants":
+        rig["devices"].pop("illuminants")
     change(rig)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "rig.yaml").write_text(write_quickly(rig))

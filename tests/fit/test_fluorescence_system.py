@@ -171,7 +171,7 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
         r"light '475 nm': expected variances above 0",
     ),
     "one light": (
-        lambda: system_of(lights()[:1]),
+        lambda: JointEstimator(system_of(lights()[:1])),
         r"expected two or more lights, got 1",
     ),
     "camera elsewhere": (

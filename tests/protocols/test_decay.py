@@ -32,7 +32,8 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_every_shipped_protocol_can_be_planned(name: str, rig: str) -> None:
     # One rig has a bank of LEDs.
-    rig = "sim-fluorescent" if name.startswith(("led_", "direct_", "angular_")) else rig
+    lit = ("led_", "direct_", "angular_", "validate_")
+    rig = "sim-fluorescent" if name.startswith(lit) else rig
     laid_out = planned(resources.find("protocols", "protocol", name), rig)
     assert laid_out.duration_s > 1800
     # A direct measurement reads spectra only.

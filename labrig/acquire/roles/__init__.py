@@ -22,6 +22,13 @@ from labrig.acquire.roles.door_and_shield import (
     Shield,
     TrapDoor,
 )
+from labrig.acquire.roles.illuminants import (
+    ILLUMINANTS,
+    ILLUMINANTS_OFF,
+    Illuminant,
+    IlluminantSwitch,
+    LampBank,
+)
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
 from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedLight, LedSwitch
 from labrig.acquire.roles.role import (
@@ -56,6 +63,7 @@ ROLES: dict[str, Role[Any]] = {
     for role in (
         LAMP,
         LEDS,
+        ILLUMINANTS,
         SHIELD,
         DOOR,
         CHANGER,
@@ -76,6 +84,8 @@ __all__ = [
     "DOOR",
     "DOOR_CLOSE",
     "DOOR_OPEN",
+    "ILLUMINANTS",
+    "ILLUMINANTS_OFF",
     "LAMP",
     "LAMP_OFF",
     "LAMP_ON",
@@ -99,8 +109,11 @@ __all__ = [
     "Exercised",
     "FrameReader",
     "Guarded",
+    "Illuminant",
+    "IlluminantSwitch",
     "KeptAwake",
     "Lamp",
+    "LampBank",
     "LampShield",
     "LedBank",
     "LedLight",

@@ -114,10 +114,10 @@ class LedBank(Light, Protocol):
     def channels(self) -> tuple[str, ...]:
         """Return the names of the LEDs."""
 
-    def settling_s(self, channel: str) -> float:
+    def settling_s(self, channel: str, /) -> float:
         """Return the time in seconds from switching an LED on until its light is steady."""
 
-    def light(self, channel: str) -> None:
+    def light(self, channel: str, /) -> None:
         """Switch one LED on after all others are off; both are read back where the device can.
 
         The light is steady `settling_s` later, for which protocols wait themselves.
@@ -156,11 +156,11 @@ class PlannedLedBank(PlannedDevice):
         """Return the names that the driver declares."""
         return tuple(self._leds)
 
-    def settling_s(self, channel: str) -> float:
+    def settling_s(self, channel: str, /) -> float:
         """Return the settling time in seconds that the driver declares."""
         return self._leds[channel].settling
 
-    def light(self, channel: str) -> None:
+    def light(self, channel: str, /) -> None:
         """Switch one LED on."""
         self._channel_on = channel
 

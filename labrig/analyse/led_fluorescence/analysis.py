@@ -1,17 +1,18 @@
 """Re-radiation matrices of the patches of a fluorescence run."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from labrig.analyse.inputs import Part
-from labrig.analyse.led_fluorescence.card_checks import exchanged, lines_of, unused_leds
+from labrig.analyse.led_fluorescence.card_checks import UsableLights, usable_lights
 from labrig.analyse.led_fluorescence.direct import direct_measurement, missing_samples
 from labrig.analyse.led_fluorescence.lit_patches import (
     SEEN_SIGMA,
+    LightKind,
     LitPatch,
     lit_patches,
     mean_of,
@@ -21,12 +22,17 @@ from labrig.analyse.led_fluorescence.methods import method_differences, reradiat
 from labrig.analyse.led_fluorescence.mixture import mixture_of
 from labrig.analyse.led_fluorescence.warnings import (
     bleaching_warnings,
-    exchanged_warnings,
     fact_warnings,
     left_warnings,
     per_led_warnings,
 )
-from labrig.bench_optics import camera_curves, card_reflectance, led_exposures
+from labrig.bench_optics import (
+    LedExposure,
+    camera_curves,
+    card_reflectance,
+    illuminant_exposures,
+    led_exposures,
+)
 from labrig.errors import DataError, UsageError
 from labrig.fit.fluorescence import (
     EstimatedFluorophore,
@@ -37,7 +43,7 @@ from labrig.fit.fluorescence import (
     predicted_colour,
 )
 from labrig.material import appearance, read_emissions
-from labrig.optics import Spectrum, delta_e, read_light
+from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
 from labrig.protocols.led_fluorescence import SAMPLE, LedFrames
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.results import (
@@ -70,49 +76,54 @@ def analyse(part: Part) -> LedFluorescenceResult:
     Raises
     ------
     UsageError
-        The rig file lacks an LED, or the curves of camera or card, or names an emission library or
-        a direct measurement that is none.
+        The rig file lacks an LED or a lamp, or the curves of camera or card, or names an emission
+        library or a direct measurement that is none.
     DataError
         Frames are missing or damaged, or fewer than two LEDs can be used.
     """
-    leds = part.protocol.leds
-    lights = led_exposures(part.rig, "rig.yaml", part.inputs.leds)
-    if unknown := [led for led in leds if led not in lights]:
-        raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
-    spectra = {led: replace(lights[led].light, name=led) for led in leds}
+    names = [*part.protocol.leds, *part.protocol.lamps]
+    lights = _lights(part)
+    spectra = {led: replace(lights[led].light, name=led) for led in names}
     peak_nm = {
         led: float(light.wavelength_nm[light.value.argmax()]) for led, light in spectra.items()
     }
     camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
-    cards = lit_patches(part, LedFrames.CARD, CARD)
-    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE)
-    left_out = list(unused_leds(leds, spectra, camera, white, cards, samples))
-    places = exchanged(left_out)
-    left_out = [unused for unused in left_out if unused.led not in places]
-    warnings = [*lines_of(left_out), *exchanged_warnings(places)]
+    first = part.protocol.shuffled()[0]
+    cards = lit_patches(part, LedFrames.CARD, CARD, names)
+    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE, names, first)
+    usable, usable_lamps = _usable(part, spectra, camera, white, cards, samples)
+    warnings = [*usable.warnings, *usable_lamps.warnings]
     if part.rig.optics.may_see_gloss:
         warnings.append(
             f"at {part.rig.optics.geometry_text} a surface's gloss reaches the camera, and is in "
             "the reflectance: light from 45°, or cross polarisers"
         )
-    warnings += [*left_warnings("card", cards, leds), *left_warnings("samples", samples, leds)]
-    # The LED whose light it is, by the row of its frames.
-    light_of = {
-        row: places.get(led, led)
-        for row, led in enumerate(leds)
-        if led not in {unused.led for unused in left_out}
-    }
-    if len(light_of) < 2:
+    kind: LightKind = "light" if part.protocol.lamps else "LED"
+    warnings += [
+        *left_warnings("card", cards, names, kind),
+        *left_warnings("samples", samples, names, kind),
+    ]
+    if len(usable.by_row) < 2:
         raise DataError(
-            f"expected two LEDs or more that can be used, got {len(light_of)}: "
-            f"{'; '.join(lines_of(left_out))}"
+            f"expected two LEDs or more that can be used, got {len(usable.by_row)}: "
+            f"{'; '.join(usable.left_out)}"
         )
-    rows = sorted(light_of, key=lambda row: peak_nm[light_of[row]])
-    used = [light_of[row] for row in rows]
-    has_first = leds.index(part.protocol.shuffled()[0]) in rows
+    # LEDs come first, each by rising peak.
+    rows = [
+        row
+        for each in (usable, usable_lamps)
+        for row in sorted(each.by_row, key=lambda row: peak_nm[each.by_row[row]])
+    ]
+    light_of = {**usable.by_row, **usable_lamps.by_row}
+    used, by_led = [light_of[row] for row in rows], range(len(usable.by_row))
+    has_first = names.index(first) in rows
     cards = {name: card.under(rows).without_rest() for name, card in cards.items()}
     card = mean_of(cards)
     system = lit_system([lights[led] for led in used], camera, white, card)
+    only_leds = system
+    if usable_lamps.by_row:
+        of_leds = [lights[led] for led in used[: len(by_led)]]
+        only_leds = lit_system(of_leds, camera, white, card.under(by_led))
     # Frames show all samples at once, but not the card.
     flicker = np.hypot(card.flicker, mean_of(samples).under(rows).flicker)
     named = part.rig.optics.emission_library
@@ -128,7 +139,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
         even = sample.times(*_evenness(cards[name], card, system))
         estimates = _Estimates(
             estimator.fit(name, even.value, even.own_variance, seed=number),
-            fit_per_led(name, even.value, even.variance, system),
+            _per_led(name, even, system, only_leds),
             method,
         )
         patches[name] = _patch(estimates, even, system, direct)
@@ -147,7 +158,69 @@ def analyse(part: Part) -> LedFluorescenceResult:
         patches=patches,
         run=part.run.folder.resolve().name,
         geometry=part.rig.optics.geometry_text,
+        lamps=tuple(used[len(by_led) :]),
         warnings=tuple(warnings),
+    )
+
+
+def _usable(
+    part: Part,
+    spectra: Mapping[str, Spectrum],
+    camera: CameraResponse,
+    white: Transmittance,
+    cards: Mapping[str, LitPatch],
+    samples: Mapping[str, LitPatch],
+) -> tuple[UsableLights, UsableLights]:
+    """Return the LEDs and the lamps that can be used, by the rows of all lights."""
+    leds, lamps = part.protocol.leds, part.protocol.lamps
+
+    def of(names: Sequence[str], begin: int, kind: LightKind) -> UsableLights:
+        rows = range(begin, begin + len(names))
+        among = {name: spectra[name] for name in names}
+        own = [
+            {name: patch.under(rows) for name, patch in each.items()} for each in (cards, samples)
+        ]
+        usable = usable_lights(names, among, camera, white, own[0], own[1], kind)
+        return replace(usable, by_row={begin + row: name for row, name in usable.by_row.items()})
+
+    usable = of(leds, 0, "LED")
+    return usable, of(lamps, len(leds), "lamp") if lamps else UsableLights({}, (), (), {})
+
+
+def _lights(part: Part) -> dict[str, LedExposure]:
+    """Return the lights of the protocol by name, LEDs and lamps.
+
+    Raises
+    ------
+    UsageError
+        The rig file lacks one of them.
+    """
+    protocol = part.protocol
+    lights = led_exposures(part.rig, "rig.yaml", part.inputs.leds)
+    if unknown := [led for led in protocol.leds if led not in lights]:
+        raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
+    if not protocol.lamps:
+        return lights
+    lamps = illuminant_exposures(part.rig, "rig.yaml")
+    if unknown := [lamp for lamp in protocol.lamps if lamp not in lamps]:
+        raise UsageError(f"rig.yaml: expected lamps called {', '.join(unknown)}, got none")
+    return lights | {lamp: lamps[lamp] for lamp in protocol.lamps}
+
+
+def _per_led(
+    name: str, lit: LitPatch, system: FluorescenceSystem, only_leds: FluorescenceSystem
+) -> FluorescenceFit:
+    """Estimate a matrix by one LED by itself, and what it predicts under lamps, which come last."""
+    count = len(only_leds.exposures)
+    by_led = lit.under(range(count))
+    fit = fit_per_led(name, by_led.value, by_led.variance, only_leds)
+    scale = system.brightness[:, np.newaxis]
+    predicted = scale * system.values(fit.matrix.reflectance, fit.matrix.reradiation)
+    pull = (lit.value - predicted) / np.sqrt(lit.variance)
+    return replace(
+        fit,
+        predicted=np.concatenate([fit.predicted, predicted[count:]]),
+        pull=np.concatenate([fit.pull, pull[count:]]),
     )
 
 
@@ -214,15 +287,19 @@ def _patch(
         mixture=mixture_of(fit.matrix, is_extrapolated) if fit.fluorophores else None,
         direct=None if read is None else MatrixOnBands.of(read),
         under_lights=reradiation_under_lights(
-            joint, per_led, [exposure.light for exposure in system.exposures], direct
+            joint, per_led, [each.light for each in system.exposures if not each.is_lamp], direct
         ),
         differences=method_differences(joint.matrix, per_led.matrix, read),
     )
 
 
 def _extrapolated(system: FluorescenceSystem) -> BoolArray:
-    """Return which input bands no LED of known brightness lit, shape (i,)."""
-    known = system.response.absorbed[~system.is_loose]
+    """Return which input bands no LED of known brightness lit, shape (i,).
+
+    A lamp lights all of them, and tells their sum only.
+    """
+    is_lamp = np.array([exposure.is_lamp for exposure in system.exposures])
+    known = system.response.absorbed[~system.is_loose & ~is_lamp]
     return np.asarray(~(known > LIT * known.max(axis=1, keepdims=True)).any(axis=0))
 
 

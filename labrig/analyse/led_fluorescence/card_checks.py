@@ -1,12 +1,19 @@
-"""Whether card and samples show the LEDs that were to be lit, and only these."""
+"""Whether card and samples show the lights that were to be lit, and only these."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.analyse.led_fluorescence.lit_patches import SEEN_SIGMA, LitPatch, mean_of
-from labrig.fit.leds import match_channels
+from labrig.analyse.led_fluorescence.lit_patches import (
+    SEEN_SIGMA,
+    LightKind,
+    LitPatch,
+    mean_of,
+)
+from labrig.analyse.led_fluorescence.warnings import exchanged_warnings, one_of
+from labrig.fit.leds import ChannelMatch, match_channels
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 from labrig.results import FloatArray
 
@@ -21,7 +28,7 @@ GOES_OFF = 0.02
 
 @dataclass(frozen=True)
 class UnusedLed:
-    """An LED whose frames are left out.
+    """An LED, or a lamp, whose frames are left out.
 
     Attributes
     ----------
@@ -30,12 +37,61 @@ class UnusedLed:
     reason
         What card or samples show, and what to do.
     light
-        The LED that is lit in its place, None if none is known.
+        The one that is lit in its place, None if none is known.
     """
 
     led: str
     reason: str
     light: str | None = None
+
+
+@dataclass(frozen=True)
+class UsableLights:
+    """Lights of a kind of which there are frames that can be used.
+
+    Attributes
+    ----------
+    by_row
+        The light that was lit, which need not be the one that was to be, by the row of its frames.
+    left_out
+        A line for each reason to leave others out.
+    exchanged
+        Lines on lights that have only changed places.
+    light_of
+        The light that is lit in the place of each of these.
+    """
+
+    by_row: Mapping[int, str]
+    left_out: Sequence[str]
+    exchanged: Sequence[str]
+    light_of: Mapping[str, str]
+
+    @property
+    def warnings(self) -> list[str]:
+        """All lines."""
+        return [*self.left_out, *self.exchanged]
+
+
+def usable_lights(
+    names: Sequence[str],
+    spectra: Mapping[str, Spectrum],
+    camera: CameraResponse,
+    white: Transmittance,
+    cards: Mapping[str, LitPatch],
+    samples: Mapping[str, LitPatch],
+    kind: LightKind = "LED",
+) -> UsableLights:
+    """Return the lights of a kind that can be used; parameters are those of `unused_leds`."""
+    unused = list(unused_leds(names, spectra, camera, white, cards, samples, kind))
+    light_of = exchanged(unused)
+    unused = [one for one in unused if one.led not in light_of]
+    out = {one.led for one in unused}
+    return UsableLights(
+        {row: light_of.get(name, name) for row, name in enumerate(names) if name not in out},
+        lines_of(unused),
+        list(exchanged_warnings(light_of, kind)),
+        light_of,
+    )
 
 
 def lines_of(unused: Sequence[UnusedLed]) -> list[str]:
@@ -61,19 +117,22 @@ def unused_leds(
     white: Transmittance,
     cards: Mapping[str, LitPatch],
     samples: Mapping[str, LitPatch],
+    kind: LightKind = "LED",
 ) -> Iterator[UnusedLed]:
-    """Yield the LEDs that cannot be used, by the light of card and samples under each.
+    """Yield the lights of a kind that cannot be used, by card and samples under each.
 
     Parameters
     ----------
     leds
-        Names of the LEDs, in the order of the patches' rows.
+        Names of the lights, in the order of the patches' rows.
     spectra
         Their spectra.
     camera, white
         Curves of the camera, and reflectance of the card.
     cards, samples
         Values of the card in the place of each patch, and of the patches.
+    kind
+        What the lights are called in messages.
     """
     card = mean_of(cards)
     lit = card.without_rest()
@@ -87,44 +146,49 @@ def unused_leds(
     def at(row: int) -> tuple[FloatArray, FloatArray]:
         return lit.value[row], lit.variance[row]
 
+    matches: dict[str, ChannelMatch] = {}
     for row, led in enumerate(leds):
-        if reason := _unlit(row, "card", cards, needs_light=bool(is_visible[row])):
+        needs_light = bool(is_visible[row])
+        reason = _unlit(row, "card", cards, kind, needs_light=needs_light)
+        reason = reason or _unlit(row, "samples", samples, kind, needs_light=needs_light)
+        if reason is not None:
             yield UnusedLed(led, reason)
         elif not is_visible[row]:
             if lit.is_seen[row] and brightest[row] > TOO_BRIGHT * usual:
                 match = match_channels(visible[0], *at(row), of_visible, camera, white)
                 best = min(match.chi2, key=lambda name: match.chi2[name])
-                yield _odd(led, None if match.is_odd(best) else best, None)
-        elif reason := _unlit(row, "samples", samples, needs_light=True):
-            yield UnusedLed(led, reason)
+                yield _odd(led, None if match.is_odd(best) else best, None, kind)
         else:
-            match = match_channels(led, *at(row), spectra, camera, white)
-            if match.is_odd(led):
-                yield _odd(led, match.other(led), match.pair)
+            matches[led] = match_channels(led, *at(row), spectra, camera, white)
+    odd = {led: match.other(led) for led, match in matches.items() if match.is_odd(led)}
+    for led, other in odd.items():
+        yield _odd(led, other, matches[led].pair, kind)
+        if other in matches and other not in odd and _is_rather(matches[other], led, other):
+            yield _odd(other, led, None, kind)
 
 
 def _unlit(
-    row: int, what: str, patches: Mapping[str, LitPatch], *, needs_light: bool
+    row: int, what: str, patches: Mapping[str, LitPatch], kind: LightKind, *, needs_light: bool
 ) -> str | None:
-    """Return what is amiss with the light of an LED on the patches, None if nothing is."""
+    """Return what is amiss with a light on the patches, None if nothing is."""
     if any(patch.is_clipped[row] for patch in patches.values()):
         return (
-            f"frames of the {what} clip at the shortest exposure; dim the LED, lower camera.iso or "
-            "close the aperture"
+            f"frames of the {what} clip at the shortest exposure; dim the {kind}, lower camera.iso "
+            "or close the aperture"
         )
     if any(patch.is_off_clipped[row] for patch in patches.values()):
         return (
-            f"frames of the {what} clip with all LEDs off; an LED stays lit, or another light is "
-            "on: check the LEDs' relays, darken the room"
+            f"frames of the {what} clip with all {kind}s off; {one_of(kind)} stays lit, or another "
+            f"light is on: check the {kind}s' relays, darken the room"
         )
     if not needs_light:
         return None
     if not any(patch.is_seen[row] for patch in patches.values()):
-        return f"frames of the {what} are dark; the LED did not light: check its plug"
+        return f"frames of the {what} are dark; the {kind} did not light: check its plug"
     if not any(_goes_off(patch, row) for patch in patches.values()):
         return (
-            f"frames of the {what} are as bright with all LEDs off; the LED did not light or stays "
-            "lit: check its plug and its relay"
+            f"frames of the {what} are as bright with all {kind}s off; the {kind} did not light or "
+            "stays lit: check its plug and its relay"
         )
     return None
 
@@ -135,23 +199,33 @@ def _goes_off(patch: LitPatch, row: int) -> bool:
     return bool((part & (light.value[row] > SEEN_SIGMA * np.sqrt(light.variance[row]))).any())
 
 
-def _odd(led: str, other: str | None, pair: str | None) -> UnusedLed:
+def _is_rather(match: ChannelMatch, led: str, named: str) -> bool:
+    """Return whether a light is that of an LED rather than of the one named, if not clearly so.
+
+    Broadband lamps differ by less than the errors of a camera's curves, but one whose light is seen
+    elsewhere is not in its own place.
+    """
+    return match.chi2.get(led, math.inf) < match.chi2[named]
+
+
+def _odd(led: str, other: str | None, pair: str | None, kind: LightKind) -> UnusedLed:
     if other is not None:
         reason = (
-            f"the card has the colour of {other}; correct the order of the LEDs in the rig file"
+            f"the card has the colour of {other}; correct the order of the {kind}s in the rig file"
         )
     elif pair is not None:
-        reason = f"the card has the colour of two LEDs, {pair} is lit, too; check their relays"
+        reason = f"the card has the colour of two {kind}s, {pair} is lit, too; check their relays"
     else:
+        keys = "'centre' and 'fwhm'" if kind == "LED" else "'spectrum' and 'filter'"
         reason = (
-            "the card has another colour than under this LED; correct its 'centre' and 'fwhm' in "
-            "the rig file"
+            f"the card has another colour than under this {kind}; correct its {keys} in the rig "
+            "file"
         )
     return UnusedLed(led, reason, other)
 
 
 def _expected(spectrum: Spectrum, camera: CameraResponse, white: Transmittance) -> FloatArray:
-    """Return the card's value in each channel under the LED, shape (k,)."""
+    """Return the card's value in each channel under a light, shape (k,)."""
     nm = camera.wavelength_nm
     light = spectrum.at(nm) * white.at(nm)
     power = np.trapezoid(spectrum.value, spectrum.wavelength_nm)

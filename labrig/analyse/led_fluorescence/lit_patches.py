@@ -1,7 +1,8 @@
-"""Values of patches under LEDs, from brackets of frames with and without light."""
+"""Values of patches under LEDs or lamps, from brackets of frames with and without light."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -9,11 +10,14 @@ from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.errors import DataError
-from labrig.protocols.led_fluorescence import LedFrames
 from labrig.protocols.steps.led_scenes import AGAIN
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches
+from labrig.region import Region
 from labrig.results import BoolArray, FloatArray, Measured, Series
+
+#: What lights are called in messages; both kinds together are lights.
+LightKind = Literal["LED", "lamp", "light"]
 
 #: Significance in σ from which a light is seen.
 SEEN_SIGMA = 5.0
@@ -24,7 +28,7 @@ LEAST_OWN = 0.01
 
 @dataclass(frozen=True, eq=False)
 class LitPatch:
-    """Values of one patch under m LEDs, in k channels.
+    """Values of one patch under m lights, LEDs or lamps, in k channels.
 
     Attributes
     ----------
@@ -33,12 +37,12 @@ class LitPatch:
     flicker
         Relative σ by flicker that all channels and all patches have in common, shape (m,).
     off, off_sigma
-        Values in DN/s just after each LED, and their σ, shape (m, k).
+        Values in DN/s just after each light, and their σ, shape (m, k).
     is_clipped, is_off_clipped
-        Whether even the shortest exposures were clipped, and whether those without the LED were,
+        Whether even the shortest exposures were clipped, and whether those without the light were,
         shape (m,).
     bleaching
-        Value under the first LED at the end of the run over that at its begin; None if it was not
+        Value under the first light at the end of the run over that at its begin; None if it was not
         lit again.
     """
 
@@ -58,8 +62,15 @@ class LitPatch:
         return np.maximum(own, LEAST_OWN * self.variance)
 
     @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the channels under each light, shape (m, k, k)."""
+        common = self.flicker[:, np.newaxis] * self.value
+        own = self.own_variance[:, :, np.newaxis] * np.eye(self.value.shape[1])
+        return np.asarray(own + common[:, :, np.newaxis] * common[:, np.newaxis, :])
+
+    @property
     def is_left(self) -> BoolArray:
-        """Whether light is left when the LED is off, shape (m, k)."""
+        """Whether light is left when the light is off, shape (m, k)."""
         return np.asarray(self.off > SEEN_SIGMA * self.off_sigma)
 
     @property
@@ -68,7 +79,7 @@ class LitPatch:
         return np.asarray((self.value > SEEN_SIGMA * np.sqrt(self.variance)).any(axis=1))
 
     def without_rest(self) -> "LitPatch":
-        """Return the values without the light that is left when the LED is off, if there is any."""
+        """Return the values without what is left when the light is off, if there is any."""
         return replace(
             self,
             value=np.where(self.is_left, self.value - self.off, self.value),
@@ -76,7 +87,7 @@ class LitPatch:
         )
 
     def under(self, rows: Sequence[int]) -> "LitPatch":
-        """Return the values under some of the LEDs."""
+        """Return the values under some of the lights."""
         return LitPatch(
             self.value[rows],
             self.variance[rows],
@@ -89,7 +100,7 @@ class LitPatch:
         )
 
     def times(self, factor: FloatArray, relative_variance: FloatArray) -> "LitPatch":
-        """Return the values under each LED times a factor with an error, each shape (m,)."""
+        """Return the values under each light times a factor with an error, each shape (m,)."""
         by = factor[:, np.newaxis]
         value = self.value * by
         variance = self.variance * by**2 + value**2 * relative_variance[:, np.newaxis]
@@ -97,8 +108,30 @@ class LitPatch:
         return replace(self, value=value, variance=variance, off=off, off_sigma=off_sigma)
 
 
-def lit_patches(part: Part, role: LedFrames, begin: str) -> dict[str, LitPatch]:
-    """Return each patch under all LEDs, in the protocol's order of them.
+def lit_patches(
+    part: Part,
+    role: str,
+    begin: str,
+    lights: Sequence[str],
+    first: str | None = None,
+    patches: Mapping[str, Region] | None = None,
+) -> dict[str, LitPatch]:
+    """Return each patch under all lights, in their order.
+
+    Parameters
+    ----------
+    part
+        The run.
+    role
+        Role of the frames with a light on; `-off` is added for those with all lights off.
+    begin
+        Begin of the names of the units, which end with the light.
+    lights
+        Names of the lights.
+    first
+        Light under which the patches were photographed once more at the end; None for none.
+    patches
+        Regions of the patches; None for those of the protocol.
 
     Raises
     ------
@@ -107,11 +140,11 @@ def lit_patches(part: Part, role: LedFrames, begin: str) -> dict[str, LitPatch]:
     """
     camera = part.inputs.camera
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
-    lit, left = _series(part, role), _series(part, LedFrames(f"{role}-off"))
-    units = [f"{begin}{led}" for led in part.protocol.leds]
-    first = part.protocol.shuffled()[0]
+    lit, left = (_series(part, each, patches) for each in (role, f"{role}-off"))
+    units = [f"{begin}{light}" for light in lights]
+    again = None if first is None else (f"{begin}{first}", f"{AGAIN}{first}")
     return {
-        name: _lit_patch(part, series, left[name], units, (f"{begin}{first}", first), flicker)
+        name: _lit_patch(part, series, left[name], units, again, flicker)
         for name, series in lit.items()
     }
 
@@ -130,7 +163,7 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
     )
 
 
-def _series(part: Part, role: str) -> dict[str, Series]:
+def _series(part: Part, role: str, patches: Mapping[str, Region] | None) -> dict[str, Series]:
     run, camera = part.run, part.inputs.camera
     frames = steady_frames(run, part.overrides, role)
     if not frames:
@@ -140,7 +173,8 @@ def _series(part: Part, role: str) -> dict[str, Series]:
         )
     require_calibrated_camera(camera, run, run.frames(role))
     darks = steady_frames(run, part.overrides, FrameRole.DARK)
-    return reduce_patches(frames, part.overrides.patches(part.protocol), darks, camera=camera)
+    regions = part.overrides.patches(part.protocol) if patches is None else patches
+    return reduce_patches(frames, regions, darks, camera=camera)
 
 
 def _lit_patch(
@@ -148,7 +182,7 @@ def _lit_patch(
     series: Series,
     left: Series,
     units: Sequence[str],
-    first: tuple[str, str],
+    again: tuple[str, str] | None,
     flicker: float,
 ) -> LitPatch:
     lit = {unit.unit[0]: _merged(unit, flicker) for unit in series.by_unit()}
@@ -160,12 +194,13 @@ def _lit_patch(
             f"{part.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
             f"resume {part.run.folder}"
         )
-    again = lit.get(f"{AGAIN}{first[1]}")
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
-    bleaching = None if again is None else _ratio(again, lit[first[0]])
     value, variance, is_clipped, common = columns
     dark, dark_sigma, is_off_clipped = offs
+    bleaching = None
+    if again is not None and again[1] in lit:
+        bleaching = _ratio(lit[again[1]], lit[again[0]])
     return LitPatch(
         value, variance, dark, dark_sigma, is_clipped, is_off_clipped, common, bleaching
     )

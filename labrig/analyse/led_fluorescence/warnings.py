@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from labrig.analyse.led_fluorescence.lit_patches import LitPatch
+from labrig.analyse.led_fluorescence.lit_patches import LightKind, LitPatch
 from labrig.errors import DataError
 from labrig.fit.fluorescence import (
     ExtrapolatedExcitation,
@@ -23,20 +23,22 @@ LEFT = 0.002
 BLEACHED, BLEACHED_SIGMA = 0.02, 3.0
 
 
-def exchanged_warnings(places: Mapping[str, str]) -> Iterator[str]:
-    """Yield a line if LEDs are lit in one another's places, by the LED that is lit for each."""
+def exchanged_warnings(places: Mapping[str, str], kind: LightKind = "LED") -> Iterator[str]:
+    """Yield a line if lights are lit in one another's places, by the one that is lit for each."""
     if places:
-        which = ", ".join(f"{light} for {led}" for led, light in places.items())
+        which = ", ".join(f"{light} for {name}" for name, light in places.items())
         yield (
-            f"{', '.join(places)}: expected LEDs in the order of their names, got others by the "
-            f"card's colour ({which}); the frames count as those of the LED that was lit: correct "
-            "the rig file before the next run"
+            f"{', '.join(places)}: expected {kind}s in the order of their names, got others by the "
+            f"card's colour ({which}); the frames count as those of the {kind} that was lit: "
+            "correct the rig file before the next run"
         )
 
 
-def left_warnings(what: str, patches: Mapping[str, LitPatch], leds: Sequence[str]) -> Iterator[str]:
-    """Yield a line if patches are bright after some LED."""
-    counted, most = np.zeros(len(leds), dtype=np.bool_), {}
+def left_warnings(
+    what: str, patches: Mapping[str, LitPatch], lights: Sequence[str], kind: LightKind = "LED"
+) -> Iterator[str]:
+    """Yield a line if patches are bright after some light of a kind."""
+    counted, most = np.zeros(len(lights), dtype=np.bool_), {}
     for name, patch in patches.items():
         brightest = patch.value.max(axis=1, keepdims=True)
         counts = patch.is_left & (patch.off > LEFT * brightest)
@@ -44,13 +46,18 @@ def left_warnings(what: str, patches: Mapping[str, LitPatch], leds: Sequence[str
             most[name] = float((patch.off / brightest)[counts].max())
             counted |= counts.any(axis=1)
     if most:
-        which = ", ".join(led for led, counts in zip(leds, counted, strict=True) if counts)
+        which = ", ".join(name for name, counts in zip(lights, counted, strict=True) if counts)
         worst = max(most, key=lambda name: most[name])
         yield (
-            f"{what}: with all LEDs off there was light after {which}, up to {most[worst]:.1%} of "
-            f"that with the LED ({worst}); it is subtracted: something glows, another light is on, "
-            "or an LED stays lit"
+            f"{what}: with all {kind}s off there was light after {which}, up to {most[worst]:.1%} "
+            f"of that with the {kind} ({worst}); it is subtracted: something glows, another light "
+            f"is on, or {one_of(kind)} stays lit"
         )
+
+
+def one_of(kind: LightKind) -> str:
+    """Return a kind of light with its article."""
+    return f"an {kind}" if kind == "LED" else f"a {kind}"
 
 
 def bleaching_warnings(name: str, bleaching: Measured | None) -> Iterator[str]:

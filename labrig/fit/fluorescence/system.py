@@ -71,6 +71,9 @@ class Exposure:
     width_sigma, skew_sigma
         Standard deviations of width and skew, as `labrig.fit.leds.changed_spectrum` has them, of a
         spectrum that is a curve by peak and width only.
+    spectrum_error
+        Error of its spectrum's shape, smooth over wavelength, as of a lamp that is another one than
+        that of the file; None for none.
     """
 
     light: Spectrum
@@ -79,6 +82,7 @@ class Exposure:
     wavelength_sigma_nm: float = 0.0
     width_sigma: float = 0.0
     skew_sigma: float = 0.0
+    spectrum_error: CurveError | None = None
 
     def changes(self) -> Iterator[tuple[float, Spectrum, Spectrum]]:
         """Yield, of each error of shape, σ over two steps, and spectra a step ahead and behind."""
@@ -91,6 +95,11 @@ class Exposure:
     def _changed(self, kind: int, step: float) -> Spectrum:
         shift_nm, wider, skew = (step if number == kind else 0.0 for number in range(3))
         return changed_spectrum(self.light, shift_nm, 1 + wider, skew)
+
+    @property
+    def is_lamp(self) -> bool:
+        """Whether it is a lamp whose spectrum is another one's: it tells sums over bands only."""
+        return self.spectrum_error is not None
 
     def __post_init__(self) -> None:
         name = self.light.name
@@ -174,8 +183,11 @@ class FluorescenceSystem:
 
     @property
     def is_lit(self) -> np.ndarray:
-        """Whether some light is strong in an input band, relative to its strongest one, (i,)."""
-        absorbed = self.response.absorbed
+        """Whether some light is strong in an input band, relative to its strongest one, (i,).
+
+        Lamps do not count.
+        """
+        absorbed = self.response.absorbed[[not each.is_lamp for each in self.exposures]]
         return np.asarray((absorbed > LIT * absorbed.max(axis=1, keepdims=True)).any(axis=0))
 
     def values(self, reflectance: FloatArray, reradiation: FloatArray) -> FloatArray:
@@ -350,7 +362,7 @@ def fluorescence_system(
     Parameters
     ----------
     exposures
-        The lights, two or more.
+        The lights, one or more; an estimate needs two.
     camera
         The camera, with its curves on their own wavelengths.
     curve_error
@@ -366,7 +378,7 @@ def fluorescence_system(
     Raises
     ------
     UsageError
-        There are fewer than two lights, a light lies outside of the input bands, or the camera's
+        There are no lights, a light lies outside of the input bands, or the camera's
         curves lie outside of the output bands.
 
     Examples
@@ -382,11 +394,8 @@ def fluorescence_system(
     ((3, 3), [0.015, 0.198, 0.048])
     """
     inputs, outputs = (np.asarray(nm, dtype=np.float64) for nm in (input_nm, output_nm))
-    if len(exposures) < 2:
-        raise UsageError(
-            f"expected two or more lights, got {len(exposures)}: one light tells nothing of what "
-            "others excite; photograph the surface under more"
-        )
+    if not exposures:
+        raise UsageError("expected one or more lights, got none")
     in_edges, out_edges = edges_from_centres(inputs), edges_from_centres(outputs)
     low_nm, high_nm = camera.wavelength_nm[[0, -1]]
     if high_nm <= out_edges[0] or low_nm >= out_edges[-1]:
@@ -408,6 +417,10 @@ def fluorescence_system(
     hats = hat_functions(outputs, np.clip(nodes, outputs[0], outputs[-1]))
     in_output = np.asarray(
         (nodes[:, np.newaxis] >= out_edges[:-1]) & (nodes[:, np.newaxis] < out_edges[1:]),
+        dtype=np.float64,
+    )
+    in_input = np.asarray(
+        (nodes[:, np.newaxis] >= in_edges[:-1]) & (nodes[:, np.newaxis] < in_edges[1:]),
         dtype=np.float64,
     )
     curves = camera.at(nodes)
@@ -444,6 +457,15 @@ def fluorescence_system(
             moved.reflected[number] = per_step * reflected(power[np.newaxis], curves)[0]
             moved.absorbed[number] = per_step * (absorbed(ahead) - absorbed(behind))
             modes.append(moved)
+        light = lights[number][:, np.newaxis]
+        for change in curve_modes(exposure.spectrum_error, nodes, light, light.max(axis=0)):
+            bent = _Response(
+                np.zeros_like(response.reflected), np.zeros_like(response.absorbed),
+                np.zeros_like(response.seen),
+            )  # fmt: skip
+            bent.reflected[number] = reflected(change.T, curves)[0]
+            bent.absorbed[number] = (weights * change[:, 0]) @ in_input
+            modes.append(bent)
     brightness = np.array([exposure.brightness for exposure in exposures])
     relative = np.array([exposure.brightness_sigma for exposure in exposures]) / brightness
     for number in np.flatnonzero((relative > 0) & (relative <= LOOSE)).tolist():
@@ -488,7 +510,12 @@ def checked_values(
 
 
 def require_scale(system: FluorescenceSystem) -> None:
-    """Raise UsageError if no light has a known brightness."""
+    """Raise UsageError if there are fewer than two lights, or none has a known brightness."""
+    if len(system.exposures) < 2:
+        raise UsageError(
+            f"expected two or more lights, got {len(system.exposures)}: one light tells nothing of "
+            "what others excite; photograph the surface under more"
+        )
     if system.is_loose.all():
         raise UsageError(
             "expected one light or more of known brightness, got none; photograph a white "

@@ -299,3 +299,42 @@ def test_a_method_is_refused_where_there_is_none_to_choose() -> None:
     assert "\n" not in str(no.value)
     with pytest.raises(UsageError, match="expected joint or per-led, got 'thesis'"):
         Overrides.parse([], [], method="thesis")
+
+
+def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Path) -> None:
+    patches = {name: QUICK["patches"][name] for name in ("yellow", "felt")}
+    asked = FEW | {"lamps": ["halogen"], "patches": patches, "repeats": 1}
+    run = record(tmp_path, asked)
+    done = process_and_report(run)
+    part, result = part_of(run), done.result
+    assert isinstance(result, LedFluorescenceResult)
+    assert_read_back(result)
+    assert "LED or lamp" in done.report.read_text()
+    assert result.leds == ("430 nm", "455 nm", "530 nm", "625 nm", "halogen")
+    assert result.lamps == ("halogen",)
+    assert all("and 400 nm where no LED" not in line for line in result.warnings), "lamps tell sums"
+    yellow, felt = result.patches["yellow"], result.patches["felt"]
+    assert yellow.value.shape == (5, 3)
+    assert len(yellow.dyes) == 1
+    assert not felt.dyes
+    assert yellow.is_extrapolated.any(), "a lamp does not count as light of a wavelength"
+    assert [each.light for each in yellow.under_lights] == list(result.leds[:4])
+    assert yellow.under_lights[0].per_led.sigma is None
+
+    by_led = analyse(replace(part, overrides=Overrides(method="per-led"))).patches["yellow"]
+    np.testing.assert_array_equal(by_led.matrix.reradiation, yellow.per_led.reradiation)
+    without = part.protocol.model_copy(update={"lamps": ()})
+    alone = analyse(replace(part, protocol=without)).patches["yellow"]
+    np.testing.assert_allclose(by_led.matrix.reradiation, alone.per_led.reradiation)
+    assert by_led.predicted.shape == by_led.pull.shape == (5, 3)
+
+
+def test_a_lamp_that_does_not_light_is_left_out_and_the_leds_go_on(tmp_path: Path) -> None:
+    def unplugged(rig: dict[str, Any]) -> None:
+        rig["devices"]["illuminants"]["lamps"]["halogen"]["relay"] = 7
+
+    asked = FEW | {"lamps": ["halogen"], "repeats": 1}
+    result = analyse(part_of(record(tmp_path, asked, unplugged)))
+    assert result.leds == ("430 nm", "455 nm", "530 nm", "625 nm")
+    assert _said(result, "halogen: left out, frames of the card are dark; the lamp did not light")
+    assert _is_felt(result)
