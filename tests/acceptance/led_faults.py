@@ -115,7 +115,7 @@ CASES = (
         {
             "led_fluorescence": "card: with all LEDs off there was light",
             "led_brightness": "with all LEDs off there was light",
-            "direct_bispectral": "white: with all LEDs off the light was another",
+            "direct_bispectral": "with all lights off the spectrometer sees light",
         },
     ),
     Case(

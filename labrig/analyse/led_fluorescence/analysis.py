@@ -81,62 +81,29 @@ def analyse(part: Part) -> LedFluorescenceResult:
     DataError
         Frames are missing or damaged, or fewer than two LEDs can be used.
     """
-    names = [*part.protocol.leds, *part.protocol.lamps]
     lights = _lights(part)
-    spectra = {led: replace(lights[led].light, name=led) for led in names}
-    peak_nm = {
-        led: float(light.wavelength_nm[light.value.argmax()]) for led, light in spectra.items()
-    }
     camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
-    first = part.protocol.shuffled()[0]
-    cards = lit_patches(part, LedFrames.CARD, CARD, names)
-    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE, names, first)
-    usable, usable_lamps = _usable(part, spectra, camera, white, cards, samples)
-    warnings = [*usable.warnings, *usable_lamps.warnings]
-    if part.rig.optics.may_see_gloss:
-        warnings.append(
-            f"at {part.rig.optics.geometry_text} a surface's gloss reaches the camera, and is in "
-            "the reflectance: light from 45°, or cross polarisers"
-        )
-    kind: LightKind = "light" if part.protocol.lamps else "LED"
-    warnings += [
-        *left_warnings("card", cards, names, kind),
-        *left_warnings("samples", samples, names, kind),
-    ]
-    if len(usable.by_row) < 2:
-        raise DataError(
-            f"expected two LEDs or more that can be used, got {len(usable.by_row)}: "
-            f"{'; '.join(usable.left_out)}"
-        )
-    # LEDs come first, each by rising peak.
-    rows = [
-        row
-        for each in (usable, usable_lamps)
-        for row in sorted(each.by_row, key=lambda row: peak_nm[each.by_row[row]])
-    ]
-    light_of = {**usable.by_row, **usable_lamps.by_row}
-    used, by_led = [light_of[row] for row in rows], range(len(usable.by_row))
-    has_first = names.index(first) in rows
-    cards = {name: card.under(rows).without_rest() for name, card in cards.items()}
-    card = mean_of(cards)
-    system = lit_system([lights[led] for led in used], camera, white, card)
+    lit = _lit(part, lights, camera, white)
+    warnings = list(lit.warnings)
+    card = mean_of(lit.cards)
+    system = lit_system([lights[led] for led in lit.used], camera, white, card)
     only_leds = system
-    if usable_lamps.by_row:
-        of_leds = [lights[led] for led in used[: len(by_led)]]
+    if lit.lamps:
+        by_led = range(len(lit.used) - len(lit.lamps))
+        of_leds = [lights[lit.used[row]] for row in by_led]
         only_leds = lit_system(of_leds, camera, white, card.under(by_led))
     # Frames show all samples at once, but not the card.
-    flicker = np.hypot(card.flicker, mean_of(samples).under(rows).flicker)
+    flicker = np.hypot(card.flicker, mean_of(lit.samples).flicker)
     named = part.rig.optics.emission_library
     library = () if named is None else read_emissions(named)
     estimator = JointEstimator(system.with_drift(flicker), library)
     method: EstimateMethod = part.overrides.method or part.protocol.method
     direct = direct_measurement(part.rig)
     if direct is not None:
-        warnings += missing_samples(direct, samples)
+        warnings += missing_samples(direct, lit.samples)
     patches = {}
-    for number, name in enumerate(samples):
-        sample = samples[name].under(rows).without_rest()
-        even = sample.times(*_evenness(cards[name], card, system))
+    for number, (name, sample) in enumerate(lit.samples.items()):
+        even = sample.times(*_evenness(lit.cards[name], card, system))
         estimates = _Estimates(
             estimator.fit(name, even.value, even.own_variance, seed=number),
             _per_led(name, even, system, only_leds),
@@ -146,19 +113,101 @@ def analyse(part: Part) -> LedFluorescenceResult:
         warnings += fact_warnings(name, estimates.chosen, camera.channels)
         if method == "per-led":
             warnings += per_led_warnings(name, estimates.chosen)
-        if has_first:
+        if lit.has_first:
             warnings += bleaching_warnings(name, even.bleaching)
     return LedFluorescenceResult(
-        leds=tuple(used),
-        led_peak_nm=np.array([peak_nm[led] for led in used]),
+        leds=lit.used,
+        led_peak_nm=lit.peak_nm,
         channels=camera.channels,
         brightness=system.brightness,
         is_brightness_known=~system.is_loose,
-        uv_scale=_uv_scale([peak_nm[led] for led in used], system),
+        uv_scale=_uv_scale(lit.peak_nm, system),
         patches=patches,
         run=part.run.folder.resolve().name,
         geometry=part.rig.optics.geometry_text,
-        lamps=tuple(used[len(by_led) :]),
+        lamps=lit.lamps,
+        warnings=tuple(warnings),
+    )
+
+
+@dataclass(frozen=True)
+class _Lit:
+    """Card and samples under the lights that can be used.
+
+    Attributes
+    ----------
+    used, lamps
+        Names of the lights, LEDs first, each by rising peak; and of the lamps among them.
+    peak_nm
+        Their peaks in nm, shape (m,).
+    cards, samples
+        Values of the card in the place of each sample, and of the samples, under these lights and
+        without the light that is left when they are off.
+    has_first
+        Whether the LED is among them that was lit again at the end.
+    warnings
+        What is amiss with the light.
+    """
+
+    used: tuple[str, ...]
+    lamps: tuple[str, ...]
+    peak_nm: FloatArray
+    cards: Mapping[str, LitPatch]
+    samples: Mapping[str, LitPatch]
+    has_first: bool
+    warnings: tuple[str, ...]
+
+
+def _lit(
+    part: Part,
+    lights: Mapping[str, LedExposure],
+    camera: CameraResponse,
+    white: Transmittance,
+) -> _Lit:
+    """Return card and samples under the lights that can be used.
+
+    Raises
+    ------
+    DataError
+        Fewer than two LEDs can be used.
+    """
+    names = [*part.protocol.leds, *part.protocol.lamps]
+    spectra = {led: replace(lights[led].light, name=led) for led in names}
+    first = part.protocol.shuffled()[0]
+    cards = lit_patches(part, LedFrames.CARD, CARD, names)
+    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE, names, first)
+    leds, lamps = _usable(part, spectra, camera, white, cards, samples)
+    if len(leds.by_row) < 2:
+        raise DataError(
+            f"expected two LEDs or more that can be used, got {len(leds.by_row)}: "
+            f"{'; '.join(leds.left_out)}"
+        )
+    warnings = [*leds.warnings, *lamps.warnings]
+    if part.rig.optics.may_see_gloss:
+        warnings.append(
+            f"at {part.rig.optics.geometry_text} a surface's gloss reaches the camera, and is in "
+            "the reflectance: light from 45°, or cross polarisers"
+        )
+    kind: LightKind = "light" if part.protocol.lamps else "LED"
+    for what, patches in (("card", cards), ("samples", samples)):
+        warnings += left_warnings(what, patches, names, kind)
+    peak_nm = {
+        led: float(light.wavelength_nm[light.value.argmax()]) for led, light in spectra.items()
+    }
+    rows = [
+        row
+        for each in (leds, lamps)
+        for row in sorted(each.by_row, key=lambda row: peak_nm[each.by_row[row]])
+    ]
+    light_of = {**leds.by_row, **lamps.by_row}
+    used = tuple(light_of[row] for row in rows)
+    return _Lit(
+        used=used,
+        lamps=used[len(leds.by_row) :],
+        peak_nm=np.array([peak_nm[led] for led in used]),
+        cards={name: card.under(rows).without_rest() for name, card in cards.items()},
+        samples={name: sample.under(rows).without_rest() for name, sample in samples.items()},
+        has_first=names.index(first) in rows,
         warnings=tuple(warnings),
     )
 
@@ -353,9 +402,9 @@ def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) 
 
 
 def _uv_scale(
-    peaks_nm: Sequence[float], system: FluorescenceSystem
+    peaks_nm: FloatArray, system: FluorescenceSystem
 ) -> Literal["measured", "unknown", "none"]:
-    is_uv = np.array(peaks_nm) < ULTRAVIOLET_NM
+    is_uv = peaks_nm < ULTRAVIOLET_NM
     if not is_uv.any():
         return "none"
     return "unknown" if system.is_loose[is_uv].any() else "measured"
