@@ -1,12 +1,9 @@
 """Result and page of a comparison of sets of LEDs."""
 
-from importlib.metadata import version
 from pathlib import Path
 
-from labrig.errors import DiskError
-from labrig.process.provenance import library_versions
-from labrig.record import RunDescription
-from labrig.report import ComparedLeds, led_study_report, write_report
+from labrig.process.without_run import describe_without_run, write_with_report
+from labrig.report import ComparedLeds, led_study_report
 
 
 def report_led_study(compared: ComparedLeds, command: str, folder: Path) -> Path:
@@ -43,23 +40,8 @@ def report_led_study(compared: ComparedLeds, command: str, folder: Path) -> Path
     >>> report_led_study(compared, "labrig leds study --number 3", Path("leds")).as_posix()
     'leds/report.html'
     """
-    about = RunDescription(
-        title="How many LEDs, and where",
-        protocol="led_study",
-        run=compared.of_surfaces,
-        started="",
-        ended="",
-        rig="",
-        simulated=False,
-        labrig_version=version("labrig"),
-        libraries=tuple(library_versions().items()),
-        sample=(("Command", command),),
+    about = describe_without_run(
+        "How many LEDs, and where", "led_study", compared.of_surfaces, [("Command", command)]
     )
-    report = folder / "report.html"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "led_study.json").write_text(compared.to_json() + "\n", encoding="utf-8")
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
-    write_report(report, led_study_report(compared, about))
-    return report
+    page = led_study_report(compared, about)
+    return write_with_report(folder, "led_study.json", compared.to_json(), page)

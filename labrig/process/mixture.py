@@ -1,13 +1,10 @@
 """Result and report of a mixture that stands for a re-radiation matrix."""
 
 import hashlib
-from importlib.metadata import version
 from pathlib import Path
 
-from labrig.errors import DiskError
-from labrig.process.provenance import library_versions
-from labrig.record import RunDescription
-from labrig.report import FittedMatrix, mixture_report, write_report
+from labrig.process.without_run import describe_without_run, write_with_report
+from labrig.report import FittedMatrix, mixture_report
 
 
 def report_mixture(file: Path, fitted: FittedMatrix, command: str, folder: Path) -> Path:
@@ -47,26 +44,9 @@ def report_mixture(file: Path, fitted: FittedMatrix, command: str, folder: Path)
     >>> report_mixture(Path("paper.csv"), fitted, command, Path("mixture")).as_posix()
     'mixture/report.html'
     """
-    about = RunDescription(
-        title=fitted.matrix.name,
-        protocol="mixture",
-        run=file.name,
-        started="",
-        ended="",
-        rig="",
-        simulated=False,
-        labrig_version=version("labrig"),
-        libraries=tuple(library_versions().items()),
-        sample=(
-            ("SHA-256", hashlib.sha256(file.read_bytes()).hexdigest()),
-            ("Command", command),
-        ),
-    )
-    report = folder / "report.html"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "fit.json").write_text(fitted.to_json() + "\n", encoding="utf-8")
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
-    write_report(report, mixture_report(fitted, about))
-    return report
+    sample = [
+        ("SHA-256", hashlib.sha256(file.read_bytes()).hexdigest()),
+        ("Command", command),
+    ]
+    about = describe_without_run(fitted.matrix.name, "mixture", file.name, sample)
+    return write_with_report(folder, "fit.json", fitted.to_json(), mixture_report(fitted, about))

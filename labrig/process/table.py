@@ -12,7 +12,7 @@ from labrig.analyse import FittedTable, TableFitOptions
 from labrig.errors import DiskError
 from labrig.process.provenance import library_versions
 from labrig.process.run import Processed, new_result, put_in_place
-from labrig.record import RunDescription
+from labrig.process.without_run import describe_without_run
 from labrig.report import Report, table_sections, write_report
 from labrig.results import DecayPatch, DecayResult, write_result
 from labrig.yaml_file import write_yaml
@@ -104,18 +104,8 @@ def report_table(
         sha256=hashlib.sha256(table.read_bytes()).hexdigest(),
         options={name: str(value) for name, value in asdict(options).items() if value is not None},
     )
-    about = RunDescription(
-        title=table.stem,
-        protocol="decay",
-        run=table.name,
-        started="",
-        ended="",
-        rig="",
-        simulated=False,
-        labrig_version=provenance.labrig,
-        libraries=tuple(provenance.libraries.items()),
-        sample=(("SHA-256", provenance.sha256), *_uncertainties(fitted, options)),
-    )
+    sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted, options)]
+    about = describe_without_run(table.stem, "decay", table.name, sample)
     sections, methods = table_sections(result, about)
     try:
         folder.mkdir(parents=True, exist_ok=True)
