@@ -5,21 +5,20 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
-from labrig.acquire import read_protocol
-from labrig.errors import DeviceError, UsageError
+from labrig.errors import DeviceError
 from labrig.protocols.angular_fluorescence import AngularFluorescence, AngularFrames
 from labrig.record import read_run
 from tests.analyse.angular_bench import record_angular
 from tests.analyse.recorded import cut_off_and_resumed
-from tests.protocols.test_glow_protocols import planned, written
+from tests.protocols.protocol_files import (
+    assert_one_clear_line,
+    assert_timeline_as_agreed,
+    written,
+)
 
 
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
-    shipped = resources.find("protocols", "protocol", "angular_fluorescence")
-    laid_out = planned(shipped, "sim-fluorescent")
-    golden = Path(__file__).parent / "angular_fluorescence.timeline.txt"
-    assert "\n".join(laid_out.lines()) + "\n" == golden.read_text(encoding="utf-8")
+    assert_timeline_as_agreed("angular_fluorescence", "sim-fluorescent")
 
 
 @pytest.mark.parametrize(
@@ -42,12 +41,7 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
     ],
 )
 def test_what_cannot_be_is_one_clear_line(tmp_path: Path, keys: dict[str, Any], said: str) -> None:
-    path = written(tmp_path, protocol="angular_fluorescence", **keys)
-    with pytest.raises(UsageError) as caught:
-        read_protocol(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert_one_clear_line(written(tmp_path, protocol="angular_fluorescence", **keys), said)
 
 
 def test_every_round_has_every_angle_in_another_order() -> None:

@@ -4,26 +4,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
-from labrig import resources
-from labrig.acquire import Plan, plan, read_protocol, read_rig_file
-from labrig.errors import DeviceError, ProtocolError, UsageError
+from labrig.acquire import read_protocol
+from labrig.errors import DeviceError, ProtocolError
 from tests.analyse.recorded import record
-
-FOLDER = Path(__file__).parent
-
-
-def planned(protocol: Path, rig: Path) -> Plan:
-    return plan(read_protocol(protocol), read_rig_file(rig), str(rig))
+from tests.protocols.protocol_files import (
+    assert_one_clear_line,
+    assert_timeline_as_agreed,
+    planned,
+    written,
+)
 
 
 @pytest.mark.parametrize("name", ["blank", "camera_calibration", "fade"])
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
-    rig = resources.find("config", "rig", "sim-phosphor")
-    laid_out = planned(resources.find("protocols", "protocol", name), rig)
-    golden = (FOLDER / f"{name}.timeline.txt").read_text()
-    assert "\n".join(laid_out.lines()) + "\n" == golden
+    assert_timeline_as_agreed(name, "sim-phosphor")
 
 
 @pytest.mark.parametrize(
@@ -46,25 +41,18 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
 def test_an_impossible_key_is_one_clear_line(
     tmp_path: Path, name: str, keys: dict[str, object], said: str
 ) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": name} | keys))
-    with pytest.raises(UsageError) as caught:
-        read_protocol(path)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert_one_clear_line(written(tmp_path, protocol=name, **keys), said)
 
 
 def test_a_blank_before_the_door_is_open_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": "blank", "first": "400 ms"}))
+    path = written(tmp_path, protocol="blank", first="400 ms")
     with pytest.raises(ProtocolError, match="the door still moves; write first: auto"):
-        planned(path, resources.find("config", "rig", "sim-phosphor"))
+        planned(path, "sim-phosphor")
 
 
 def test_a_lens_that_does_not_tell_its_aperture_has_one_flat_field(tmp_path: Path) -> None:
-    path = tmp_path / "protocol.yaml"
     keys = {"camera": {"iso": 100, "f_number": None}, "f_numbers": []}
-    path.write_text(yaml.safe_dump({"protocol": "camera_calibration"} | keys))
+    path = written(tmp_path, protocol="camera_calibration", **keys)
     units = [unit.name for unit in read_protocol(path).units()]
     assert [unit for unit in units if unit.startswith("flat")] == ["flat"]
 

@@ -7,35 +7,25 @@ from typing import Any
 import pytest
 import yaml
 
-from labrig import resources
-from labrig.acquire import Plan, plan, read_protocol, read_rig_file
-from labrig.errors import UsageError
+from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.process import process_run
 from labrig.protocols.direct_bispectral import DirectBispectral
 from labrig.record import read_run
 from labrig.results import DirectBispectralResult
 from tests.analyse.direct_bench import write_bench
 from tests.conftest import Ended
+from tests.protocols.protocol_files import (
+    assert_one_clear_line,
+    assert_timeline_as_agreed,
+    written,
+)
 
 NAME = "direct_bispectral"
 QUICK: dict[str, Any] = {"leds": ["430 nm"], "samples": ["felt"], "repetitions": 4}
 
 
-def planned(protocol: Path) -> Plan:
-    rig = resources.find("config", "rig", "sim-fluorescent")
-    return plan(read_protocol(protocol), read_rig_file(rig), str(rig))
-
-
-def written(folder: Path, **keys: Any) -> Path:
-    path = folder / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": NAME} | keys))
-    return path
-
-
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
-    laid_out = planned(resources.find("protocols", "protocol", NAME))
-    golden = Path(__file__).parent / f"{NAME}.timeline.txt"
-    assert "\n".join(laid_out.lines()) + "\n" == golden.read_text(encoding="utf-8")
+    assert_timeline_as_agreed(NAME, "sim-fluorescent")
 
 
 @pytest.mark.parametrize(
@@ -52,10 +42,7 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
     ],
 )
 def test_what_cannot_be_is_one_clear_line(tmp_path: Path, keys: dict[str, Any], said: str) -> None:
-    with pytest.raises(UsageError) as caught:
-        read_protocol(written(tmp_path, **keys))
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert_one_clear_line(written(tmp_path, protocol=NAME, **keys), said)
 
 
 def test_every_light_is_read_on_white_and_on_every_sample_and_the_first_once_more() -> None:
@@ -72,7 +59,8 @@ def test_every_light_is_read_on_white_and_on_every_sample_and_the_first_once_mor
 
 
 def test_filters_before_the_lamp_are_put_in_by_hand(tmp_path: Path) -> None:
-    path = written(tmp_path, filters=["bandpass-450", "bandpass-550"], samples=["felt"])
+    filters = ["bandpass-450", "bandpass-550"]
+    path = written(tmp_path, protocol=NAME, filters=filters, samples=["felt"])
     rig_file = read_rig_file(write_bench(tmp_path))
     laid_out = plan(read_protocol(path), rig_file, "rig.yaml")
     steps = [step.action for step in laid_out.steps if step.device == "person"]
@@ -88,8 +76,8 @@ def test_a_spectrometer_that_is_unplugged_ends_the_run_and_it_is_resumed(
     fault = {"spectrometer_unplugged": {"at": "6 min"}}
     rig = write_bench(tmp_path, faults=[fault])
     runs = tmp_path / "runs"
-    ended = labrig("run", written(tmp_path, **QUICK), "--rig", rig, "--runs", runs, "--yes",
-                   "--no-process")  # fmt: skip
+    protocol = written(tmp_path, protocol=NAME, **QUICK)
+    ended = labrig("run", protocol, "--rig", rig, "--runs", runs, "--yes", "--no-process")
     assert ended.code == 3
     (said,) = [line for line in ended.err.splitlines() if line.startswith("labrig: ")]
     assert "spectrometer" in said

@@ -6,32 +6,24 @@ from typing import Any
 import pytest
 import yaml
 
-from labrig import resources
-from labrig.acquire import Plan, plan, read_protocol, read_rig_file
+from labrig.acquire import read_protocol
 from labrig.cli.exit_codes import guarded
-from labrig.errors import ProtocolError, UsageError
+from labrig.errors import ProtocolError
 from labrig.record import read_run
 from tests.analyse.spectral_bench import write_bench
+from tests.protocols.protocol_files import (
+    assert_one_clear_line,
+    assert_timeline_as_agreed,
+    planned,
+    written,
+)
 
 PROTOCOLS = ("emission_spectrum", "isotropy", "saturation")
 
 
-def planned(protocol: Path, rig: str | Path = "sim-phosphor") -> Plan:
-    path = resources.find("config", "rig", rig)
-    return plan(read_protocol(protocol), read_rig_file(path), str(path))
-
-
-def written(folder: Path, **keys: Any) -> Path:
-    path = folder / "protocol.yaml"
-    path.write_text(yaml.safe_dump(keys))
-    return path
-
-
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
-    laid_out = planned(resources.find("protocols", "protocol", name))
-    golden = Path(__file__).parent / f"{name}.timeline.txt"
-    assert "\n".join(laid_out.lines()) + "\n" == golden.read_text(encoding="utf-8")
+    assert_timeline_as_agreed(name, "sim-phosphor")
 
 
 @pytest.mark.parametrize(
@@ -53,12 +45,7 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
     ],
 )
 def test_what_cannot_be_is_one_clear_line(tmp_path: Path, keys: dict[str, Any], said: str) -> None:
-    path = written(tmp_path, **keys)
-    with pytest.raises(UsageError) as caught:
-        read_protocol(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert_one_clear_line(written(tmp_path, **keys), said)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +63,7 @@ def test_a_plan_that_cannot_work_is_refused(
     tmp_path: Path, keys: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(ProtocolError) as caught:
-        planned(written(tmp_path, **keys))
+        planned(written(tmp_path, **keys), "sim-phosphor")
     assert said in str(caught.value)
 
 
@@ -94,7 +81,7 @@ def test_a_written_protocol_reads_back_as_itself(tmp_path: Path) -> None:
 
 
 def manual_steps(tmp_path: Path, **keys: Any) -> list[tuple[str, str]]:
-    laid_out = planned(written(tmp_path, **keys))
+    laid_out = planned(written(tmp_path, **keys), "sim-phosphor")
     return [(step.unit, step.action) for step in laid_out.steps if step.device == "person"]
 
 

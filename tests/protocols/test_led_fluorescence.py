@@ -3,21 +3,19 @@
 from pathlib import Path
 
 import pytest
-import yaml
 
-from labrig import resources
-from labrig.acquire import plan, read_protocol, read_rig_file
-from labrig.errors import LabrigError, UsageError
+from labrig.errors import LabrigError
 from labrig.protocols.led_fluorescence import LedFluorescence
-
-GOLDEN = Path(__file__).parent / "led_fluorescence.timeline.txt"
+from tests.protocols.protocol_files import (
+    assert_one_clear_line,
+    assert_timeline_as_agreed,
+    planned,
+    written,
+)
 
 
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
-    rig = resources.find("config", "rig", "sim-fluorescent")
-    protocol = read_protocol(resources.find("protocols", "protocol", "led_fluorescence"))
-    laid_out = plan(protocol, read_rig_file(rig), str(rig))
-    assert "\n".join(laid_out.lines()) + "\n" == GOLDEN.read_text()
+    assert_timeline_as_agreed("led_fluorescence", "sim-fluorescent")
 
 
 def test_the_order_is_shuffled_by_its_seed_and_the_first_led_comes_last_again() -> None:
@@ -42,16 +40,10 @@ def test_the_order_is_shuffled_by_its_seed_and_the_first_led_comes_last_again() 
 def test_an_impossible_key_is_one_clear_line(
     tmp_path: Path, keys: dict[str, object], said: str
 ) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": "led_fluorescence"} | keys))
-    with pytest.raises(UsageError, match=said) as caught:
-        read_protocol(path)
-    assert "\n" not in str(caught.value)
+    assert_one_clear_line(written(tmp_path, protocol="led_fluorescence", **keys), said)
 
 
 def test_an_led_that_the_rig_has_not_is_named_before_anything_moves(tmp_path: Path) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": "led_fluorescence", "leds": ["470 nm"]}))
-    rig = resources.find("config", "rig", "sim-fluorescent")
+    path = written(tmp_path, protocol="led_fluorescence", leds=["470 nm"])
     with pytest.raises(LabrigError, match="470 nm"):
-        plan(read_protocol(path), read_rig_file(rig), str(rig))
+        planned(path, "sim-fluorescent")

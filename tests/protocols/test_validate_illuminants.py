@@ -3,21 +3,20 @@
 from pathlib import Path
 
 import pytest
-import yaml
 
-from labrig import resources
-from labrig.acquire import plan, read_protocol, read_rig_file
-from labrig.errors import LabrigError, UsageError
+from labrig.acquire import read_protocol
+from labrig.errors import LabrigError
 from labrig.protocols.validate_illuminants import ValidateIlluminants
-
-GOLDEN = Path(__file__).parent / "validate_illuminants.timeline.txt"
-RIG = resources.find("config", "rig", "sim-fluorescent")
+from tests.protocols.protocol_files import (
+    assert_one_clear_line,
+    assert_timeline_as_agreed,
+    planned,
+    written,
+)
 
 
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
-    protocol = read_protocol(resources.find("protocols", "protocol", "validate_illuminants"))
-    lines = plan(protocol, read_rig_file(RIG), str(RIG)).lines()
-    assert "\n".join(lines) + "\n" == GOLDEN.read_text(encoding="utf-8")
+    assert_timeline_as_agreed("validate_illuminants", "sim-fluorescent")
 
 
 def test_the_chart_is_photographed_under_the_lamp_of_the_white_balance() -> None:
@@ -36,25 +35,23 @@ def test_the_chart_is_photographed_under_the_lamp_of_the_white_balance() -> None
         ({"lamps": []}, "lamps"),
         ({"lamps": ["xenon", "xenon"]}, "expected every lamp once"),
         ({"balance": "sun"}, "expected 'balance' to be one of 'lamps'"),
-        ({"fluorescence": {"other": "white-paper"}}, "a material for each patch, .* 'sample'"),
+        (
+            {"fluorescence": {"other": "white-paper"}},
+            "for each patch, got none for 'sample'",
+        ),
         ({"exposures": 9}, "exposures"),
     ],
 )
 def test_an_impossible_key_is_one_clear_line(
     tmp_path: Path, keys: dict[str, object], said: str
 ) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": "validate_illuminants"} | keys))
-    with pytest.raises(UsageError, match=said) as caught:
-        read_protocol(path)
-    assert "\n" not in str(caught.value)
+    assert_one_clear_line(written(tmp_path, protocol="validate_illuminants", **keys), said)
 
 
 def test_a_lamp_that_the_rig_has_not_is_named_before_anything_moves(tmp_path: Path) -> None:
-    path = tmp_path / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": "validate_illuminants", "lamps": ["xeonn"]}))
+    path = written(tmp_path, protocol="validate_illuminants", lamps=["xeonn"])
     with pytest.raises(LabrigError, match="a lamp 'xeonn', which the rig has not; did you mean"):
-        plan(read_protocol(path), read_rig_file(RIG), str(RIG))
+        planned(path, "sim-fluorescent")
 
 
 def test_a_run_beside_the_protocol_is_found_from_elsewhere(tmp_path: Path) -> None:
