@@ -2,10 +2,15 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Protocol
+from typing import Annotated, Protocol
+
+from pydantic import Field
 
 from labrig.acquire import LedLight
 from labrig.errors import DeviceError
+
+#: Name of a light in a rig file.
+Name = Annotated[str, Field(min_length=1)]
 
 
 class Switch(Protocol):
@@ -50,6 +55,10 @@ class LightSwitches:
         #: Lights not read back as off since they were last lit; after connecting, all.
         self._may_be_lit = set(self._switches)
 
+    def channels(self) -> tuple[str, ...]:
+        """Return the names of the lights, in the rig file's order."""
+        return tuple(self._switches)
+
     def settling_s(self, name: str, /) -> float:
         """Return the time in seconds from switching a light on until it is steady."""
         return self._lights[name].settling
@@ -74,7 +83,7 @@ class LightSwitches:
         if failure:
             raise failure
 
-    def _lit(self) -> str | None:
+    def channel_on(self) -> str | None:
         """Return the light that is on, as reported by the board, else as commanded last.
 
         Raises
@@ -98,39 +107,3 @@ class LightSwitches:
 
     def disconnect(self) -> None:
         """Do nothing: the port belongs to the connections, which close it."""
-
-
-class LedSwitches(LightSwitches):
-    """Relays that each switch an LED."""
-
-    def channels(self) -> tuple[str, ...]:
-        """Return the names of the LEDs, in the rig file's order."""
-        return tuple(self._switches)
-
-    def channel_on(self) -> str | None:
-        """Return the LED that is on, as reported by the board, else as commanded last.
-
-        Raises
-        ------
-        DeviceError
-            Several LEDs are on.
-        """
-        return self._lit()
-
-
-class LampSwitches(LightSwitches):
-    """Relays that each switch a broadband lamp."""
-
-    def lamps(self) -> tuple[str, ...]:
-        """Return the names of the lamps, in the rig file's order."""
-        return tuple(self._switches)
-
-    def lamp_on(self) -> str | None:
-        """Return the lamp that is on, as reported by the board, else as commanded last.
-
-        Raises
-        ------
-        DeviceError
-            Several lamps are on.
-        """
-        return self._lit()

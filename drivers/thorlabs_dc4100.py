@@ -17,7 +17,7 @@ from labrig.acquire import Connections, Finding, LedLight
 from labrig.errors import DeviceError, UnclearAnswerError, UsageError
 from labrig.quantity import Fraction
 
-from .light_switches import LedSwitches
+from .light_switches import LightSwitches, Name
 from .serial_line import SerialLine
 
 BAUDRATE = 115200
@@ -45,8 +45,6 @@ AT_LIMIT = 0x200000
 #: warning, and that mean another head than was meant.
 NOTABLE_NM, OTHER_HEAD_NM = 5.0, 20.0
 _ERROR_NUMBER = re.compile(r"\D*(\d+)")
-
-Name = Annotated[str, Field(min_length=1)]
 
 
 class Dc4100Led(LedLight):
@@ -295,7 +293,7 @@ class _Output:
         return self.unit.is_on(self.number)
 
 
-class ThorlabsLedBank(LedSwitches):
+class ThorlabsLedBank(LightSwitches):
     """LED heads on the outputs of one or several DC4100 or DC4104, one lit at a time.
 
     Parameters

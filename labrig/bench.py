@@ -18,6 +18,7 @@ from labrig.acquire import (
     Rig,
     RigFile,
     SerialPort,
+    driver_and_settings,
     in_safe_order,
     load_driver,
 )
@@ -29,7 +30,6 @@ from labrig.guard import Guard, guarding
 from labrig.record import REAL_DISK, Disk
 from labrig.serial_ports import SerialPorts
 from labrig.signals import interrupting, pausing
-from labrig.yaml_file import validate
 
 if TYPE_CHECKING:
     from labrig.sim import OpenRoom
@@ -101,8 +101,7 @@ class Bench:
             stack.callback(self._make_safe, rig)
             opened = [key for key in self.file.devices if key not in self.left_out]
             for key in in_safe_order(opened):
-                entry = self.file.devices[key]
-                rig.connect(key, partial(_open, key, entry, connections, self.source))
+                rig.connect(key, partial(_open, self.file, key, connections, self.source))
             if self.guard is not None:
                 self.guard.watch()
             yield rig
@@ -246,10 +245,9 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
             server.serve(clock)
 
 
-def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str) -> Device:
-    driver = load_driver(key, entry.driver, source)
-    settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
-    device: Device = driver(entry.address, settings, connections)
+def _open(file: RigFile, key: str, connections: "_Connections", source: str) -> Device:
+    driver, settings = driver_and_settings(file, key, source)
+    device: Device = driver(file.devices[key].address, settings, connections)
     return device
 
 

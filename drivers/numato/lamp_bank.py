@@ -1,16 +1,14 @@
 """Broadband lamps behind relays of a Numato board, one lit at a time; every relay is read back."""
 
 from collections.abc import Mapping
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import Connections, Illuminant
 
-from ..light_switches import LampSwitches
-from .board import CHANNELS, Board, BoardRelay
-
-Name = Annotated[str, Field(min_length=1)]
+from ..light_switches import Name
+from .relay_bank import Number, RelayBank, require_a_relay_each
 
 
 class RelayLamp(Illuminant):
@@ -22,10 +20,10 @@ class RelayLamp(Illuminant):
         Number of the relay that switches the lamp, counted from 0.
     """
 
-    relay: Annotated[int, Field(ge=0, lt=len(CHANNELS))]
+    relay: Number
 
 
-class NumatoLampBank(LampSwitches):
+class NumatoLampBank(RelayBank):
     """Several relays of one Numato board, each switching a lamp.
 
     Parameters
@@ -37,6 +35,8 @@ class NumatoLampBank(LampSwitches):
     connections
         Connections that open the port.
     """
+
+    nouns = "lamps"
 
     class Settings(BaseModel):
         """Keys of lamps on relays of a Numato board in a rig file.
@@ -54,26 +54,14 @@ class NumatoLampBank(LampSwitches):
 
         @model_validator(mode="after")
         def _a_relay_each(self) -> Self:
-            if len({lamp.relay for lamp in self.lamps.values()}) < len(self.lamps):
-                raise ValueError("expected a relay of its own for each lamp in 'lamps'")
+            require_a_relay_each((lamp.relay for lamp in self.lamps.values()), "lamp", "lamps")
             return self
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
-        self._relays = {name: lamp.relay for name, lamp in settings.lamps.items()}
-        self._board = Board(address, connections)
-        relays = {name: BoardRelay(self._board, relay) for name, relay in self._relays.items()}
-        super().__init__(self._board.name, relays, settings.lamps, self._board.resynchronise)
+        relays = {name: lamp.relay for name, lamp in settings.lamps.items()}
+        super().__init__(address, relays, settings.lamps, connections)
 
     @classmethod
     def declared_lamps(cls, settings: Settings) -> Mapping[str, Illuminant]:
         """Return what the rig file says of the lamps' light by their names, for plans."""
         return settings.lamps
-
-    def reads_back(self) -> bool:
-        """Return True: every Numato board reports the states of its relays."""
-        return True
-
-    def identity(self) -> str:
-        """Return maker, firmware version and id of the board, and the names of the lamps."""
-        lamps = ", ".join(f"{name} on relay {relay}" for name, relay in self._relays.items())
-        return f"Numato relay board, {self._board.identity()}, lamps {lamps}"

@@ -7,11 +7,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from labrig.acquire import Connections, LedLight
 
-from ..light_switches import LedSwitches
-from .board import CHANNELS, Board, BoardRelay
-
-Name = Annotated[str, Field(min_length=1)]
-Number = Annotated[int, Field(ge=0, lt=len(CHANNELS))]
+from ..light_switches import Name
+from .relay_bank import Number, RelayBank, require_a_relay_each
 
 
 class RelayLed(LedLight):
@@ -33,7 +30,7 @@ def _led(value: Any) -> Any:
 Led = Annotated[RelayLed, BeforeValidator(_led, json_schema_input_type=Number | RelayLed)]
 
 
-class NumatoLedBank(LedSwitches):
+class NumatoLedBank(RelayBank):
     """Several relays of one Numato board, each switching an LED.
 
     Parameters
@@ -45,6 +42,8 @@ class NumatoLedBank(LedSwitches):
     connections
         Connections that open the port.
     """
+
+    nouns = "LEDs"
 
     class Settings(BaseModel):
         """Keys of LEDs on relays of a Numato board in a rig file.
@@ -63,26 +62,14 @@ class NumatoLedBank(LedSwitches):
 
         @model_validator(mode="after")
         def _a_relay_each(self) -> Self:
-            if len({led.relay for led in self.relays.values()}) < len(self.relays):
-                raise ValueError("expected a relay of its own for each LED in 'relays'")
+            require_a_relay_each((led.relay for led in self.relays.values()), "LED", "relays")
             return self
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
-        self._relays = {name: led.relay for name, led in settings.relays.items()}
-        self._board = Board(address, connections)
-        relays = {name: BoardRelay(self._board, relay) for name, relay in self._relays.items()}
-        super().__init__(self._board.name, relays, settings.relays, self._board.resynchronise)
+        relays = {name: led.relay for name, led in settings.relays.items()}
+        super().__init__(address, relays, settings.relays, connections)
 
     @classmethod
     def declared_leds(cls, settings: Settings) -> Mapping[str, LedLight]:
         """Return what the rig file says of the LEDs' light by their names, for plans."""
         return settings.relays
-
-    def reads_back(self) -> bool:
-        """Return True: every Numato board reports the states of its relays."""
-        return True
-
-    def identity(self) -> str:
-        """Return maker, firmware version and id of the board, and the names of the LEDs."""
-        leds = ", ".join(f"{name} on relay {relay}" for name, relay in self._relays.items())
-        return f"Numato relay board, {self._board.identity()}, LEDs {leds}"

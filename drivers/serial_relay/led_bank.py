@@ -1,25 +1,23 @@
 """LEDs behind relays of any board on a serial line, one lit at a time."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from labrig.acquire import Connections, Finding, LedLight
 
-from ..light_switches import LedSwitches
+from ..light_switches import LightSwitches, Name
 from .board import Board, Relay, findings
 from .settings import BoardSettings, SwitchCommands
 from .wire_text import wire_text
-
-Name = Annotated[str, Field(min_length=1)]
 
 
 class CommandedLed(LedLight, SwitchCommands):
     """Commands of an LED's relay, with what is known of its light."""
 
 
-class SerialLedBank(LedSwitches):
+class SerialLedBank(LightSwitches):
     """Several relays of a board whose commands are in the rig file, each switching an LED.
 
     Parameters

@@ -3,7 +3,13 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.connections import Connections, SerialPort
-from labrig.acquire.loading import illuminant_lights, led_lights, load_driver, read_protocol
+from labrig.acquire.loading import (
+    driver_and_settings,
+    illuminant_lights,
+    led_lights,
+    load_driver,
+    read_protocol,
+)
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -53,6 +59,7 @@ __all__ = [
     "UndoManualStep",
     "Unit",
     "at",
+    "driver_and_settings",
     "frame_bytes",
     "illuminant_lights",
     "in_safe_order",

@@ -48,6 +48,46 @@ def load_driver(key: str, name: str, source: str) -> Any:
     return driver
 
 
+def driver_and_settings(rig: RigFile, key: str, source: str) -> tuple[Any, Any]:
+    """Load the driver class of a device of a rig file, and validate its keys.
+
+    Parameters
+    ----------
+    rig
+        Rig file with the device.
+    key
+        Key of the device in the rig file, such as `lamp`.
+    source
+        Name or path of the rig file, for messages.
+
+    Returns
+    -------
+    driver : type
+        Class of the driver; it satisfies the Protocol of the role `key`.
+    settings : BaseModel
+        The device's keys, of the driver's class `Settings`.
+
+    Raises
+    ------
+    UsageError
+        If there is no such driver, if it is one for another role, or if a key is unknown or
+        invalid.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig import resources
+    >>> from labrig.acquire import driver_and_settings
+    >>> rig = labrig.read_rig_file(resources.find("config", "rig", "sim-arduino"))
+    >>> driver, settings = driver_and_settings(rig, "leds", "sim-arduino")
+    >>> driver.__name__, list(settings.channels)
+    ('SerialLedBank', ['450 nm', '525 nm'])
+    """
+    entry = rig.devices[key]
+    driver = load_driver(key, entry.driver, source)
+    return driver, validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
+
+
 def led_lights(rig: RigFile, source: str) -> dict[str, LedLight]:
     """Return what a rig file says of the light of its LEDs, without opening any device.
 
@@ -79,11 +119,9 @@ def led_lights(rig: RigFile, source: str) -> dict[str, LedLight]:
     >>> [(name, light.peak_nm()) for name, light in lights.items()]
     [('450 nm', 450.0), ('525 nm', 525.0)]
     """
-    entry = rig.devices.get(LEDS.key)
-    if entry is None:
+    if LEDS.key not in rig.devices:
         return {}
-    driver = load_driver(LEDS.key, entry.driver, source)
-    settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{LEDS.key}")
+    driver, settings = driver_and_settings(rig, LEDS.key, source)
     return dict(driver.declared_leds(settings))
 
 
@@ -118,12 +156,10 @@ def illuminant_lights(rig: RigFile, source: str) -> dict[str, Illuminant]:
     >>> [(name, lamp.settling) for name, lamp in lamps.items()][:2]
     [('daylight', 600.0), ('halogen', 600.0)]
     """
-    entry = rig.devices.get(ILLUMINANTS.key)
-    if entry is None:
+    if ILLUMINANTS.key not in rig.devices:
         return {}
-    driver = load_driver(ILLUMINANTS.key, entry.driver, source)
-    place = f"{source}, devices.{ILLUMINANTS.key}"
-    return dict(driver.declared_lamps(validate(entry.settings(), driver.Settings, place)))
+    driver, settings = driver_and_settings(rig, ILLUMINANTS.key, source)
+    return dict(driver.declared_lamps(settings))
 
 
 def read_protocol(path: str | Path) -> ProtocolModel:

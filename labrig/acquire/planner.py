@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
 from labrig.acquire.frame_regions import require_inside
-from labrig.acquire.loading import load_driver
+from labrig.acquire.loading import driver_and_settings
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.rig import Rig
@@ -21,7 +21,6 @@ from labrig.errors import ProtocolError
 from labrig.optics import SpectrometerReading
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, FrameRecord, SpectrumRecord
-from labrig.yaml_file import validate
 
 #: Largest number of steps: more than any run has, and laid out in about a second.
 MAX_STEPS = 50_000
@@ -128,11 +127,10 @@ def planned_rig(rig: RigFile, source: str, keys: Collection[str] | None = None) 
     """
     clock = VirtualClock()
     devices: dict[str, Device] = {}
-    for key, entry in rig.devices.items():
+    for key in rig.devices:
         if keys is not None and key not in keys:
             continue
-        driver = load_driver(key, entry.driver, source)
-        settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
+        driver, settings = driver_and_settings(rig, key, source)
         if stand_in := ROLES[key].planned:
             devices[key] = stand_in(driver, settings, clock)
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}

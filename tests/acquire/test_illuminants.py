@@ -97,6 +97,25 @@ def test_a_lamp_that_is_not_there_and_another_driver_are_named(rig: Path) -> Non
 
 
 @pytest.mark.parametrize(
+    ("key", "driver", "keys", "said"),
+    [
+        ("illuminants", "numato_led_bank", {"relays": {"day": 0}}, "is no bank of lamps"),
+        ("leds", "numato_lamp_bank", {"lamps": LAMPS}, "is no bank of LEDs"),
+    ],
+)
+def test_a_bank_of_the_other_kind_is_refused(
+    rig: Path, key: str, driver: str, keys: dict[str, Any], said: str
+) -> None:
+    content = yaml.safe_load(rig.read_text())
+    content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
+    content["devices"][key] = {"driver": driver, "address": "COM3"} | keys
+    rig.write_text(yaml.safe_dump(content))
+    with pytest.raises(UsageError, match=f"the driver '{driver}' {said}") as caught:
+        plan(Lit(protocol="lit"), read_rig_file(rig), str(rig))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
     ("lamps", "said"),
     [
         ({"a": {"relay": 1, "spectrum": "D65"}, "b": {"relay": 1}}, "a relay of its own"),

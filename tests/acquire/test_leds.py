@@ -29,7 +29,7 @@ from labrig.acquire import (
     read_rig_file,
     run_units,
 )
-from labrig.acquire.roles.leds import PlannedLedBank
+from labrig.acquire.roles.light_bank import PlannedLightBank
 from labrig.bench import open_bench
 from labrig.clock import VirtualClock
 from labrig.errors import DeviceError, ProtocolError, UsageError
@@ -126,7 +126,7 @@ def test_another_driver_does_not_do(rig: Path) -> None:
         plan(Colours(protocol="colours"), read_rig_file(rig), str(rig))
 
 
-class Shared(PlannedLedBank):
+class Shared(PlannedLightBank):
     """Somebody else switches it off after 30 s."""
 
     def __init__(self, clock: VirtualClock) -> None:

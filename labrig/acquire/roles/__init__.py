@@ -31,6 +31,7 @@ from labrig.acquire.roles.illuminants import (
 )
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
 from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedLight, LedSwitch
+from labrig.acquire.roles.light_bank import LightBank
 from labrig.acquire.roles.role import (
     DARK,
     Checkable,
@@ -119,6 +120,7 @@ __all__ = [
     "LedLight",
     "LedSwitch",
     "Light",
+    "LightBank",
     "LiveView",
     "Measured",
     "PlannedDevice",

@@ -1,28 +1,17 @@
 """The bank of broadband lamps, under which samples are seen as in daily life, one at a time."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, ClassVar, Protocol, runtime_checkable
+from typing import Annotated, Any, Protocol, runtime_checkable
 
 from pydantic import Field
 
 from labrig import resources
 from labrig.acquire.roles.leds import LedLight
-from labrig.acquire.roles.role import (
-    DARK,
-    ExerciseContext,
-    Exercised,
-    Light,
-    Measured,
-    PlannedDevice,
-    Role,
-    spread_ms,
-)
-from labrig.errors import DeviceError, ProtocolError
+from labrig.acquire.roles.light_bank import BankSwitch, LightBank, PlannedLightBank, exercise
+from labrig.acquire.roles.role import Role
 from labrig.optics import Spectrum, read_light
-from labrig.quantity import DurationS, duration_text
-from labrig.yaml_file import did_you_mean
+from labrig.quantity import DurationS
 
 
 class Illuminant(LedLight):
@@ -67,142 +56,29 @@ class Illuminant(LedLight):
 
 
 @runtime_checkable
-class LampBank(Light, Protocol):
+class LampBank(LightBank, Protocol):
     """Broadband lamps of which at most one is on. Safe state: all off."""
 
-    def lamps(self) -> tuple[str, ...]:
-        """Return the names of the lamps."""
-
-    def settling_s(self, lamp: str, /) -> float:
-        """Return the time in seconds from switching a lamp on until its light is steady."""
-
-    def light(self, lamp: str, /) -> None:
-        """Switch one lamp on after all others are off; both are read back where possible.
-
-        The light is steady `settling_s` later, for which protocols wait themselves.
-        """
-
-    def dark(self) -> None:
-        """Switch all lamps off, read back where the device can."""
-
-    def lamp_on(self) -> str | None:
-        """Return the lamp that is on, None if all are off: as read back where the device can.
-
-        Raises
-        ------
-        DeviceError
-            If more than one lamp is on.
-        """
+    @classmethod
+    def declared_lamps(cls, settings: Any, /) -> Mapping[str, Illuminant]:
+        """Return what the rig file says of the lamps' light by their names, for plans."""
 
 
-class PlannedLampBank(PlannedDevice):
-    """Stand-in of a bank of lamps in a plan; protocols wait for a lamp's settling themselves.
+class IlluminantSwitch(BankSwitch):
+    """The action that switches one lamp of the bank on and all others off, or all off for None."""
 
-    Files of spectra are read, so that a missing one is found before anything moves.
-    """
-
-    def __init__(self, lamps: Mapping[str, Illuminant]) -> None:
-        for lamp in lamps.values():
-            lamp.relative_spectrum()
-        self._lamps = dict(lamps)
-        self._lamp_on: str | None = None
-
-    def reads_back(self) -> bool:
-        """Return False: nothing else can switch a stand-in."""
-        return False
-
-    def lamps(self) -> tuple[str, ...]:
-        """Return the names that the driver declares."""
-        return tuple(self._lamps)
-
-    def settling_s(self, lamp: str, /) -> float:
-        """Return the settling time in seconds that the driver declares."""
-        return self._lamps[lamp].settling
-
-    def light(self, lamp: str, /) -> None:
-        """Switch one lamp on."""
-        self._lamp_on = lamp
-
-    def dark(self) -> None:
-        """Switch all lamps off."""
-        self._lamp_on = None
-
-    def lamp_on(self) -> str | None:
-        """Return the lamp that is on, as commanded last."""
-        return self._lamp_on
-
-
-@dataclass(frozen=True)
-class IlluminantSwitch:
-    """The action that switches one lamp of the bank on and all others off.
-
-    Attributes
-    ----------
-    lamp
-        Name of the lamp; None to switch all off.
-    """
-
-    lamp: str | None
-    device: ClassVar[str] = "illuminants"
-
-    def __str__(self) -> str:
-        return DARK if self.lamp is None else f"{self.lamp} on"
-
-    def begin(self, bank: LampBank) -> None:
-        """Switch the lamps.
-
-        Raises
-        ------
-        ProtocolError
-            If there is no such lamp.
-        """
-        if self.lamp is None:
-            bank.dark()
-        elif self.lamp in bank.lamps():
-            bank.light(self.lamp)
-        else:
-            raise ProtocolError(
-                f"the protocol lights a lamp '{self.lamp}', which the rig has not; "
-                f"{did_you_mean(self.lamp, bank.lamps())}"
-            )
+    device = "illuminants"
+    noun = "a lamp"
 
 
 ILLUMINANTS_OFF = IlluminantSwitch(None)
 
-
-def _exercise(bank: LampBank, context: ExerciseContext) -> Exercised:
-    """Switch each lamp on for some hundredths of a second, once: arcs do not like it."""
-    measured, off_s = [], []
-    try:
-        for lamp in bank.lamps():
-            on_s = context.timed_s(partial(bank.light, lamp))
-            measured.append(Measured(f"{lamp} on, read back", f"{on_s * 1e3:.1f} ms"))
-            if settling_s := bank.settling_s(lamp):
-                text = f"{duration_text(settling_s)}, for which protocols wait"
-                measured.append(Measured(f"{lamp} settles, from the rig file", text))
-            _require_state(bank, lamp)
-            off_s.append(context.timed_s(bank.dark))
-            _require_state(bank, None)
-    finally:
-        with context.clock.shielded():
-            bank.dark()
-    return Exercised((*measured, Measured("off, read back", spread_ms(off_s))))
-
-
-def _require_state(bank: LampBank, lamp: str | None) -> None:
-    if (lamp_on := bank.lamp_on()) != lamp:
-        raise DeviceError(
-            f"the lamps were switched to {lamp or 'dark'}, they say {lamp_on or 'dark'}; look at "
-            "them, switch them off by hand and check the relays"
-        )
-
-
-ILLUMINANTS: Role[LampBank] = Role(
+ILLUMINANTS: Role[LightBank] = Role(
     key="illuminants",
     protocol_class=LampBank,
     name="bank of lamps",
-    planned=lambda driver, settings, clock: PlannedLampBank(driver.declared_lamps(settings)),
-    exercise=_exercise,
-    state=lambda bank: str(IlluminantSwitch(bank.lamp_on())),
+    planned=lambda driver, settings, clock: PlannedLightBank(driver.declared_lamps(settings)),
+    exercise=partial(exercise, nouns="lamps"),
+    state=lambda bank: str(IlluminantSwitch(bank.channel_on())),
     safe_first=True,
 )
