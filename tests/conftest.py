@@ -131,9 +131,19 @@ def unsynced() -> Iterator[None]:
 def unlogged() -> None:
     """Runs log no transactions of their devices: that takes a tenth of a recording.
 
-    `tests/test_run_log.py` has the tests that ask for them.
+    Tests that ask for them use `logged`.
     """
     logging.getLogger("labrig.drivers").setLevel(logging.INFO)
+
+
+@pytest.fixture
+def logged() -> Iterator[None]:
+    """What goes over the wires is logged, as it is in the field."""
+    logger = logging.getLogger("labrig.drivers")
+    level = logger.level
+    logger.setLevel(logging.NOTSET)
+    yield
+    logger.setLevel(level)
 
 
 def _leave_blank(figure: object, file: object, format: str = "", **_: object) -> None:

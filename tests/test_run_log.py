@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,19 +13,12 @@ from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
+
+pytestmark = pytest.mark.usefixtures("logged")
+
 LINE = re.compile(
     r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3}) (DEBUG|INFO|WARNING|ERROR) +(\S+): (.+)"
 )
-
-
-@pytest.fixture(autouse=True)
-def logged() -> Iterator[None]:
-    """What goes over the wires is logged, as it is in the field."""
-    logger = logging.getLogger("labrig.drivers")
-    level = logger.level
-    logger.setLevel(logging.NOTSET)
-    yield
-    logger.setLevel(level)
 
 
 def lines_of(text: str) -> list[tuple[datetime, str, str, str]]:
