@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from pydantic import BaseModel
 
-from labrig import resources
+from labrig import material, resources
 from labrig.acquire import RigFile, illuminant_lights, led_lights
 from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
 from labrig.errors import UsageError
@@ -274,9 +274,8 @@ def require_optics(rig: RigFile) -> None:
     if rig.optics.filters is not None:
         rig.optics.filter_files()
     if rig.optics.emission_library is not None:
-        from labrig.material import read_emissions  # brings scipy, which is slow to load
-
-        read_emissions(rig.optics.emission_library)
+        # Not by its name above: it needs SciPy, which no plan of a run should wait for.
+        material.read_emissions(rig.optics.emission_library)
     for kind in kinds():
         calibration(rig, kind)
 

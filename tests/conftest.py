@@ -9,6 +9,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import gc
+import logging
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -37,6 +38,7 @@ sys.dont_write_bytecode = False
 # As Python sets it, the collector takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 10, 10)
 SHARED = Path(__file__).parents[2] / "shared" / "data"
+SYNC = os.fsync
 HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
 # In CI the same examples every time, so that a red run is about the change; elsewhere new ones,
@@ -117,10 +119,31 @@ def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
         monkeypatch.setattr("labrig.report.page.draw", _draw_blank)
 
 
-@pytest.fixture(autouse=True)
-def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="session", autouse=True)
+def unsynced() -> Iterator[None]:
     """Files are not synced: nobody pulls the plug. `tests/record` has the tests that ask for it."""
-    monkeypatch.setattr("os.fsync", lambda handle: None)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("os.fsync", lambda handle: None)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def unlogged() -> None:
+    """Runs log no transactions of their devices: that takes a tenth of a recording.
+
+    Tests that ask for them use `logged`.
+    """
+    logging.getLogger("labrig.drivers").setLevel(logging.INFO)
+
+
+@pytest.fixture
+def logged() -> Iterator[None]:
+    """What goes over the wires is logged, as it is in the field."""
+    logger = logging.getLogger("labrig.drivers")
+    level = logger.level
+    logger.setLevel(logging.NOTSET)
+    yield
+    logger.setLevel(level)
 
 
 def _leave_blank(figure: object, file: object, format: str = "", **_: object) -> None:

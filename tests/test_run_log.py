@@ -13,6 +13,9 @@ from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
+
+pytestmark = pytest.mark.usefixtures("logged")
+
 LINE = re.compile(
     r"(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3}) (DEBUG|INFO|WARNING|ERROR) +(\S+): (.+)"
 )

@@ -176,11 +176,10 @@ class SpectrometerReading:
         if self.calibration is not None:
             facts["calibration"] = _spectrum_content(self.calibration)
         names = [f"raw_{number + 1}" for number in range(len(self.raw_counts))]
-        rows = zip(self.wavelength_nm.tolist(), *self.raw_counts.tolist(), strict=True)
-        table = "".join([",".join(map(repr, row)) + "\n" for row in rows])
+        columns = [_texts(column) for column in (self.wavelength_nm, *self.raw_counts)]
+        rows = map(",".join, zip(*columns, strict=True))
         head = [FORMAT, f"# {json.dumps(facts)}", ",".join(["wavelength_nm", *names])]
-        # Whole numbers, as most counts are, without their point.
-        return "\n".join(head) + "\n" + table.replace(".0,", ",").replace(".0\n", "\n")
+        return "\n".join([*head, *rows]) + "\n"
 
     def _linear(self) -> FloatArray:
         """Return counts above the dark pixels, divided by the relative response."""
@@ -245,6 +244,15 @@ def _variance_of_mean(repetitions: FloatArray) -> FloatArray | None:
     pooled[order] = np.convolve(scatter, window, mode="same") / shares
     variance: FloatArray = pooled / number
     return variance
+
+
+def _texts(column: FloatArray) -> list[str]:
+    """Return numbers as text; whole ones, as most counts are, without a point."""
+    with np.errstate(invalid="ignore"):
+        whole = column.astype(np.int64)
+    if np.array_equal(whole, column):
+        return list(map(str, whole.tolist()))
+    return [repr(number).removesuffix(".0") for number in column.tolist()]
 
 
 def _spectrum_content(spectrum: Spectrum) -> dict[str, Any]:

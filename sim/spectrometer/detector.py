@@ -94,5 +94,8 @@ def _response(linear: FloatArray) -> FloatArray:
     powers = [float(text) for text in NONLINEARITY_TEXTS]
     counts = linear.copy()
     for _ in range(60):
+        before = counts
         counts = linear * np.polynomial.polynomial.polyval(np.clip(counts, 0, FULL), powers)
+        if np.array_equal(counts, before):
+            break
     return counts

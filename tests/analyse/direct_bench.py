@@ -1,6 +1,5 @@
 """The simulated bench with LEDs and a spectrometer, its scale and its grey card known exactly."""
 
-import logging
 from pathlib import Path
 from typing import Any
 
@@ -66,14 +65,7 @@ def recording(
 
 def record(folder: Path, protocol: dict[str, Any], seed: int = 1, **simulation: Any) -> Path:
     """The folder of a run of that protocol."""
-    # Every byte on the serial lines is logged, which here takes as long as all else.
-    logger = logging.getLogger("labrig")
-    level = logger.level
-    logger.setLevel(logging.WARNING)
-    try:
-        return recording(folder, protocol, seed, **simulation).record(quietly)
-    finally:
-        logger.setLevel(level)
+    return recording(folder, protocol, seed, **simulation).record(quietly)
 
 
 def shipped_leds() -> tuple[LedSettings, ...]:

@@ -5,6 +5,7 @@
 prints pytest-benchmark's own table and, below it, one line for each peer.
 """
 
+import logging
 import os
 import statistics
 import time
@@ -14,12 +15,16 @@ from typing import Any
 
 import pytest
 
+from tests.conftest import SYNC
+
 Run = Callable[[], object]
 
 
 @pytest.fixture(autouse=True)
-def unsynced() -> None:
-    """Files are synced here, as they are in the field."""
+def as_in_the_field(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are synced here, and all is logged."""
+    monkeypatch.setattr("os.fsync", SYNC)
+    logging.getLogger("labrig.drivers").setLevel(logging.NOTSET)
 
 
 @dataclass(frozen=True)

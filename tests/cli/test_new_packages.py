@@ -29,7 +29,8 @@ def installed(package: Path, place: Path) -> dict[str, str]:
     place.mkdir()
     building = [sys.executable, "-c", BUILD, str(place)]
     subprocess.run(building, cwd=package, check=True, capture_output=True)
-    return os.environ | {"PYTHONPATH": str(place)}
+    # Plugins of pytest, which the package does not need, take as long as its tests.
+    return os.environ | {"PYTHONPATH": str(place), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,7 @@ def device(report: Report, key: str) -> Report:
     return found
 
 
+@pytest.mark.usefixtures("logged")
 def test_a_good_rig_is_measured_and_fine(labrig: Labrig, make_rig: Make) -> None:
     ended = labrig("rig", "check", make_rig())
     assert (ended.code, ended.err) == (0, "")

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import optimize
@@ -21,14 +22,20 @@ STATIONARY = 1e-4
 
 @dataclass(frozen=True)
 class Compared:
-    """A problem with labrig's fit and χ² of `trf`, of the best known minimum and of rounding."""
+    """A problem with labrig's fit, χ² of `trf` and its evaluations, and χ² of rounding."""
 
     problem: Problem
     fit: LeastSquaresFit
     trf: float
     trf_evaluations: int
-    best: float
     floor: float
+
+    @cached_property
+    def best(self) -> float:
+        """The least known χ², also of a fit from the truth."""
+        truth = self.problem.truth
+        near = np.inf if truth is None else trf(self.problem, truth)[0]
+        return min(self.fit.chi2, self.trf, near)
 
     @property
     def ratio(self) -> float:
@@ -81,8 +88,7 @@ def compared(problem: Problem) -> Compared | None:
         r = problem.residuals(np.clip(problem.start, problem.lower, problem.upper))[0]
     floor = ROUNDING * max(1.0, min(float(r @ r), 1e6))
     other, evaluations = trf(problem, problem.start)
-    near = np.inf if problem.truth is None else trf(problem, problem.truth)[0]
-    return Compared(problem, fit, other, evaluations, min(fit.chi2, other, near), floor)
+    return Compared(problem, fit, other, evaluations, floor)
 
 
 def is_at_minimum(result: Compared) -> bool:

@@ -61,7 +61,7 @@ def test_independent_channels_are_the_default() -> None:
     assert one.chi2 == other.chi2
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(st.floats(-0.4, 0.4), st.integers(0, 5))
 def test_the_order_of_channels_does_not_matter(r: float, seed: int) -> None:
     seen = observed(seed)

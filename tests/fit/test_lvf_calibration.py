@@ -156,6 +156,6 @@ def test_real_filters_under_a_real_lamp(catalogue: str) -> None:
     }[catalogue]
     curves = list(read_curve_file(made.DATA / place).curves.items())
     none = Transmittance("none", np.array([380.0, 780.0]), np.ones(2))
-    chosen = [Transmittance(name, *curve) for name, curve in curves[:: len(curves) // 60]]
+    chosen = [Transmittance(name, *curve) for name, curve in curves[:: len(curves) // 40]]
     camera = bent(made.of_the_house(), 2)
     assert_calibrated(*calibrated(31, [none, *chosen], made.halogen_lamp(), camera))

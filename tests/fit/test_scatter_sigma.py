@@ -4,6 +4,8 @@ The bounds fail at a σ that is 20 % too large or too small: the standard error 
 third of the distance or less. Many more cases and seeds: `tests.acceptance.coverage_table_sigma`.
 """
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -13,30 +15,30 @@ from tests.acceptance.coverage_table_sigma import DECAYS, NOISES, coverage
 from tests.fit import truths
 
 T_S = np.linspace(0.5, 200, 60)
-SEEDS = range(100, 160)
 
 
-@pytest.mark.parametrize("noise", ["constant", "2000 counts"])
-@pytest.mark.parametrize("decay", ["1 state", "2 states"])
-def test_sigma_of_values_and_rates_is_right(decay: str, noise: str) -> None:
-    found = coverage(DECAYS[decay], NOISES[noise], len(T_S), SEEDS)
-    # 60 values of each of 60 seeds: the standard error of the ratio is below 2 %.
-    assert 0.92 < found.sigma_ratio < 1.1
-    assert found.refused == 0
-    # One figure for all rates, 60 or 120 pulls; its standard error is 7 to 9 %.
-    assert 0.83 < np.sqrt(np.mean(found.pulls**2)) < 1.2
+def test_sigma_of_values_and_rates_is_right() -> None:
+    pulls = []
+    for decay, noise in product(("1 state", "2 states"), ("constant", "2000 counts")):
+        found = coverage(DECAYS[decay], NOISES[noise], len(T_S), range(100, 125))
+        # 60 values of each of 25 seeds: the standard error of the ratio is 2 %.
+        assert 0.92 < found.sigma_ratio < 1.1, (decay, noise)
+        assert found.refused == 0
+        pulls += found.pulls.ravel().tolist()
+    # One figure for all 150 rates; its standard error is 6 %.
+    assert 0.84 < np.sqrt(np.mean(np.square(pulls))) < 1.19
 
 
 @pytest.mark.parametrize("noise", ["constant", "2000 counts"])
 @pytest.mark.parametrize("decay", ["power law", "stretched exponential"])
 def test_a_decay_of_another_law_is_not_taken_for_noise(decay: str, noise: str) -> None:
-    found = coverage(DECAYS[decay], NOISES[noise], len(T_S), range(100, 120))
+    found = coverage(DECAYS[decay], NOISES[noise], len(T_S), range(100, 110))
     assert 0.9 < found.sigma_ratio < 1.12
 
 
 def test_rates_of_too_few_states_scatter_by_their_sigma() -> None:
     """Three exponentials in a power law: without the misfit's curvature σ is a third too small."""
-    found = coverage(DECAYS["power law"], NOISES["2000 counts"], 100, range(100, 160))
+    found = coverage(DECAYS["power law"], NOISES["2000 counts"], 100, range(100, 136))
     assert 0.83 < np.sqrt(np.mean(found.pulls**2)) < 1.25
 
 

@@ -2,7 +2,10 @@
 
 import pytest
 
+from tests.conftest import SYNC
+
 
 @pytest.fixture(autouse=True)
-def unsynced() -> None:
+def synced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Files are synced, as they are in the field."""
+    monkeypatch.setattr("os.fsync", SYNC)

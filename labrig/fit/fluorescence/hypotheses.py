@@ -137,7 +137,8 @@ class Hypotheses:
         """Return the values per excitation of dyes of some emissions (s, o), shape (s, n, i)."""
         response = self.system.response
         # Emission that a light cannot excite is cut off at its wavelength.
-        seen = np.einsum("so,oi,ok->ski", emissions, self.edge, response.seen, optimize=True)
+        emitted = emissions[:, :, np.newaxis] * response.seen
+        seen = np.tensordot(emitted, self.edge, axes=(1, 0))
         designs = response.absorbed[np.newaxis, :, np.newaxis, :] * seen[:, np.newaxis]
         return np.asarray(designs.reshape(len(emissions), -1, designs.shape[-1]))
 
@@ -189,7 +190,7 @@ class Hypotheses:
         for shape, emission in enumerate(self.shapes.value):
             designs = self.designs(self.modes * emission)
             spread = designs @ self.excitation_covariance(shape)
-            variance[shape] = np.einsum("rai,rbi->ab", spread, designs, optimize=True)
+            variance[shape] = np.tensordot(spread, designs, axes=((0, 2), (0, 2)))
         return variance
 
     @cached_property
@@ -200,18 +201,19 @@ class Hypotheses:
         if not len(modes.absorbed):
             return variance
         response = self.system.response
+        courses_of = {
+            peak: _courses(covariance) for peak, covariance in self._excitation_covariances.items()
+        }
         for shape, emission in enumerate(self.shapes.value):
-            values, vectors = np.linalg.eigh(self.excitation_covariance(shape))
-            courses = vectors[:, -COURSES:] * np.sqrt(np.maximum(values[-COURSES:], 0.0))
-            # What a dye with each course of excitation emits under unit light in each band.
-            emitted = emission[:, np.newaxis] * self.edge
-            change = np.einsum(
-                "zmi,ic,oi,ok->zmkc", modes.absorbed, courses, emitted, response.seen, optimize=True
-            ) + np.einsum(
-                "mi,ic,oi,zok->zmkc", response.absorbed, courses, emitted, modes.seen, optimize=True
-            )
-            change = change.reshape(len(change), -1, change.shape[-1])
-            variance[shape] = np.einsum("zac,zbc->ab", change, change, optimize=True)
+            courses = courses_of[float(self.shapes.peak_nm[shape])]
+            # What a dye emits under unit light in each band (i, o); what is seen of it (…, i, k).
+            emitted = (emission[:, np.newaxis] * self.edge).T
+            seen, seen_changes = emitted @ response.seen, emitted @ modes.seen
+            # By courses (c, i) of excitation, changes of the lights (z, m, i) and of the curves.
+            change = modes.absorbed @ (courses[:, :, np.newaxis] * seen)[:, np.newaxis]
+            change += (response.absorbed * courses[:, np.newaxis])[:, np.newaxis] @ seen_changes
+            flat = change.reshape(-1, variance.shape[-1])
+            variance[shape] = flat.T @ flat
         return variance
 
     @cached_property
@@ -389,6 +391,12 @@ class Hypotheses:
             log_posterior = float(density.flat[index]) + self.log_prior(hypothesis)
             found.append(Scored(hypothesis, log_posterior))
         return found, (density + log_prior).max(axis=0)
+
+
+def _courses(covariance: FloatArray) -> FloatArray:
+    """Return the strongest courses (c, i) of an excitation with that covariance."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors[:, -COURSES:] * np.sqrt(np.maximum(values[-COURSES:], 0.0))).T)
 
 
 def log_prior_of(fluorophores: int) -> float:

@@ -99,7 +99,7 @@ class Posterior:
         """Find the most likely surface, with deviations of some covariance as noise."""
         deviation = np.zeros_like(self._noise)
         for design, covariance in zip(self._deviation_designs, self._deviations, strict=True):
-            deviation += np.einsum("rni,rmi->nm", design @ covariance, design, optimize=True)
+            deviation += np.tensordot(design @ covariance, design, axes=((0, 2), (0, 2)))
         self._deviation = deviation
         self._lower = np.linalg.cholesky(self._noise + self._background + deviation)
         self._whitened = solve_triangular(self._lower, self._design, lower=True)
@@ -205,10 +205,10 @@ class Posterior:
         for design, covariance in zip(self._deviation_designs, self._deviations, strict=True):
             drawn = rng.standard_normal((count, modes, len(covariance))) @ _root(covariance).T
             before.append(drawn)
-            seen = seen - np.einsum("rni,dri->dn", design, drawn, optimize=True)
+            seen = seen - np.tensordot(drawn, design, axes=((1, 2), (0, 2)))
         pulled = cho_solve((self._lower, True), seen.T)
         return [
-            drawn + np.einsum("rni,nd->dri", design, pulled, optimize=True) @ covariance
+            drawn + np.tensordot(pulled, design, axes=(0, 1)) @ covariance
             for design, drawn, covariance in zip(
                 self._deviation_designs, before, self._deviations, strict=True
             )

@@ -102,12 +102,7 @@ def facts_of(
         facts.append(
             UnexplainedValues(reduced_chi2, names[light], int(channel), float(pull[light, channel]))
         )
-    fractions = np.array(
-        [
-            ReradiationMatrix("", matrix.input_nm, matrix.output_nm, rho, phi).total_fraction
-            for rho, phi in zip(surfaces.reflectance, surfaces.reradiation, strict=True)
-        ]
-    )
+    fractions = _total_fractions(matrix, surfaces)
     mean, sigma = fractions.mean(axis=0), fractions.std(axis=0, ddof=1)
     worst = int(np.argmax(mean - SIGMAS * sigma))
     if mean[worst] > LARGEST_FRACTION + SIGMAS * sigma[worst]:
@@ -115,3 +110,15 @@ def facts_of(
             MoreThanWhite(float(matrix.input_nm[worst]), float(mean[worst]), float(sigma[worst]))
         )
     return tuple(facts)
+
+
+def _total_fractions(matrix: ReradiationMatrix, surfaces: Surfaces) -> FloatArray:
+    """Return the fraction of light that comes back at all from each drawn surface, shape (d, i)."""
+    stokes = np.where(matrix.is_stokes, surfaces.reradiation, 0.0)
+    reradiated = np.einsum("o,doi->di", matrix.output_width_nm, stokes)
+    nm = matrix.input_nm
+    reflected = [
+        np.interp(nm, matrix.output_nm, reflectance, left=0.0, right=0.0)
+        for reflectance in surfaces.reflectance
+    ]
+    return np.asarray(reradiated + np.array(reflected))

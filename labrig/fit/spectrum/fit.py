@@ -87,14 +87,14 @@ def nonnegative_minimum(
     for _ in range(MAX_EXCHANGES):
         x = np.zeros_like(linear)
         if free.any():
-            x[free] = _solved(curvature[np.ix_(free, free)], linear[free])
+            x[free] = _solved(curvature[free][:, free], linear[free])
         slope = curvature @ x - linear
         slack = ROUNDING * (size @ np.abs(x) + np.abs(linear))
         below = x < -SMALLEST * float(np.abs(x).max(initial=0.0))
-        wrong = np.flatnonzero(np.where(free, below, slope < -slack))
-        if not wrong.size:
+        wrong = np.where(free, below, slope < -slack)
+        if not wrong.any():
             return np.maximum(x, 0.0)
-        free[wrong] = ~free[wrong]
+        free ^= wrong
     upper = cholesky(curvature)
     return nonnegative_least_squares(upper, solve_triangular(upper, linear, trans="T"))
 

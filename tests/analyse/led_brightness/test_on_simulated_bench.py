@@ -29,6 +29,7 @@ from tests.analyse.recorded import part_of
 from tests.results.made import assert_read_back
 
 SHORT, LONG = ["430 nm", "455 nm"], ["565 nm", "590 nm", "625 nm"]
+SOME = ["365 nm", "430 nm", "490 nm", "530 nm", "625 nm"]
 
 
 def seeded(seed: int) -> Callable[[Rig], None]:
@@ -69,7 +70,7 @@ def test_spectra_and_brightnesses_are_the_rooms_and_come_back_from_files(tmp_pat
     all_pulls, off_nm = [], []
     for seed in (4,):
         run = recorded(tmp_path / str(seed), seeded(seed))
-        result = result_of(run)
+        result = processed(run)
         assert faults(result) == {}
         assert (result.uv_scale, result.calibration.scale) == ("measured", "relative")
         true = truth(run)
@@ -82,10 +83,9 @@ def test_spectra_and_brightnesses_are_the_rooms_and_come_back_from_files(tmp_pat
     # test of σ is that of the fit, over many cameras.
     assert 0.4 < np.sqrt(np.mean(np.square(all_pulls))) < 1.6
 
-    read = processed(run)
     assert_read_back(result)
-    assert read.calibration == LEDS_KIND.read(run)
-    exposures = led_exposures(part_of(run).rig, "rig", read.calibration)
+    assert result.calibration == LEDS_KIND.read(run)
+    exposures = led_exposures(part_of(run).rig, "rig", result.calibration)
     assert all(math.isfinite(one.brightness_sigma) for one in exposures.values())
     page = (run / "result" / "report.html").read_text(encoding="utf-8")
     assert "Brightness of the LEDs" in page
@@ -102,7 +102,7 @@ def test_with_an_absolute_scale_it_is_irradiance(tmp_path: Path) -> None:
             rig["simulation"]["seed"] = seed
             calibrated(rig, folder)
 
-        run = recorded(folder, change)
+        run = recorded(folder, change, leds=SOME)
         result, true = result_of(run), truth(run)
         assert faults(result) == {}
         assert (result.uv_scale, result.calibration.scale) == ("measured", "absolute")
@@ -123,7 +123,7 @@ def test_with_an_absolute_scale_it_is_irradiance(tmp_path: Path) -> None:
 
 
 def test_by_the_camera_alone_the_scale_of_ultraviolet_is_unknown(tmp_path: Path) -> None:
-    run = recorded(tmp_path, without_spectrometer)
+    run = recorded(tmp_path, without_spectrometer, leds=SOME)
     result, true = processed(run), truth(run)
     assert (result.uv_scale, result.calibration.uv_scale) == ("unknown", "unknown")
     assert result.leds["365 nm"].brightness is None

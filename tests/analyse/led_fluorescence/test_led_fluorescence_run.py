@@ -21,7 +21,7 @@ from labrig.material import (
     read_fluorescent,
 )
 from labrig.optics import read_light
-from labrig.process import process_and_report
+from labrig.process import Processed, process_and_report
 from labrig.results import FluorescentPatch, LedFluorescenceResult
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of
@@ -40,8 +40,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def result(run: Path) -> LedFluorescenceResult:
-    return analyse(part_of(run))
+def processed(run: Path) -> Processed:
+    return process_and_report(run)
+
+
+@pytest.fixture(scope="module")
+def result(processed: Processed) -> Any:
+    return processed.result
 
 
 def test_dyes_are_counted_and_placed(result: LedFluorescenceResult) -> None:
@@ -99,8 +104,8 @@ def test_nothing_bleaches_or_is_left_without_a_cause(result: LedFluorescenceResu
     assert not any("left with all LEDs off" in warning for warning in result.warnings)
 
 
-def test_the_result_is_read_back_and_written_as_materials(run: Path) -> None:
-    done = process_and_report(run)
+def test_the_result_is_read_back_and_written_as_materials(processed: Processed) -> None:
+    done = processed
     assert isinstance(done.result, LedFluorescenceResult)
     assert_read_back(done.result)
     folder = done.report.parent

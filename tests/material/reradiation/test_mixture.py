@@ -119,7 +119,7 @@ def test_a_conditional_times_its_integral_is_the_joint_density(
 
 
 @both_ways
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(seed=seeds, given_nm=wavelengths)
 def test_pdf_and_cdf_agree_and_end_at_the_diagonal(given: str, seed: int, given_nm: float) -> None:
     density = conditional(random_mixture(seed), given)
