@@ -19,6 +19,10 @@ ON_S, OFF_S = 20.0, 220.0
 T_S = np.concatenate([np.arange(0.0, 400.0, 1.0), np.geomspace(400.0, 3000.0, 200)])
 
 
+def growth(_: float, r: FloatArray, kappa: float, k: float, b: float) -> FloatArray:
+    return np.asarray((1 - r) * kappa - k * np.maximum(r, 0) ** b)
+
+
 def light(
     states: list[tuple[float, float, float, float]],
     stimulated: float = 1.0,
@@ -30,12 +34,12 @@ def light(
     for kappa, k, b, reradiation in states:
         start = np.zeros(1)
         for begin, end, lamp in ((ON_S, OFF_S, kappa), (OFF_S, t_s[-1] + 1, 0.0)):
-            solved = solve_ivp(
-                lambda _, r, lamp=lamp, k=k, b=b: (1 - r) * lamp - k * np.maximum(r, 0) ** b,
-                (begin, end), start, dense_output=True, rtol=1e-9, atol=1e-12, method="LSODA",
-            )  # fmt: skip
             own = (t_s >= begin) & (t_s < end)
-            r = np.maximum(solved.sol(t_s[own])[0], 0.0)
+            solved = solve_ivp(
+                growth, (begin, end), start, args=(lamp, k, b), t_eval=[*t_s[own], end],
+                rtol=1e-9, atol=1e-12, method="LSODA",
+            )  # fmt: skip
+            r = np.maximum(solved.y[0, :-1], 0.0)
             total[own] += reradiation * (k * r**b + stimulated * lamp * r)
             start = solved.y[:, -1]
     return total
