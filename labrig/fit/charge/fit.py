@@ -38,7 +38,7 @@ UNSATURATED = 1e-3
 #: Start values: orders, κ times the length of the charge, and speeds of the states over the
 #: inverse time in which the light falls by a factor e.
 START_ORDER, START_KAPPA = 1.7, 0.3
-START_SPEEDS = {1: (1.0,), 2: (3.0, 0.3)}
+START_SPEEDS = {1: ((1.0,),), 2: ((3.0, 0.3), (1.5, 0.7))}
 #: Difference in BIC from which a model with more parameters is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
 #: Gain in χ² of a step at which fits that are compared end.
@@ -207,7 +207,17 @@ class _Problem:
         return int(np.count_nonzero(low < high))
 
     def fit(self, model: _Model) -> LeastSquaresFit:
-        """Fit a model from the time in which the light decays."""
+        """Fit a model from several starts; η, where it is free, from the fit that holds it at 1."""
+        if self.light_stimulated is None:
+            held = _Problem(self.readings, 1.0).fit(model)
+            return self._search(held.parameters, model)
+        found = [
+            self._search(self._start(speeds, model), model) for speeds in START_SPEEDS[model.states]
+        ]
+        return min(found, key=lambda fit: fit.chi2)
+
+    def _start(self, speeds: tuple[float, ...], model: _Model) -> FloatArray:
+        """Return start values by the time in which the light decays."""
         readings = self.readings
         lit, n = readings.values - readings.dark, readings.lit
         fading = lit[n:] < lit[n] / np.e
@@ -215,7 +225,7 @@ class _Problem:
         steady = max(float(lit[:n].max()), float(lit.max())) / model.states
         theta = [
             value
-            for speed in START_SPEEDS[model.states]
+            for speed in speeds
             for value in (
                 np.log(START_KAPPA / readings.times.charge_s),
                 np.log(speed / fall_s),
@@ -224,10 +234,14 @@ class _Problem:
             )
         ]
         stimulated = 1.0 if self.light_stimulated is None else self.light_stimulated
+        return np.array([*theta, stimulated, 0.05 * steady, readings.dark])
+
+    def _search(self, start: FloatArray, model: _Model) -> LeastSquaresFit:
+        """Fit from a start until a step gains little."""
         low, high = self.bounds(model)
         return least_squares(
             self.residuals,
-            np.array([*theta, stimulated, 0.05 * steady, readings.dark]),
+            start,
             lower=low,
             upper=high,
             max_iterations=MAX_ITERATIONS,
