@@ -205,15 +205,15 @@ def _order_figure(test: OrderTest) -> Figure:
     """Draw the rate at lamp off over the light there, and the power law through it."""
     figure = new_figure(256.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
     error_bars(axes, test.light, test.rate_per_s, test.rate_sigma_per_s, INK)
     points(axes, test.light, test.rate_per_s, MARKERS[0], INK, INK)
     middle = float(np.exp(np.log(test.rate_per_s).mean()))
-    ends = np.array([test.light.min(), test.light.max()])
-    power = (ends / np.exp(np.log(test.light).mean())) ** test.shift.value
-    axes.plot(ends, middle * power, color=INK, linewidth=1.0)
-    axes.plot(ends, np.full(2, middle), color=MUTED, linewidth=1.0, linestyle=DASHED)
+    light = np.geomspace(test.light.min(), test.light.max(), 64)
+    power = (light / np.exp(np.log(test.light).mean())) ** test.shift.value
+    axes.plot(light, middle * power, color=INK, linewidth=1.0)
+    axes.axhline(middle, color=MUTED, linewidth=1.0, linestyle=DASHED)
+    axes.set_xlim(0, None)
+    axes.set_ylim(0, None)
     axes.set_xlabel("Glow at lamp off / (DN/s)")
     axes.set_ylabel("Relative fall / s⁻¹")
     return figure

@@ -137,6 +137,7 @@ def test_a_model_that_misses_the_light_says_so() -> None:
         (T_S, np.ones_like(T_S), 1.0, (220.0, 20.0), "lamp off after it was on"),
         (T_S, np.ones_like(T_S), 1.0, (4000.0, 5000.0), "got 0 and 0"),
         (T_S, np.full_like(T_S, np.nan), 1.0, (20.0, 220.0), "expected finite values"),
+        (T_S, np.sin(T_S), 1.0, (20.0, 220.0), "none above the noise"),
         (T_S, np.ones_like(T_S), 0.0, (20.0, 220.0), "expected σ > 0"),
         (T_S, np.ones_like(T_S), None, (20.0, 220.0), "give their σ"),
         (T_S[:5], np.ones_like(T_S), 1.0, (20.0, 220.0), "one value for each time"),

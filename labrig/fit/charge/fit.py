@@ -386,10 +386,13 @@ def _state(
     is_known = 0 < log_kappa_sigma < KNOWN_LOG_KAPPA
     is_known = is_known and problem.gain_of_kappa(fit, model, number) > KNOWN_GAIN * misfit
     b, time_s = order.value, 1 / inverse_time.value
+    # A speed that a bound holds is not determined.
+    is_timed = covariance[own, own][1, 1] > 0
+    time_sigma = inverse_time.sigma * time_s**2 if is_timed else np.inf
     return OrderState(
         order=order,
         amplitude=amplitude,
-        decay_time_s=Measured(time_s, inverse_time.sigma * time_s**2, "s"),
+        decay_time_s=Measured(time_s, time_sigma, "s"),
         exponent=Measured(b / (b - 1), order.sigma / (b - 1) ** 2) if b > 1 else None,
         kappa_per_s=Measured(kappa.value, kappa.sigma, "1/s") if is_known else None,
         k_r_per_s=Measured(k_r.value, k_r.sigma, "1/s") if is_known else None,
@@ -433,6 +436,8 @@ def _warnings(
     for state in states:
         if state.order.value >= MAX_ORDER:
             yield f"an order reached its bound, {MAX_ORDER:g}: this is no state of general order"
+    if any(np.isinf(state.decay_time_s.sigma) for state in states):
+        yield "the decay time of a state is not determined: record for longer, or more densely"
     if any(state.kappa_per_s is None for state in states):
         yield (
             "κ, k_r and r(0) of a state are not known apart, since its charge does not saturate "

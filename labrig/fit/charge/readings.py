@@ -20,6 +20,8 @@ NEIGHBOURS = 9
 MEDIAN_SQUARE = 0.4549
 #: Least counts in the variance of a reading.
 LEAST_COUNTS = 4.0
+#: Least light after the lamp, in σ of its mean.
+VISIBLE_SIGMAS = 5.0
 #: Stretches of the charge, of equal times, and of the decay, of equal ratios of times, in which
 #: residuals are summed.
 CHARGE_STRETCHES, DECAY_STRETCHES = 15, 25
@@ -119,7 +121,7 @@ def readings_of(
         used = [given[part] for part in parts]
     kept = np.concatenate([lit, after])
     dark_weights = used[0] ** -2.0
-    return Readings(
+    readings = Readings(
         ChargeAndDecay(
             off_s - on_s, (t + exposure / 2)[lit] - on_s, t[after] - off_s, exposure[after]
         ),
@@ -128,6 +130,21 @@ def readings_of(
         float(np.average(y[before], weights=dark_weights)) if len(before) else 0.0,
         float(dark_weights.sum() ** -0.5) if len(before) else 0.0,
     )
+    _refuse_darkness(readings)
+    return readings
+
+
+def _refuse_darkness(readings: Readings) -> None:
+    """Refuse readings after the lamp of which no first few stand out of their noise."""
+    glow = readings.values[readings.lit :] - readings.dark
+    weights = readings.sigma[readings.lit :] ** -2.0
+    total = np.cumsum(weights)
+    mean_sigma = np.hypot(total**-0.5, readings.dark_sigma)
+    if not np.max(np.cumsum(weights * glow) / total / mean_sigma) > VISIBLE_SIGMAS:
+        raise FitError(
+            "expected light that decays after the lamp, got none above the noise; check the times "
+            "of the lamp"
+        )
 
 
 def _counting_sigma(parts: list[FloatArray]) -> list[FloatArray]:
