@@ -184,15 +184,24 @@ class Traps:
         return relative
 
 
-def law_of(settings: KineticsSettings | None) -> Law | None:
-    """Return the law of a sample; None if it is the rate equation with traps of usual depth."""
+def law_of(settings: KineticsSettings | None, order: float = 1.0) -> Law | None:
+    """Return the law of a state; None if it is the rate equation with traps of usual depth.
+
+    Parameters
+    ----------
+    settings
+        Settings of the sample.
+    order
+        Kinetic order of the state in the material's file, which settings of a law of their own
+        leave at 1.
+    """
     if settings is None:
-        return None
+        return None if order == 1 else GeneralOrder(order)
     if settings.retrapping is not None:
         return OneTrap(settings.retrapping)
     offset = math.inf if settings.charging_offset is None else settings.charging_offset
-    order = settings.order if settings.model == "general_order" else 1.0
-    law = GeneralOrder(order, settings.prompt, offset)
+    own_order = settings.order if settings.model == "general_order" else order
+    law = GeneralOrder(own_order, settings.prompt, offset)
     is_plain = law == GeneralOrder(1.0) and settings.depth_ev == USUAL_DEPTH_EV
     return None if is_plain and settings.model != "trap_depths" else law
 

@@ -33,7 +33,8 @@ class KineticsSettings(Part):
     Attributes
     ----------
     model
-        Law of the traps. `first_order`: as of any sample. `general_order`: the re-radiation is k_r
+        Law of the traps. `first_order`: as of any sample, or of the kinetic order in its material's
+        file. `general_order`: the re-radiation is k_r
         times the concentration to the power `order`. `otor`: one trap and one recombination centre,
         between which free carriers choose. `trap_depths`: traps of many depths, each of first
         order, or with `retrapping` into its own depth.

@@ -310,24 +310,30 @@ def phosphor(
     """
     each = kinetics or [None] * len(materials)
     rows = [
-        (state.k_r_per_s, _excitation(material, state, charge, irradiance, settings), index)
+        (
+            state.k_r_per_s,
+            _excitation(material, state, charge, irradiance, settings),
+            index,
+            law_of(settings, state.kinetic_order),
+        )
         for index, (material, charge, settings) in enumerate(
             zip(materials, charges, each, strict=True)
         )
         for state in material.states
     ]
-    k_r, excitation, patch = zip(*rows, strict=True)
+    k_r, excitation, patch, laws = zip(*rows, strict=True)
     states = Phosphor(np.array(k_r), np.array(excitation), np.array(patch, dtype=np.intp))
-    return _of_traps(states, each) if any(each) else states
+    return _of_traps(states, each, laws) if any(each) or any(laws) else states
 
 
-def _of_traps(states: Phosphor, kinetics: Sequence[KineticsSettings | None]) -> Phosphor:
+def _of_traps(
+    states: Phosphor, kinetics: Sequence[KineticsSettings | None], laws: Sequence[Law | None]
+) -> Phosphor:
     """Return the traps of all states: of every depth, in every layer of the sample."""
-    laws = [law_of(settings) for settings in kinetics]
     different = tuple(dict.fromkeys(law for law in laws if law is not None))
     rows = []
     for state, patch in enumerate(states.patch.tolist()):
-        law, settings = laws[patch], kinetics[patch]
+        law, settings = laws[state], kinetics[patch]
         number = -1 if law is None else different.index(law)
         passed, thickness = layers_of(settings, states.excitation[states.patch == patch])
         depths = depths_of(settings, float(states.k_r_per_s[state]))
@@ -363,7 +369,7 @@ def _excitation(
     if charge is not None or state.k_e_per_s is None:
         level = UNKNOWN_CHARGE if charge is None else charge
         # The burning lamp holds this level, all wavelengths taking their part.
-        kappa_per_s = _holding(level, state.k_r_per_s, kinetics)
+        kappa_per_s = _holding(level, state, kinetics)
         row: FloatArray = np.full_like(spectrum, kappa_per_s / spectrum.sum())
         return row
     if material.bands_nm is None or material.irradiance_norm is None:
@@ -392,12 +398,14 @@ def _over_wavelengths(
     return np.asarray(np.diff(running(CELL_EDGES_NM)) / CELL_NM)
 
 
-def _holding(level: float, k_r_per_s: float, kinetics: KineticsSettings | None) -> float:
+def _holding(level: float, state: State, kinetics: KineticsSettings | None) -> float:
     """Return the κ that holds a level of the traps at the surface."""
-    law = law_of(kinetics)
-    if kinetics is None or law is None:
-        return k_r_per_s * level / (1 - level)
-    return law.generation(level, rate_in_the_middle(kinetics, k_r_per_s))
+    law = law_of(kinetics, state.kinetic_order)
+    if law is None:
+        return state.k_r_per_s * level / (1 - level)
+    return law.generation(
+        level, rate_in_the_middle(kinetics or KineticsSettings(), state.k_r_per_s)
+    )
 
 
 def band_cells(bands_nm: Sequence[float] | FloatArray) -> FloatArray:

@@ -70,6 +70,8 @@ class Samples:
                     f"{material.name}: expected 'kinetics' with a phosphor, got it with a "
                     "re-radiation matrix, which has no states"
                 )
+            if patch.kinetics is not None and patch.kinetics.model != "first_order":
+                _refuse_two_laws(material, patch.kinetics.model)
         self._patches = replace(
             phosphor(phosphors, charges, simulation.lamp.irradiance, kinetics),
             rate_factor=rate_factor(simulation.temperature),
@@ -195,3 +197,11 @@ class Samples:
             passed = Lvf(self._lvf).below(self._lvf.on_sample, turned)[self._piece]
             self._below_lvf[turned] = replace(self.cells, excitation=self.cells.excitation * passed)
         return self._below_lvf[turned]
+
+
+def _refuse_two_laws(material: object, model: str) -> None:
+    if isinstance(material, Material) and not material.is_first_order:
+        raise UsageError(
+            f"{material.name}: expected no 'model: {model}' in 'kinetics' of a material that has "
+            "'kinetic_order', got both; leave one of them out"
+        )

@@ -62,7 +62,7 @@ class TruePatch(_Part):
     Attributes
     ----------
     kinetics
-        Law of its traps; null: the rate equation of first order.
+        Law of its traps; null: the rate equation, of the order in the material's file.
     """
 
     material: str

@@ -1,5 +1,6 @@
 """From the frames of a run to its typed result: one module or package for each protocol."""
 
+from labrig.analyse.charge_table import ChargeTableOptions, fit_charge_table
 from labrig.analyse.frames import verify_frames
 from labrig.analyse.hyperspectral import CubeList, matrix_from_cubes
 from labrig.analyse.inputs import Inputs, Part
@@ -9,12 +10,14 @@ from labrig.analyse.table_fit import FittedTable, TableFitOptions, fit_table
 from labrig.analyse.temperature import temperature_warnings
 
 __all__ = [
+    "ChargeTableOptions",
     "CubeList",
     "FittedTable",
     "Inputs",
     "Overrides",
     "Part",
     "TableFitOptions",
+    "fit_charge_table",
     "fit_series",
     "fit_table",
     "matrix_from_cubes",

@@ -23,6 +23,7 @@ from labrig.analyse.frames import (
     without_stray_light,
 )
 from labrig.analyse.inputs import Part
+from labrig.analyse.kinetic_order import compare_levels
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import DataError, FitError
 from labrig.fit import EPSILON, least_squares
@@ -294,7 +295,8 @@ def _patch_saturation(
     if part.protocol.weaker is not None and weaker:
         levels = _levels(rates, charge_s, weaker[-1], full[-1], part.protocol.weaker)
     begin, end = _growths(*(curves[units[row]] for row in full[-2:]))
-    return PatchSaturation(fit, light, charge_s, curves, rates, begin, end, tuple(levels))
+    order = compare_levels(list(curves.values()))
+    return PatchSaturation(fit, light, charge_s, curves, rates, begin, end, tuple(levels), order)
 
 
 def _levels(
@@ -347,4 +349,10 @@ def _warnings(patch: PatchSaturation) -> Iterator[str]:
             f"the rates depend on the charge (p = {patch.rates.p_value:.2g}): the decay is no sum "
             f"of {patch.fit.n_states} exponentials of fixed rates, as power laws are none; what "
             "was found holds for the charge it was measured at"
+        )
+    if patch.order is not None and patch.order.verdict == "general order":
+        yield (
+            f"the glow falls as that of a state of kinetic order {patch.order.order}, the more "
+            "slowly the less it was charged: excitation is fitted with order 1 and will not "
+            "describe it"
         )

@@ -122,6 +122,57 @@ def decay(
             typer.echo(f"report: {processed.report}")
 
 
+@app.command("charge")
+def charge(
+    table: Annotated[
+        Path, typer.Argument(help="Table of times and one value, through charge and decay.")
+    ],
+    on: Annotated[float, typer.Option("--on", help="When the lamp was switched on, in seconds.")],
+    off: Annotated[float, typer.Option("--off", help="When it was switched off, in seconds.")],
+    states: Annotated[
+        int | None,
+        typer.Option("--states", min=1, max=2, help="Number of states; chosen by default."),
+    ] = None,
+    order: Annotated[
+        str,
+        typer.Option("--order", help="Kinetic order: 'first', 'general', or 'auto' by the data."),
+    ] = "auto",
+    stimulated: Annotated[
+        str,
+        typer.Option(
+            "--stimulated",
+            help="η, fraction of the carriers that find their trap filled and recombine at once: "
+            "0 to 1, or 'free'. 1 conserves energy.",
+        ),
+    ] = "1",
+    column: Annotated[
+        str | None, typer.Option("--column", help="Name of the column of values, of several.")
+    ] = None,
+    time: Annotated[str | None, typer.Option("--time", help="Name of the column of times.")] = None,
+    time_unit: Annotated[
+        str | None,
+        typer.Option("--time-unit", help="Unit of the times: ns, ms, s, min, h, …"),
+    ] = None,
+    decimal: Annotated[
+        str | None,
+        typer.Option("--decimal", help="Decimal mark of the numbers, 'point' or 'comma'."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the fit as JSON.")] = False,
+) -> None:
+    """States of general kinetic order that charge and decay as one series of readings does.
+
+    The lamp is constant from --on to --off, and the sample was empty before. Without σ in the
+    table, the variance is proportional to the value, and told by the scatter of neighbours.
+    """
+    from labrig.analyse import ChargeTableOptions, fit_charge_table
+    from labrig.results import TableLayout
+
+    options = ChargeTableOptions(on, off, states, order, stimulated)
+    layout = TableLayout(time, column, time_unit, decimal)
+    fit, columns = fit_charge_table(table, options, layout)
+    typer.echo(fit.to_json() if json else f"columns  {columns}\n{fit}")
+
+
 @app.command("mixture")
 def mixture(
     file: File,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from labrig.compare.nalbach2017 import DELTA_E, emission
 from labrig.compare.viewing import FloatArray, Viewing
 from labrig.errors import DataError, UsageError
-from labrig.material import Material, phi1
+from labrig.material import DECAY_LAWS, Material, State, becquerel_of, exponential_means
 from labrig.optics import CameraResponse, Spectrum, delta_e, lab
 from labrig.report import Table, exposure_middles_s
 from labrig.results import Series
@@ -36,7 +36,7 @@ def glow_of(material: Material, series: Series, camera: CameraResponse | None) -
     """Return the mean glow of a material over each exposure, on the scale of `series`, (n, 3).
 
     Rates and relative strengths of the states are the material's: its amplitudes, else
-    Λ_i k_r,i r_i(0), with r_i(0) = 1 if it is not known. All states have one colour: that of the
+    Λ_i k_r,i r_i(0)ᵇ, with r_i(0) = 1 if it is not known. All states have one colour: that of the
     material's spectrum or, if spectrum or camera are not known, the mean colour of the photographs.
     The scale is one factor, found by least squares.
 
@@ -45,16 +45,26 @@ def glow_of(material: Material, series: Series, camera: CameraResponse | None) -
     UsageError
         If the material's file has neither amplitudes nor Λ.
     """
-    rates = np.array([state.k_r_per_s for state in material.states])
-    means = np.exp(-np.multiply.outer(series.t_s, rates)) * phi1(
-        np.multiply.outer(series.exposure_s, rates)
-    )
+    means = np.column_stack([_means(state, series) for state in material.states])
     signal = means @ _amplitudes(material)
     spectrum = emission(material)
     glow = np.multiply.outer(signal, signal @ series.values)
     if spectrum is not None and camera is not None:
         glow = in_colour(glow, spectrum, camera)
     return np.asarray(glow * (np.sum(glow * series.values) / np.sum(glow**2)))
+
+
+def _means(state: State, series: Series) -> FloatArray:
+    """Return the light of a state over that at lamp off, averaged over each exposure, (n,)."""
+    if state.kinetic_order == 1:
+        rate = np.array([state.k_r_per_s])
+        return exponential_means(rate, series.t_s, series.exposure_s)[:, 0]
+    law = becquerel_of(_level_at_off(state), state.k_r_per_s, state.kinetic_order)
+    return DECAY_LAWS["becquerel"].means(*law, series.t_s, series.exposure_s)[0]
+
+
+def _level_at_off(state: State) -> float:
+    return 1.0 if state.r0 is None else state.r0
 
 
 def _amplitudes(material: Material) -> FloatArray:
@@ -72,7 +82,7 @@ def _amplitudes(material: Material) -> FloatArray:
         [
             float(np.array(state.reradiation) @ widths)
             * state.k_r_per_s
-            * (1.0 if state.r0 is None else state.r0)
+            * _level_at_off(state) ** state.kinetic_order
             for state in material.states
         ]
     )

@@ -7,6 +7,7 @@ from labrig.fit.bispectral import (
     bispectral_columns,
     separate_columns,
 )
+from labrig.fit.charge import ChargeCandidate, ChargeFit, OrderState, fit_charge_and_decay
 from labrig.fit.decay import DecayFit, fit_decay
 from labrig.fit.least_squares import (
     EPSILON,
@@ -27,6 +28,8 @@ from labrig.fit.mixture import (
 __all__ = [
     "EPSILON",
     "BispectralColumns",
+    "ChargeCandidate",
+    "ChargeFit",
     "DecayFit",
     "Ending",
     "FloatArray",
@@ -36,8 +39,10 @@ __all__ = [
     "MixtureCandidate",
     "MixtureFit",
     "MixtureTexture",
+    "OrderState",
     "SeparatedColumns",
     "bispectral_columns",
+    "fit_charge_and_decay",
     "fit_decay",
     "fit_mixture",
     "fit_mixture_texture",

@@ -25,6 +25,14 @@ from .fluorescent import (
     read_fluorescent as read_fluorescent,
     write_fluorescent as write_fluorescent,
 )
+from .general_order import (
+    BecquerelDecay as BecquerelDecay,
+    Charged as Charged,
+    becquerel_of as becquerel_of,
+    dark_concentration as dark_concentration,
+    lit_concentration as lit_concentration,
+    steady_concentration as steady_concentration,
+)
 from .rates import (
     concentration as concentration,
     exponential_means as exponential_means,

@@ -99,6 +99,11 @@ def compare_materials(measured: Material, reference: Material) -> MaterialCompar
             f"{len(reference_states)}: their rows stand beside each other, but do not "
             "mean the same; fit as many (--states)."
         )
+    if _orders(measured_states) != _orders(reference_states):
+        notes.append(
+            "Their kinetic orders differ, so their k_r and Λ do not mean the same: k_r is the rate "
+            "of a full state only."
+        )
     same_bands = measured.bands_nm == reference.bands_nm
     if not same_bands and measured.bands_nm is not None and reference.bands_nm is not None:
         notes.append("Their bands differ, so k_e and Λ are left out.")
@@ -117,6 +122,8 @@ def compare_materials(measured: Material, reference: Material) -> MaterialCompar
         reference_state = reference_states[number] if number < len(reference_states) else None
         label = f" {number + 1}" if max(len(measured_states), len(reference_states)) > 1 else ""
         pairs += _pairs(state, reference_state, label, "k_r", "s⁻¹", "k_r_per_s")
+        if not (measured.is_first_order and reference.is_first_order):
+            pairs += _pairs(state, reference_state, label, "b", "", "kinetic_order")
         pairs += _pairs(state, reference_state, label, "r(0)", "", "r0")
         if same_bands and measured.bands_nm is not None:
             bands = measured.bands_nm
@@ -133,6 +140,10 @@ def compare_materials(measured: Material, reference: Material) -> MaterialCompar
 
 def _by_falling_rate(material: Material) -> Sequence[State]:
     return sorted(material.states, key=lambda state: -state.k_r_per_s)
+
+
+def _orders(states: Sequence[State]) -> list[float]:
+    return [state.kinetic_order for state in states]
 
 
 def _closest(

@@ -1,26 +1,36 @@
 """The material file: the result of measuring a phosphor, and the definition of a simulated sample.
 
-A state i has the rates of Nalbach et al., eq. 1 and 3:
-dr/dt = (1 − r) Σ_j k_e,j E_j − k_r r, and radiance L_j = Σ_i Λ_i,j k_r,i r_i.
+A state i has the rates of Nalbach et al., eq. 1 and 3, with a kinetic order b that is 1 there:
+dr/dt = (1 − r) Σ_j k_e,j E_j − k_r rᵇ, and radiance L_j = Σ_i Λ_i,j k_r,i r_iᵇ in the dark.
 """
 
 import os
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from labrig import resources
 from labrig.finite import NotNegative
 from labrig.yaml_file import read_model, write_yaml
 
 Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Order = Annotated[float, Field(ge=1, le=4)]
 Concentration = Annotated[float, Field(ge=0, le=1)]
 Series = tuple[NotNegative, ...]
 
 #: Fields of a state that may have an uncertainty.
-MEASURED = ("k_r_per_s", "amplitude", "r0", "k_e_per_s", "reradiation")
+MEASURED = ("k_r_per_s", "kinetic_order", "amplitude", "r0", "k_e_per_s", "reradiation")
+#: Fields that are written where the kinetic order is not 1.
+OF_ORDER = ("kinetic_order", "kinetic_order_sigma")
 
 
 class _Part(BaseModel):
@@ -50,8 +60,14 @@ class State(_Part):
     ----------
     k_r_per_s
         Re-radiation rate k_r of the state, in 1/s.
+    kinetic_order
+        Kinetic order b of the state, which re-radiates k_r times its concentration to this power. 1
+        is the rate equation of Nalbach et al., and not written; the light of a higher order decays
+        as (1 + t/τ)^(−b/(b − 1)) with τ = 1/((b − 1) k_r r(0)^(b − 1)), so that its amplitude needs
+        `r0`.
     amplitude
-        Amplitude a = Λ k_r r(0) of the state in the decay, in the camera's or the fit's own unit.
+        Amplitude a = Λ k_r r(0) of the state in the decay, in the camera's or the fit's own unit;
+        Λ k_r r(0)ᵇ with a kinetic order.
     r0
         Concentration r(0) of the state at lamp off to which `amplitude` belongs, 0 to 1.
     k_e_per_s
@@ -62,6 +78,8 @@ class State(_Part):
         are bands.
     k_r_per_s_sigma
         Standard deviation of `k_r_per_s`, in 1/s.
+    kinetic_order_sigma
+        Standard deviation of `kinetic_order`.
     amplitude_sigma
         Standard deviation of `amplitude`, in its unit.
     r0_sigma
@@ -73,11 +91,13 @@ class State(_Part):
     """
 
     k_r_per_s: Rate
+    kinetic_order: Order = 1.0
     amplitude: NotNegative | None = None
     r0: Concentration | None = None
     k_e_per_s: Series | None = None
     reradiation: Series | None = None
     k_r_per_s_sigma: NotNegative | None = None
+    kinetic_order_sigma: NotNegative | None = None
     amplitude_sigma: NotNegative | None = None
     r0_sigma: NotNegative | None = None
     k_e_per_s_sigma: Series | None = None
@@ -97,6 +117,23 @@ class State(_Part):
                     f"got {len(sigma)}"
                 )
         return self
+
+    @model_validator(mode="after")
+    def _amplitude_of_an_order_has_its_charge(self) -> Self:
+        if self.kinetic_order != 1 and self.amplitude is not None and not self.r0:
+            raise ValueError(
+                "expected 'r0' above 0 beside 'amplitude' of a state with 'kinetic_order', since "
+                f"its decay depends on the charge, got {'nothing' if self.r0 is None else self.r0}"
+            )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_the_first_order(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content: dict[str, Any] = handler(self)
+        if self.kinetic_order == 1:
+            for name in OF_ORDER:
+                content.pop(name, None)
+        return content
 
 
 class Spectrum(_Part):
@@ -185,6 +222,11 @@ class Material(_Part):
     states: Annotated[tuple[State, ...], Field(min_length=1)]
     spectrum: Spectrum | None = None
     provenance: Provenance | None = None
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether all states decay as exponentials."""
+        return all(state.kinetic_order == 1 for state in self.states)
 
     @model_validator(mode="after")
     def _fits_its_bands(self) -> Self:

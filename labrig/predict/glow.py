@@ -62,8 +62,14 @@ def check_states(material: Material) -> None:
     Raises
     ------
     UsageError
-        If it has more states than a fit can resolve, or two with the same rate.
+        If it has more states than a fit can resolve, two with the same rate, or one of a kinetic
+        order.
     """
+    if not material.is_first_order:
+        raise UsageError(
+            f"{material.name}: expected states of first order, got 'kinetic_order'; what is "
+            "predicted is a fit of exponentials, which its decay is not"
+        )
     rates = sorted((state.k_r_per_s for state in material.states), reverse=True)
     if len(rates) > MAX_STATES:
         raise UsageError(

@@ -121,8 +121,11 @@ def _measured_head(comparison: MaterialComparison) -> str:
 
 
 def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[str, ...]]:
-    """Yield the rows of k_r, r(0), and k_e and Λ by band."""
-    for quantity, name in (("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")):
+    """Yield the rows of k_r, kinetic order, r(0), and k_e and Λ by band."""
+    own = [("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")]
+    if any(state.kinetic_order != 1 for state in states):
+        own.insert(1, ("kinetic order b", "kinetic_order"))
+    for quantity, name in own:
         if any(getattr(state, name) is not None for state in states):
             yield (quantity, *(_quantity_text(state, name) for state in states))
     for symbol, unit, name in (("k_e", " / s⁻¹", "k_e_per_s"), ("Λ", "", "reradiation")):

@@ -78,7 +78,8 @@ def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
             continue
         axes.stairs(
             values, edges_nm, color=colour, linewidth=1.4,
-            label=f"1/k_r = {rounded(1 / state.k_r_per_s, 3)} s",
+            label=f"1/k_r = {rounded(1 / state.k_r_per_s, 3)} s"
+            + ("" if state.kinetic_order == 1 else f", b = {rounded(state.kinetic_order, 3)}"),
         )  # fmt: skip
         if sigmas is not None:
             middles_nm = (edges_nm[1:] + edges_nm[:-1]) / 2

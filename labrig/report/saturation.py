@@ -30,6 +30,7 @@ from labrig.results import (
     FULL_LIGHT,
     LIGHTS,
     Measured,
+    OrderTest,
     PatchSaturation,
     RatesTest,
     SaturationResult,
@@ -71,6 +72,23 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
     if not patch.levels:
         yield ("r(0): not determined without a weaker light; saturation in time is none in level")
     yield _rates_text(patch)
+    if patch.order is not None:
+        yield _order_text(patch.order)
+
+
+def _order_text(test: OrderTest) -> str:
+    """Return the verdict on a kinetic order above 1."""
+    shape, shift = (plus_minus(each.value, each.sigma) for each in (test.shape, test.shift))
+    verdict = {
+        "first order": "no sign of a kinetic order above 1: it does not depend on the charge",
+        "general order": f"as of a state of kinetic order {test.order}",
+        "neither": "it depends on the charge, but not as that of a state of one kinetic order",
+        "not decided": "a kinetic order is not decided; compare charges that differ more",
+    }[test.verdict]
+    return (
+        f"fall of the glow at lamp off: {verdict} (exponent {shift} by the charge, {shape} by the "
+        f"shape of the decays, reduced χ² {test.reduced_chi2:.3g})"
+    )
 
 
 def _rates_text(patch: PatchSaturation) -> str:
@@ -102,6 +120,7 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
         "Rates are compared by an F-test of all decays with shared against each with its own "
         "rates, amplitudes always their own."
     )
+    order = () if patch.order is None else (_order_picture(name, patch.order),)
     return Section(
         f"Saturation: {name}",
         tuple(f"{line[0].upper()}{line[1:]}." if line[-1] != "." else line for line in text),
@@ -117,8 +136,18 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
                 "Decays after different charges over their begin, and their residuals with shared "
                 "rates, in σ.",
             ),
+            *order,
         ),
         (_rates_table(patch.rates, tuple(patch.curves)),),
+    )
+
+
+def _order_picture(name: str, test: OrderTest) -> Picture:
+    return Picture(
+        f"order-{name}",
+        partial(_order_figure, test),
+        "Relative fall of the glow at lamp off over the glow there, one point a decay; bars: 1 σ. "
+        "Solid: the power of the glow that fits; dashed: no dependence, as of first order.",
     )
 
 
@@ -169,6 +198,24 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
     axes.set_xlabel("Charge / min")
     axes.set_ylabel("Amplitude / (DN/s)")
     legend_above(figure, entries, columns=5)
+    return figure
+
+
+def _order_figure(test: OrderTest) -> Figure:
+    """Draw the rate at lamp off over the light there, and the power law through it."""
+    figure = new_figure(256.0)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
+    error_bars(axes, test.light, test.rate_per_s, test.rate_sigma_per_s, INK)
+    points(axes, test.light, test.rate_per_s, MARKERS[0], INK, INK)
+    middle = float(np.exp(np.log(test.rate_per_s).mean()))
+    light = np.geomspace(test.light.min(), test.light.max(), 64)
+    power = (light / np.exp(np.log(test.light).mean())) ** test.shift.value
+    axes.plot(light, middle * power, color=INK, linewidth=1.0)
+    axes.axhline(middle, color=MUTED, linewidth=1.0, linestyle=DASHED)
+    axes.set_xlim(0, None)
+    axes.set_ylim(0, None)
+    axes.set_xlabel("Glow at lamp off / (DN/s)")
+    axes.set_ylabel("Relative fall / s⁻¹")
     return figure
 
 

@@ -149,6 +149,7 @@ from .saturation import (
     LIGHTS as LIGHTS,
     Concentration as Concentration,
     Curve as Curve,
+    OrderTest as OrderTest,
     PatchSaturation as PatchSaturation,
     RatesTest as RatesTest,
     SaturationResult as SaturationResult,

@@ -22,6 +22,9 @@ PLATEAU = 0.02
 SIGMAS = 2.0
 #: Significance level of the test for different rates.
 LEVEL = 1e-3
+#: Differences in σ from which a kinetic order shows, and largest σ of the shift's exponent with
+#: which its absence is told.
+ORDER_SIGMAS, LARGEST_SHIFT_SIGMA = 3.0, 0.1
 #: Significance level of the test for decays that are not exponential.
 MISFIT_LEVEL = 5e-4
 
@@ -123,6 +126,51 @@ class RatesTest:
 
 
 @dataclass(frozen=True, eq=False)
+class OrderTest:
+    """Test of a kinetic order by decays after several charges, each (1 + u R t)^(−1/u).
+
+    Attributes
+    ----------
+    light
+        Signal of every decay at lamp off in DN/s, shape (d,).
+    rate_per_s, rate_sigma_per_s
+        Relative fall R of the signal at lamp off and its standard uncertainty in 1/s, shape (d,).
+    shape
+        Exponent u of the common shape, 0 of an exponential; (b − 1)/b of a state of order b.
+    shift
+        Exponent v of R ∝ lightᵛ: 0 where the rate does not depend on the charge, u of a state.
+    difference_sigma
+        Standard uncertainty of u − v.
+    reduced_chi2
+        χ² per degree of freedom; where it is above 1 all σ are enlarged by its root.
+    """
+
+    light: FloatArray
+    rate_per_s: FloatArray
+    rate_sigma_per_s: FloatArray
+    shape: Measured
+    shift: Measured
+    difference_sigma: float
+    reduced_chi2: float
+
+    @property
+    def verdict(self) -> Literal["first order", "general order", "neither", "not decided"]:
+        """What the rates at lamp off say."""
+        if self.shift.sigma > LARGEST_SHIFT_SIGMA:
+            return "not decided"
+        if abs(self.shift.value) < ORDER_SIGMAS * self.shift.sigma:
+            return "first order"
+        is_alike = abs(self.shape.value - self.shift.value) < ORDER_SIGMAS * self.difference_sigma
+        return "general order" if is_alike else "neither"
+
+    @property
+    def order(self) -> Measured:
+        """Kinetic order b = 1/(1 − v) by the shift."""
+        kept = 1 - self.shift.value
+        return Measured(1 / kept, self.shift.sigma / kept**2)
+
+
+@dataclass(frozen=True, eq=False)
 class PatchSaturation:
     """Saturation of a patch.
 
@@ -142,6 +190,8 @@ class PatchSaturation:
         and at the end of their decays, where slow states dominate.
     levels
         Level of every state by falling rate; empty without a weaker light.
+    order
+        Test of a kinetic order; None where the decays do not allow it.
     """
 
     fit: FittedDecay
@@ -152,6 +202,7 @@ class PatchSaturation:
     growth_at_begin: Measured
     growth_at_end: Measured
     levels: tuple[Concentration, ...]
+    order: OrderTest | None = None
 
     @property
     def time_saturation(self) -> Literal["saturated in time", "not saturated", "not decided"]:

@@ -1,4 +1,4 @@
-"""The rate equation against a real phosphor, charge and decay together: how well, and where not.
+"""Rate equations against a real phosphor, charge and decay together: how well, and where not.
 
     python -m tests.acceptance.sao_charge_and_decay
 
@@ -9,7 +9,9 @@ misfit over glow in the charge, the decay's first minute, and the rest.
 
 The charging curve of this phosphor is convex for its first minute and a half. Under constant light
 every state of the rate equation approaches its equilibrium ever more slowly, and so does any sum of
-them: no number of states can follow that.
+them: no number of states can follow that. States of general order can; they are fitted by
+`fit_charge_and_decay`, with the share η of carriers that recombine at once where their trap is
+filled held at 0, at 1, or free.
 """
 
 from itertools import pairwise
@@ -18,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit import LeastSquaresFit, least_squares
+from labrig.fit import ChargeFit, LeastSquaresFit, fit_charge_and_decay, least_squares
 from labrig.material.rates import concentration, phi1
 
 FloatArray = NDArray[np.float64]
@@ -82,6 +84,20 @@ def fitted(states: int, t_s: FloatArray, glow: FloatArray, dark: float) -> Least
     return min(found, key=lambda fit: fit.chi2)
 
 
+def of_general_order(light_stimulated: float | None) -> ChargeFit:
+    """One and two states, of first and of general order."""
+    t_s, counts = np.genfromtxt(TABLE, skip_header=1, usecols=(0, 1)).T
+    return fit_charge_and_decay(
+        t_s,
+        counts,
+        np.sqrt(COUNT * np.maximum(counts, 4 * COUNT)),
+        light_on_s=ON_S,
+        light_off_s=OFF_S,
+        exposure_s=READING_S,
+        light_stimulated=light_stimulated,
+    )
+
+
 def convexity(t_s: FloatArray, glow: FloatArray) -> tuple[float, float]:
     """Growth in counts per second: 5 to 25 s and 60 to 90 s after switching on."""
     spans = [(t_s > begin) & (t_s < end) for begin, end in ((5, 25), (60, 90))]
@@ -108,6 +124,14 @@ def main() -> None:
         fit = fitted(states, t_s, glow, dark)
         said = "".join(f"{100 * part:8.1f}" for part in misfits(fit, t_s, glow))
         print(f"{states:>6}{fit.reduced_chi2:>12.1f}   {said}")
+    print("η      model                        χ² per reading: charge, decay")
+    fits = {name: of_general_order(eta) for name, eta in (("0", 0.0), ("1", 1.0), ("free", None))}
+    for name, fit_of_order in fits.items():
+        for candidate in fit_of_order.candidates:
+            parts = f"{candidate.chi2_charge:8.2f}{candidate.chi2_decay:8.2f}"
+            print(f"{name:<7}{candidate.label:<29}{parts}")
+    print()
+    print(fits["1"])
 
 
 if __name__ == "__main__":

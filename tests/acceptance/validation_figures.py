@@ -200,6 +200,11 @@ def _real_charge(printed: str) -> str:
     return f"{two[2]:.0f} %, {two[3]:.0f} %, {two[4]:.0f} %, {two[5]:.0f} %"
 
 
+def _real_charge_of_general_order(printed: str) -> str:
+    ((charge,), (decay,)) = _columns(r"^1 +2 states of general order +([\d.]+) +([\d.]+)$", printed)
+    return f"{charge:.1f}, {decay:.1f}"
+
+
 def _narrow_lights(printed: str) -> str:
     thirds = _columns(r"^every third.* ([\d.]+) +([\d.]+) +([\d.]+) +[\d.]+ +([\d.]+)$", printed)
     (low,), (median,), (high,), (worst,) = thirds
@@ -458,6 +463,12 @@ FIGURES = (
         "charge until 60 s, in the charge until 300 s, in the decay until 60 s, later",
         "sao_charge_and_decay",
         _real_charge,
+    ),
+    Figure(
+        "The same, two states of general order, the charge's energy conserved: χ² per reading in "
+        "the charge, in the decay",
+        "sao_charge_and_decay",
+        _real_charge_of_general_order,
     ),
     Figure(
         "Faults of 15 kinds at random moments of a run, signals and kill -9 in addition; "

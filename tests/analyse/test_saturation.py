@@ -49,16 +49,20 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     assert level.assessment == "no"
     assert len(patch.curves) == 6
     assert not patch.rates.differ
+    assert patch.order is not None
+    assert patch.order.verdict == "first order"
     assert any("r(0) = 1 does not hold" in warning for warning in done.result.warnings)
     assert_read_back(done.result)
     given_noise = replace(patch, rates=replace(patch.rates, noise_dof=np.inf))
     assert_read_back(replace(done.result, patches={"sample": given_noise}))
     rows = (done.report.parent / "saturation.csv").read_text().splitlines()
     assert len(rows) == 1 + 6
-    time_saturation, of_level, rates = done.lines
+    time_saturation, of_level, rates, order = done.lines
     assert "saturated in time" in time_saturation
     assert of_level.endswith("assumption r(0) = 1: no")
     assert "rates are the same after all 6 charges" in rates
+    assert "no sign of a kinetic order above 1" in order
+    assert "order-sample" in done.report.read_text()
     assert "The weaker light was 50% of the full one (σ 2% of that)" in done.report.read_text()
 
 

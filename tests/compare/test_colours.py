@@ -8,13 +8,13 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 from labrig.compare import three_channels
-from labrig.compare.glow import compare_glow
+from labrig.compare.glow import compare_glow, glow_of
 from labrig.compare.nalbach2017 import TABLE_1, emission
 from labrig.compare.residuals import equally_weighted, fits_by_states, residuals
 from labrig.compare.spectra_figure import spectra_figure
 from labrig.compare.viewing import viewing
 from labrig.errors import DataError, UsageError
-from labrig.material import read_material
+from labrig.material import Material, State, dark_concentration, read_material
 from labrig.optics import (
     CIE_1931,
     CIE_2015,
@@ -144,3 +144,14 @@ def test_two_states_take_all_that_one_leaves_of_two() -> None:
     assert found.rms[1] == found.last[1] == 1
     assert max(found.rms[2], found.last[2]) < 1e-3
     assert found.supported[2] == 2
+
+
+def test_the_glow_of_a_kinetic_order_is_the_fall_of_its_concentration() -> None:
+    series = decay_series()
+    state = State(k_r_per_s=0.3, kinetic_order=1.8, r0=0.4, amplitude=1.0)
+    material = Material(name="x", kind="phosphor", states=(state,))
+    glow = glow_of(material, series, None)
+    ends_s = series.t_s + series.exposure_s
+    level, later = (dark_concentration(0.4, 0.3, 1.8, t_s) for t_s in (series.t_s, ends_s))
+    expected = level - later
+    assert glow[:, 1] / glow[0, 1] == pytest.approx(expected / expected[0], rel=1e-9)

@@ -89,6 +89,13 @@ def test_what_was_not_measured_is_reported() -> None:
     )
 
 
+def test_other_orders_are_said() -> None:
+    found = compare_materials(measured(kinetic_order=1.6), read_material("blue-paint"))
+    assert [pair.quantity for pair in found.pairs][:2] == ["k_r", "b"]
+    assert (found.pairs[1].measured, found.pairs[1].reference) == (1.6, 1.0)
+    assert any("kinetic orders differ" in note for note in found.notes)
+
+
 def test_the_materials_of_table_1_are_shipped() -> None:
     assert len(TABLE_1) == 11
     assert set(TABLE_1) <= set(NAMES)

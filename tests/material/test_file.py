@@ -46,6 +46,7 @@ def materials(draw: st.DrawFn) -> Material:
             State(
                 k_r_per_s=draw(positive),
                 k_r_per_s_sigma=draw(st.none() | not_negative),
+                kinetic_order=draw(st.just(1.0) | st.floats(1.001, 4)),
                 r0=draw(st.none() | st.floats(0, 1)),
                 k_e_per_s=k_e,
                 k_e_per_s_sigma=None if k_e is None else draw(st.none() | series(bands)),
@@ -75,6 +76,15 @@ def test_written_and_read_is_the_same(material: Material, tmp_path: Path) -> Non
     path = tmp_path / "sample.yaml"
     write_material(path, material)
     assert read_material(path) == material
+
+
+def test_the_first_order_is_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "sample.yaml"
+    for order in (1.0, 1.5):
+        state = State(k_r_per_s=0.1, kinetic_order=order, kinetic_order_sigma=0.1)
+        write_material(path, Material(name="x", kind="phosphor", states=(state,)))
+        assert ("kinetic_order" in path.read_text()) == (order != 1)
+        assert read_material(path).is_first_order == (order == 1)
 
 
 @pytest.mark.parametrize("name", list(resources.names("config/materials")))
@@ -128,6 +138,11 @@ WHOLE = {
         (
             "states: [{k_r_per_s: 0.1, reradiation: [1, 2], reradiation_sigma: [1]}]",
             "expected 2 values in 'reradiation_sigma' as in 'reradiation', got 1",
+        ),
+        ("states: [{k_r_per_s: 0.1, kinetic_order: 0.5}]", "kinetic_order"),
+        (
+            "states: [{k_r_per_s: 0.1, kinetic_order: 2, amplitude: 5}]",
+            "expected 'r0' above 0 beside 'amplitude' of a state with 'kinetic_order'",
         ),
         ("states: []", "at least 1 value"),
         ("bands_nm: [500, 400, 600]", "rising wavelengths in 'bands_nm'"),

@@ -193,6 +193,11 @@ def test_a_plan_without_a_material_is_the_timeline_for_programs_too(labrig: Labr
         ("states: []", [], "states"),
         ("states: [{k_r_per_s: 0.1}, {k_r_per_s: 0.01}]", [], "'amplitude' or 'reradiation'"),
         ("states: [{k_r_per_s: 0.1}, {k_r_per_s: 0.1}]", [], "same rate"),
+        (
+            "states: [{k_r_per_s: 0.1, kinetic_order: 1.5}]",
+            [],
+            "expected states of first order, got 'kinetic_order'",
+        ),
         ("power-law", [], "no decay tells so many apart"),
         ("blu-paint", [], "did you mean 'blue-paint'?"),
         ("smaple=blue-paint", [], "did you mean 'sample'?"),

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import least_squares
 
 from labrig.errors import UsageError
-from labrig.material import Material, read_material
+from labrig.material import Material, read_material, write_material
 from labrig.material.file import IrradianceNorm, State
 from labrig.sim.bench_settings import TemperatureSettings
 from labrig.sim.kinetics import BOLTZMANN_EV_K, RATES_K
@@ -344,3 +345,21 @@ def test_a_usual_sample_beside_an_unusual_one_stays_as_it_is() -> None:
         assert state.emission == other.emission
         assert state.concentration == pytest.approx(other.concentration, rel=1e-6)
         assert state.amplitude_dn_per_s == pytest.approx(other.amplitude_dn_per_s, rel=1e-6)
+
+
+def test_the_kinetic_order_of_a_material_is_a_law_of_its_own(tmp_path: Path) -> None:
+    state = read_material("blue-paint").states[0]
+    path = tmp_path / "second.yaml"
+    of_order = state.model_copy(update={"kinetic_order": 1.7})
+    write_material(path, read_material("blue-paint").model_copy(update={"states": (of_order,)}))
+    room: dict[str, object] = SMALL["sample"][0]
+    by_settings = {**room, "kinetics": {"model": "general_order", "order": 1.7}}
+    seen = []
+    for patch in ({**room, "material": str(path)}, {**by_settings, "material": "blue-paint"}):
+        bench = Darkroom(sample=[patch])
+        bench.charge(60.0)
+        (true,) = bench.room.truth(iso=400).patches[0].states
+        seen.append((true.concentration, true.amplitude_dn_per_s, bench.shoot(1.0, 400).mean()))
+    assert seen[0] == seen[1]
+    with pytest.raises(UsageError, match="leave one of them out"):
+        Darkroom(sample=[{**by_settings, "material": str(path)}])

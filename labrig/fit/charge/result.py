@@ -1,0 +1,194 @@
+"""Result of a fit to charge and decay, readable as text and as JSON."""
+
+import json
+from dataclasses import dataclass, fields
+from typing import Any
+
+from labrig.number_format import aligned
+from labrig.results import Measured
+
+UNKNOWN = "–"
+
+
+@dataclass(frozen=True)
+class OrderState:
+    """A state of general order; what charge and decay do not tell is None.
+
+    Attributes
+    ----------
+    order
+        Kinetic order b; its σ is 0 where it is held at 1.
+    amplitude
+        Light at lamp off Λ k r(0)ᵇ, in the unit of the values.
+    decay_time_s, exponent
+        τ and p of (1 + t/τ)^(−p), the light after *this* charge; at b = 1, an exponential, τ is 1/k
+        and there is no p.
+    kappa_per_s, k_r_per_s, r0
+        Excitation κ and re-radiation rate k in 1/s, and concentration at lamp off; only where the
+        charge saturates enough for κ to be known.
+    """
+
+    order: Measured
+    amplitude: Measured
+    decay_time_s: Measured
+    exponent: Measured | None
+    kappa_per_s: Measured | None
+    k_r_per_s: Measured | None
+    r0: Measured | None
+
+
+@dataclass(frozen=True)
+class ChargeCandidate:
+    """A model that was tried.
+
+    Attributes
+    ----------
+    states
+        Number of its states.
+    is_general
+        Whether their orders are free; else they are 1.
+    n_parameters
+        Number of fitted parameters.
+    chi2_charge, chi2_decay
+        χ² of the readings under the lamp and after it, per reading.
+    bic
+        Bayesian information criterion, with the noise enlarged to the misfit of the best model.
+    """
+
+    states: int
+    is_general: bool
+    n_parameters: int
+    chi2_charge: float
+    chi2_decay: float
+    bic: float
+
+    @property
+    def label(self) -> str:
+        """The model in words."""
+        number = f"{self.states} state{'s' if self.states > 1 else ''}"
+        return f"{number} of {'general' if self.is_general else 'first'} order"
+
+
+@dataclass(frozen=True)
+class ChargeFit:
+    """Charge and decay of one series, fitted with states of one kinetic order each.
+
+    Attributes
+    ----------
+    states
+        States by falling rate of their decay at lamp off.
+    light_stimulated
+        η, fraction of the carriers that find their trap filled and recombine at once; its σ is 0
+        where it was given.
+    prompt
+        Light that is there only while the lamp is on, in the unit of the values.
+    dark
+        Light before the charge, in all readings.
+    charge_s
+        Length of the charge to which amplitudes and times belong.
+    n_charge, n_decay
+        Numbers of readings under the lamp and after it.
+    chi2_charge, chi2_decay
+        χ² of these readings, per reading.
+    misfit
+        Factor of the variance of all parameters by which sums of neighbouring residuals exceed
+        noise; 1 where they do not.
+    candidates
+        Models that were tried; `chosen` is the one of this fit.
+    chosen
+        Index of the model among `candidates`.
+    warnings
+        Doubts, one a line.
+    """
+
+    states: tuple[OrderState, ...]
+    light_stimulated: Measured
+    prompt: Measured
+    dark: Measured
+    charge_s: float
+    n_charge: int
+    n_decay: int
+    chi2_charge: float
+    chi2_decay: float
+    misfit: float
+    candidates: tuple[ChargeCandidate, ...]
+    chosen: int
+    warnings: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Return a table of the states, one of the models, and all warnings."""
+        lines = [
+            f"{self.candidates[self.chosen].label}, after {self.charge_s:g} s of charge",
+            f"reduced χ²  charge {self.chi2_charge:.2f} ({self.n_charge} readings), "
+            f"decay {self.chi2_decay:.2f} ({self.n_decay})",
+        ]
+        columns = [field.name for field in fields(OrderState)]
+        columns = [name for name in columns if any(getattr(s, name) for s in self.states)]
+        rows = [["state", *(COLUMN_LABELS[name] for name in columns)]]
+        for number, state in enumerate(self.states, start=1):
+            values = (getattr(state, name) for name in columns)
+            rows.append([str(number), *(_text(value) for value in values)])
+        lines += aligned(rows)
+        lines.append(
+            f"light-stimulated η {_text(self.light_stimulated)}, prompt light "
+            f"{_text(self.prompt)}, dark level {_text(self.dark)}"
+        )
+        best = min(candidate.bic for candidate in self.candidates)
+        rows = [["model", "χ² charge", "χ² decay", "ΔBIC"]]
+        rows += [
+            [
+                candidate.label,
+                f"{candidate.chi2_charge:.2f}",
+                f"{candidate.chi2_decay:.2f}",
+                f"{candidate.bic - best:.0f}",
+            ]
+            for candidate in self.candidates
+        ]
+        lines += aligned(rows)
+        return "\n".join([*lines, *(f"! {line}" for line in self.warnings)])
+
+    def to_json(self) -> str:
+        """Return all of it as JSON, numbers as `{"value": …, "sigma": …}`."""
+        content: dict[str, Any] = {
+            "states": [_to_dict(state) for state in self.states],
+            "light_stimulated": _number(self.light_stimulated),
+            "prompt": _number(self.prompt),
+            "dark": _number(self.dark),
+            "charge_s": self.charge_s,
+            "n_charge": self.n_charge,
+            "n_decay": self.n_decay,
+            "chi2_charge": self.chi2_charge,
+            "chi2_decay": self.chi2_decay,
+            "misfit": self.misfit,
+            "candidates": [vars(candidate) for candidate in self.candidates],
+            "chosen": self.chosen,
+            "warnings": list(self.warnings),
+        }
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+#: Heads of the columns of the table of states.
+COLUMN_LABELS = {
+    "order": "b",
+    "amplitude": "amplitude",
+    "decay_time_s": "τ / s",
+    "exponent": "p",
+    "kappa_per_s": "κ / s⁻¹",
+    "k_r_per_s": "k_r / s⁻¹",
+    "r0": "r(0)",
+}
+
+
+def _text(measured: Measured | None) -> str:
+    return UNKNOWN if measured is None else str(Measured(measured.value, measured.sigma))
+
+
+def _to_dict(state: OrderState) -> dict[str, Any]:
+    return {field.name: _number(getattr(state, field.name)) for field in fields(state)}
+
+
+def _number(measured: Measured | None) -> dict[str, float | None] | None:
+    if measured is None:
+        return None
+    is_known = measured.sigma < float("inf")
+    return {"value": measured.value, "sigma": measured.sigma if is_known else None}

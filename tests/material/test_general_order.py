@@ -1,0 +1,116 @@
+"""States of general order against an integrator that does not know their solutions."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.integrate import solve_ivp
+
+from labrig.material import (
+    DECAY_LAWS,
+    becquerel_of,
+    concentration,
+    dark_concentration,
+    lit_concentration,
+    steady_concentration,
+)
+
+rates = st.floats(-4, 0.5).map(lambda exponent: 10.0**exponent)
+orders = st.floats(1.0, 4.0)
+concentrations = st.one_of(st.just(0.0), st.floats(1e-3, 1.0))
+durations = st.floats(-1, 3).map(lambda exponent: 10.0**exponent)
+
+
+def integrated(start: float, kappa: float, k: float, b: float, duration_s: float) -> float:
+    """r(t) by a method for stiff equations."""
+    solved = solve_ivp(
+        lambda _, r: (1 - r) * kappa - k * np.maximum(r, 0.0) ** b,
+        (0.0, duration_s),
+        [start],
+        method="LSODA",
+        rtol=1e-10,
+        atol=1e-13,
+    )
+    return float(solved.y[0, -1])
+
+
+@settings(max_examples=60)
+@given(concentrations, rates, rates, orders, durations)
+def test_steps_under_light(start: float, kappa: float, k: float, b: float, t_s: float) -> None:
+    value = lit_concentration(start, kappa, k, b, t_s).value
+    assert value == pytest.approx(integrated(start, kappa, k, b, t_s), rel=1e-6, abs=1e-10)
+
+
+@settings(max_examples=30)
+@given(st.floats(1e-3, 1.0), rates, orders, durations)
+def test_steps_in_the_dark(start: float, k: float, b: float, t_s: float) -> None:
+    value = dark_concentration(start, k, b, t_s)
+    assert value == pytest.approx(integrated(start, 0.0, k, b, t_s), rel=1e-6, abs=1e-10)
+
+
+@given(concentrations, rates, rates, orders, durations, durations)
+def test_two_steps_are_one(
+    start: float, kappa: float, k: float, b: float, first_s: float, second_s: float
+) -> None:
+    between = lit_concentration(start, kappa, k, b, first_s).value
+    after = lit_concentration(between, kappa, k, b, second_s).value
+    whole = lit_concentration(start, kappa, k, b, first_s + second_s).value
+    assert after == pytest.approx(whole, rel=1e-8)
+
+
+@given(concentrations, rates, rates, durations)
+def test_the_first_order_is_the_rate_equation(
+    start: float, kappa: float, k: float, t_s: float
+) -> None:
+    expected = concentration(start, kappa, k, t_s)
+    assert lit_concentration(start, kappa, k, 1.0, t_s).value == pytest.approx(expected, rel=1e-10)
+    # b is no special case at 1, neither under light nor in the dark.
+    near = lit_concentration(start, kappa, k, 1 + 1e-9, t_s).value
+    assert near == pytest.approx(expected, rel=1e-6)
+    dark = dark_concentration(start, k, [1.0, 1 + 1e-12], t_s)
+    assert dark[0] == pytest.approx(float(concentration(start, 0.0, k, t_s)), rel=1e-12)
+    assert dark[1] == pytest.approx(dark[0], rel=1e-6)
+
+
+def test_the_second_order_is_riccati_s_equation() -> None:
+    kappa, k, t_s = 0.01, 0.07, np.array([1.0, 20.0, 300.0])
+    # E. L. Ince, Ordinary Differential Equations, 2.15, by the roots of k r² + κ r − κ = 0.
+    spread = np.sqrt(kappa**2 + 4 * kappa * k)
+    tanh = np.tanh(spread * t_s / 2)
+    expected = 2 * kappa * tanh / (spread + kappa * tanh)
+    value = lit_concentration(0.0, kappa, k, 2.0, t_s).value
+    assert value == pytest.approx(expected, rel=1e-12)
+
+
+@given(concentrations, rates, rates, st.floats(1.01, 3.9), durations)
+def test_derivatives(start: float, kappa: float, k: float, b: float, t_s: float) -> None:
+    charged = lit_concentration(start, kappa, k, b, t_s)
+    step = 1e-4
+    analytic = (charged.by_kappa * kappa, charged.by_k_r * k, charged.by_order)
+    for slope, (up, down) in zip(
+        analytic,
+        (
+            ((kappa * (1 + step), k, b), (kappa * (1 - step), k, b)),
+            ((kappa, k * (1 + step), b), (kappa, k * (1 - step), b)),
+            ((kappa, k, b + step), (kappa, k, b - step)),
+        ),
+        strict=True,
+    ):
+        ends = [lit_concentration(start, *each, t_s).value for each in (up, down)]
+        numeric = (ends[0] - ends[1]) / (2 * step)
+        assert slope == pytest.approx(numeric, rel=1e-4, abs=1e-6 * float(charged.value))
+
+
+@given(rates, rates, orders)
+def test_long_light_ends_in_balance(kappa: float, k: float, b: float) -> None:
+    steady = steady_concentration(kappa, k, b)
+    assert kappa * (1 - steady) == pytest.approx(k * steady**b, rel=1e-9)
+    assert lit_concentration(0.3, kappa, k, b, 1e7).value == pytest.approx(steady, rel=1e-9)
+
+
+@pytest.mark.parametrize("b", [1.0, 1.3, 2.0, 3.0])
+def test_light_in_the_dark_is_becquerel_s_law(b: float) -> None:
+    start, k, t_s, exposure_s = 0.6, 0.05, np.array([0.0, 3.0, 200.0]), np.array([2.0, 1.0, 50.0])
+    law = becquerel_of(start, k, b)
+    means, _ = DECAY_LAWS["becquerel"].means(*law, t_s, exposure_s)
+    fall = dark_concentration(start, k, b, t_s) - dark_concentration(start, k, b, t_s + exposure_s)
+    assert k * start**b * means == pytest.approx(fall / exposure_s, rel=1e-9)
