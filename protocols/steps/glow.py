@@ -199,29 +199,29 @@ def _look(
     Returns the fraction of the range by which the longest exposure exceeds the closed door, or 0;
     more than 1 if it clips.
     """
-    offers, light = session.rig[CAMERA].offers(), 0.0
+    offers, least = session.rig[CAMERA].offers(), 0.0
     for fraction in LADDER[::-1]:
         exposure_s = offers.exposure_at_most(longest.exposure_s * fraction)
         session.perform(Shoot(FrameRole.REST, replace(longest, exposure_s=exposure_s)))
-        light, clips = session.choose(
-            "light before", lambda: _light(session, unit, regions), worst=(0.0, False)
-        )
-        if not clips:
-            break
-    return light
+        light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
+        if np.isfinite(light):
+            return light
+        least = longest.exposure_s / exposure_s
+    return least
 
 
-def _light(session: Session, unit: str, regions: Sequence[Region]) -> tuple[float, bool]:
-    """Return the light of the last frame in the longest exposure, and whether it clips.
+def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
+    """Return the light of the last frame in the longest exposure, infinity if the frame clips.
 
-    The light is a fraction of the range beyond the closed door, 0 if there is none.
+    It is a fraction of the range beyond the closed door, 0 if there is none.
     """
     closed, *_, last = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
     dark = measure_frame(closed, regions)
     signal = glow(measure_frame(last, regions), levels(dark), last.start_time)
     fraction = signal.brightest * closed.exposure_s / range_dn(dark)
-    seen = signal.clips or (signal.seen and fraction > LEAST)
-    return fraction if seen else 0.0, signal.clips
+    if signal.clips:
+        return np.inf
+    return fraction if signal.seen and fraction > LEAST else 0.0
 
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
