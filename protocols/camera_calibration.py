@@ -253,6 +253,12 @@ def _interleaved(
     yield reference
 
 
+def _overlap(first: Region, second: Region) -> bool:
+    return all(
+        first[k] < second[k] + second[k + 2] and second[k] < first[k] + first[k + 2] for k in (0, 1)
+    )
+
+
 class CameraCalibration(ProtocolModel):
     """Settings of a camera calibration; `camera_calibration.yaml` is the commented example.
 
@@ -271,6 +277,9 @@ class CameraCalibration(ProtocolModel):
         Place of the lit grey card in the frame: `[x, y, width, height]` in pixels, or all four as
         fractions of the frame. The larger it is, the better the flat field is known towards the
         corners.
+    black
+        Place of a black trap beside the card, such as a box with a hole, lined with black velvet:
+        its light is the lens's veiling glare. Null: the glare is not measured.
     levels
         Number of signal levels of the photon transfer curve at every ISO, two frames each.
     repeats
@@ -291,6 +300,7 @@ class CameraCalibration(ProtocolModel):
     isos: tuple[Iso, ...] = Field((100, 200, 400, 800, 1600), min_length=1)
     f_numbers: tuple[FNumber, ...] = (2.8, 4.0, 5.6, 8.0, 11.0)
     card: Region = CENTRE
+    black: Region | None = None
     levels: int = Field(6, ge=3, le=30)
     repeats: Count = Field(24, ge=6)
     cycles: Count = Field(4, ge=2)
@@ -306,6 +316,12 @@ class CameraCalibration(ProtocolModel):
             raise ValueError("expected 'f_numbers: []' where camera.f_number is null")
         if f_number is not None and f_number not in self.f_numbers:
             raise ValueError(f"expected camera.f_number {f_number:g} among 'f_numbers'")
+        return self
+
+    @model_validator(mode="after")
+    def _trap_beside_the_card(self) -> Self:
+        if self.black is not None and _overlap(self.black, self.card):
+            raise ValueError("expected 'black' beside 'card', got a part of it")
         return self
 
     def settings(self) -> ExposureSettings:

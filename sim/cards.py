@@ -24,8 +24,8 @@ GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
 def reflectances(card: Card, grey: float) -> FloatArray:
     """Return reflectances of all surfaces of a card, shape (surfaces, wavelengths).
 
-    Surface 0 is outside of the card, and 0. A grey card, or a blank of the same, is surface 1; of a
-    ColorChecker, row by row, 1 to 24, its frame is 25.
+    Surface 0 is outside of the card, and 0. A grey card, or a blank of the same, is surface 1, and
+    the black trap in it 2; of a ColorChecker, row by row, 1 to 24, its frame is 25.
     """
     nothing = np.zeros((1, len(WAVELENGTH_NM)))
     if card == "sample":
@@ -33,17 +33,23 @@ def reflectances(card: Card, grey: float) -> FloatArray:
     if card == "colorchecker":
         frame = np.full((1, len(WAVELENGTH_NM)), FRAME_REFLECTANCE)
         return np.concatenate([nothing, _colorchecker(), frame])
-    return np.concatenate([nothing, grey * np.interp(WAVELENGTH_NM, GREY_NM, GREY)[None, :]])
+    card_reflectance = grey * np.interp(WAVELENGTH_NM, GREY_NM, GREY)[None, :]
+    return np.concatenate([nothing, card_reflectance, nothing])
 
 
-def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
+def surfaces(
+    card: Card, chart: Region, width: int, height: int, black_trap: Region | None = None
+) -> IntArray:
     """Return the surface of a card on top in every pixel, shape (height, width).
 
-    A grey card fills the picture, a ColorChecker its region. A blank lies below.
+    A grey card fills the picture but for the trap, a ColorChecker its region. A blank lies below.
     """
     surface = np.zeros((height, width), dtype=np.intp)
     if card == "grey card":
         surface[:] = 1
+        if black_trap is not None:
+            x, y, wide, high = region_pixels(black_trap, width, height)
+            surface[y : y + high, x : x + wide] = 2
     elif card == "colorchecker":
         x, y, wide, high = region_pixels(chart, width, height)
         row, in_row = np.divmod((np.arange(high) + 0.5) / high * ROWS, 1)

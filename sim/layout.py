@@ -99,7 +99,7 @@ class Layout:
 
     def _places(self, card: Card, through: LvfPlace) -> Places:
         width, height = self._size
-        surface = surfaces(card, self._simulation.chart, width, height)
+        surface = surfaces(card, self._simulation.chart, width, height, self._simulation.black_trap)
         piece = self._strips.get(through, np.zeros_like(surface))
         numbers = (self._cells * (surface.max() + 1) + surface) * (PIECES + 1) + piece
         distinct = np.flatnonzero(np.bincount(numbers.ravel()))

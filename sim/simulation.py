@@ -250,6 +250,8 @@ class Simulation(Part):
     chart
         Place in the frame of a ColorChecker that the changer lays down: `[x, y, width, height]` in
         pixels, or all four as fractions of the frame.
+    black_trap
+        Place in the frame of a hole in the grey card from which no light comes back; null: none.
     ambient
         Irradiance at the sample of light that leaks into the room, as a fraction of the warm
         lamp's, for example `0.001 %`.
@@ -312,6 +314,7 @@ class Simulation(Part):
     filters_bent: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     grey_card: Annotated[Fraction, Field(gt=0, le=0.95)] = 0.18
     chart: Region = MIDDLE
+    black_trap: Region | None = None
     ambient: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     temperature: TemperatureSettings | None = None
     anisotropy: Annotated[Fraction, Field(ge=0, le=1)] = 0.0

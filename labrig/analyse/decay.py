@@ -12,13 +12,21 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
+from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State
 from labrig.record import FrameRole, charge_durations_s, glow_temperature_c
-from labrig.reduce import NoiseModel, reduce_patches, variance_terms
+from labrig.reduce import (
+    WHOLE_FRAME,
+    WHOLE_FRAME_NAME,
+    NoiseModel,
+    reduce_patches,
+    sensor_layout,
+    variance_terms,
+)
 from labrig.region import Region
 from labrig.results import DecayPatch, DecayResult, FittedDecay, FloatArray, NoiseBudget, Series
 
@@ -88,7 +96,22 @@ def analyse(part: Part) -> DecayResult:
     background = protocol.background if protocol.dark == "background" else None
     frames, stray = without_stray_light(intact_frames(run, overrides), part.inputs.blank)
     require_calibrated_camera(part.inputs.camera, run, run.frames(FrameRole.DECAY))
-    series = reduce_patches(frames.decay, regions, frames.dark, background, part.inputs.camera)
+    camera = part.inputs.camera
+    # A calibrated glare is subtracted, and a background has the same as the patches.
+    unknown_glare = background is None and (camera is None or camera.glare is None)
+    series = reduce_patches(
+        frames.decay,
+        {**regions, WHOLE_FRAME_NAME: WHOLE_FRAME} if unknown_glare else regions,
+        frames.dark,
+        background,
+        camera,
+    )
+    whole_frame = series.pop(WHOLE_FRAME_NAME, None)
+    veiled = (
+        ()
+        if whole_frame is None
+        else glare_warning(series, regions, whole_frame, sensor_layout(frames.decay[0]))
+    )
     states = overrides.states or (None if protocol.states == "auto" else protocol.states)
     fit = partial(
         fit_series,
@@ -113,6 +136,7 @@ def analyse(part: Part) -> DecayResult:
             *frames.warnings,
             *stray,
             *_clipping_warnings(series),
+            *veiled,
             *_fit_warnings(fits),
         ),
     )

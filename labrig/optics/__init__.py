@@ -11,6 +11,7 @@ from labrig.optics.camera_model import (
     CameraModel,
     Factor,
     Flat,
+    Glare,
     f_number_text,
     rho_squared,
 )
@@ -71,6 +72,7 @@ __all__ = [
     "CurveFile",
     "Factor",
     "Flat",
+    "Glare",
     "HyperspectralCube",
     "Lvf",
     "MeasuredSpectrum",

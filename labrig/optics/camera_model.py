@@ -82,6 +82,19 @@ class Factor(_Part):
     sigma: NotNegative
 
 
+class Glare(_Part):
+    """Veiling glare: part of the frame's mean light that lies evenly over all of it.
+
+    Attributes
+    ----------
+    fraction, sigma
+        That fraction of the mean light, common to all channels and apertures, and σ.
+    """
+
+    fraction: Annotated[float, Field(ge=0, lt=1)]
+    sigma: NotNegative
+
+
 class CameraModel(_Part):
     """A calibrated camera body and lens.
 
@@ -99,6 +112,8 @@ class CameraModel(_Part):
         Light over that at `f_number` times the squared ratio of the nominal values.
     flats
         Flat fields, one for each f-number.
+    glare
+        Veiling glare of the lens; null if it was not measured.
     """
 
     iso: Positive
@@ -108,6 +123,7 @@ class CameraModel(_Part):
     iso_gain: tuple[Factor, ...] = ()
     aperture: tuple[Factor, ...] = ()
     flats: Annotated[tuple[Flat, ...], Field(min_length=1)]
+    glare: Glare | None = None
 
     def exposure_s(self, nominal_s: float) -> tuple[float, float]:
         """Return the actual exposure time of a nominal one in s, and its relative σ.

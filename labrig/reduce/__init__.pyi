@@ -25,6 +25,10 @@ from .frame_reduction import (
     reduce_frames as reduce_frames,
     reduce_groups as reduce_groups,
 )
+from .glare import (
+    WHOLE_FRAME as WHOLE_FRAME,
+    WHOLE_FRAME_NAME as WHOLE_FRAME_NAME,
+)
 from .hdr import (
     HdrFrame as HdrFrame,
     read_hdr_frame as read_hdr_frame,

@@ -9,6 +9,7 @@ import numpy as np
 from labrig.errors import DataError
 from labrig.optics import CameraModel
 from labrig.reduce.dark import DarkModel, fit_dark
+from labrig.reduce.glare import WHOLE_FRAME, WHOLE_FRAME_NAME, subtract_glare
 from labrig.reduce.hot_pixels import HotPixels, hot_pixels_of
 from labrig.reduce.measured_frames import (
     MeasuredFrame,
@@ -186,8 +187,9 @@ def reduce_patches(
     background
         Dark region of the light frames, whose level is subtracted instead of the dark frames'.
     camera
-        Calibration by which actual exposure times, vignetting and gains of the settings are
-        corrected; None leaves the values as they are.
+        Calibration by which actual exposure times, vignetting, gains of the settings and veiling
+        glare are corrected; None leaves the values as they are. A background has the same glare as
+        the patches.
 
     Returns
     -------
@@ -219,6 +221,9 @@ def reduce_patches(
     """
     if not frames or not patches:
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
+    glare = None if camera is None or background is not None else camera.glare
+    if glare is not None:
+        patches = {**patches, WHOLE_FRAME_NAME: WHOLE_FRAME}
     hot = hot_pixels_of(darks)
     dark = {} if background else _patch_darks(darks, patches, hot)
     measured = measure_frames(frames, patches, background, hot)
@@ -226,9 +231,16 @@ def reduce_patches(
     series = {name: _patch_series(name, measured, dark) for name in patches}
     if camera is None:
         return series
-    return {
+    calibrated = {
         name: apply_calibration(patch_series, camera, patches[name], *_frame_size(measured[0]))
         for name, patch_series in series.items()
+    }
+    if glare is None:
+        return calibrated
+    frame = calibrated.pop(WHOLE_FRAME_NAME)
+    return {
+        name: subtract_glare(patch_series, frame, glare)
+        for name, patch_series in calibrated.items()
     }
 
 

@@ -268,3 +268,6 @@ def _lines(file: CameraFile) -> Iterator[str]:
         f"{100 * corner:.1f} %{stop}" for corner, stop in zip(corners, stops, strict=True)
     )
     yield f"vignetting: corners at {', '.join(corner_texts)}"
+    if glare := file.glare:
+        text = plus_minus(100 * glare.fraction, 100 * glare.sigma)
+        yield f"veiling glare: {text} % of the frame's mean light"

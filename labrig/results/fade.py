@@ -23,6 +23,8 @@ class SwitchedFrames:
         uncertainty, in seconds, shape (n, S); NaN where it clips.
     steady_dn_per_s
         Signal of the steady lamp in DN/s, shape (S,).
+    dark_sigma_dn_per_s
+        σ of the dark level, which all frames share, in DN/s, shape (S,).
     clipped
         Number of frames that clip somewhere; those that clip everywhere are not among the n.
     """
@@ -32,6 +34,7 @@ class SwitchedFrames:
     light_s: FloatArray
     light_sigma_s: FloatArray
     steady_dn_per_s: FloatArray
+    dark_sigma_dn_per_s: FloatArray
     clipped: int
 
 

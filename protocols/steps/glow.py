@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Protocol
 
@@ -131,7 +131,7 @@ def metered_schedule(session: Session, protocol: GlowSettings, metering: str) ->
 
 #: Interval of checks of the sample, and longest rest.
 CHECK_EVERY_S = 180.0
-AT_MOST_S = 3600.0
+AT_MOST_S = 3 * 3600.0
 #: Least fading between two checks of a light that fades.
 FADES = 0.05
 #: Fraction of the range below which there is no light.
@@ -172,8 +172,7 @@ def _rest_until_dark(
     face_camera(session)
     previous, rested_s = np.inf, 0.0
     while True:
-        session.perform(Shoot(FrameRole.REST, longest))
-        light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
+        light = _look(session, unit, regions, longest)
         fades = light < (1 - FADES) * previous
         if not light or not fades or rested_s >= AT_MOST_S:
             break
@@ -192,13 +191,37 @@ def _rest_until_dark(
         )
 
 
+def _look(
+    session: Session, unit: str, regions: Sequence[Region], longest: ExposureSettings
+) -> float:
+    """Photograph the sample, for shorter where it clips: whether that fades could not be seen.
+
+    Returns the fraction of the range by which the longest exposure exceeds the closed door, or 0;
+    more than 1 if it clips.
+    """
+    offers, least = session.rig[CAMERA].offers(), 0.0
+    for fraction in LADDER[::-1]:
+        exposure_s = offers.exposure_at_most(longest.exposure_s * fraction)
+        session.perform(Shoot(FrameRole.REST, replace(longest, exposure_s=exposure_s)))
+        light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
+        if np.isfinite(light):
+            return light
+        least = longest.exposure_s / exposure_s
+    return least
+
+
 def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
-    """Return the fraction of the range by which the last frame exceeds the closed door, or 0."""
+    """Return the light of the last frame in the longest exposure, infinity if the frame clips.
+
+    It is a fraction of the range beyond the closed door, 0 if there is none.
+    """
     closed, *_, last = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
     dark = measure_frame(closed, regions)
     signal = glow(measure_frame(last, regions), levels(dark), last.start_time)
-    fraction = signal.brightest * last.exposure_s / range_dn(dark)
-    return fraction if signal.clips or (signal.seen and fraction > LEAST) else 0.0
+    fraction = signal.brightest * closed.exposure_s / range_dn(dark)
+    if signal.clips:
+        return np.inf
+    return fraction if signal.seen and fraction > LEAST else 0.0
 
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.

@@ -94,7 +94,7 @@ def test_saturation_taken_for_granted_as_in_the_paper() -> None:
 def test_weak_light_leaves_the_level_unknown_and_says_so() -> None:
     bench = Bench(read_material("blue-paint"), irradiance=0.02)
     found = fitted(bench, measured(bench))
-    assert any("known to" in said and "charge for longer" in said for said in found.warnings)
+    assert any("charged is not known, nor are Λ" in said for said in found.warnings)
     assert (
         found.at_off[0].amplitude_sigma[0] / found.at_off[0].amplitude[0]
         < found.states[0].amplitude_sigma / found.states[0].amplitude / 5
@@ -142,6 +142,22 @@ def test_a_sample_that_is_no_phosphor_of_these_states_is_reported() -> None:
     found = fit(series, [0.03], [1.0], RelativeSigmas(bench.flicker, LAMP))
     assert found.reduced_chi2 > 2
     assert any("reduced χ²" in said for said in found.warnings)
+
+
+@pytest.mark.parametrize("convex", [True, False])
+def test_charging_by_another_law_is_told_from_the_lamps_scatter(convex: bool) -> None:
+    """A sample that takes the less light the emptier it is, or the more: its short charges differ.
+
+    The fit could make good for it by a lamp that is darker the shorter it shines.
+    """
+    bench = Bench(read_material("blue-paint"))
+    bare, through = measured(bench)
+    emptied = -0.15 if convex else 0.15
+    charged = np.repeat([charge.off_s - charge.on_s for charge in through.charges], 12)
+    bent = 1 + emptied * np.exp(-charged / 40.0)[:, None, None]
+    found = fitted(bench, [bare, replace(through, values=bent * through.values)])
+    (said,) = [line for line in found.warnings if "rate equation says" in line]
+    assert said.startswith(f"long charges glow {'more' if convex else 'less'} and short ones ")
 
 
 def test_irradiance_known_badly_goes_into_every_rate() -> None:

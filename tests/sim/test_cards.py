@@ -19,7 +19,8 @@ def lit(*tasks: str, **changed: object) -> Darkroom:
 
 
 def test_a_grey_card_is_nearly_grey_and_fills_the_frame() -> None:
-    (_, grey) = reflectances("grey card", 0.18)
+    (_, grey, trap) = reflectances("grey card", 0.18)
+    assert not trap.any()
     assert grey == pytest.approx(0.18, rel=0.03)
     assert grey.std() > 0
     frame = lit("grey card").shoot(1 / 60, 100, 5.6)

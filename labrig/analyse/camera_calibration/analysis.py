@@ -7,6 +7,7 @@ import numpy as np
 
 from labrig.analyse.camera_calibration.factors import CardFrame, Factors, fit_factors
 from labrig.analyse.camera_calibration.flat_field import fit_flat
+from labrig.analyse.camera_calibration.glare import measure_glare
 from labrig.analyse.camera_calibration.linearity import deviation, fit_linearity
 from labrig.analyse.camera_calibration.photon_transfer import (
     MeasureScatter,
@@ -38,6 +39,8 @@ MAX_BENT = 0.02
 STRAIGHT_CHI2 = 6.0
 #: Deviations from linearity and of exposure times, and gradients of light, that cause a warning.
 BENT, OFF, UNEVEN = 0.01, 0.05, 0.2
+#: Veiling glare of a dirty lens.
+MUCH_GLARE = 0.03
 #: Significance of a difference in σ.
 CLEAR_SIGMAS = 4.0
 
@@ -87,6 +90,7 @@ def analyse(part: Part) -> CameraCalibrationResult:
         source="measured with labrig, camera_calibration",
         run=run.folder.resolve().name,
     )
+    file = file.model_copy(update={"glare": measure_glare(part, file, lit, darks)})
     return CameraCalibrationResult(
         calibration=file,
         card=card.series,
@@ -294,5 +298,10 @@ def _warnings(
         yield f"shutter times are off by more than 5 % ({named}): longer ones are more exact"
     if any(max(map(abs, row)) > UNEVEN for flat in file.flats for row in flat.gradient):
         yield "the card is lit unevenly, by more than 20 %: move the lamp further away"
+    if file.glare is not None and file.glare.fraction > MUCH_GLARE:
+        yield (
+            f"{100 * file.glare.fraction:.1f} % of the frame's light lies over all of it: clean "
+            "the lens and shade it, and look whether the black trap is black"
+        )
     if clipped := card.clipped:
         yield f"{clipped} frames of the card clip and are left out; lower camera.iso"

@@ -1,6 +1,6 @@
 """Analysis of an excitation run, from its frames to rates and a material of every patch."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from labrig.errors import DataError
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.record import FrameRole
 from labrig.results import (
+    Closure,
     ExcitationResult,
     FittedDecay,
     FittedExcitation,
@@ -30,6 +31,8 @@ from labrig.results import (
 LAMP = 0.01
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
+#: Deviation of the closure in σ that causes a warning.
+CLOSURE_SIGMAS = 3.0
 #: Least standard uncertainty of a dark level in DN/s.
 MIN_DARK = 1e-3
 
@@ -107,8 +110,17 @@ def _patch_excitation(
     material = at_temperature(material, run, part.protocol.rate_frames)
     return (
         PatchExcitation(charging, decay, fit, material, closure),
-        (*decay.warnings, *fit.warnings, *no_spectrum),
+        (*decay.warnings, *fit.warnings, *_closure_warnings(closure), *no_spectrum),
     )
+
+
+def _closure_warnings(closure: Closure | None) -> Iterator[str]:
+    if closure is not None and closure.rms_sigma > CLOSURE_SIGMAS:
+        yield (
+            f"charging by the lamp itself is predicted from the bands only within "
+            f"{closure.rms_percent:.1f} % ({closure.rms_sigma:.1f} σ): the lamp has light outside "
+            "of the bands, the ratio of irradiances is wrong, or the rate equation does not hold"
+        )
 
 
 def _states(part: Part, patch: StripPatch) -> int | None:

@@ -18,6 +18,7 @@ from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
 from labrig.errors import DataError
+from labrig.fit.spectrum import CurveError, curve_modes
 from labrig.number_format import plus_minus
 from labrig.optics import CameraResponse, Spectrum
 from labrig.protocols.fade import SWITCHED, LampFrames
@@ -37,8 +38,11 @@ GONE = 1e-4
 LONGEST_S = 5.0
 #: Standard deviation in seconds between the delays of a relay's closing and opening.
 RELAY_S = 1e-3
-#: χ² per degree of freedom beyond which the lamp is no black-body emitter.
-BAD_CHI2 = 3.0
+#: Error of the camera's curves: those of another camera of its model.
+CURVES = CurveError(added=0.02)
+#: χ² per degree of freedom beyond which the lamp is no black-body emitter, and by how many of its
+#: own standard deviations: 1.0 to 1.3 on 24 simulated benches.
+BAD_CHI2, BAD_SIGMAS = 1.2, 4.0
 
 
 def analyse(part: Part) -> FadeResult:
@@ -60,20 +64,28 @@ def analyse(part: Part) -> FadeResult:
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     edges = np.array(protocol.bands)
     nm = np.arange(edges[0], edges[-1] + STEP_NM / 2, STEP_NM)
-    places, weights = _places(part, frames, curves, lamp, nm)
+    places, weights, errors = _places(part, frames, curves, lamp, nm)
     bands = _band_weights(edges, lamp, nm)
     changes: dict[str, LampChange] = {}
     tables: dict[str, Change] = {}
     lag = ANY_LAG
     for role in SWITCHED if protocol.rise else SWITCHED[:1]:
         switched = frames_after_switch(part.run, frames, darks, places, camera, role)
-        channel_weights = weights
+        channel_weights, weight_errors = weights, errors
         if protocol.through_lvf:
             # All channels of a place see the same band: one of them is enough.
             columns = brightest_channels(switched, len(curves.channels))
-            switched, channel_weights = take_columns(switched, columns), weights[columns]
-        rises = role == LampFrames.RISE
-        change = fit_change(switched, channel_weights, nm, flicker, rises=rises, lag=lag)
+            switched = take_columns(switched, columns)
+            channel_weights, weight_errors = weights[columns], errors[:, columns]
+        change = fit_change(
+            switched,
+            channel_weights,
+            weight_errors,
+            nm,
+            flicker,
+            rises=role == LampFrames.RISE,
+            lag=lag,
+        )
         lag = replace(change.lag, sigma=float(np.hypot(change.lag.sigma, RELAY_S)))
         changes[role] = change.result(switched)
         tables[role] = _table(change, bands, nm)
@@ -112,11 +124,18 @@ def _places(
     curves: CameraResponse,
     lamp: Spectrum,
     nm: FloatArray,
-) -> tuple[Mapping[str, Region], FloatArray]:
-    """Return regions, and the weights of the steady lamp at `nm` in each of their channels."""
-    channel_light = (lamp.at(nm)[:, np.newaxis] * curves.at(nm)).T
+) -> tuple[Mapping[str, Region], FloatArray, FloatArray]:
+    """Return regions, and the steady lamp's weights at `nm` in their channels with their errors.
+
+    A narrow band's weights hardly depend on the curves, and have no errors.
+    """
+    light, sensitivity = lamp.at(nm)[:, np.newaxis], curves.at(nm)
+    channel_light = (light * sensitivity).T
     if not part.protocol.through_lvf:
-        return {"card": part_region(part, part.protocol.card)}, _normalise(channel_light)
+        changes = curve_modes(CURVES, nm, sensitivity, curves.sensitivity.max(axis=0))
+        light_errors = np.array([(light * change).T for change in changes])
+        card = {"card": part_region(part, part.protocol.card)}
+        return card, _normalise(channel_light), _normalised_errors(channel_light, light_errors)
     lvf = part.inputs.lvf
     if lvf is None or lvf.before_camera is None:
         raise DataError(
@@ -126,11 +145,21 @@ def _places(
     strip, layout = lvf.before_camera, sensor_layout(frames[0])
     transmission = lvf.lvf.at(strip.positions(layout.width, layout.height)).transmission(nm)
     through = transmission[:, np.newaxis, :] * channel_light
-    return strip.slices(), _normalise(through.reshape(-1, len(nm)))
+    weights = _normalise(through.reshape(-1, len(nm)))
+    return strip.slices(), weights, np.empty((0, *weights.shape))
 
 
 def _normalise(weights: FloatArray) -> FloatArray:
     result: FloatArray = weights / weights.sum(axis=1, keepdims=True)
+    return result
+
+
+def _normalised_errors(light: FloatArray, light_errors: FloatArray) -> FloatArray:
+    """Return the errors of `_normalise(light)` by those of the light, (q, S, wavelengths)."""
+    total_errors = light_errors.sum(axis=2, keepdims=True)
+    result: FloatArray = (light_errors - _normalise(light) * total_errors) / light.sum(
+        axis=1, keepdims=True
+    )
     return result
 
 
@@ -174,7 +203,7 @@ def _rounded(value: float) -> float:
 
 def _warnings(changes: Mapping[str, LampChange]) -> Iterator[str]:
     for role, change in changes.items():
-        if change.best.reduced_chi2 > BAD_CHI2:
+        if change.best.reduced_chi2 > BAD_CHI2 + BAD_SIGMAS * np.sqrt(2 / change.best.dof):
             yield (
                 f"the {role} is not that of a glowing body (χ² {change.best.reduced_chi2:.1f} a "
                 "degree of freedom): is it a halogen lamp, and are its spectrum and the camera's "

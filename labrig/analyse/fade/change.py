@@ -24,6 +24,13 @@ DARK = 60.0
 LN_KAPPA, LN_KAPPA_SIGMA = float(np.log(8.72)), 0.1
 #: Prior σ of the ratio of radiation to conduction, ln r/(1 − r), nearly uninformative.
 LOGIT_SIGMA = 1.5
+#: Part of tungsten's specific heat at 3000 K that is missing when it is cold, and its σ (G. K.
+#: White and M. L. Minges, Int. J. Thermophysics 18, 1997, 1269).
+COLD_LOSS, COLD_LOSS_SIGMA = 0.42, 0.1
+#: Temperature of the room over the filament's, and least difference to it.
+ROOM, LEAST_ABOVE_ROOM = 295 / 3000, 5e-3
+#: Values of u between which the filament's cooling is integrated.
+U_GRID: FloatArray = DARK * np.linspace(0.0, 1.0, 1001) ** 2
 #: Step of the derivatives as a fraction of σ.
 STEP = 0.01
 
@@ -62,33 +69,41 @@ class Shape(Protocol):
 
 @dataclass(frozen=True)
 class Cooling:
-    """A filament that loses heat by radiation and conduction, dT/dt ∝ −T (r T⁴ + 1 − r), T₀ = 1.
+    """A filament that loses heat by radiation and conduction.
 
-    Its radiation is proportional to T⁵, as tungsten's emissivity grows with T. The equation is one
-    of Bernoulli's: 1/T = [(e^(q t) − r) / (1 − r)]^(1/4), u = κ (1/T − 1). Parameters: ln κ, ln q,
-    ln r/(1 − r).
+    c(T) dT/dt = −q/4 (r T⁵ + (1 − r) (T − Tₐ)/(1 − Tₐ)) from T₀ = 1, u = κ (1/T − 1). Radiation is
+    proportional to T⁵, as tungsten's emissivity grows with T; the heat capacity is
+    c = 1 − h (1 − T²). Parameters: ln κ, ln q, ln r/(1 − r), h.
     """
 
     rises: bool = False
-    free: int = 3
+    free: int = 4
     name: str = "filament"
 
     def start(self, level: float, slope: float) -> FloatArray:
         """Return initial parameters of equal radiation and conduction."""
         per_s = -slope / SCALE_S
-        return np.array([LN_KAPPA, np.log(2 * max(per_s, 0.1) / np.exp(LN_KAPPA)), 0.0])
+        log_rate = np.log(4 * max(per_s, 0.1) / np.exp(LN_KAPPA))
+        return np.array([LN_KAPPA, log_rate, 0.0, COLD_LOSS])
 
     def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
         """Return u at times in seconds after the switch, shape (m,)."""
         kappa, rate = np.exp(parameters[:2])
-        conducted = 1 / (1 + np.exp(parameters[2]))
-        grown = np.expm1(np.minimum(rate * t_s, 300.0)) / conducted
-        u: FloatArray = np.minimum(kappa * np.expm1(np.log1p(grown) / 4), DARK)
-        return u
+        radiated = 1 / (1 + np.exp(-parameters[2]))
+        temperature = 1 / (1 + U_GRID / kappa)
+        above_room = np.maximum(temperature - ROOM, LEAST_ABOVE_ROOM) / (1 - ROOM)
+        lost = radiated * temperature**5 + (1 - radiated) * above_room
+        capacity = 1 - parameters[3] * (1 - temperature**2)
+        seconds_per_u = capacity * temperature**2 / (kappa * lost * rate / 4)
+        steps_s = np.diff(U_GRID) * (seconds_per_u[1:] + seconds_per_u[:-1]) / 2
+        return np.interp(t_s, np.append(0.0, np.cumsum(steps_s)), U_GRID)
 
     def expected(self) -> tuple[FloatArray, FloatArray]:
         """Return prior values of the parameters of halogen lamps, and their σ."""
-        return np.array([LN_KAPPA, 0.0, 0.0]), np.array([LN_KAPPA_SIGMA, np.inf, LOGIT_SIGMA])
+        return (
+            np.array([LN_KAPPA, 0.0, 0.0, COLD_LOSS]),
+            np.array([LN_KAPPA_SIGMA, np.inf, LOGIT_SIGMA, COLD_LOSS_SIGMA]),
+        )
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,12 @@
 """Fit of the lamp's transients to photographs.
 
 The begin of a photograph after the switch is known up to a constant lag and some jitter, which all
-its places and colours share, as they share its flicker.
+its places and colours share, as they share its flicker. The camera's curves and its dark level have
+errors that all photographs share: without these in the noise, every colour's fade would be a little
+off that of a glowing body.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,8 +33,8 @@ ANY_LAG = Measured(0.0, 6e-3, "s")
 #: Jitters in seconds that are compared, and the initial one.
 JITTERS_S = np.geomspace(3e-4, 2e-2, 31)
 FIRST_JITTER_S = 3e-3
-#: Iterations of the covariances by the model; most steps of a fit, and its tolerance.
-ROUNDS, MAX_STEPS, TOLERANCE = 3, 100, 1e-6
+#: Tolerances of the fits with the covariance by the one before, and most steps of a fit.
+TOLERANCES, MAX_STEPS = (1e-3, 1e-3, 1e-6), 100
 #: Difference in −2 ln L from which another shape replaces the filament.
 CLEARLY = 10.0
 
@@ -38,6 +42,7 @@ CLEARLY = 10.0
 def fit_change(
     frames: SwitchedFrames,
     weights: FloatArray,
+    weight_errors: FloatArray,
     nm: FloatArray,
     flicker: float,
     *,
@@ -53,6 +58,8 @@ def fit_change(
     weights
         Weights of the steady lamp's light at `nm` in each place or colour, which sum to 1, shape
         (S, wavelengths).
+    weight_errors
+        Standard deviations of these weights in independent directions, shape (q, S, wavelengths).
     nm
         Wavelengths in nm.
     flicker
@@ -71,12 +78,18 @@ def fit_change(
     smooth = [Smooth(rises, degree, last_s) for degree in DEGREES]
     shapes: list[Shape] = [*smooth] if rises else [Cooling(), *smooth]
     fits = [
-        _fit(frames, weights, nm, flicker, shape, lag)
+        _fit(_Problem(frames, weights, weight_errors, nm, flicker, shape, lag), shape)
         for shape in shapes
         if len(frames.start_s) > shape.free + 3
     ]
     if not fits:
         raise FitError(f"expected more photographs of the lamp, got {len(frames.start_s)}")
+    fits = [fit for fit in fits if np.isfinite(fit.covariance).all()]
+    if not fits:
+        raise FitError(
+            f"the {'rise' if rises else 'fade'} is not that of a glowing body, nor like it: is it "
+            "a halogen lamp, and the only light on the card?"
+        )
     # What no shape explains (curves that are not quite this bench's) must not decide.
     scatter = max(min(fit.reduced_chi2 for fit in fits), 1.0)
     aic = np.array(
@@ -88,27 +101,78 @@ def fit_change(
     return FittedChange(tuple(fits), likely / likely.sum())
 
 
-def _fit(
-    frames: SwitchedFrames,
-    weights: FloatArray,
-    nm: FloatArray,
-    flicker: float,
-    shape: Shape,
-    lag: Measured,
-) -> Fit:
-    problem = _Problem(frames, weights, nm, flicker, shape, lag)
+def _fit(problem: "_Problem", shape: Shape) -> Fit:
     theta, jitter_s = problem.start(), FIRST_JITTER_S
-    for _ in range(ROUNDS):
+    for tolerance in TOLERANCES:
         problem.whiten(theta, jitter_s)
         result = least_squares(
-            problem.residuals, theta, max_iterations=MAX_STEPS, tolerance=TOLERANCE
+            problem.residuals, theta, max_iterations=MAX_STEPS, tolerance=tolerance
         )
         theta = result.parameters
         jitter_s = problem.likeliest_jitter(theta)
     problem.whiten(theta, jitter_s)
     chi2, dof = problem.chi2(theta), max(problem.values - len(theta), 1)
     covariance = result.covariance * max(chi2 / dof, 1.0)
-    return Fit(shape, theta, covariance, jitter_s, chi2, dof, problem.log_determinant)
+    return Fit(shape, theta, covariance, jitter_s, chi2, dof, problem.log_determinant())
+
+
+@dataclass(frozen=True, eq=False)
+class _CommonModes:
+    """Noise Σ v e eᵀ besides one of unit variance, in unit vectors e that are orthogonal.
+
+    Attributes
+    ----------
+    along
+        Unit vectors, shape (..., values, k).
+    variance
+        Variances v, shape (..., k).
+    """
+
+    along: FloatArray
+    variance: FloatArray
+
+    @classmethod
+    def of(cls, modes: FloatArray) -> "_CommonModes":
+        """Return the noise of independent modes of one standard deviation, (..., values, k)."""
+        variance, rotation = np.linalg.eigh(np.swapaxes(modes, -1, -2) @ modes)
+        variance = np.maximum(variance, np.finfo(np.float64).tiny)
+        return cls(modes @ rotation / np.sqrt(variance)[..., np.newaxis, :], variance)
+
+    def whiten(self, columns: FloatArray) -> FloatArray:
+        """Return (1 + Σ v e eᵀ)^(−1/2) times columns, shape (..., values, c)."""
+        shrunk = 1 - 1 / np.sqrt(1 + self.variance)
+        common = shrunk[..., np.newaxis] * (np.swapaxes(self.along, -1, -2) @ columns)
+        result: FloatArray = columns - self.along @ common
+        return result
+
+    def log_determinant(self) -> float:
+        """Return the logarithm of the determinant of 1 + Σ v e eᵀ."""
+        return float(np.log1p(self.variance).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """Common-mode noise in σ: each photograph's own, then what all of them share.
+
+    Attributes
+    ----------
+    photographs
+        Flicker and jitter, `along` of shape (n, S, 2).
+    all_share
+        Errors of curves and dark level, whitened by the former, `along` of shape (n S, q + S).
+    """
+
+    photographs: _CommonModes
+    all_share: _CommonModes
+
+    def whiten(self, residual: FloatArray) -> FloatArray:
+        """Return whitened residuals (n S,) of residuals in σ, shape (n, S)."""
+        own = self.photographs.whiten(residual[..., np.newaxis])
+        return self.all_share.whiten(own.reshape(-1, 1))[:, 0]
+
+    def log_determinant(self) -> float:
+        """Return the logarithm of the determinant of the covariance in units of σ²."""
+        return self.photographs.log_determinant() + self.all_share.log_determinant()
 
 
 class _Problem:
@@ -118,12 +182,14 @@ class _Problem:
         self,
         frames: SwitchedFrames,
         weights: FloatArray,
+        weight_errors: FloatArray,
         nm: FloatArray,
         flicker: float,
         shape: Shape,
         lag: Measured,
     ) -> None:
         self._frames, self._weights, self._nm = frames, weights, nm
+        self._weight_errors = weight_errors
         self._flicker, self._shape = flicker, shape
         expected, sigma = shape.expected()
         self._expected = np.array([*expected, 1.0, lag.value])
@@ -134,8 +200,7 @@ class _Problem:
         self.values = int(self._used.sum())
         sigma_s = np.where(self._used, frames.light_sigma_s, 1.0)
         self._inverse_sigma = np.where(self._used, 1 / sigma_s, 0.0)
-        self._along, self._common = np.empty((0, 0, 2)), np.empty((0, 2))
-        self.log_determinant = 0.0
+        self._noise: _Noise
 
     def start(self) -> FloatArray:
         """Return initial parameters by the photographs' brightest colour."""
@@ -164,7 +229,11 @@ class _Problem:
 
     def model(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ∫ fraction dt of every photograph, and its slope by the begin; (n, S) each."""
-        fraction = fraction_of(self._shape, theta, self._nm, self._grid_s) @ self._weights.T
+        return self._integrals(theta, self._weights)
+
+    def _integrals(self, theta: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ∫ fraction dt, and its slope by the begin, in k weightings (k, wavelengths)."""
+        fraction = fraction_of(self._shape, theta, self._nm, self._grid_s) @ weights.T
         steps = STEP_S * (fraction[1:] + fraction[:-1]) / 2
         integral = np.vstack([np.zeros(fraction.shape[1]), np.cumsum(steps, axis=0)])
         begin_s = self._frames.start_s + theta[-1]
@@ -173,21 +242,22 @@ class _Problem:
         return last - first, after - before
 
     def whiten(self, theta: FloatArray, jitter_s: float) -> None:
-        """Set the covariances to those of the model at these parameters."""
-        value, slope = self.model(theta)
-        self._along, self._common = self._common_mode(value, slope, jitter_s)
+        """Set the covariance to that of the model at these parameters."""
+        self._noise = self._noise_at(*self.model(theta), self._shared_errors(theta), jitter_s)
+
+    def log_determinant(self) -> float:
+        """Return the logarithm of the determinant of the photographs' covariance."""
         log_variance = np.log(np.square(self._frames.light_sigma_s[self._used]))
-        self.log_determinant = float(log_variance.sum() + np.log1p(self._common).sum())
+        return float(log_variance.sum()) + self._noise.log_determinant()
 
     def likeliest_jitter(self, theta: FloatArray) -> float:
         """Return the most probable of `JITTERS_S` by the residuals of the photographs."""
-        value, slope = self.model(theta)
+        (value, slope), shared = self.model(theta), self._shared_errors(theta)
         residual = self._scaled_residuals(value)
 
         def negative_log_likelihood(jitter_s: float) -> float:
-            along, common = self._common_mode(value, slope, jitter_s)
-            explained = np.square(np.einsum("nsk,ns->nk", along, residual)) * common / (1 + common)
-            return float(np.log1p(common).sum() - explained.sum())
+            noise = self._noise_at(value, slope, shared, jitter_s)
+            return float(np.square(noise.whiten(residual)).sum()) + noise.log_determinant()
 
         return float(
             JITTERS_S[np.argmin([negative_log_likelihood(jitter_s) for jitter_s in JITTERS_S])]
@@ -197,28 +267,27 @@ class _Problem:
         """Return the residuals of a model in σ; 0 of values that are not used."""
         return np.where(self._used, (self._frames.light_s - value) * self._inverse_sigma, 0.0)
 
-    def _common_mode(
-        self, value: FloatArray, slope: FloatArray, jitter_s: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the common-mode noise of each photograph's values in σ.
+    def _shared_errors(self, theta: FloatArray) -> FloatArray:
+        """Return the values' errors in σ by those of curves and dark level, shape (n, S, q + S)."""
+        frames = self._frames
+        by_wavelength, _ = self._integrals(theta, np.eye(len(self._nm)))
+        by_curves = np.tensordot(by_wavelength, self._weight_errors, axes=(1, 2))
+        dark = np.diag(frames.dark_sigma_dn_per_s / frames.steady_dn_per_s)
+        by_dark = frames.exposure_s[:, np.newaxis, np.newaxis] * dark
+        errors = np.concatenate([np.moveaxis(by_curves, 1, 2), by_dark], axis=2)
+        scaled: FloatArray = errors * self._inverse_sigma[..., np.newaxis]
+        return scaled
 
-        It consists of unit vectors, shape (n, S, 2), and variances, shape (n, 2).
-        """
+    def _noise_at(
+        self, value: FloatArray, slope: FloatArray, shared: FloatArray, jitter_s: float
+    ) -> _Noise:
         modes = np.stack([self._flicker * value, jitter_s * slope], axis=2)
-        modes *= self._inverse_sigma[..., np.newaxis]
-        variance, rotation = np.linalg.eigh(np.einsum("nsk,nsl->nkl", modes, modes))
-        variance = np.maximum(variance, np.finfo(np.float64).tiny)
-        along: FloatArray = modes @ rotation / np.sqrt(variance)[:, np.newaxis, :]
-        return along, variance
+        photographs = _CommonModes.of(modes * self._inverse_sigma[..., np.newaxis])
+        whitened = photographs.whiten(shared)
+        return _Noise(photographs, _CommonModes.of(whitened.reshape(-1, shared.shape[-1])))
 
     def _whitened_residuals(self, theta: FloatArray) -> FloatArray:
-        """Multiply the residuals by (1 + Σ v e eᵀ)^(−1/2), with unit vectors e and variances v."""
-        residual = self._scaled_residuals(self.model(theta)[0])
-        common_part = np.einsum("nsk,ns->nk", self._along, residual) * (
-            1 - 1 / np.sqrt(1 + self._common)
-        )
-        result: FloatArray = (residual - np.einsum("nsk,nk->ns", self._along, common_part)).ravel()
-        return result
+        return self._noise.whiten(self._scaled_residuals(self.model(theta)[0]))
 
     def chi2(self, theta: FloatArray) -> float:
         """Return χ² of the photographs alone."""

@@ -69,7 +69,9 @@ def frames_after_switch(
     parts = [_place_light(place_series, len(switched)) for place_series in series.values()]
     light_s, sigma_s = (np.hstack([part[number] for part in parts]) for number in (0, 1))
     first = next(iter(series.values()))
-    steady_dn_per_s = np.concatenate([part[2] for part in parts])
+    steady_dn_per_s, dark_sigma_dn_per_s = (
+        np.concatenate([part[number] for part in parts]) for number in (2, 3)
+    )
     unclipped = np.isfinite(light_s).any(axis=1)
     if np.count_nonzero(unclipped) < FEWEST:
         raise DataError(
@@ -85,6 +87,7 @@ def frames_after_switch(
         light_s[unclipped],
         sigma_s[unclipped],
         steady_dn_per_s,
+        dark_sigma_dn_per_s,
         clipped=int(np.count_nonzero(clips)),
     )
 
@@ -103,11 +106,17 @@ def take_columns(frames: SwitchedFrames, columns: NDArray[np.intp]) -> SwitchedF
         light_s=frames.light_s[:, columns],
         light_sigma_s=frames.light_sigma_s[:, columns],
         steady_dn_per_s=frames.steady_dn_per_s[columns],
+        dark_sigma_dn_per_s=frames.dark_sigma_dn_per_s[columns],
     )
 
 
-def _place_light(series: Series, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return light and σ of the first `count` photographs, (n, C) each, and the steady signal."""
+def _place_light(
+    series: Series, count: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return light and σ of the first `count` photographs, steady signal and σ of the dark level.
+
+    The first two are (n, C), the others (C,).
+    """
     unit = np.array(series.unit)
     is_steady = np.arange(len(unit)) >= count
     value, sigma = np.full((2, count, len(series.channels)), np.nan)
@@ -125,7 +134,8 @@ def _place_light(series: Series, count: int) -> tuple[FloatArray, FloatArray, Fl
     steady = series.values[is_steady & series.usable]
     if not len(steady):
         raise DataError("the steady lamp clips in all frames; lower camera.iso")
-    return value, sigma, steady.mean(axis=0)
+    # A series without dark frames does not know it.
+    return value, sigma, steady.mean(axis=0), np.nan_to_num(series.dark_sigma)
 
 
 def warming(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import FitError
+from labrig.fit.excitation.lamp_pulls import law_test
 from labrig.fit.excitation.levels import levels_at_off
 from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of
 from labrig.fit.excitation.problem import ExcitationProblem
@@ -199,7 +200,7 @@ def _result(
         chi2=solution.chi2,
         dof=problem.n_values + len(problem.parameters.prior_sigma) - solution.rank,
         covariance=total_covariance[np.ix_(kept, kept)],
-        warnings=tuple(_warnings(problem, solution, states)),
+        warnings=(*_warnings(problem, solution, states), *_law_warnings(problem, rates, theta)),
         residuals=problem.plain_residuals(theta),
     )
 
@@ -259,9 +260,10 @@ def _warnings(
         )
     worst = max(state.amplitude_sigma / max(state.amplitude, 1e-300) for state in states)
     if worst > LEVEL_KNOWN:
+        known = f"known to {100 * worst:.0f} % only, as are" if worst < 1 else "not known, nor are"
         messages.append(
-            f"how far the sample was charged is known to {100 * worst:.0f} % only, as are Λ and "
-            "r(0): charge for longer or with more light, so that the glow stops growing"
+            f"how far the sample was charged is {known} Λ and r(0): charge for longer or with more "
+            "light, so that the glow stops growing"
         )
     reduced = solution.chi2 / max(problem.n_values - solution.rank, 1)
     if reduced > LARGE_CHI2:
@@ -270,3 +272,20 @@ def _warnings(
             "at the residuals of each charge"
         )
     return messages
+
+
+def _law_warnings(problem: ExcitationProblem, rates: Rates, theta: FloatArray) -> list[str]:
+    """Return one line if charges of different lengths do not follow the rate equation."""
+    test = law_test(problem.parameters, rates, theta, problem.series)
+    if test is None or not test.fails:
+        return []
+    long_ones, short_ones, cause = (
+        ("more", "less", "charging is convex, the layer is thick")
+        if test.trend > 0
+        else ("less", "more", "states are missing, the lamp's light empties traps")
+    )
+    return [
+        f"long charges glow {long_ones} and short ones {short_ones} than the rate equation says "
+        f"({abs(test.trend):.1f} σ of the lamp's scatter): {cause}, or another law holds; k_e, Λ "
+        "and r(0) are not to be trusted"
+    ]

@@ -95,6 +95,34 @@ def test_it_is_a_glowing_bodys(result: FadeResult) -> None:
         assert change.best.reduced_chi2 < 2
 
 
+def test_with_the_curves_of_another_camera_it_still_is(tmp_path: Path) -> None:
+    """The blue of this seed's sensor sees a little of the red, where the curves have nothing."""
+
+    def other_camera(rig: dict[str, Any]) -> None:
+        rig["simulation"]["seed"] = 2
+
+    protocol = PROTOCOL | {"warming": False, "rise": False}
+    result: Any = process_run(record(tmp_path, protocol, other_camera))
+    assert result.warnings == ()
+    assert result.fade.best.name == "filament"
+    true = true_fractions(result.calibration, result.calibration.fade, rises=False)
+    fraction, sigma = (
+        np.array(rows) for rows in (result.calibration.fade.fraction, result.calibration.fade.sigma)
+    )
+    assert np.all(np.abs(fraction - true) < 3 * sigma + 1e-3)
+
+
+def test_what_glows_after_the_lamp_is_no_glowing_bodys(tmp_path: Path) -> None:
+    """A hundredth of a per cent that fades within a minute, as of a lamp's phosphor."""
+
+    def afterglow(rig: dict[str, Any]) -> None:
+        rig["simulation"]["lamp"] = {"afterglow": "0.01 %", "afterglow_fades": "60 s"}
+
+    protocol = PROTOCOL | {"warming": False, "rise": False, "every": "80 ms"}
+    result: Any = process_run(record(tmp_path, protocol, afterglow))
+    assert any("is not that of a glowing body" in warning for warning in result.warnings)
+
+
 def test_a_person_is_reported(processed: Processed) -> None:
     told = ("the turn-off transient is", "the turn-on transient lacks", "a cold lamp has")
     for line, begin in zip(processed.lines, told, strict=True):
