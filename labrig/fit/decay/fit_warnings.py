@@ -227,8 +227,8 @@ def warnings_about(
 def _hidden_warning(hidden: HiddenState, n_states: int, span_s: float) -> str:
     lifetime_s = hidden.lifetime * span_s
     return (
-        f"state {n_states + 1}, of about {100 * hidden.share:.0f} % with a lifetime around "
-        f"{lifetime_s:.2g} s, is likely but would not be seen in these frames; σ allows for it: "
+        f"a state {n_states + 1} of about {100 * hidden.share:.0f} % with a lifetime around "
+        f"{lifetime_s:.2g} s may hide in the first frames, which do not tell it; σ allows for it: "
         f"take frames closer together than {lifetime_s / 2:.2g} s in the first "
         f"{3 * lifetime_s:.2g} s"
     )

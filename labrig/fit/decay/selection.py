@@ -26,8 +26,10 @@ F_TEST_LEVEL = 0.002
 CREEPING_GAIN, GOOD_REDUCED_CHI2 = 4.0, 1.5
 #: Gain in χ² beyond that found from which a further state is looked for at its most promising rate.
 MISSED_GAIN = 1.0
-#: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
+#: Difference in BIC from which another model is clearly better: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
+#: Difference in BIC from which a law of one shape is taken instead of exponentials.
+PREFERRED_BIC = 2.0
 #: Gain in BIC from which a further state is accepted though its rate is ill-determined: odds of
 #: e^5 = 150 : 1 against fewer states.
 REFUTING_BIC = 10.0
