@@ -100,8 +100,8 @@ def fit_decay(
     law
         Law that describes the decay: `exponentials`, `becquerel`, `otor`, `stretched` or
         `rate-spectrum`. `auto` takes exponentials, unless no number of states was asked for and the
-        BIC of another law is lower by 2, or by 6 if it is that of a spectrum of rates. All of them
-        are fitted in any case.
+        BIC of another law is lower by 2, by 6 than that of a single one or if it is a spectrum of
+        rates. All of them are fitted in any case.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def fit_decay(
     if law == AUTO and n_states is not None:
         law = EXPONENTIALS
     is_choice = law == AUTO
-    chosen_law = _chosen_law(law, min(candidate.bic for candidate in tried), laws, spectrum)
+    chosen_law = _chosen_law(law, chosen.n_states, tried, laws, spectrum)
     all_needed = is_needed(data, chosen, tried, noise_dof)
     envelope_data = data
     data, chosen = _reweighted(data, chosen, smooth.flicker)
@@ -256,16 +256,23 @@ def _supported_states(
 
 
 def _chosen_law(
-    law: str, exponentials_bic: float, laws: Sequence[LawFit], spectrum: FittedRateSpectrum | None
+    law: str,
+    n_states: int,
+    tried: Sequence[Candidate],
+    laws: Sequence[LawFit],
+    spectrum: FittedRateSpectrum | None,
 ) -> str:
-    """Return the law that was asked for, or the one that the data clearly prefer."""
-    bics = {EXPONENTIALS: exponentials_bic, **{each.fitted.name: each.fitted.bic for each in laws}}
+    """Return the law that was asked for, or the one that the data prefer to exponentials."""
+    bics = {each.fitted.name: each.fitted.bic for each in laws}
+    bics[EXPONENTIALS] = min(candidate.bic for candidate in tried)
     if spectrum is not None:
         bics[RATE_SPECTRUM] = spectrum.bic
     if law == AUTO:
-        # A spectrum contains the exponentials: it has to be better by more.
-        margins = {EXPONENTIALS: 0.0, RATE_SPECTRUM: CLEAR_BIC}
-        return min(bics, key=lambda name: bics[name] + margins.get(name, PREFERRED_BIC))
+        # One exponential is the limit of every law, and a spectrum contains all of them: what
+        # contains the other has to be better by more.
+        margins = dict.fromkeys(bics, CLEAR_BIC if n_states == 1 else PREFERRED_BIC)
+        margins |= {EXPONENTIALS: 0.0, RATE_SPECTRUM: CLEAR_BIC}
+        return min(bics, key=lambda name: bics[name] + margins[name])
     if law not in bics:
         raise FitError(f"expected a signal that decays by the law '{law}', got none")
     return law

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.fit.decay.selection import CLEAR_BIC
+from labrig.fit.decay.selection import CLEAR_BIC, PREFERRED_BIC
 from labrig.number_format import rounded
 from labrig.results import (
     EXPONENTIALS,
@@ -28,9 +28,7 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
         law
         for law in compared.values()
         # A spectrum of rates is what any exponentials are, blurred: no other law.
-        if law.name != RATE_SPECTRUM
-        and abs(law.bic_above_best - taken.bic_above_best) < CLEAR_BIC
-        and _differs(fit, law.name)
+        if law.name != RATE_SPECTRUM and _is_close(fit, taken, law) and _differs(fit, law.name)
     ]
     if not ties:
         return []
@@ -42,6 +40,13 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
         f"{CLEAR_BIC:.0f}): at {at_s:.3g} s they differ by a factor of "
         f"{rounded(max(signals) / lowest, 2)}; record longer, or take more light at first"
     ]
+
+
+def _is_close(fit: FittedDecay, taken: ComparedLaw, other: ComparedLaw) -> bool:
+    difference = other.bic_above_best - taken.bic_above_best
+    # One exponential is the limit of every law: only if the data support its shape it is another.
+    contains = fit.law == EXPONENTIALS and fit.n_states == 1
+    return -CLEAR_BIC < difference < (-PREFERRED_BIC if contains else CLEAR_BIC)
 
 
 def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:
