@@ -19,13 +19,15 @@ from labrig.fit.least_squares import FloatArray
 
 #: Correlations of neighbouring frames that are weighed, and the chance of none before the data
 #: tell: shutter and aperture, which dominate, have none.
-CORRELATIONS = np.array([0.0, 0.3, 0.5, 0.65, 0.8, 0.9, 0.95])
+CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92])
 PRIOR_OF_NONE = 0.8
 #: Values of an estimated ρ that are weighed, relative to the estimate: a correlated flicker is
 #: larger than its scatter about a curve that follows it.
-FLICKERS = np.geomspace(0.5, 4.0, 7)
-#: Frames below which no correlation is told.
-FEWEST_FRAMES = 12
+FLICKERS = np.geomspace(0.5, 4.0, 5)
+#: Frames below which no correlation is told, and number of first frames that tell it.
+FEWEST_FRAMES, MOST_FRAMES = 12, 100
+#: Diagonal of a triangular factor that stands for 0.
+TINY = 1e-300
 #: Least estimate: a flicker that drifts with the decay leaves hardly any scatter about a curve.
 LEAST_FLICKER = 0.002
 #: Mean ρ² B below which flicker hardly matters.
@@ -88,27 +90,24 @@ def flicker_correlation(
     flickers = (
         np.minimum(noise.flicker * FLICKERS, MAX_FLICKER) if is_estimated else [noise.flicker]
     )
-    pairs = [(float(rho), float(phi)) for phi in CORRELATIONS for rho in flickers]
-    distance = np.abs(np.subtract.outer(np.arange(bright.sum()), np.arange(bright.sum())))
-    log_posterior = np.array(
-        [
-            _log_restricted_likelihood(
-                deviation, design, np.diag(1 / brightness2[bright]) + rho**2 * phi**distance
-            )
-            + _log_prior(rho, phi)
-            for rho, phi in pairs
-        ]
+    rho, phi = (grid.ravel() for grid in np.meshgrid(flickers, CORRELATIONS))
+    told = slice(0, MOST_FRAMES)
+    n_told = len(deviation[told])
+    powers = _powers(n_told)
+    covariances = np.repeat(powers, len(flickers), axis=0) * rho[:, None, None] ** 2
+    covariances += np.diag(1 / brightness2[bright][told])
+    log_posterior = _log_restricted_likelihoods(deviation[told], design[told], covariances)
+    log_posterior -= np.log1p((rho / USUAL_FLICKER) ** 2)
+    log_posterior += np.log(
+        np.where(phi == 0, PRIOR_OF_NONE, (1 - PRIOR_OF_NONE) / (len(CORRELATIONS) - 1))
     )
     probability = np.exp(log_posterior - log_posterior.max())
     probability /= probability.sum()
-    rho2, phi = np.array(pairs).T
-    rho2 = rho2**2
     correlates = float(probability @ (phi > 0))
-    excess = sum(
-        p * r2 * (one**distance - np.eye(len(distance)))
-        for p, r2, one in zip(probability, rho2, phi, strict=True)
-    )
-    covariance = _effect(data, fit, bright, np.asarray(excess))
+    variances = (probability * rho**2).reshape(len(CORRELATIONS), -1).sum(axis=1)
+    all_powers = _powers(len(deviation))
+    excess = np.tensordot(variances, all_powers, 1) - variances.sum() * np.eye(len(deviation))
+    covariance = _effect(data, fit, bright, excess)
     rates = slice(0, 2 * fit.n_free, 2)
     independent = np.diag(fit.joint.least_squares.covariance)[rates]
     ratio = np.diag(covariance)[rates] / np.where(independent > 0, independent, np.inf)
@@ -120,21 +119,28 @@ def flicker_correlation(
     )
 
 
-def _log_prior(rho: float, phi: float) -> float:
-    of_phi = PRIOR_OF_NONE if phi == 0 else (1 - PRIOR_OF_NONE) / (len(CORRELATIONS) - 1)
-    return float(np.log(of_phi / (1 + (rho / USUAL_FLICKER) ** 2)))
+def _powers(n_frames: int) -> FloatArray:
+    """Return φ^|f − g| for every correlation φ, shape (k, n, n)."""
+    frames = np.arange(n_frames)
+    distance = np.abs(np.subtract.outer(frames, frames))
+    return np.asarray(np.power(CORRELATIONS[:, None], frames)[:, distance])
 
 
-def _log_restricted_likelihood(
-    deviation: FloatArray, design: FloatArray, covariance: FloatArray
-) -> float:
-    """Return the log likelihood of what a linear model (n, q) leaves of the deviations (n,)."""
-    cholesky = np.linalg.cholesky(covariance)
-    both = np.linalg.solve(cholesky, np.column_stack([design, deviation]))
-    triangle = np.abs(np.diag(np.linalg.qr(both, mode="r")))
+def _log_restricted_likelihoods(
+    deviation: FloatArray, design: FloatArray, covariances: FloatArray
+) -> FloatArray:
+    """Return the log likelihood of what a linear model (n, q) leaves of the deviations (n,).
+
+    The result is (k,) for k covariances (k, n, n).
+    """
+    choleskys = np.linalg.cholesky(covariances)
+    both = np.column_stack([design, deviation])
+    triangles = np.linalg.qr(np.linalg.solve(choleskys, both[None]), mode="r")
     # The diagonal is log|V⁻¹ᐟ² X| and, last, the norm of the residual.
-    log_volume = np.log(np.diag(cholesky)).sum() + np.log(np.maximum(triangle[:-1], 1e-300)).sum()
-    return float(-log_volume - triangle[-1] ** 2 / 2)
+    diagonal = np.abs(np.diagonal(triangles, axis1=1, axis2=2))
+    volumes = np.log(np.diagonal(choleskys, axis1=1, axis2=2)).sum(axis=1)
+    volumes += np.log(np.maximum(diagonal[:, :-1], TINY)).sum(axis=1)
+    return np.asarray(-volumes - diagonal[:, -1] ** 2 / 2)
 
 
 def _effect(

@@ -4,9 +4,9 @@ A fast state that is gone after a frame or two shifts the rates of the others lo
 prove it. For each rate that it could have, the fit is linear in its small amplitude a: with the
 column c of that exponential and the Jacobian J of the fitted parameters, q = c − J J⁺c is what only
 the further state explains, a = −q·r/q² ± 1/|q| its amplitude, and −J⁺c a its effect on the others.
-The chance that it is there follows from the likelihood, averaged over rates and over a ≥ 0 with a
-prior as informative as one datum (that of the BIC; R. Kass and L. Wasserman, J. Am. Stat. Assoc.
-90, 1995). Its effect on the others, times its chance, is a part of their covariance.
+The chance that it is there follows from the likelihood, averaged over its rate and over the a ≥ 0
+that are usual (model averaging; J. Hoeting et al., Statistical Science 14, 1999). Its effect on the
+others, times its chance, is a part of their covariance.
 """
 
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr
 
+from labrig.fit.decay.series import FASTEST_DECAYS
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
@@ -23,6 +24,8 @@ from labrig.material import exponential_means
 ANY_RATES, FASTER_RATES = 24, 12
 #: Odds that a fast state is there before the data tell: most samples have none.
 PRIOR_ODDS = 0.2
+#: Scale of its amplitude, relative to all others' sum.
+USUAL_SHARE = 0.4
 #: Ratio to the fastest rate found from which a further state is a fast one.
 FASTER = 1.5
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
@@ -113,7 +116,9 @@ class HiddenState:
 
 
 def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
-    """Return what a state faster than all fitted ones would do to them; None if there is no room.
+    """Return what a state would do to the fitted ones that is gone after a step between frames.
+
+    The result is None if the fastest one fitted leaves no room.
 
     Parameters
     ----------
@@ -122,19 +127,21 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
     fit
         The fit at its minimum.
     """
-    low = float(fit.log_rates.max()) + np.log(FASTER)
     high = data.series.log_rate_bounds[1]
+    low = max(float(fit.log_rates.max()) + np.log(FASTER), high - np.log(FASTEST_DECAYS))
     if low >= high or not np.isfinite(fit.joint.least_squares.covariance).all():
         return None
     further = further_state(data, fit, np.linspace(low, high, FASTER_RATES))
     if not len(further.log_rates):
         return None
-    z, sigma = further.amplitude / further.amplitude_sigma, further.amplitude_sigma
+    prior = USUAL_SHARE * float(fit.amplitudes.sum())
+    kept = prior**2 / (prior**2 + further.amplitude_sigma**2)
+    amplitude, sigma = kept * further.amplitude, np.sqrt(kept) * further.amplitude_sigma
+    z = amplitude / sigma
     # Of a normal distribution cut off below 0: its integral, its mean and its mean square.
-    penalty = np.log(data.independent_data(fit.joint.weights))
-    log_evidence = np.log(2 * PRIOR_ODDS) + log_ndtr(z) + (z**2 - penalty) / 2
+    log_evidence = np.log(2 * PRIOR_ODDS) + np.log1p(-kept) / 2 + log_ndtr(z) + z**2 / 2
     mean = sigma * (z + np.exp(-(z**2) / 2 - log_ndtr(z)) / np.sqrt(2 * np.pi))
-    mean_square = sigma**2 + further.amplitude * mean
+    mean_square = sigma**2 + amplitude * mean
     largest = max(float(log_evidence.max()), 0.0)
     evidence = np.exp(log_evidence - largest) / len(z)
     probability = evidence / (evidence.sum() + np.exp(-largest))
