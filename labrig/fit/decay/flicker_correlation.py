@@ -78,7 +78,9 @@ def flicker_correlation(
     bright = brightness2 > 0
     flicker = max(noise.flicker, LEAST_FLICKER) if is_estimated else noise.flicker
     is_low = flicker**2 * brightness2.mean() < LEAST_EFFECT
-    if bright.sum() < FEWEST_FRAMES or is_low or len(series.repeats) > 1:
+    is_determined = np.isfinite(fit.joint.least_squares.covariance).all()
+    is_told = bright.sum() >= FEWEST_FRAMES and len(series.repeats) == 1
+    if not (is_determined and is_told) or is_low:
         return None
     whitened_values = np.einsum("fcd,fd->fc", series.whiteners, series.values - noise.offsets)
     deviation = np.einsum("fc,fc->f", whitened_signal, whitened_values)[bright]

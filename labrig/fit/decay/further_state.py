@@ -27,7 +27,9 @@ PRIOR_ODDS = 0.2
 #: Scale of its amplitude, relative to all others' sum.
 USUAL_SHARE = 0.4
 #: Ratio to the fastest rate found from which a further state is a fast one.
-FASTER = 1.5
+FASTER = 2.0
+#: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
+SHOWN_GAIN = 40.0
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
 LEAST_OWN = 1e-4
 #: Smallest slope of the others' parameters that counts as dependent.
@@ -118,7 +120,7 @@ class HiddenState:
 def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
     """Return what a state would do to the fitted ones that is gone after a step between frames.
 
-    The result is None if the fastest one fitted leaves no room.
+    The result is None if the fastest one fitted leaves no room, or if the data show it.
 
     Parameters
     ----------
@@ -132,7 +134,7 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
     if low >= high or not np.isfinite(fit.joint.least_squares.covariance).all():
         return None
     further = further_state(data, fit, np.linspace(low, high, FASTER_RATES))
-    if not len(further.log_rates):
+    if not len(further.log_rates) or further.gain.max() > SHOWN_GAIN:
         return None
     prior = USUAL_SHARE * float(fit.amplitudes.sum())
     kept = prior**2 / (prior**2 + further.amplitude_sigma**2)
