@@ -15,6 +15,8 @@ from tests.acceptance.decay_coverage import LAWS, fit, hidden_truth, is_right
 from tests.fit import truths
 
 DOUBLE = ((0.1, 1.0), (0.02, 0.5))
+#: So many frames tell a drift.
+DENSE_S = 0.3 + 2.5 * np.arange(74)
 #: A lamp that drifts: flicker of 0.7 %, correlated by so much from frame to frame.
 DRIFT = 0.9
 
@@ -102,11 +104,13 @@ def test_a_free_offset_hides_no_flicker() -> None:
 
 
 def test_the_drift_of_a_lamp_is_in_sigma() -> None:
-    """Without its correlation σ would be half as large."""
+    """Without its correlation σ would be a third as large."""
     pulls, told = [], 0
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        seen = truths.observe(truths.exponentials((0.02, 1.0)), 800 + seed, flicker=0.0)
+        seen = truths.observe(
+            truths.exponentials((0.02, 1.0)), 800 + seed, flicker=0.0, t_s=DENSE_S
+        )
         steps = 0.007 * np.sqrt(1 - DRIFT**2) * rng.normal(size=len(seen.t_s))
         steps[0] = 0.007 * rng.normal()
         drift = [0.0]
@@ -123,8 +127,9 @@ def test_the_drift_of_a_lamp_is_in_sigma() -> None:
         )
         told += _says(each, "neighbouring frames correlates")
         pulls.append((each.states[0].k_r_per_s - 0.02) / each.states[0].k_r_sigma_per_s)
-    assert 0.83 < np.sqrt(np.mean(np.square(pulls))) < 1.2
-    assert told > 20
+    # Correlations that are averaged over make σ a tenth too large: 0.9.
+    assert 0.75 < np.sqrt(np.mean(np.square(pulls))) < 1.1
+    assert told > 50
 
 
 def test_few_counts_are_not_biased(tmp_path: Path) -> None:

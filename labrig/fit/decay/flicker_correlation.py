@@ -20,7 +20,7 @@ from labrig.fit.least_squares import FloatArray
 #: Correlations of neighbouring frames that are weighed, and the chance of none before the data
 #: tell: shutter and aperture, which dominate, have none.
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92])
-PRIOR_OF_NONE = 0.8
+PRIOR_OF_NONE = 0.85
 #: Values of an estimated ρ that are weighed, relative to the estimate: a correlated flicker is
 #: larger than its scatter about a curve that follows it.
 FLICKERS = np.geomspace(0.5, 4.0, 5)
