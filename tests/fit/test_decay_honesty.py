@@ -16,7 +16,7 @@ from tests.fit import truths
 
 DOUBLE = ((0.1, 1.0), (0.02, 0.5))
 #: So many frames tell a drift.
-DENSE_S = 0.3 + 2.5 * np.arange(74)
+DENSE_S: truths.FloatArray = 0.3 + 2.5 * np.arange(74, dtype=np.float64)
 #: A lamp that drifts: flicker of 0.7 %, correlated by so much from frame to frame.
 DRIFT = 0.9
 
@@ -104,7 +104,7 @@ def test_a_free_offset_hides_no_flicker() -> None:
 
 
 def test_the_drift_of_a_lamp_is_in_sigma() -> None:
-    """Without its correlation σ would be a third as large."""
+    """Frames that err together tell less than independent ones."""
     pulls, told = [], 0
     for seed in range(60):
         rng = np.random.default_rng(seed)
