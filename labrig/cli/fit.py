@@ -63,7 +63,7 @@ def decay(
     ] = "auto",
     weights: Annotated[
         str,
-        typer.Option("--weights", help="'given' σ, or 'counts' (σ² = counts, at least 5)."),
+        typer.Option("--weights", help="'given' σ, or 'counts' (σ² = those expected, ≥ 5)."),
     ] = "given",
     origin: Annotated[
         float, typer.Option("--origin", help="Time at which the light went off, in seconds.")

@@ -24,6 +24,9 @@ COARSE_RATES = 48
 REFINEMENT = 4
 #: Iterations: the grid ratio falls from 1.2 to 1.003, the error of the curve below 1e−5.
 ROUNDS = 3
+#: Logarithm of the slowest rate, in 1/spans, beside a free offset. Slower ones and a negative
+#: offset cancel, but their light would flicker: ρ came out four times too small.
+SLOWEST_BESIDE_OFFSET = 0.0
 #: Upper limit of the flicker of shutters, apertures and lamps: a larger scatter is due to a wrong
 #: dark level or model.
 MAX_FLICKER = 0.1
@@ -66,6 +69,8 @@ class Envelope:
         `FEWEST_NOISE_DOF` degrees of freedom one σ(ρ²) above the estimate.
     likely_flickers
         Equally probable values of ρ after the measurement, or the given one, shape (m,).
+    shapes
+        Exponentials that the curve is made of, 1 at the first frame, shape (n, q).
     """
 
     series: DecaySeries
@@ -76,6 +81,7 @@ class Envelope:
     flicker: float
     flicker_sigma: float
     likely_flickers: FloatArray
+    shapes: FloatArray
 
 
 def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
@@ -95,12 +101,13 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     is_single = len(weights) == len(series.repeats) == 1
     if is_single and flicker == 0 and series.sigma_given:
         n_frames = series.n_frames
-        return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1))
+        none = np.zeros((n_frames, 0))
+        return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1), none)
     rho, rho_sigma = 0.0, 0.0
     likely = np.array([flicker or 0.0])
     for _ in range(ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN):
         data = whitened(series, signal, rho)
-        curve, offsets, leverage = monotone_curve(data, weights)
+        curve, offsets, leverage, shapes = monotone_curve(data, weights)
         dof = max(series.n_frames - float(leverage.sum()), 1.0)
         if len(weights) > 1:
             weights, curve = _channel_weights(data, curve, offsets)
@@ -114,7 +121,7 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
             rho, rho_sigma, dof, likely = _flicker(series, signal, offsets, leverage)
         else:
             rho = flicker
-    return Envelope(series, signal, weights, offsets, dof, rho, rho_sigma, likely)
+    return Envelope(series, signal, weights, offsets, dof, rho, rho_sigma, likely, shapes)
 
 
 def _first_weights(series: DecaySeries) -> FloatArray:
@@ -127,8 +134,10 @@ def _first_weights(series: DecaySeries) -> FloatArray:
 
 def monotone_curve(
     data: WhitenedSeries, weights: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the best completely monotone curve (n,), offsets (C,) and their leverage (n,).
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the best completely monotone curve, offsets, leverage, and what it is made of.
+
+    Their shapes are (n,), (C,), (n,) and (n, q).
 
     Parameters
     ----------
@@ -140,6 +149,8 @@ def monotone_curve(
     series = data.series
     problem = projection(data, weights)
     low, high = series.log_rate_bounds
+    if np.isinf(series.offset_sigma).any():
+        low = max(low, SLOWEST_BESIDE_OFFSET)
     log_rates = np.linspace(low, high, COARSE_RATES)
     step = (high - low) / (COARSE_RATES - 1)
     for refinement in range(ROUNDS + 1):
@@ -156,7 +167,7 @@ def monotone_curve(
     residual = data.target - design @ amplitudes[used]
     offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, residual)[0]
     along, _ = data.leverage(weights, np.hstack([design, data.offset_design]))
-    return means @ amplitudes, offsets, along
+    return means @ amplitudes, offsets, along, means[:, used]
 
 
 def _channel_weights(

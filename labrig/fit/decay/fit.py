@@ -1,6 +1,7 @@
 """Fit of rates and amplitudes to the frames of a decay: `fit_decay`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,11 +9,12 @@ from numpy.typing import ArrayLike
 from labrig.errors import FitError
 from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
+from labrig.fit.decay.law_ties import tie_warnings
 from labrig.fit.decay.laws import LawFit, fit_laws
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
 from labrig.fit.decay.result import DecayFit, assemble, noise_matrices, student_factor
 from labrig.fit.decay.scatter import with_scatter_sigma
-from labrig.fit.decay.selection import CLEAR_BIC, choose_states, is_needed
+from labrig.fit.decay.selection import CLEAR_BIC, PREFERRED_BIC, choose_states, is_needed
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
@@ -97,8 +99,9 @@ def fit_decay(
         drifts in all channels. None is no correlation.
     law
         Law that describes the decay: `exponentials`, `becquerel`, `otor`, `stretched` or
-        `rate-spectrum`. `auto` takes exponentials, unless another law is clearly better: its BIC is
-        lower by 6, and no number of states was asked for. All of them are fitted in any case.
+        `rate-spectrum`. `auto` takes exponentials, unless no number of states was asked for and the
+        BIC of another law is lower by 2, by 6 than that of a single one or if it is a spectrum of
+        rates. All of them are fitted in any case.
 
     Returns
     -------
@@ -119,7 +122,7 @@ def fit_decay(
     >>> fit = labrig.fit_decay(decay.t_s, y, sigma, exposure_s=decay.exposure_s, flicker=0.007)
     >>> for state in fit.states:
     ...     print(f"k = {state.k_r_per_s:.4f} ± {state.k_r_sigma_per_s:.4f} 1/s")
-    k = 0.2046 ± 0.0029 1/s
+    k = 0.2046 ± 0.0035 1/s
     k = 0.0101 ± 0.0001 1/s
     """
     if law not in (AUTO, *LAW_NAMES):
@@ -155,12 +158,13 @@ def fit_decay(
     spectrum = fit_rate_spectrum(data, weights, student)
     if law == AUTO and n_states is not None:
         law = EXPONENTIALS
-    chosen_law = _chosen_law(law, min(candidate.bic for candidate in tried), laws, spectrum)
+    is_choice = law == AUTO
+    chosen_law = _chosen_law(law, chosen.n_states, tried, laws, spectrum)
     all_needed = is_needed(data, chosen, tried, noise_dof)
     envelope_data = data
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     refuse_if_constant(chosen, data)
-    return assemble(
+    result = assemble(
         data,
         chosen,
         Evidence(
@@ -178,6 +182,9 @@ def fit_decay(
             n_fixed=len(fixed),
         ),
     )
+    if not is_choice:
+        return result
+    return replace(result, warnings=(*result.warnings, *tie_warnings(result)))
 
 
 def _log_rates(rates_per_s: Sequence[float], span_s: float) -> FloatArray:
@@ -249,15 +256,23 @@ def _supported_states(
 
 
 def _chosen_law(
-    law: str, exponentials_bic: float, laws: Sequence[LawFit], spectrum: FittedRateSpectrum | None
+    law: str,
+    n_states: int,
+    tried: Sequence[Candidate],
+    laws: Sequence[LawFit],
+    spectrum: FittedRateSpectrum | None,
 ) -> str:
-    """Return the law that was asked for, or the one that the data clearly prefer."""
-    bics = {EXPONENTIALS: exponentials_bic, **{each.fitted.name: each.fitted.bic for each in laws}}
+    """Return the law that was asked for, or the one that the data prefer to exponentials."""
+    bics = {each.fitted.name: each.fitted.bic for each in laws}
+    bics[EXPONENTIALS] = min(candidate.bic for candidate in tried)
     if spectrum is not None:
         bics[RATE_SPECTRUM] = spectrum.bic
     if law == AUTO:
-        best = min(bics, key=bics.__getitem__)
-        return best if bics[best] < exponentials_bic - CLEAR_BIC else EXPONENTIALS
+        # One exponential is the limit of every law, and a spectrum contains all of them: what
+        # contains the other has to be better by more.
+        margins = dict.fromkeys(bics, CLEAR_BIC if n_states == 1 else PREFERRED_BIC)
+        margins |= {EXPONENTIALS: 0.0, RATE_SPECTRUM: CLEAR_BIC}
+        return min(bics, key=lambda name: bics[name] + margins[name])
     if law not in bics:
         raise FitError(f"expected a signal that decays by the law '{law}', got none")
     return law

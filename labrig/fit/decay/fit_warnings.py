@@ -15,6 +15,8 @@ from labrig.fit.decay.diagnostics import (
     state_warnings,
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
+from labrig.fit.decay.flicker_correlation import FlickerCorrelation
+from labrig.fit.decay.further_state import HiddenState
 from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.laws import LawFit
 from labrig.fit.decay.selection import CLEAR_BIC
@@ -34,6 +36,10 @@ from labrig.results import (
 )
 
 RISING_SIGMAS = 5.0
+#: Chance from which a state that the frames do not show is named.
+LIKELY = 0.5
+#: Chance from which correlated flicker is said.
+VERY_LIKELY = 0.8
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
 AT_BOUND = 1e-3
 
@@ -134,6 +140,8 @@ def warnings_about(
     states: tuple[DecayState, ...],
     log_rate_covariance: FloatArray,
     evidence: Evidence,
+    hidden: HiddenState | None,
+    correlation: FlickerCorrelation | None,
 ) -> list[str]:
     """Return the warnings about a fit, one line each.
 
@@ -147,6 +155,10 @@ def warnings_about(
         Covariance of log k of `states`, shape (n, n).
     evidence
         Steps that led to the fit.
+    hidden
+        A fast state that the data may hide; None if there is no room for one.
+    correlation
+        Correlation of neighbouring frames' flicker; None if it is not told.
     """
     series, joint = data.series, fit.joint
     warnings = []
@@ -205,6 +217,14 @@ def warnings_about(
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     if not is_exponential:
         return warnings
+    if correlation is not None and correlation.probability > VERY_LIKELY:
+        warnings.append(
+            f"the flicker of neighbouring frames correlates (by {correlation.correlation:.1f}): σ "
+            f"allows for it, it is up to {correlation.factor:.2g} times as large as for "
+            "independent frames; find what drifts, or photograph a steady light beside the sample"
+        )
+    if hidden is not None and hidden.probability > LIKELY:
+        warnings.append(_hidden_warning(hidden, fit.n_states, series.span_s))
     low, high = series.log_rate_bounds
     return warnings + state_warnings(
         states,
@@ -213,6 +233,16 @@ def warnings_about(
         (float(np.exp(low)) / series.span_s, float(np.exp(high)) / series.span_s),
         evidence.all_needed,
         free_offset,
+    )
+
+
+def _hidden_warning(hidden: HiddenState, n_states: int, span_s: float) -> str:
+    lifetime_s = hidden.lifetime * span_s
+    return (
+        f"a state {n_states + 1} of about {100 * hidden.share:.0f} % with a lifetime around "
+        f"{lifetime_s:.2g} s may hide in the first frames, which do not tell it; σ allows for it: "
+        f"take frames closer together than {lifetime_s / 2:.2g} s in the first "
+        f"{3 * lifetime_s:.2g} s"
     )
 
 

@@ -16,7 +16,7 @@ from labrig.fit.least_squares import (
     FloatArray,
     LeastSquaresFit,
     least_squares,
-    parameter_covariance,
+    parameter_covariances,
 )
 
 #: Shape parameters (q,) → h (n,) and its Jacobian (n, q).
@@ -193,10 +193,10 @@ def covariances_under(
     model[:, series.fitted_offsets, range(first_offset, n_parameters)] = 1.0
     priors = np.zeros((len(series.offset_prior), n_parameters))
     priors[:, first_offset:] = series.offset_prior
-    return [
-        parameter_covariance(np.vstack([(whitening @ model).reshape(-1, n_parameters), priors]))[0]
-        for whitening in matrices
+    designs = [
+        np.vstack([(whitening @ model).reshape(-1, n_parameters), priors]) for whitening in matrices
     ]
+    return parameter_covariances(np.stack(designs))
 
 
 def weight_sigma(fit: JointFit, covariance: FloatArray) -> FloatArray:

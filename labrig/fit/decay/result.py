@@ -6,6 +6,8 @@ import numpy as np
 
 from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
+from labrig.fit.decay.flicker_correlation import flicker_correlation
+from labrig.fit.decay.further_state import hidden_state
 from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.misfit_covariance import with_misfit
 from labrig.fit.decay.selection import bic
@@ -39,6 +41,13 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
     fitted_covariance = _fitted_covariance(fit, data, evidence)
+    hidden = hidden_state(data, fit)
+    correlation = flicker_correlation(
+        data, fit, evidence.noise, is_estimated=len(evidence.noise.likely_flickers) > 1
+    )
+    for source in (hidden, correlation):
+        if source is not None:
+            fitted_covariance = fitted_covariance + source.covariance
     covariance, log_rate_covariance = _covariances(fit, data, fitted_covariance)
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates[order]) / series.span_s
@@ -81,7 +90,15 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         bic=bic(data, joint),
         covariance=covariance[np.ix_(kept, kept)],
         warnings=tuple(
-            warnings_about(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)
+            warnings_about(
+                data,
+                fit,
+                states,
+                log_rate_covariance[np.ix_(order, order)],
+                evidence,
+                hidden,
+                correlation,
+            )
         ),
         candidates=evidence.candidates,
         law=evidence.law,

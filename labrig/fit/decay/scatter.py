@@ -53,7 +53,7 @@ def with_scatter_sigma(series: DecaySeries) -> tuple[DecaySeries, ScatterSigma]:
     result = series
     for _ in range(ITERATIONS):
         data = whitened(result, np.zeros_like(series.values), 0.0)
-        curve, offsets, leverage = monotone_curve(data, np.ones(1))
+        curve, offsets, leverage, _ = monotone_curve(data, np.ones(1))
         residual = series.values[:, 0] - curve - offsets[0]
         law = _likely_law(residual, np.maximum(curve, 0.0), np.minimum(leverage, 1.0))
         sigma = np.maximum(law.sigma(curve), EXACT)

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import fdtrc
 
+from labrig.fit.decay.further_state import promising_rate
 from labrig.fit.decay.joint import JointFit
-from labrig.fit.decay.states import StatesFit, fit_states
+from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.results import Candidate
@@ -23,8 +24,12 @@ F_TEST_LEVEL = 0.002
 #: Gain in χ² that a creeping candidate may still reach where fewer states fit well already, hardly
 #: ever more than 2; and the reduced χ² below which they do.
 CREEPING_GAIN, GOOD_REDUCED_CHI2 = 4.0, 1.5
-#: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
+#: Gain in χ² beyond that found from which a further state is looked for at its most promising rate.
+MISSED_GAIN = 1.0
+#: Difference in BIC from which another model is clearly better: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
+#: Difference in BIC from which a law of one shape is taken instead of exponentials.
+PREFERRED_BIC = 2.0
 #: Gain in BIC from which a further state is accepted though its rate is ill-determined: odds of
 #: e^5 = 150 : 1 against fewer states.
 REFUTING_BIC = 10.0
@@ -69,6 +74,8 @@ def choose_states(
     needed_chi2 = np.inf
     for n_states in numbers:
         fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets, needed_chi2)
+        if chosen is not None:
+            fit = _better(data, chosen, fit)
         if fit is None:
             break
         p_value = None if chosen is None else f_test(data, chosen.joint, fit.joint, noise_dof)
@@ -85,6 +92,22 @@ def choose_states(
             penalty = 2 * float(np.log(data.independent_data(weights)))
             needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
     return chosen, tried
+
+
+def _better(data: WhitenedSeries, fewer: StatesFit, found: StatesFit | None) -> StatesFit | None:
+    """Return the fit that was found, or a better one with the further state that promises more.
+
+    A state that lasts for a frame is easily missed on the grid of rates, where others are so far
+    from their best that their misfit outweighs it.
+    """
+    log_rate, amplitude, gain = promising_rate(data, fewer)
+    reached = 0.0 if found is None else fewer.joint.chi2 - found.joint.chi2
+    if gain < reached + MISSED_GAIN:
+        return found
+    other = fit_one_more(data, fewer, log_rate, amplitude)
+    if other is None or (found is not None and found.joint.chi2 <= other.joint.chi2):
+        return found
+    return other
 
 
 def is_needed(

@@ -195,10 +195,23 @@ def fit_states(
     vanished = fit.vanished
     if vanished[n_free:].any():
         return fit_states(data, n_free, fixed[~vanished[n_free:]], weights, offsets, needed_chi2)
-    merged = n_free > 1 and np.diff(np.sort(fit.joint.shape[0 : 2 * n_free : 2])).min()
-    if vanished.any() or (n_free > 1 and merged < MERGED_LOG_RATE):
-        return None
-    return fit
+    return None if vanished.any() or _are_merged(fit) else fit
+
+
+def fit_one_more(
+    data: WhitenedSeries, fit: StatesFit, log_rate: float, amplitude: float
+) -> StatesFit | None:
+    """Fit one free state more than in `fit`, from a start value; None if it does not stay apart."""
+    start = np.insert(fit.joint.shape, 2 * fit.n_free, [log_rate, amplitude])
+    weights, offsets = fit.joint.weights, fit.joint.offsets
+    limits = CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE
+    more = _fit_from(data, start, fit.fixed, weights, offsets, *limits, CANDIDATE_GAIN)
+    return None if more.vanished.any() or _are_merged(more) else more
+
+
+def _are_merged(fit: StatesFit) -> bool:
+    rates = np.sort(fit.joint.shape[0 : 2 * fit.n_free : 2])
+    return len(rates) > 1 and float(np.diff(rates).min()) < MERGED_LOG_RATE
 
 
 def refit(data: WhitenedSeries, fit: StatesFit) -> StatesFit:

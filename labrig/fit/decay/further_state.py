@@ -1,0 +1,161 @@
+"""A further state beside those fitted: what it would take from the data, and from the others.
+
+A fast state that is gone after a frame or two shifts the rates of the others long before the data
+prove it. For each rate that it could have, the fit is linear in its small amplitude a: with the
+column c of that exponential and the Jacobian J of the fitted parameters, q = c − J J⁺c is what only
+the further state explains, a = −q·r/q² ± 1/|q| its amplitude, and −J⁺c a its effect on the others.
+The chance that it is there follows from the likelihood, averaged over its rate and over the a ≥ 0
+that are usual (model averaging; J. Hoeting et al., Statistical Science 14, 1999). Its effect on the
+others, times its chance, is a part of their covariance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr
+
+from labrig.fit.decay.series import FASTEST_DECAYS
+from labrig.fit.decay.states import StatesFit
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+from labrig.material import exponential_means
+
+#: Rates tried for a further state of any rate, and for one that is faster than all others.
+ANY_RATES, FASTER_RATES = 24, 12
+#: Odds that a fast state is there before the data tell: most samples have none.
+PRIOR_ODDS = 0.2
+#: Scale of its amplitude, relative to all others' sum.
+USUAL_SHARE = 0.4
+#: Ratio to the fastest rate found from which a further state is a fast one.
+FASTER = 2.0
+#: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
+SHOWN_GAIN = 40.0
+#: Part of an exponential that the fitted parameters must leave over; less is rounding.
+LEAST_OWN = 1e-4
+#: Smallest slope of the others' parameters that counts as dependent.
+RCOND = 1e-10
+
+
+@dataclass(frozen=True)
+class FurtherState:
+    """Effect of an exponential of each of m rates, in the fit's own units.
+
+    Attributes
+    ----------
+    log_rates
+        Logarithms of the rates, shape (m,).
+    amplitude, amplitude_sigma
+        Amplitude at the first frame, of either sign, and σ, shape (m,).
+    effect
+        Change of the fitted parameters by an amplitude of 1, shape (p, m).
+    """
+
+    log_rates: FloatArray
+    amplitude: FloatArray
+    amplitude_sigma: FloatArray
+    effect: FloatArray
+
+    @property
+    def gain(self) -> FloatArray:
+        """Fall of χ² by a positive amplitude, shape (m,)."""
+        return np.maximum(self.amplitude / self.amplitude_sigma, 0.0) ** 2
+
+
+def further_state(data: WhitenedSeries, fit: StatesFit, log_rates: FloatArray) -> FurtherState:
+    """Return what a further state would be at each of the given log rates (m,)."""
+    series, joint = data.series, fit.joint
+    solution = joint.least_squares
+    means = exponential_means(np.exp(log_rates), series.t, series.exposure)
+    columns = data.signal_design(data.constant(joint.weights), means)
+    jacobian = solution.jacobian
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    effect = -np.linalg.lstsq(jacobian / scale, columns, rcond=RCOND)[0] / scale[:, None]
+    own = columns + jacobian @ effect
+    own2 = np.einsum("ij,ij->j", own, own)
+    is_own = own2 > LEAST_OWN**2 * np.einsum("ij,ij->j", columns, columns)
+    own2 = np.where(is_own, own2, np.inf)
+    amplitude = -(own.T @ solution.residuals) / own2
+    return FurtherState(
+        log_rates[is_own], amplitude[is_own], own2[is_own] ** -0.5, effect[:, is_own]
+    )
+
+
+def promising_rate(data: WhitenedSeries, fit: StatesFit) -> tuple[float, float, float]:
+    """Return log rate, amplitude and gain in χ² of the further state that explains most."""
+    rates = np.linspace(*data.series.log_rate_bounds, ANY_RATES)
+    further = further_state(data, fit, rates)
+    if not len(further.log_rates):
+        return 0.0, 0.0, 0.0
+    best = int(np.argmax(further.gain))
+    return (
+        float(further.log_rates[best]),
+        max(float(further.amplitude[best]), 0.0),
+        float(further.gain[best]),
+    )
+
+
+@dataclass(frozen=True)
+class HiddenState:
+    """A fast state that the data neither show nor exclude.
+
+    Attributes
+    ----------
+    probability
+        Chance that there is one.
+    lifetime
+        Lifetime at which the data support it most, in spans.
+    share
+        Its share of all amplitudes at lamp off.
+    covariance
+        Its part in the covariance of the fitted parameters, shape (p, p).
+    """
+
+    probability: float
+    lifetime: float
+    share: float
+    covariance: FloatArray
+
+
+def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
+    """Return what a state would do to the fitted ones that is gone after a step between frames.
+
+    The result is None if the fastest one fitted leaves no room, or if the data show it.
+
+    Parameters
+    ----------
+    data
+        The series in units of its noise.
+    fit
+        The fit at its minimum.
+    """
+    high = data.series.log_rate_bounds[1]
+    low = max(float(fit.log_rates.max()) + np.log(FASTER), high - np.log(FASTEST_DECAYS))
+    if low >= high or not np.isfinite(fit.joint.least_squares.covariance).all():
+        return None
+    further = further_state(data, fit, np.linspace(low, high, FASTER_RATES))
+    if not len(further.log_rates) or further.gain.max() > SHOWN_GAIN:
+        return None
+    prior = USUAL_SHARE * float(fit.amplitudes.sum())
+    kept = prior**2 / (prior**2 + further.amplitude_sigma**2)
+    amplitude, sigma = kept * further.amplitude, np.sqrt(kept) * further.amplitude_sigma
+    z = amplitude / sigma
+    # Of a normal distribution cut off below 0: its integral, its mean and its mean square.
+    log_evidence = np.log(2 * PRIOR_ODDS) + np.log1p(-kept) / 2 + log_ndtr(z) + z**2 / 2
+    mean = sigma * (z + np.exp(-(z**2) / 2 - log_ndtr(z)) / np.sqrt(2 * np.pi))
+    mean_square = sigma**2 + amplitude * mean
+    largest = max(float(log_evidence.max()), 0.0)
+    evidence = np.exp(log_evidence - largest) / len(z)
+    probability = evidence / (evidence.sum() + np.exp(-largest))
+    covariance = (further.effect * (probability * mean_square)) @ further.effect.T
+    likeliest = int(np.argmax(probability))
+    lifetime = float(np.exp(-further.log_rates[likeliest]))
+    start = data.series.start
+    at_lamp_off = float(mean[likeliest] * np.exp(start / lifetime))
+    total = float(fit.amplitudes @ np.exp(np.exp(fit.log_rates) * start))
+    return HiddenState(
+        probability=float(probability.sum()),
+        lifetime=lifetime,
+        share=at_lamp_off / max(total, at_lamp_off),
+        covariance=covariance,
+    )

@@ -1,0 +1,71 @@
+"""Laws that describe a decay about as well as the one that was taken, and predict otherwise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from labrig.fit.decay.selection import CLEAR_BIC, PREFERRED_BIC
+from labrig.number_format import rounded
+from labrig.results import (
+    EXPONENTIALS,
+    FORECAST_SPANS,
+    LAW_LABELS,
+    RATE_SPECTRUM,
+    ComparedLaw,
+    FittedDecay,
+)
+
+#: Difference of two laws at the end of a forecast, in their σ, from which it matters which holds.
+#: A law that contains the other one, as one trap does the exponential, differs by less.
+MATTERS_SIGMAS = 3.0
+
+
+def tie_warnings(fit: FittedDecay) -> list[str]:
+    """Return a warning if laws that the data do not tell from the one taken predict otherwise."""
+    compared = {law.name: law for law in fit.compared_laws}
+    taken = compared.pop(fit.law)
+    ties = [
+        law
+        for law in compared.values()
+        # A spectrum of rates is what any exponentials are, blurred: no other law.
+        if law.name != RATE_SPECTRUM and _is_close(fit, taken, law) and _differs(fit, law.name)
+    ]
+    if not ties:
+        return []
+    at_s = FORECAST_SPANS * fit.measured_until_s
+    signals = [_signal(fit, law.name)[0] for law in (taken, *ties)]
+    lowest = max(min(signals), np.finfo(float).tiny)
+    return [
+        f"the data do not tell {_name(fit, taken)} from {_names(fit, ties)} (ΔBIC below "
+        f"{CLEAR_BIC:.0f}): at {at_s:.3g} s they differ by a factor of "
+        f"{rounded(max(signals) / lowest, 2)}; record longer, or take more light at first"
+    ]
+
+
+def _is_close(fit: FittedDecay, taken: ComparedLaw, other: ComparedLaw) -> bool:
+    difference = other.bic_above_best - taken.bic_above_best
+    # One exponential is the limit of every law: only if the data support its shape it is another.
+    contains = fit.law == EXPONENTIALS and fit.n_states == 1
+    return -CLEAR_BIC < difference < (-PREFERRED_BIC if contains else CLEAR_BIC)
+
+
+def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:
+    at_s = np.array([FORECAST_SPANS * fit.measured_until_s])
+    value, variance = fit.signal(at_s, np.zeros(1), law)
+    return float(value[0]), float(variance[0])
+
+
+def _differs(fit: FittedDecay, law: str) -> bool:
+    own, own_variance = _signal(fit, fit.law)
+    other, variance = _signal(fit, law)
+    return bool(abs(own - other) > MATTERS_SIGMAS * np.sqrt(own_variance + variance))
+
+
+def _name(fit: FittedDecay, law: ComparedLaw) -> str:
+    if law.name != EXPONENTIALS:
+        return LAW_LABELS[law.name]
+    return f"{fit.n_states} exponential{'s' if fit.n_states > 1 else ''}"
+
+
+def _names(fit: FittedDecay, laws: Sequence[ComparedLaw]) -> str:
+    return " or ".join(_name(fit, law) for law in laws)
