@@ -397,7 +397,8 @@ class FittedDecay:
         weights = np.array([law.probability for law in compared])[:, None]
         value = (weights * values).sum(axis=0)
         spread = np.stack([variance for _, variance in curves]) + (values - value) ** 2
-        sigma = np.sqrt(np.where(weights > 0, weights * spread, 0.0).sum(axis=0))
+        # A law that is not probable may have an infinite σ.
+        sigma = np.sqrt((weights * np.where(weights > 0, spread, 0.0)).sum(axis=0))
         chi2 = np.array([law.reduced_chi2 for law in compared])
         describes = chi2 <= BRACKET_CHI2 * np.nanmin(chi2) if np.isfinite(chi2).any() else chi2 != 0
         is_far = t > FORECAST_SPANS * self.measured_until_s

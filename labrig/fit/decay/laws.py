@@ -102,7 +102,8 @@ def fit_law(
         return None
     covariances = covariances_under(series, shape, fit, noises)
     covariance = np.mean(covariances, axis=0)
-    covariance = np.where(covariance == 0, 0.0, student * covariance)
+    with np.errstate(invalid="ignore"):
+        covariance = np.where(covariance == 0, 0.0, student * covariance)
     return LawFit(fit, _in_units(law, fit, series, covariance, bic(data, fit)))
 
 
