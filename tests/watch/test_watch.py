@@ -563,7 +563,8 @@ def test_the_page_shows_a_chain_by_its_parts(long_chain: Watching, chromium: Chr
     chromium.execute_cdp_cmd("Network.setBlockedURLs", {"urls": ["*events*"]})
     chromium.set_window_size(420, 800)
     chromium.get(long_chain.server.url)
-    parts = chromium.find_elements(By.CSS_SELECTOR, "#units details")
+    wait = WebDriverWait(chromium, PATIENCE_S, poll_frequency=0.02)
+    parts = wait.until(lambda page: page.find_elements(By.CSS_SELECTOR, "#units details"))
     assert [part.get_property("open") for part in parts] == [False, True, False, False, False]
     heads = [part.find_element(By.TAG_NAME, "summary").text for part in parts]
     assert [said.split("\n")[1].split(",")[0] for said in heads] == [

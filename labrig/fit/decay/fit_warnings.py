@@ -36,8 +36,6 @@ from labrig.results import (
 )
 
 RISING_SIGMAS = 5.0
-#: Chance from which a state that the frames do not show is named.
-LIKELY = 0.5
 #: Chance from which correlated flicker is said.
 VERY_LIKELY = 0.8
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
@@ -223,7 +221,7 @@ def warnings_about(
             f"allows for it, it is up to {correlation.factor:.2g} times as large as for "
             "independent frames; find what drifts, or photograph a steady light beside the sample"
         )
-    if hidden is not None and hidden.probability > LIKELY:
+    if hidden is not None:
         warnings.append(_hidden_warning(hidden, fit.n_states, series.span_s))
     low, high = series.log_rate_bounds
     return warnings + state_warnings(

@@ -21,6 +21,8 @@ from labrig.fit.least_squares import FloatArray
 #: tell: shutter and aperture, which dominate, have none.
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92])
 PRIOR_OF_NONE = 0.85
+#: Chance from which it counts: below, the data do not support it.
+LIKELY = 0.3
 #: Values of an estimated ρ that are weighed, relative to the estimate: a correlated flicker is
 #: larger than its scatter about a curve that follows it.
 FLICKERS = np.geomspace(0.5, 4.0, 5)
@@ -59,7 +61,7 @@ class FlickerCorrelation:
 def flicker_correlation(
     data: WhitenedSeries, fit: StatesFit, noise: Envelope, *, is_estimated: bool
 ) -> FlickerCorrelation | None:
-    """Return how the flicker correlates; None if too few frames tell, or without flicker.
+    """Return how the flicker correlates; None without it, or if too few frames tell.
 
     Parameters
     ----------
@@ -106,6 +108,8 @@ def flicker_correlation(
     probability = np.exp(log_posterior - log_posterior.max())
     probability /= probability.sum()
     correlates = float(probability @ (phi > 0))
+    if correlates <= LIKELY:
+        return None
     variances = (probability * rho**2).reshape(len(CORRELATIONS), -1).sum(axis=1)
     all_powers = _powers(len(deviation))
     excess = np.tensordot(variances, all_powers, 1) - variances.sum() * np.eye(len(deviation))

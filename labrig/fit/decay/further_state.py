@@ -28,6 +28,9 @@ PRIOR_ODDS = 0.2
 USUAL_SHARE = 0.4
 #: Ratio to the fastest rate found from which a further state is a fast one.
 FASTER = 2.0
+#: Chance from which a hidden state is told and counts: below, the data do not support it, and a σ
+#: that covered what they say nothing of would have no limit.
+LIKELY = 0.35
 #: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
 SHOWN_GAIN = 40.0
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
@@ -120,7 +123,8 @@ class HiddenState:
 def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
     """Return what a state would do to the fitted ones that is gone after a step between frames.
 
-    The result is None if the fastest one fitted leaves no room, or if the data show it.
+    The result is None if the fastest one fitted leaves no room, if the data show it, or if they do
+    not support it.
 
     Parameters
     ----------
@@ -147,6 +151,8 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
     largest = max(float(log_evidence.max()), 0.0)
     evidence = np.exp(log_evidence - largest) / len(z)
     probability = evidence / (evidence.sum() + np.exp(-largest))
+    if probability.sum() <= LIKELY:
+        return None
     covariance = (further.effect * (probability * mean_square)) @ further.effect.T
     likeliest = int(np.argmax(probability))
     lifetime = float(np.exp(-further.log_rates[likeliest]))
