@@ -93,9 +93,9 @@ def test_they_are_what_the_fit_gives_for_data_without_noise(
     )
     fit = fitted(expected, without_noise(expected), flicker)
     found = information(expected)
-    # The fit also counts what values without noise do not exclude: hidden states, drifting flicker.
+    # Values without noise lie on a curve, which looks like flicker that drifts: the fit's σ has it.
     np.testing.assert_allclose(
-        found.sigma, np.sqrt(np.diag(fit.covariance))[: 2 * states], rtol=0.15
+        found.sigma, np.sqrt(np.diag(fit.covariance))[: 2 * states], rtol=0.25 if flicker else 1e-3
     )
     parts = np.sum(list(found.budget.values()), axis=0)
     np.testing.assert_allclose(parts, 1.0, rtol=1e-9)

@@ -30,7 +30,7 @@ USUAL_SHARE = 0.4
 FASTER = 2.0
 #: Chance from which a hidden state is told and counts: below, the data do not support it, and a σ
 #: that covered what they say nothing of would have no limit.
-LIKELY = 0.35
+LIKELY = 0.5
 #: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
 SHOWN_GAIN = 40.0
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
