@@ -22,7 +22,7 @@ from labrig.fit.least_squares import FloatArray
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92])
 PRIOR_OF_NONE = 0.85
 #: Chance from which it counts: below, the data do not support it.
-LIKELY = 0.5
+LIKELY = 0.8
 #: Values of an estimated ρ that are weighed, relative to the estimate: a correlated flicker is
 #: larger than its scatter about a curve that follows it.
 FLICKERS = np.geomspace(0.5, 4.0, 5)
