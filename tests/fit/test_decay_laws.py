@@ -41,14 +41,14 @@ def fitted(name: str, shape: float, seed: int, law: str = "auto") -> DecayFit:
 def test_the_law_is_chosen_by_which_the_signal_decays(
     name: str, shape: float, right: set[str]
 ) -> None:
-    fits = [fitted(name, shape, seed) for seed in range(100, 108)]
-    assert sum(fit.law in right for fit in fits) >= 7
+    fits = [fitted(name, shape, seed) for seed in range(100, 105)]
+    assert sum(fit.law in right for fit in fits) >= 4
     assert all(fit.compared_laws[0].bic_above_best == 0 for fit in fits)
 
 
 def test_exponentials_stay_exponentials() -> None:
     signal = exponential_means(np.array([0.2, 0.02]), T_S, EXPOSURE_S) @ [0.7, 0.3]
-    for seed in range(200, 208):
+    for seed in range(200, 205):
         values, sigma = measured(signal, seed)
         fit = fit_decay(T_S, values, sigma, exposure_s=EXPOSURE_S)
         assert (fit.law, fit.n_states) == ("exponentials", 2)
@@ -56,10 +56,10 @@ def test_exponentials_stay_exponentials() -> None:
 
 
 def test_the_errors_of_rate_and_shape_are_as_large_as_their_sigma() -> None:
-    """At 20 % too large or too small a σ of 120 pulls is outside of these limits."""
+    """At 20 % too large or too small a σ of 102 pulls is outside of these limits."""
     pulls = []
     for number, (name, shape) in enumerate(
-        [("becquerel", 0.4), ("otor", 0.3), ("stretched", 0.6)] * 20
+        [("becquerel", 0.4), ("otor", 0.3), ("stretched", 0.6)] * 17
     ):
         fit = fitted(name, shape, 300 + number)
         law = next(law for law in fit.laws if law.name == name)
@@ -94,7 +94,7 @@ def test_beyond_three_times_the_measured_time_there_is_a_bracket_without_sigma()
 def test_the_errors_of_the_averaged_signal_are_as_large_as_their_sigma() -> None:
     pulls = []
     at_s = np.array([5.0, 150.0, 600.0])
-    for number, (name, shape) in enumerate([("becquerel", 0.35), ("stretched", 0.7)] * 25):
+    for number, (name, shape) in enumerate([("becquerel", 0.35), ("stretched", 0.7)] * 17):
         forecast = fitted(name, shape, 500 + number).forecast(at_s)
         true = DECAY_LAWS[name].value(0.05 * at_s, np.full(3, shape))
         pulls += list((forecast.value - true) / forecast.sigma)
