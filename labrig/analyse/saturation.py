@@ -27,8 +27,7 @@ from labrig.analyse.kinetic_order import compare_levels
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import DataError, FitError
 from labrig.fit import EPSILON, least_squares
-from labrig.fit.decay import exponential_means_and_slopes
-from labrig.material import exponential_means
+from labrig.material import exponential_means, exponential_means_and_slopes
 from labrig.number_format import plus_minus
 from labrig.protocols.saturation import Light, WeakerLight
 from labrig.record import FrameRole, RunRecord, charge_durations_s

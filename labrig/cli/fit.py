@@ -23,6 +23,18 @@ from labrig.errors import DataError, UsageError
 #: Lights under which a mixture's colours are judged: near ultraviolet asks most of it.
 MIXTURE_LIGHTS = (*LIGHTS, "395nm")
 
+#: What a table leaves open about its columns, in every command that reads one.
+Column = Annotated[
+    str | None, typer.Option("--column", help="Name of the column of values, of several.")
+]
+Time = Annotated[str | None, typer.Option("--time", help="Name of the column of times.")]
+TimeUnit = Annotated[
+    str | None, typer.Option("--time-unit", help="Unit of the times: ns, ms, s, min, h, …")
+]
+Decimal = Annotated[
+    str | None, typer.Option("--decimal", help="Decimal mark of the numbers, 'point' or 'comma'.")
+]
+
 app = typer.Typer(help="Fit data from any source.")
 
 
@@ -71,18 +83,10 @@ def decay(
     start: Annotated[
         float | None, typer.Option("--from", help="Use points from this time on, in seconds.")
     ] = None,
-    column: Annotated[
-        str | None, typer.Option("--column", help="Name of the column of values, of several.")
-    ] = None,
-    time: Annotated[str | None, typer.Option("--time", help="Name of the column of times.")] = None,
-    time_unit: Annotated[
-        str | None,
-        typer.Option("--time-unit", help="Unit of the times: ns, ms, s, min, h, …"),
-    ] = None,
-    decimal: Annotated[
-        str | None,
-        typer.Option("--decimal", help="Decimal mark of the numbers, 'point' or 'comma'."),
-    ] = None,
+    column: Column = None,
+    time: Time = None,
+    time_unit: TimeUnit = None,
+    decimal: Decimal = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for result/: page, figures, fit.json, result.json."),
@@ -145,18 +149,10 @@ def charge(
             "0 to 1, or 'free'. 1 conserves energy.",
         ),
     ] = "1",
-    column: Annotated[
-        str | None, typer.Option("--column", help="Name of the column of values, of several.")
-    ] = None,
-    time: Annotated[str | None, typer.Option("--time", help="Name of the column of times.")] = None,
-    time_unit: Annotated[
-        str | None,
-        typer.Option("--time-unit", help="Unit of the times: ns, ms, s, min, h, …"),
-    ] = None,
-    decimal: Annotated[
-        str | None,
-        typer.Option("--decimal", help="Decimal mark of the numbers, 'point' or 'comma'."),
-    ] = None,
+    column: Column = None,
+    time: Time = None,
+    time_unit: TimeUnit = None,
+    decimal: Decimal = None,
     json: Annotated[bool, typer.Option("--json", help="Print the fit as JSON.")] = False,
 ) -> None:
     """States of general kinetic order that charge and decay as one series of readings does.

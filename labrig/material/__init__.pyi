@@ -36,6 +36,7 @@ from .general_order import (
 from .rates import (
     concentration as concentration,
     exponential_means as exponential_means,
+    exponential_means_and_slopes as exponential_means_and_slopes,
     phi1 as phi1,
     phi2 as phi2,
     relaxation_with_slopes as relaxation_with_slopes,

@@ -18,6 +18,8 @@ FloatArray = NDArray[np.float64]
 
 #: Argument below which φ₂ is summed as a series: the difference 1 − φ₁ loses digits.
 _SERIES_BELOW = 0.5
+#: Value of k T below which x φ₁′(x), a difference of nearly equal numbers, is summed as a series.
+_SLOPE_SERIES_BELOW = 0.03
 #: Σ (−x)ⁿ/(n + 2)!, highest power first; the first omitted term is 2e-17 at 0.5.
 _PHI2_SERIES = [(-1) ** n / math.factorial(n + 2) for n in range(13, -1, -1)]
 
@@ -103,6 +105,51 @@ def exponential_means(
         return decayed
     x = np.multiply.outer(exposure_s, rates_per_s)
     return decayed * phi1(x)
+
+
+def exponential_means_and_slopes(
+    rates_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Average e^(−k t) over each exposure, with derivatives by the logarithms of the rates.
+
+    Parameters
+    ----------
+    rates_per_s
+        Rates k > 0 in 1/s, shape (m,).
+    t_s
+        Begin t of each exposure in seconds after lamp off, shape (n,).
+    exposure_s
+        Length T ≥ 0 of each exposure in seconds, shape (n,).
+
+    Returns
+    -------
+    means, slopes
+        Means as of `exponential_means`, and their derivatives by log k, both of shape (n, m).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.material import exponential_means_and_slopes
+    >>> t_s, exposure_s = np.array([0.0, 5.0]), np.array([0.5, 0.5])
+    >>> means, slopes = exponential_means_and_slopes(np.array([0.2]), t_s, exposure_s)
+    >>> means.round(4).tolist(), slopes.round(4).tolist()
+    ([[0.9516], [0.3501]], [[-0.0468], [-0.3673]])
+    """
+    phase = np.multiply.outer(t_s, rates_per_s)
+    decayed: FloatArray = np.exp(-phase)
+    if not exposure_s.any():
+        return decayed, -phase * decayed
+    x = np.multiply.outer(exposure_s, rates_per_s)
+    mean = phi1(x)
+    return decayed * mean, decayed * (_mean_slope(x, mean) - phase * mean)
+
+
+def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
+    """Return x φ₁′(x) = e^(−x) − φ₁(x), given φ₁(x)."""
+    # Σ_j j (−x)^j / (j + 1)!, j = 1 … 6; cut off, since powers of what is not small overflow.
+    y = np.minimum(x, _SLOPE_SERIES_BELOW)
+    series = -y * (1 / 2 - y * (1 / 3 - y * (1 / 8 - y * (1 / 30 - y * (1 / 144 - y / 840)))))
+    return np.where(x < _SLOPE_SERIES_BELOW, series, np.exp(-x) - mean)
 
 
 def _phi1_and_phi2(x: FloatArray, exp_minus_x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit import EPSILON, FloatArray
-from labrig.fit.decay import exponential_means_and_slopes
+from labrig.material import exponential_means_and_slopes
 from labrig.predict.series import DARK, FLICKER, ExpectedSeries
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import DataError, FitError
-from labrig.material import exponential_means
+from labrig.material import exponential_means_and_slopes
 from labrig.number_format import aligned
 from labrig.results.fitted_law import (
     EXPONENTIALS,
@@ -344,11 +344,9 @@ class FittedDecay:
             return other.signal(t_s, exposure_s, with_offset=with_offset)
         rates = np.array([state.k_r_per_s for state in self.states])
         amplitudes = np.array([state.amplitude for state in self.states])
-        means = exponential_means(rates, t_s, exposure_s)
-        step = 1e-4
-        further = exponential_means(rates * (1 + step), t_s, exposure_s)
+        means, slopes = exponential_means_and_slopes(rates, t_s, exposure_s)
         jacobian = np.full((len(t_s), len(self.covariance)), float(with_offset))
-        jacobian[:, 0:-1:2] = (further - means) / (step * rates) * amplitudes
+        jacobian[:, 0:-1:2] = slopes / rates * amplitudes
         jacobian[:, 1:-1:2] = means
         shift = self.offset if with_offset else 0.0
         return means @ amplitudes + shift, curve_variance(jacobian, self.covariance)

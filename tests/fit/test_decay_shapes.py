@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from labrig.fit.decay.states import exponential_means_and_slopes
 from labrig.fit.least_squares import FloatArray
-from labrig.material.rates import exponential_means
+from labrig.material import exponential_means, exponential_means_and_slopes
 from tests.fit import truths
 
 T_S = np.array([0.0, 0.3, 5.0, 50.0, 175.0])

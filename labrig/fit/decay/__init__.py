@@ -3,12 +3,11 @@
 from labrig.fit.decay.fit import fit_decay
 from labrig.fit.decay.result import DecayFit
 from labrig.fit.decay.selection import F_TEST_LEVEL
-from labrig.fit.decay.states import APART_SIGMAS, exponential_means_and_slopes
+from labrig.fit.decay.states import APART_SIGMAS
 
 __all__ = [
     "APART_SIGMAS",
     "F_TEST_LEVEL",
     "DecayFit",
-    "exponential_means_and_slopes",
     "fit_decay",
 ]

@@ -163,9 +163,7 @@ def monotone_curve(
             log_rates = np.unique(np.add.outer(log_rates[used], refinements).round(12))
             log_rates = np.clip(log_rates, low, high)
     design = data.signal_design(problem.unit, means[:, used])
-    offsets = np.zeros_like(weights)
-    residual = data.target - design @ amplitudes[used]
-    offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, residual)[0]
+    offsets = data.offsets_of(data.target - design @ amplitudes[used])
     along, _ = data.leverage(weights, np.hstack([design, data.offset_design]))
     return means @ amplitudes, offsets, along, means[:, used]
 

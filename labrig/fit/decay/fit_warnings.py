@@ -36,8 +36,6 @@ from labrig.results import (
 )
 
 RISING_SIGMAS = 5.0
-#: Chance from which correlated flicker is said.
-VERY_LIKELY = 0.8
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
 AT_BOUND = 1e-3
 
@@ -215,7 +213,7 @@ def warnings_about(
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     if not is_exponential:
         return warnings
-    if correlation is not None and correlation.probability > VERY_LIKELY:
+    if correlation is not None:
         warnings.append(
             f"the flicker of neighbouring frames correlates (by {correlation.correlation:.1f}): σ "
             f"allows for it, it is up to {correlation.factor:.2g} times as large as for "

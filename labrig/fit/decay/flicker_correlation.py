@@ -42,17 +42,14 @@ class FlickerCorrelation:
 
     Attributes
     ----------
-    probability
-        Chance that there is a correlation.
     correlation
-        Its mean, if there is one.
+        Mean of the correlation.
     covariance
         Its part in the covariance of the fitted parameters, shape (p, p).
     factor
         Factor by which the largest σ of a rate grows with it.
     """
 
-    probability: float
     correlation: float
     covariance: FloatArray
     factor: float
@@ -118,8 +115,7 @@ def flicker_correlation(
     independent = np.diag(fit.joint.least_squares.covariance)[rates]
     ratio = np.diag(covariance)[rates] / np.where(independent > 0, independent, np.inf)
     return FlickerCorrelation(
-        probability=correlates,
-        correlation=float(probability @ phi) / max(correlates, 1e-12),
+        correlation=float(probability @ phi) / correlates,
         covariance=covariance,
         factor=float(np.sqrt(1 + ratio.max(initial=0.0))),
     )

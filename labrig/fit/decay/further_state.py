@@ -104,8 +104,6 @@ class HiddenState:
 
     Attributes
     ----------
-    probability
-        Chance that there is one.
     lifetime
         Lifetime at which the data support it most, in spans.
     share
@@ -114,7 +112,6 @@ class HiddenState:
         Its part in the covariance of the fitted parameters, shape (p, p).
     """
 
-    probability: float
     lifetime: float
     share: float
     covariance: FloatArray
@@ -160,7 +157,6 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
     at_lamp_off = float(mean[likeliest] * np.exp(start / lifetime))
     total = float(fit.amplitudes @ np.exp(np.exp(fit.log_rates) * start))
     return HiddenState(
-        probability=float(probability.sum()),
         lifetime=lifetime,
         share=at_lamp_off / max(total, at_lamp_off),
         covariance=covariance,

@@ -82,9 +82,7 @@ def fit_rate_spectrum(
     # Amplitudes are fitted at the first frame, given at lamp off.
     growth = np.append(np.exp(rates * series.start), 1.0) * series.peak
     kept = data.signal_design(problem.unit, means[:, best.kept])
-    offsets = np.zeros_like(weights)
-    residual = data.target - kept @ best.amplitudes[best.kept]
-    offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, residual)[0]
+    offsets = data.offsets_of(data.target - kept @ best.amplitudes[best.kept])
     covariance = _covariance(data, kept, best, int(np.argmax(weights)))
     n_values = series.n_values + len(series.offset_prior)
     dof = n_values - best.n_parameters - (len(series.repeats) - 1)

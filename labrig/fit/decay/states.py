@@ -12,32 +12,7 @@ from labrig.fit.decay.search import projection, search_rates
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import Ending, FloatArray
-from labrig.material import phi1
-
-#: Value of k T below which a difference of nearly equal numbers is replaced by its Taylor series.
-SERIES_BELOW = 0.03
-
-
-def exponential_means_and_slopes(
-    rates_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return `labrig.material.exponential_means` and their derivatives by log k, both (n, m)."""
-    phase = np.multiply.outer(t_s, rates_per_s)
-    decayed: FloatArray = np.exp(-phase)
-    if not exposure_s.any():
-        return decayed, -phase * decayed
-    x = np.multiply.outer(exposure_s, rates_per_s)
-    mean = phi1(x)
-    return decayed * mean, decayed * (_mean_slope(x, mean) - phase * mean)
-
-
-def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
-    """Return x φ₁′(x) = e^(−x) − φ₁(x), given φ₁(x)."""
-    # Σ_j j (−x)^j / (j + 1)!, j = 1 … 6; cut off, since powers of what is not small overflow.
-    y = np.minimum(x, SERIES_BELOW)
-    series = -y * (1 / 2 - y * (1 / 3 - y * (1 / 8 - y * (1 / 30 - y * (1 / 144 - y / 840)))))
-    return np.where(x < SERIES_BELOW, series, np.exp(-x) - mean)
-
+from labrig.material import exponential_means_and_slopes
 
 #: Amplitude at the first frame, relative to the largest, below which a state is dropped.
 NEGLIGIBLE_AMPLITUDE = 1e-9

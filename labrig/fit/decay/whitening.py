@@ -48,6 +48,12 @@ class WhitenedSeries:
         constant: FloatArray = self.matrices @ levels
         return constant
 
+    def offsets_of(self, residual: FloatArray) -> FloatArray:
+        """Return the offsets (C,) that best explain whitened residuals (n C + p,)."""
+        offsets = np.zeros(len(self.series.channels))
+        offsets[self.series.fitted_offsets] = np.linalg.lstsq(self.offset_design, residual)[0]
+        return offsets
+
     def signal_design(self, unit: FloatArray, shapes: FloatArray) -> FloatArray:
         """Return the design (n C + p, q) of shapes (n, q) times a whitened signal `unit` (n, C)."""
         design = np.zeros((len(self.target), shapes.shape[1]))
