@@ -231,7 +231,7 @@ class LensSettings(Part):
 
 
 class ImagingSettings(Part):
-    """What keeps a photograph from being the scene; none of it unless given.
+    """Imperfections that keep a photograph from being the scene; none unless given.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ LAYERS, LAYERS_PER_DENSITY = 4, 2
 
 
 class Rates(NamedTuple):
-    """What happens to traps in a second.
+    """Rates of filling, emptying and emission of traps.
 
     Attributes
     ----------

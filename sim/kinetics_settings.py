@@ -24,7 +24,7 @@ MODELS_OF_KEYS = {
 
 
 class KineticsSettings(Part):
-    """How the traps of a sample fill and empty, where that is no rate equation of first order.
+    """Law by which the traps of a sample fill and empty, where it is not of first order.
 
     The material's rates stay what they are: the excitation rates generate charge carriers at the
     surface of the sample, and a full trap is emptied at the re-radiation rate, at 21 °C. Each

@@ -46,7 +46,7 @@ DERIVATIVES: FloatArray = np.asarray(np.linalg.inv(INTEGRALS), dtype=np.float64)
 
 
 class Drive(NamedTuple):
-    """What acts on traps at some times.
+    """Influences on traps at some times.
 
     Attributes
     ----------

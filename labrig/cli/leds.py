@@ -82,7 +82,7 @@ def study(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print led_study.json.")] = False,
 ) -> None:
-    """How well LEDs of some number and placement estimate known fluorescent materials.
+    """Study how well LEDs of some number and placement estimate known fluorescent materials.
 
     Matrices are photographed under the LEDs by a simulation, estimated, and compared with
     themselves: recommended and evenly spaced LEDs, and your own.

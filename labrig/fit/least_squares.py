@@ -63,7 +63,7 @@ POLISH_PATIENCE = 3
 
 
 class Ending(Enum):
-    """How a fit ended."""
+    """Reason for the end of a fit."""
 
     #: At a minimum that determines every parameter that no bound holds.
     MINIMUM = "minimum"

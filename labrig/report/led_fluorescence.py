@@ -75,7 +75,7 @@ class LitPair:
 
 @dataclass(frozen=True)
 class SamplePage:
-    """What the template shows of a sample besides its text and figures.
+    """Values of a sample for the template, besides its text and figures.
 
     Attributes
     ----------

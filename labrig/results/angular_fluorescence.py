@@ -181,7 +181,7 @@ class SphereViews:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AngularFluorescenceResult(RunResult):
-    """Whether re-radiation depends on angle.
+    """Test of whether re-radiation depends on angle.
 
     Attributes
     ----------

@@ -353,7 +353,7 @@ class FittedDecay:
 
     @property
     def compared_laws(self) -> tuple[ComparedLaw, ...]:
-        """All laws that were fitted, the best first."""
+        """Laws that were fitted, the best first."""
         others = [(law.name, law.formula, law.reduced_chi2, law.bic) for law in self.other_laws]
         own: tuple[Candidate | FittedDecay, ...] = self.candidates or (self,)
         best = min(own, key=lambda each: each.bic)

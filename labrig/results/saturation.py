@@ -155,7 +155,7 @@ class OrderTest:
 
     @property
     def verdict(self) -> Literal["first order", "general order", "neither", "not decided"]:
-        """What the rates at lamp off say."""
+        """Verdict of the rates at lamp off."""
         if self.shift.sigma > LARGEST_SHIFT_SIGMA:
             return "not decided"
         if abs(self.shift.value) < ORDER_SIGMAS * self.shift.sigma:

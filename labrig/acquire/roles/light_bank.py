@@ -50,7 +50,7 @@ class LightBank(Light, Protocol):
 
 
 class KnownLight(Protocol):
-    """What a rig file says of one light of a bank."""
+    """Settings of one light of a bank in a rig file."""
 
     @property
     def settling(self) -> float:

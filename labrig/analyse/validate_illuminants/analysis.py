@@ -110,7 +110,7 @@ def analyse(part: Part) -> ValidateIlluminantsResult:
 
 @dataclass(frozen=True, eq=False)
 class _Colours:
-    """How the camera's values become colours.
+    """Conversion of the camera's values into colours.
 
     `matrices` are those by lamp; `balance` is the lamp whose white is white, with X, Y, Z
     `white_xyz` on the scale of its matrix.

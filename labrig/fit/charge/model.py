@@ -47,7 +47,7 @@ def level_at_off(rates: StateRates, charge_s: float) -> float:
 
 @dataclass(frozen=True)
 class ChargeAndDecay:
-    """When the light of a sample was read.
+    """Times at which the light of a sample was read.
 
     Attributes
     ----------
