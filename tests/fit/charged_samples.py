@@ -48,6 +48,8 @@ class Bench:
         Of the lamp, in multiples of the norm.
     flicker
         Of every photograph.
+    lamp_scatter
+        Relative error of the brightness of every charge as the fit is told it.
     photon
         Of a signal of 1.
     """
@@ -55,6 +57,7 @@ class Bench:
     material: Material
     irradiance: float = 4.0
     flicker: float = 0.005
+    lamp_scatter: float = 0.0
     read_noise: float = 0.3
     photons: float = 20.0
     lamp: LampSettings = field(default_factory=LampSettings)
@@ -62,6 +65,7 @@ class Bench:
 
     def __post_init__(self) -> None:
         self.random = np.random.default_rng(self.seed)
+        self.lamp_random = np.random.default_rng([self.seed, 1])
 
     def irradiances(self, windows: FloatArray) -> FloatArray:
         """(P, 8) E of the bands, as the material's norm has it."""
@@ -101,7 +105,8 @@ class Bench:
             hot_s = at_s + RISE_S[-1]
             brightness = lamp.exposure(hot_s, off_s).sum() / STEADY.sum() / (off_s - hot_s)
             lasting = np.full(shots, exposure_s)
-            charges.append(Charge(at_s, off_s, start_s, lasting, brightness=float(brightness)))
+            seen = brightness * (1 + self.lamp_scatter * self.lamp_random.normal())
+            charges.append(Charge(at_s, off_s, start_s, lasting, brightness=float(seen)))
             at_s = off_s + wait_s
         glow = self._glow(windows, lamp, charges)
         values = np.multiply.outer(glow, WEIGHTS)

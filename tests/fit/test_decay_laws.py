@@ -9,6 +9,7 @@ from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
 from labrig.material import DECAY_LAWS, exponential_means
 from labrig.results import FORECAST_SPANS, FittedDecay, FloatArray
+from tests.pulls import assert_sigma_is_right
 
 T_S = np.concatenate([np.arange(0.0, 60.0, 1.5), np.arange(60.0, 400.0, 12.0)])
 EXPOSURE_S = np.full(len(T_S), 0.5)
@@ -56,7 +57,6 @@ def test_exponentials_stay_exponentials() -> None:
 
 
 def test_the_errors_of_rate_and_shape_are_as_large_as_their_sigma() -> None:
-    """At 20 % too large or too small a σ of 102 pulls is outside of these limits."""
     pulls = []
     for number, (name, shape) in enumerate(
         [("becquerel", 0.4), ("otor", 0.3), ("stretched", 0.6)] * 17
@@ -65,7 +65,7 @@ def test_the_errors_of_rate_and_shape_are_as_large_as_their_sigma() -> None:
         law = next(law for law in fit.laws if law.name == name)
         sigma = np.sqrt(np.diag(law.covariance))
         pulls += [(law.rate_per_s - 0.05) / sigma[1], (law.shape - shape) / sigma[2]]
-    assert 0.84 < np.sqrt(np.mean(np.square(pulls))) < 1.19
+    assert_sigma_is_right(pulls)
 
 
 def test_parameters_are_those_of_the_papers() -> None:
@@ -98,7 +98,7 @@ def test_the_errors_of_the_averaged_signal_are_as_large_as_their_sigma() -> None
         forecast = fitted(name, shape, 500 + number).forecast(at_s)
         true = DECAY_LAWS[name].value(0.05 * at_s, np.full(3, shape))
         pulls += list((forecast.value - true) / forecast.sigma)
-    assert 0.84 < np.sqrt(np.mean(np.square(pulls))) < 1.19
+    assert_sigma_is_right(pulls)
 
 
 def test_a_law_that_was_asked_for_is_taken_and_what_is_better_is_said() -> None:

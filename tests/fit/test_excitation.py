@@ -13,6 +13,7 @@ from labrig.material import Material, read_material
 from labrig.results import Charge, ChargingSeries, FittedExcitation, Transient
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import DOOR_S, WEIGHTS, Bench, lvf_windows, two_states
+from tests.pulls import assert_sigma_is_right
 
 LVF = lvf_windows(np.linspace(405, 695, 12))
 BARE = np.ones((1, len(WAVELENGTH_NM)))
@@ -54,6 +55,24 @@ def test_rates_and_levels_of_a_material(material: Material) -> None:
         assert state.seen[strong].all()
         assert state.k_e_per_s[strong] == pytest.approx(k_e[strong], rel=0.15)
         assert (k_e[~strong] < state.k_e_upper_per_s[~strong] + 1e-5).all()
+
+
+def test_errors_are_as_large_as_their_sigma() -> None:
+    material = read_material("blue-paint")
+    (true,) = material.states
+    pulls = []
+    for seed in range(100, 132):
+        bench = Bench(material, seed=seed, lamp_scatter=LAMP)
+        (state,) = fitted(bench, measured(bench)).states
+        (full,) = bench.amplitudes()
+        k_e = np.array(true.k_e_per_s)
+        error = (state.k_e_per_s - k_e) / state.k_e_sigma_per_s
+        pulls += [
+            (state.k_r_per_s - true.k_r_per_s) / state.k_r_sigma_per_s,
+            (state.amplitude - full) / state.amplitude_sigma,
+            *error[k_e >= 0.002],
+        ]
+    assert_sigma_is_right(pulls)
 
 
 def test_a_glow_left_from_the_charge_before_is_reckoned_with() -> None:

@@ -38,6 +38,7 @@ from tests.fit.fluorescent_samples import (
     surface,
     system_of,
 )
+from tests.pulls import assert_sigma_is_right
 
 POSTITS = Path(__file__).parents[3] / "shared" / "data" / "bispectral" / "art_postit"
 SYSTEM, FEW = system_of(lights()), system_of(lights(FEW_NM))
@@ -112,8 +113,7 @@ def test_colours_of_random_surfaces_are_as_uncertain_as_they_say(
         for lamp in lamps:
             colour = predicted_colour(fit, lamp)
             pulls.append((colour.lab - appearance(truth, lamp).lab) / colour.lab_sigma)
-    # A σ that is 20 % too large or too small is outside.
-    assert 0.86 < np.sqrt(np.square(pulls).mean()) < 1.17
+    assert_sigma_is_right(pulls)
 
 
 def test_fluorescence_is_not_found_where_there_is_none(quick_estimator: JointEstimator) -> None:

@@ -35,6 +35,7 @@ from tests.fit.fluorescent_samples import (
     surface,
     system_of,
 )
+from tests.pulls import assert_sigma_is_right
 
 EVEN = np.full(len(OUTPUT_NM), 0.4)
 GREEN = Dye(0.4, 450, 510)
@@ -136,8 +137,7 @@ def test_errors_of_a_bench_are_in_sigma() -> None:
             for lamp in lamps:
                 colour = predicted_colour(fit, lamp)
                 pulls.append((colour.lab - appearance(real, lamp).lab) / colour.lab_sigma)
-    # A σ that is 20 % too large or too small is outside.
-    assert 0.86 < np.sqrt(np.square(pulls).mean()) < 1.17
+    assert_sigma_is_right(pulls)
 
 
 def flat_camera() -> CameraResponse:

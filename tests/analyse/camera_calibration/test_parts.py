@@ -9,6 +9,7 @@ from labrig.analyse.camera_calibration.linearity import fit_linearity
 from labrig.analyse.camera_calibration.photon_transfer import photon_transfer, scatter
 from labrig.errors import DataError
 from labrig.reduce import RawFrame
+from tests.pulls import assert_sigma_is_right
 
 FloatArray = NDArray[np.float64]
 
@@ -86,7 +87,7 @@ def test_factors_and_flicker_are_right_and_as_uncertain_as_they_say() -> None:
         shutter, gain = found.shutter[0], found.iso_gain[1]
         pulls += [(shutter.factor - 1.03) / shutter.sigma, (gain.factor - 0.98) / gain.sigma]
         flickers.append(found.flicker)
-    assert 0.8 < np.std(pulls) < 1.25
+    assert_sigma_is_right(pulls)
     assert abs(np.mean(pulls)) < 0.35
     value, sigma = np.array([(one.value, one.sigma) for one in flickers]).T
     assert np.mean(value) == pytest.approx(0.007, rel=0.04)

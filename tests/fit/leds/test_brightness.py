@@ -22,6 +22,7 @@ from labrig.fit.leds import (
 )
 from labrig.fit.spectrum import curve_modes
 from labrig.optics import CameraResponse, Spectrum, Transmittance
+from tests.pulls import assert_sigma_is_right
 
 HOUSE = labrig.read_camera("canon_eos_5d_mark_ii")
 WHITE = Transmittance("card", np.array([300.0, 800.0]), np.array([0.18, 0.18]))
@@ -99,11 +100,7 @@ def test_errors_are_as_large_as_sigma_says(response: ResponseError | None, seeds
         leds, log_b = bank(seed, response)
         fit = fit_brightness(leds, HOUSE, WHITE, response or RESPONSE_UNKNOWN)
         all_pulls.append(pulls(fit, log_b))
-    rms = float(np.sqrt(np.mean(np.concatenate(all_pulls) ** 2)))
-    # A σ that is 20 % too large or too small would leave these bounds.
-    assert 0.85 < rms < 1.15
-    assert not 0.85 < rms * 1.25 < 1.15
-    assert not 0.85 < rms / 1.25 < 1.15
+    assert_sigma_is_right(np.concatenate(all_pulls))
 
 
 def test_the_spectrometer_carries_the_scale_to_the_ultraviolet() -> None:
