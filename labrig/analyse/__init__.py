@@ -4,6 +4,7 @@ from labrig.analyse.charge_table import ChargeTableOptions, fit_charge_table
 from labrig.analyse.frames import verify_frames
 from labrig.analyse.hyperspectral import CubeList, matrix_from_cubes
 from labrig.analyse.inputs import Inputs, Part
+from labrig.analyse.luminance_table import LuminanceTableOptions, evaluate_luminance_table
 from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.table_fit import FittedTable, TableFitOptions, fit_table
@@ -14,9 +15,11 @@ __all__ = [
     "CubeList",
     "FittedTable",
     "Inputs",
+    "LuminanceTableOptions",
     "Overrides",
     "Part",
     "TableFitOptions",
+    "evaluate_luminance_table",
     "fit_charge_table",
     "fit_series",
     "fit_table",

@@ -169,6 +169,54 @@ def charge(
     typer.echo(fit.to_json() if json else f"columns  {columns}\n{fit}")
 
 
+@app.command("luminance")
+def luminance(
+    table: Annotated[
+        Path, typer.Argument(help="Table of times and luminances of an afterglow, with σ or not.")
+    ],
+    off: Annotated[
+        float, typer.Option("--off", help="Time at which the light went off, in seconds.")
+    ] = 0.0,
+    unit: Annotated[
+        str | None,
+        typer.Option("--unit", help="Unit of the luminances, where the column's name has none."),
+    ] = None,
+    scale_sigma: Annotated[
+        str, typer.Option("--scale-sigma", help="σ of the meter's calibration, such as '4 %'.")
+    ] = "0 %",
+    require: Annotated[
+        list[str] | None,
+        typer.Option("--require", help="Least luminance, '140 mcd/m2 at 10 min'. Repeatable."),
+    ] = None,
+    colours: Annotated[
+        str, typer.Option("--colours", help="Letters of the colours for the marking, 'K-W'.")
+    ] = "",
+    excitation: Annotated[
+        str,
+        typer.Option("--excitation", help="Lamp, illuminance and time, as the output states them."),
+    ] = "",
+    column: Column = None,
+    time: Time = None,
+    time_unit: TimeUnit = None,
+    decimal: Decimal = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Luminances at 2, 10, 30 and 60 min, the time until 0.3 mcd/m², and the marking.
+
+    Every luminance is that of the readings around its time; no law of decay is assumed. What was
+    not measured is not stated: beyond the last reading there is only the range of the laws.
+    """
+    from labrig.analyse import LuminanceTableOptions, evaluate_luminance_table
+    from labrig.results import TableLayout
+
+    options = LuminanceTableOptions(
+        unit, off, scale_sigma, tuple(require or ()), colours, excitation
+    )
+    layout = TableLayout(time, column, time_unit, decimal)
+    decay, columns = evaluate_luminance_table(table, options, layout)
+    typer.echo(decay.to_json() if json else f"columns  {columns}\n{decay}")
+
+
 @app.command("mixture")
 def mixture(
     file: File,

@@ -16,6 +16,7 @@ from labrig.fit.least_squares import (
     LeastSquaresFit,
     least_squares,
 )
+from labrig.fit.luminance import fit_luminance
 from labrig.fit.mixture import (
     HeldOutError,
     MixtureCandidate,
@@ -44,6 +45,7 @@ __all__ = [
     "bispectral_columns",
     "fit_charge_and_decay",
     "fit_decay",
+    "fit_luminance",
     "fit_mixture",
     "fit_mixture_texture",
     "least_squares",

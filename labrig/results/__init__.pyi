@@ -107,6 +107,15 @@ from .led_fluorescence import (
     MatrixOnBands as MatrixOnBands,
     MeasuredDye as MeasuredDye,
 )
+from .luminance import (
+    MARKING_S as MARKING_S,
+    TABLE_S as TABLE_S,
+    VISIBLE_MCD_PER_M2 as VISIBLE_MCD_PER_M2,
+    LuminanceAt as LuminanceAt,
+    LuminanceDecay as LuminanceDecay,
+    LuminanceRequirement as LuminanceRequirement,
+    Verdict as Verdict,
+)
 from .lvf_calibration import (
     CameraCurves as CameraCurves,
     FilterMisfit as FilterMisfit,

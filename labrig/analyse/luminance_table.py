@@ -1,0 +1,167 @@
+"""Luminance meter's table, as `labrig fit luminance` evaluates it."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from labrig.errors import FitError, UsageError
+from labrig.fit import fit_luminance
+from labrig.quantity import FRACTION, TIME_S, parse
+from labrig.results import (
+    LuminanceDecay,
+    LuminanceRequirement,
+    TableLayout,
+    read_described_series,
+)
+
+#: Units of luminance by their names, in mcd/m².
+UNITS = {"mcd/m2": 1.0, "cd/m2": 1000.0, "µcd/m2": 1e-3, "ucd/m2": 1e-3}
+_UNIT = re.compile(r"[mµu]?cd\s*/\s*m(2|²|\^2)")
+_REQUIREMENT = re.compile(r"\s*(?P<light>.*?)\s+at\s+(?P<time>.*?)\s*")
+
+
+@dataclass(frozen=True)
+class LuminanceTableOptions:
+    """Options of `labrig fit luminance`, as texts of its command line.
+
+    Attributes
+    ----------
+    unit
+        Unit of the luminances; None takes it from the column's name, and mcd/m² without one there.
+    off_s
+        Time of lamp off in the table's seconds.
+    scale_sigma
+        Relative σ of the meter's scale, such as `4 %`.
+    require
+        Least luminances such as `140 mcd/m2 at 10 min`.
+    colours
+        Letters of the colours for the marking, such as `K-W`.
+    excitation
+        Excitation as the report shall state it.
+    """
+
+    unit: str | None = None
+    off_s: float = 0.0
+    scale_sigma: str = "0 %"
+    require: tuple[str, ...] = ()
+    colours: str = ""
+    excitation: str = ""
+
+    def __post_init__(self) -> None:
+        if self.unit is not None:
+            _factor("--unit", self.unit)
+        _ = self.scale_fraction, self.requirements
+
+    @property
+    def scale_fraction(self) -> float:
+        """Relative σ of the scale as a fraction."""
+        try:
+            return parse(self.scale_sigma, FRACTION)
+        except ValueError as error:
+            raise UsageError(f"--scale-sigma: {error}") from None
+
+    @property
+    def requirements(self) -> tuple[LuminanceRequirement, ...]:
+        """Least luminances in mcd/m²."""
+        return tuple(_requirement(text) for text in self.require)
+
+
+def evaluate_luminance_table(
+    path: Path, options: LuminanceTableOptions | None = None, layout: TableLayout | None = None
+) -> tuple[LuminanceDecay, str]:
+    """Evaluate a luminance meter's readings of an afterglow.
+
+    Parameters
+    ----------
+    path
+        Path of the table, as `read_series` reads it.
+    options
+        Options; None takes the defaults.
+    layout
+        Answers to what the table leaves open; None finds all in the table.
+
+    Returns
+    -------
+    decay : LuminanceDecay
+        Luminances at the times of standards, and what follows from them.
+    columns : str
+        Columns of the table that were taken as times, values and σ, and the unit, in words.
+
+    Raises
+    ------
+    UsageError, DataError
+        An option or the table is malformed, or it has more than one series or column of values.
+    FitError
+        There are too few readings, or their times do not rise.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from labrig.analyse import LuminanceTableOptions, evaluate_luminance_table
+    >>> t_min = np.geomspace(1, 600, 60)
+    >>> table = Path("luminance.csv")
+    >>> head = "time/min,luminance/(mcd/m2)"
+    >>> rows = np.transpose([t_min, 290 * (1 + t_min) ** -1.1])
+    >>> np.savetxt(table, rows, delimiter=",", header=head, comments="")
+    >>> decay, columns = evaluate_luminance_table(table, LuminanceTableOptions(scale_sigma="4 %"))
+    >>> decay.marking, str(decay.visible_s)
+    ('20.7/3.15-516', '31000(1100) s')
+    """
+    options = options or LuminanceTableOptions()
+    parts, columns = read_described_series(path, layout or TableLayout())
+    series = parts[0]
+    if len(parts) > 1 or len(series.channels) > 1:
+        raise UsageError(
+            f"{path}: expected one series with one column of luminances, got {len(parts)} series "
+            f"of {', '.join(series.channels)}; choose a column with --column"
+        )
+    named = _UNIT.search(series.channels[0]) or _UNIT.search(columns)
+    unit = options.unit or (named[0] if named else "mcd/m2")
+    factor = _factor(f"{path}: unit of {series.channels[0]}", unit)
+    rows = np.flatnonzero(series.usable & (series.t_s > options.off_s))
+    rows = rows[np.argsort(series.t_s[rows], kind="stable")]
+    sigma = factor * series.sigma[rows, 0]
+    try:
+        decay = fit_luminance(
+            series.t_s[rows] - options.off_s,
+            factor * series.values[rows, 0],
+            None if np.isnan(sigma).all() else sigma,
+            scale_sigma=options.scale_fraction,
+            required=options.requirements,
+            colours=options.colours,
+            excitation=options.excitation,
+        )
+    except FitError as error:
+        raise FitError(f"{path}: {error}") from None
+    return decay, f"{columns}; luminances in {unit.replace('m2', 'm²')}"
+
+
+def _factor(place: str, unit: str) -> float:
+    """Return mcd/m² in a unit."""
+    name = re.sub(r"\s", "", unit).replace("²", "2").replace("^2", "2")
+    if name not in UNITS:
+        known = ", ".join(UNITS)
+        raise UsageError(f"{place}: expected one of {known}, got '{unit}'")
+    return UNITS[name]
+
+
+def _requirement(text: str) -> LuminanceRequirement:
+    """Return the requirement that a text such as `140 mcd/m2 at 10 min` states."""
+    match = _REQUIREMENT.fullmatch(text)
+    parts = match["light"].split(maxsplit=1) if match else []
+    try:
+        if match is None or len(parts) != 2:
+            raise ValueError
+        least = float(parts[0]) * _factor("--require", parts[1])
+        t_s = parse(match["time"], TIME_S)
+        if not (least > 0 and t_s > 0):
+            raise ValueError
+    except ValueError:
+        raise UsageError(
+            "--require: expected a least luminance and a time, such as '140 mcd/m2 at 10 min', "
+            f"got '{text}'"
+        ) from None
+    return LuminanceRequirement(t_s, least)

@@ -1,0 +1,286 @@
+"""Luminance of an afterglow at given times, from readings around them.
+
+No law of decay is assumed: around each time ln L is a parabola in ln t, which every law is within a
+factor of some tenths in time. Only beyond the last reading laws say what is possible.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+from scipy.special import chdtrc
+
+from labrig.errors import FitError
+from labrig.fit.decay import fit_decay
+from labrig.fit.least_squares import least_squares
+from labrig.quantity import duration_text
+from labrig.results import (
+    MARKING_S,
+    TABLE_S,
+    VISIBLE_MCD_PER_M2,
+    FloatArray,
+    LuminanceAt,
+    LuminanceDecay,
+    LuminanceRequirement,
+    Measured,
+)
+
+UNIT = "mcd/m²"
+#: Fewest readings of a parabola, where their σ is known and where their scatter tells it.
+FEWEST, FEWEST_WITHOUT_SIGMA = 5, 8
+#: Range of ln t of a parabola to each side, at least, and at most where readings are few.
+NEAR, FAR = math.log(1.5), math.log(8.0)
+#: Significance from which the end falls too slowly, the factor in time between the luminances that
+#: tell it, and the luminance below which a meter's zero may do that.
+SLOWER_SIGMAS, EARLIER, DIM_MCD_PER_M2 = 4.0, 4.0, 3.0
+#: Slope of ln L in ln t from which a time has an error of its own.
+LEAST_SLOPE = 1e-3
+#: σ of normal errors over the median of their sizes.
+MEDIAN_TO_SIGMA = 1.4826
+#: Probability of χ² below which a parabola misses the readings.
+MISSED = 0.05
+#: Times of the last reading up to which laws are followed, and the number of times.
+FOLLOWED, N_FOLLOWED = 300.0, 400
+
+
+def fit_luminance(
+    t_s: ArrayLike,
+    luminance_mcd_per_m2: ArrayLike,
+    sigma_mcd_per_m2: ArrayLike | None = None,
+    *,
+    scale_sigma: float = 0.0,
+    required: Sequence[LuminanceRequirement] = (),
+    colours: str = "",
+    excitation: str = "",
+) -> LuminanceDecay:
+    """Find what trade standards ask of an afterglow from readings of a luminance meter.
+
+    Parameters
+    ----------
+    t_s
+        Times of the readings after lamp off in seconds, rising, > 0, shape (n,).
+    luminance_mcd_per_m2
+        Luminances in mcd/m²; those in the noise may be negative, shape (n,).
+    sigma_mcd_per_m2
+        Standard uncertainty of each reading, shape (n,) or a scalar; None takes it from the
+        scatter of neighbours.
+    scale_sigma
+        Relative σ of the scale, common to all readings.
+    required
+        Least luminances at some times.
+    colours, excitation
+        Letters for the marking, and the excitation as the report shall state it.
+
+    Returns
+    -------
+    LuminanceDecay
+        Luminances at 2, 10, 30 and 60 min, the time until 0.3 mcd/m² and what follows from them.
+
+    Raises
+    ------
+    FitError
+        There are fewer than five readings, eight without σ, times do not rise from above zero,
+        values are not finite, or no luminance is above zero.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.fit import fit_luminance
+    >>> t_s = np.geomspace(60, 40_000, 80)
+    >>> light = 300 * (1 + t_s / 60) ** -1.1
+    >>> light = light * (1 + 0.01 * np.random.default_rng(1).standard_normal(80))
+    >>> found = fit_luminance(t_s, light, 0.01 * light, scale_sigma=0.03, colours="K-W")
+    >>> found.marking
+    '21.5/3.27-532-K-W'
+    """
+    readings = _Readings.checked(t_s, luminance_mcd_per_m2, sigma_mcd_per_m2, scale_sigma)
+    visible_s = readings.falls_below(VISIBLE_MCD_PER_M2)
+    at = {t: readings.luminance_at(t) for t in TABLE_S}
+    between_s, warnings = (None, ()) if visible_s else readings.reaches(VISIBLE_MCD_PER_M2)
+    return LuminanceDecay(
+        t_s=readings.t_s,
+        luminance_mcd_per_m2=readings.value,
+        sigma_mcd_per_m2=np.full_like(readings.t_s, np.nan)
+        if readings.sigma is None
+        else readings.sigma,
+        scale_sigma=scale_sigma,
+        at=tuple(LuminanceAt(t, value) for t, value in at.items()),
+        required=tuple(
+            (each, LuminanceAt(each.t_s, readings.luminance_at(each.t_s))) for each in required
+        ),
+        visible_s=visible_s,
+        visible_between_s=between_s,
+        slope=readings.slope_between(*MARKING_S),
+        light_sum=readings.light_sum(),
+        colours=colours,
+        excitation=excitation,
+        warnings=(*warnings, *readings.slow_end()),
+    )
+
+
+@dataclass(frozen=True)
+class _Parabola:
+    """ln L = c + b ln(t/t0) + … around a time t0: e^c with its relative σ, and b."""
+
+    luminance: float
+    relative_sigma: float
+    slope: float
+
+
+@dataclass(frozen=True)
+class _Readings:
+    t_s: FloatArray
+    value: FloatArray
+    sigma: FloatArray | None
+    scale_sigma: float
+
+    @staticmethod
+    def checked(
+        t_s: ArrayLike, value: ArrayLike, sigma: ArrayLike | None, scale_sigma: float
+    ) -> "_Readings":
+        t, light = np.asarray(t_s, np.float64), np.asarray(value, np.float64)
+        known = None if sigma is None else np.broadcast_to(np.asarray(sigma, np.float64), t.shape)
+        fewest = FEWEST_WITHOUT_SIGMA if known is None else FEWEST
+        if len(t) < fewest:
+            raise FitError(f"expected {fewest} readings or more, got {len(t)}")
+        if not (np.isfinite(light).all() and t[0] > 0 and (np.diff(t) > 0).all()):
+            raise FitError("expected finite luminances at rising times after lamp off, above 0 s")
+        if known is not None and not ((known > 0) & np.isfinite(known)).all():
+            raise FitError("expected σ above zero for every reading")
+        if not (light > 0).any():
+            raise FitError("expected luminances above zero, got none")
+        return _Readings(t, light, known, scale_sigma)
+
+    def parabola(self, at_s: float, *, at_end: bool = False) -> _Parabola | None:
+        """Fit the readings around a time; None if there are none around it."""
+        x = np.log(self.t_s / at_s)
+        fewest = FEWEST_WITHOUT_SIGMA if self.sigma is None else FEWEST
+        width = max(NEAR, float(np.sort(np.abs(x))[fewest - 1]))
+        used = np.abs(x) <= width
+        x, light = x[used], self.value[used]
+        is_inside = at_end or x[0] <= 0 <= x[-1]
+        if width > FAR or not is_inside or not (light > 0).any():
+            return None
+        sigma = np.full_like(x, light.max()) if self.sigma is None else self.sigma[used]
+        powers = np.stack([np.ones_like(x), x, x**2], axis=1)
+
+        def residuals(c: FloatArray) -> tuple[FloatArray, FloatArray]:
+            model = np.exp(powers @ c)
+            return (model - light) / sigma, powers * (model / sigma)[:, None]
+
+        start = [math.log(max(float(np.median(light)), 1e-3 * float(light.max()))), -1.0, 0.0]
+        fit = least_squares(residuals, start, lower=[-np.inf, -50, -50], upper=[np.inf, 50, 50])
+        if not fit.converged:
+            return None
+        misfit = 1.0
+        if self.sigma is None:
+            # The standard deviation of Student's t, since few readings tell their own scatter.
+            misfit = fit.chi2 / (fit.dof - 2)
+        elif chdtrc(fit.dof, fit.chi2) < MISSED:
+            misfit = fit.reduced_chi2
+        relative = float(fit.sigma[0]) * math.sqrt(misfit)
+        level, slope, _ = fit.parameters
+        if width > 2 * NEAR and not at_end and (light > 0).all():
+            # Few readings far apart: what a parabola may miss is its distance from their chords.
+            relative = math.hypot(relative, level - float(np.interp(0.0, x, np.log(light))))
+        return _Parabola(math.exp(level), relative, float(slope))
+
+    def luminance_at(self, at_s: float) -> Measured | None:
+        """Return the luminance at a time with all errors; None without readings around it."""
+        found = self.parabola(at_s)
+        if found is None:
+            return None
+        relative = math.hypot(found.relative_sigma, self.scale_sigma)
+        return Measured(found.luminance, relative * found.luminance, UNIT)
+
+    def falls_below(self, limit: float) -> Measured | None:
+        """Return the time in s at which the luminance falls below a limit; None if never."""
+
+        def height(t: float) -> float:
+            found = self.parabola(t)
+            return math.nan if found is None else math.log(found.luminance / limit)
+
+        above, below = 0, len(self.t_s) - 1
+        if not (height(self.t_s[above]) > 0 > height(self.t_s[below])):
+            return None
+        while below - above > 1:
+            middle = (above + below) // 2
+            above, below = (middle, below) if height(self.t_s[middle]) > 0 else (above, middle)
+        t = float(brentq(height, self.t_s[above], self.t_s[below], rtol=1e-6))
+        found = self.parabola(t)
+        assert found is not None
+        relative = math.hypot(found.relative_sigma, self.scale_sigma)
+        return Measured(t, t * relative / max(-found.slope, LEAST_SLOPE), "s")
+
+    def slope_between(self, early_s: float, late_s: float) -> Measured | None:
+        """Return −d ln L/d ln t between two times; the scale's error cancels."""
+        early, late = self.parabola(early_s), self.parabola(late_s)
+        if early is None or late is None:
+            return None
+        span = math.log(late_s / early_s)
+        value = math.log(early.luminance / late.luminance) / span
+        return Measured(value, math.hypot(early.relative_sigma, late.relative_sigma) / span)
+
+    def light_sum(self) -> Measured:
+        """Return the integral over all readings, a power law between two neighbours."""
+        t, light = self.t_s, self.value
+        widths = np.diff(t)
+        sums = widths * (light[:-1] + light[1:]) / 2
+        positive = (light[:-1] > 0) & (light[1:] > 0)
+        power = 1 + np.log(light[1:][positive] / light[:-1][positive]) / np.log(
+            t[1:][positive] / t[:-1][positive]
+        )
+        # ∫ L dt = L₀ t₀ ∫ (t/t₀)^power d ln t
+        ratio = np.log(t[1:][positive] / t[:-1][positive])
+        grown = np.where(np.abs(power) < 1e-9, ratio, np.expm1(power * ratio) / power)
+        sums[positive] = light[:-1][positive] * t[:-1][positive] * grown
+        weights = np.zeros_like(t)
+        weights[:-1] += widths / 2
+        weights[1:] += widths / 2
+        sigma = self._scatter() if self.sigma is None else self.sigma
+        total = float(sums.sum())
+        scatter = math.sqrt(float(np.square(weights * sigma).sum()))
+        return Measured(total, math.hypot(scatter, self.scale_sigma * total), "mcd s/m²")
+
+    def _scatter(self) -> FloatArray:
+        """Return σ of every reading from the bends of ln L from one to the next."""
+        positive = np.log(self.value[self.value > 0])
+        bends = positive[2:] - 2 * positive[1:-1] + positive[:-2]
+        relative = MEDIAN_TO_SIGMA * float(np.median(np.abs(bends))) / math.sqrt(6)
+        scatter: FloatArray = relative * np.abs(self.value)
+        return scatter
+
+    def slow_end(self) -> tuple[str, ...]:
+        """Return a warning if a dim end falls more slowly than what is before it."""
+        last_s = float(self.t_s[-1])
+        end = self.parabola(last_s, at_end=True)
+        middle, early = (self.parabola(last_s / EARLIER**number) for number in (1, 2))
+        if end is None or middle is None or early is None or end.luminance > DIM_MCD_PER_M2:
+            return ()
+        going_on = middle.luminance**2 / early.luminance
+        sigma = math.hypot(end.relative_sigma, 2 * middle.relative_sigma, early.relative_sigma)
+        if math.log(end.luminance / going_on) < SLOWER_SIGMAS * sigma:
+            return ()
+        return (
+            f"after {duration_text(last_s / EARLIER)} the luminance falls more slowly than before: "
+            "a constant light, or an error of the meter's zero, of "
+            f"{end.luminance - going_on:.2g} {UNIT} would do that; read the meter with the sample "
+            "covered",
+        )
+
+    def reaches(self, limit: float) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
+        """Return when the laws of decay fall below a limit after the last reading."""
+        try:
+            decay = fit_decay(self.t_s, self.value, self.sigma)
+        except FitError as error:
+            return None, (f"no law of decay says when {limit:g} {UNIT} is reached: {error}",)
+        later_s = self.t_s[-1] * np.geomspace(1.0, FOLLOWED, N_FOLLOWED)
+        forecast = decay.forecast(later_s)
+        ends = []
+        for light in (forecast.low, forecast.high):
+            below = np.flatnonzero(light < limit)
+            ends.append(float(later_s[below[0]]) if len(below) else math.inf)
+        return (ends[0], ends[1]), ()

@@ -1,0 +1,214 @@
+"""Luminance of an afterglow at the times that trade standards name, and its marking."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from scipy.special import ndtr
+
+from labrig.number_format import aligned
+from labrig.quantity import duration_text
+from labrig.results.measured import FloatArray, Measured
+from labrig.results.text_files import finite, json_text
+
+#: Unit of luminances.
+MCD_PER_M2 = "mcd/m²"
+#: Times after lamp off of the table, and those of the marking, in seconds.
+TABLE_S = (120.0, 600.0, 1800.0, 3600.0)
+MARKING_S = (600.0, 3600.0)
+#: Luminance to which the last time of a marking belongs, a hundred times the limit of visibility.
+VISIBLE_MCD_PER_M2 = 0.3
+#: Probability from which a requirement counts as met, and its complement as missed.
+CONFIDENT = 0.95
+
+
+class Verdict(StrEnum):
+    """Whether a requirement is met, within the errors of measurement."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    UNDECIDED = "not decided within the errors"
+    NOT_MEASURED = "not measured"
+
+
+@dataclass(frozen=True)
+class LuminanceRequirement:
+    """Least luminance at a time.
+
+    Attributes
+    ----------
+    t_s
+        Time after lamp off in seconds.
+    least_mcd_per_m2
+        Least luminance in mcd/m².
+    """
+
+    t_s: float
+    least_mcd_per_m2: float
+
+
+@dataclass(frozen=True)
+class LuminanceAt:
+    """Luminance at one time.
+
+    Attributes
+    ----------
+    t_s
+        Time after lamp off in seconds.
+    luminance
+        Luminance in mcd/m² with all errors; None where there are no readings around that time.
+    """
+
+    t_s: float
+    luminance: Measured | None
+
+    def verdict(self, least_mcd_per_m2: float) -> Verdict:
+        """Return whether the luminance is at least as large, with a probability of 95 %."""
+        if self.luminance is None:
+            return Verdict.NOT_MEASURED
+        above = self.luminance.value - least_mcd_per_m2
+        sigma = self.luminance.sigma
+        probability = float(ndtr(above / sigma)) if sigma > 0 else float(above >= 0)
+        if probability >= CONFIDENT:
+            return Verdict.PASS
+        return Verdict.FAIL if probability <= 1 - CONFIDENT else Verdict.UNDECIDED
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LuminanceDecay:
+    """Luminance of an afterglow, from its readings.
+
+    Attributes
+    ----------
+    t_s, luminance_mcd_per_m2, sigma_mcd_per_m2
+        Readings: time after lamp off in seconds, luminance and its σ, NaN where not given, (n,).
+    scale_sigma
+        Relative σ of the scale, common to all readings.
+    at
+        Luminance at the times of the table.
+    required
+        Requirements, and the luminance at their times.
+    visible_s
+        Time in seconds until which the luminance is above 0.3 mcd/m²; None if that was not
+        measured.
+    visible_between_s
+        Range of that time by the laws that describe the readings, from the last reading on; None
+        if it was measured or no law describes them. An end that no law reaches is infinite.
+    slope
+        −d ln L/d ln t from 10 to 60 min; None without luminances there.
+    light_sum
+        Integral of the luminance from the first to the last reading in mcd s/m².
+    colours
+        Letters of the colours for the marking; empty if not given.
+    excitation
+        Excitation as the user states it; empty if not given.
+    warnings
+        Doubts, a sentence each.
+    """
+
+    t_s: FloatArray
+    luminance_mcd_per_m2: FloatArray
+    sigma_mcd_per_m2: FloatArray
+    scale_sigma: float
+    at: tuple[LuminanceAt, ...]
+    required: tuple[tuple[LuminanceRequirement, LuminanceAt], ...]
+    visible_s: Measured | None
+    visible_between_s: tuple[float, float] | None
+    slope: Measured | None
+    light_sum: Measured
+    colours: str
+    excitation: str
+    warnings: tuple[str, ...]
+
+    @property
+    def marking(self) -> str | None:
+        """Marking such as `28/3.6-520-K-W`: at 10 min, at 60 min, until 0.3 mcd/m² in minutes.
+
+        The time is missing where it was not measured; None without luminances at both times.
+        """
+        measured = {entry.t_s: entry.luminance for entry in self.at}
+        early, late = (measured.get(t_s) for t_s in MARKING_S)
+        if early is None or late is None:
+            return None
+        parts = [f"{early.value:.3g}/{late.value:.3g}"]
+        parts += [f"{self.visible_s.value / 60:.0f}"] if self.visible_s else []
+        parts += [self.colours] if self.colours else []
+        return "-".join(parts)
+
+    def __str__(self) -> str:
+        """Return a table for people."""
+        rows = [["luminance", "after lamp off"]]
+        rows += [
+            [f"  {duration_text(entry.t_s)}", _text(entry.luminance, "not measured")]
+            for entry in self.at
+        ]
+        rows.append([f"until {VISIBLE_MCD_PER_M2:g} {MCD_PER_M2}", self._visible_text()])
+        if self.slope is not None:
+            rows.append(["slope, 10 to 60 min", f"L ∝ t^−{self.slope}"])
+        span = f"{duration_text(float(self.t_s[0]))} to {duration_text(float(self.t_s[-1]))}"
+        rows.append(["light sum", f"{self.light_sum}, {span}"])
+        rows.append(["marking", self.marking or "none: luminances at 10 and 60 min are missing"])
+        rows.append(["excited by", self.excitation or "not stated: no standard's marking"])
+        rows += [
+            [
+                f"at least {requirement.least_mcd_per_m2:g} at {duration_text(entry.t_s)}",
+                f"{entry.verdict(requirement.least_mcd_per_m2)} "
+                f"({_text(entry.luminance, 'no readings around it')})",
+            ]
+            for requirement, entry in self.required
+        ]
+        return "\n".join([*aligned(rows), *(f"! {line}" for line in self.warnings)])
+
+    def _visible_text(self) -> str:
+        if self.visible_s is not None:
+            minutes = Measured(self.visible_s.value / 60, self.visible_s.sigma / 60, "min")
+            return str(minutes)
+        text = f"not reached until {duration_text(float(self.t_s[-1]))}"
+        if self.visible_between_s is None:
+            return text
+        early, late = self.visible_between_s
+        until = "no end" if math.isinf(late) else duration_text(late)
+        return f"{text}; the laws of decay that fit say {duration_text(early)} to {until}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of `luminance.json`; what is not finite or not known is None."""
+        content: dict[str, Any] = finite(
+            {
+                "schema_version": 1,
+                "at": [
+                    {"t_s": entry.t_s, "luminance_mcd_per_m2": _number(entry.luminance)}
+                    for entry in self.at
+                ],
+                "visible_s": _number(self.visible_s),
+                "visible_between_s": self.visible_between_s,
+                "slope": _number(self.slope),
+                "light_sum_mcd_s_per_m2": _number(self.light_sum),
+                "marking": self.marking,
+                "excitation": self.excitation,
+                "scale_sigma": self.scale_sigma,
+                "requirements": [
+                    {
+                        "t_s": entry.t_s,
+                        "least_mcd_per_m2": requirement.least_mcd_per_m2,
+                        "luminance_mcd_per_m2": _number(entry.luminance),
+                        "verdict": entry.verdict(requirement.least_mcd_per_m2).value,
+                    }
+                    for requirement, entry in self.required
+                ],
+                "warnings": list(self.warnings),
+            }
+        )
+        return content
+
+    def to_json(self) -> str:
+        """Return the text of `luminance.json`."""
+        return json_text(self.to_dict())
+
+
+def _text(measured: Measured | None, missing: str) -> str:
+    return missing if measured is None else str(measured)
+
+
+def _number(measured: Measured | None) -> dict[str, float] | None:
+    return None if measured is None else {"value": measured.value, "sigma": measured.sigma}
