@@ -22,6 +22,7 @@ FLAGS = (
     "--disable-sync",
     "--disable-dev-shm-usage",
 )
+SIZE = (1200, 820)
 # In CI both are installed; there, their absence is a failure of the test.
 IS_MISSING = not (os.environ.get("CI") or (CHROMIUM and DRIVER))
 
@@ -36,7 +37,21 @@ def browser(profile: Path) -> Iterator[Chrome]:
         options.add_argument(flag)
     chrome = Chrome(options, Service(DRIVER))
     try:
-        chrome.set_window_size(1200, 820)
+        chrome.set_window_size(*SIZE)
         yield chrome
     finally:
         chrome.quit()
+
+
+@contextmanager
+def new_window(chrome: Chrome) -> Iterator[Chrome]:
+    """The browser at an empty window, 1200 x 820; what was logged before is forgotten."""
+    before = chrome.current_window_handle
+    chrome.switch_to.new_window("window")
+    try:
+        chrome.set_window_size(*SIZE)
+        chrome.get_log("browser")  # type: ignore[no-untyped-call]
+        yield chrome
+    finally:
+        chrome.close()
+        chrome.switch_to.window(before)

@@ -1,17 +1,20 @@
 """What many tests need: small simulated rigs, quick protocols, the command line in process."""
+# ruff: noqa: E402  (what has to be said before imports stands before them)
 
 import os
+import sys
 
 # As the command line does; has to be said before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# What one process has compiled, the many that tests start need not compile again.
+# What one process has compiled, the many that tests start need not compile again; has to be said
+# before anything large is loaded, since this process is the first.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 import gc
 import logging
 import signal
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
@@ -34,7 +37,6 @@ from tests.quick_yaml import read_quickly, write_quickly
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
-sys.dont_write_bytecode = False
 # As Python sets it, the collector takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 10, 10)
 SHARED = Path(__file__).parents[2] / "shared" / "data"
@@ -197,12 +199,21 @@ def make_protocol(tmp_path: Path) -> Callable[..., Path]:
     return write
 
 
-@pytest.fixture
-def chromium(tmp_path: Path) -> Iterator["Chrome"]:
-    """A real browser."""
+@pytest.fixture(scope="session")
+def started_chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator["Chrome"]:
+    """A real browser; it takes longer to start than most tests take with it."""
     from tests.chromium import IS_MISSING, browser
 
     if IS_MISSING:
         pytest.skip("needs chromium and chromedriver")
-    with browser(tmp_path / "profile") as chrome:
+    with browser(tmp_path_factory.mktemp("chromium")) as chrome:
+        yield chrome
+
+
+@pytest.fixture
+def chromium(started_chromium: "Chrome") -> Iterator["Chrome"]:
+    """A new window of a real browser: what other tests emulate is not there."""
+    from tests.chromium import new_window
+
+    with new_window(started_chromium) as chrome:
         yield chrome

@@ -18,13 +18,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
 from labrig.acquire import LAMP_OFF, LAMP_ON, ProtocolModel, Session, Unit
 from labrig.drivers.numato import NumatoRelay
 from labrig.sim.boards import NumatoBoard
+from tests.quick_yaml import write_quickly
 
 ROOT = Path(__file__).parent.parent
 RELAY = 3
@@ -250,8 +250,8 @@ def lit_bench(
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hold\nVersion: 1\n")
     (info / "entry_points.txt").write_text(ENTRY_POINTS)
     lamp = {"driver": driver, "address": board.address, "relay": RELAY}
-    (folder / "rig.yaml").write_text(yaml.safe_dump({"name": "lamp", "devices": {"lamp": lamp}}))
-    (folder / "hold.yaml").write_text(yaml.safe_dump({"protocol": "hold", **protocol}))
+    (folder / "rig.yaml").write_text(write_quickly({"name": "lamp", "devices": {"lamp": lamp}}))
+    (folder / "hold.yaml").write_text(write_quickly({"protocol": "hold", **protocol}))
     path = os.pathsep.join((str(info.parent), str(ROOT)))
     try:
         bench = LitBench(folder, board, os.environ | {"PYTHONPATH": path})

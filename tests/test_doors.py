@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 import rawpy
-import yaml
 
 from labrig.acquire import (
     DOOR_CLOSE,
@@ -34,6 +33,7 @@ from labrig.record import RunFolder, RunRecord
 from labrig.sim.door import FRAME_S
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Make = Callable[..., Path]
 SERVO = "sim://room/servo"
@@ -57,11 +57,11 @@ def rig(make_rig: Make) -> Make:
     def write(devices: dict[str, Any] | None = None, **simulation: Any) -> Path:
         room = {"lamp": {"board": "lcus"}, "door": {}, "shield": {"channel": 1}}
         path = make_rig(**(room | simulation))
-        content = yaml.safe_load(path.read_text())
+        content = read_quickly(path.read_text())
         changed = devices or {}
         content["devices"] |= {key: DEVICES[key] | changed.get(key, {}) for key in DEVICES}
         content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(write_quickly(content))
         return path
 
     return write

@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 import serial
-import yaml
 
 from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import Bench, open_bench
@@ -24,6 +23,7 @@ from labrig.record.journal import read_journal
 from labrig.sim.boards import SerialCable
 from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Make = Callable[..., Path]
 Labrig = Callable[..., Ended]
@@ -46,10 +46,10 @@ def rig(make_rig: Make) -> Callable[..., Path]:
 
     def write(*faults: Any, **simulation: Any) -> Path:
         path = make_rig(faults=list(faults), **simulation)
-        content = yaml.safe_load(path.read_text())
+        content = read_quickly(path.read_text())
         content["devices"]["lamp"]["warm_up"] = "5 s"
         content["devices"]["camera"]["warm_up"] = "5 s"
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(write_quickly(content))
         return path
 
     return write
@@ -96,7 +96,7 @@ def without_faults(run: Path) -> None:
     """Somebody mends what is broken."""
     content = read_yaml(run / "rig.yaml")
     content["simulation"] |= {"faults": [], "initial": {"lamp": "off"}}
-    (run / "rig.yaml").write_text(yaml.safe_dump(content))
+    (run / "rig.yaml").write_text(write_quickly(content))
 
 
 @pytest.fixture(scope="module")

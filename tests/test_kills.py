@@ -10,9 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from labrig.record import read_run
+from tests.quick_yaml import write_quickly
 
 IRRADIANCE: dict[str, Any] = {
     "protocol": "irradiance", "longest": "1 s", "repeats": 1, "rounds": 1,
@@ -23,7 +22,7 @@ def test_it_is_resumed_with_all_that_was_complete(
     make_rig: Callable[..., Path], tmp_path: Path
 ) -> None:
     path, runs = tmp_path / "protocol.yaml", tmp_path / "runs"
-    path.write_text(yaml.safe_dump(IRRADIANCE))
+    path.write_text(write_quickly(IRRADIANCE))
     rig = make_rig(base="sim-phosphor")
     killed(
         ["run", path, "--rig", rig, "--runs", runs, "--yes", "--no-process"], "irradiance-direct"

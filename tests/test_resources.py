@@ -33,8 +33,9 @@ print("fine")
 """
 
 
-@pytest.mark.parametrize("before", ["", "import sim, config, drivers, protocols"])
-@pytest.mark.parametrize("as_folders", [True, False])
+@pytest.mark.parametrize(
+    ("before", "as_folders"), [("", True), ("import sim, config, drivers, protocols", False)]
+)
 def test_a_users_own_modules_neither_replace_ours_nor_break_anything(
     tmp_path: Path, before: str, as_folders: bool
 ) -> None:

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-import yaml
 
 from labrig.acquire import CAMERA, read_rig_file
 from labrig.bench import open_bench
@@ -14,6 +13,7 @@ from labrig.record import read_run
 from labrig.trial_frame import offers_with_frame_size
 from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Make = Callable[..., Path]
 
@@ -27,9 +27,9 @@ def test_a_trial_frame_shows_the_size_of_frames(make_rig: Make) -> None:
 
 def test_a_rig_file_of_another_camera_is_refused(make_rig: Make) -> None:
     path = make_rig()
-    content = yaml.safe_load(path.read_text())
+    content = read_quickly(path.read_text())
     content["devices"]["camera"] |= {"frame_pixels": [5634, 3752]}
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     with (
         open_bench(read_rig_file(path), str(path)) as bench,
         bench.devices() as rig,
@@ -51,11 +51,11 @@ def test_a_run_ends_at_once_and_goes_on_when_the_region_is_corrected(
     rig_content = read_yaml(folder / "rig.yaml")
     rig_content["simulation"]["faults"] = []
     del rig_content["devices"]["camera"]["frame_pixels"]
-    (folder / "rig.yaml").write_text(yaml.safe_dump(rig_content))
+    (folder / "rig.yaml").write_text(write_quickly(rig_content))
     protocol = read_yaml(folder / "protocol.yaml")
     for patch, code in (([32, 20, 80, 24], 2), ([32, 20, 30, 24], 0)):
         protocol["patches"] = {"a": patch}
-        (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+        (folder / "protocol.yaml").write_text(write_quickly(protocol))
         attempts = len(read_run(folder).attempts)
         ended = labrig("resume", folder, "--no-process")
         assert ended.code == code, ended.err

@@ -3,6 +3,7 @@
 import json
 import os
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -167,18 +168,20 @@ class SpectrometerReading:
 
     def text(self) -> str:
         """Return the reading as the text of a file, which `read_spectrometer_reading` reads."""
-        facts = {
-            "integration_s": self.integration_s,
-            "saturation_counts": self.saturation_counts,
-            "dark_pixels": list(self.dark_pixels),
-            "nonlinearity": list(self.nonlinearity),
-        }
+        facts = json.dumps(
+            {
+                "integration_s": self.integration_s,
+                "saturation_counts": self.saturation_counts,
+                "dark_pixels": list(self.dark_pixels),
+                "nonlinearity": list(self.nonlinearity),
+            }
+        )
         if self.calibration is not None:
-            facts["calibration"] = _spectrum_content(self.calibration)
+            facts = f'{facts[:-1]}, "calibration": {_spectrum_text(self.calibration)}}}'
         names = [f"raw_{number + 1}" for number in range(len(self.raw_counts))]
-        columns = [_texts(column) for column in (self.wavelength_nm, *self.raw_counts)]
-        rows = map(",".join, zip(*columns, strict=True))
-        head = [FORMAT, f"# {json.dumps(facts)}", ",".join(["wavelength_nm", *names])]
+        wavelengths = _texts_again(np.asarray(self.wavelength_nm, np.float64).tobytes())
+        rows = map(",".join, zip(wavelengths, *map(_texts, self.raw_counts), strict=True))
+        head = [FORMAT, f"# {facts}", ",".join(["wavelength_nm", *names])]
         return "\n".join([*head, *rows]) + "\n"
 
     def _linear(self) -> FloatArray:
@@ -255,12 +258,36 @@ def _texts(column: FloatArray) -> list[str]:
     return [repr(number).removesuffix(".0") for number in column.tolist()]
 
 
-def _spectrum_content(spectrum: Spectrum) -> dict[str, Any]:
-    return {
+# All readings of a run have the same wavelengths and calibration, which take longer to write and to
+# read than the counts.
+@lru_cache(maxsize=4)
+def _texts_again(wavelength_nm: bytes) -> list[str]:
+    """Return the text of wavelengths, given as the bytes of their array."""
+    return _texts(np.frombuffer(wavelength_nm))
+
+
+@lru_cache(maxsize=4)
+def _spectrum_text(spectrum: Spectrum) -> str:
+    content = {
         "name": spectrum.name,
         "wavelength_nm": spectrum.wavelength_nm.tolist(),
         "value": spectrum.value.tolist(),
         "sigma": None if spectrum.sigma is None else spectrum.sigma.tolist(),
+    }
+    return json.dumps(content)
+
+
+@lru_cache(maxsize=4)
+def _facts(line: str) -> dict[str, Any]:
+    """Return what the second line of a reading's file says, as arguments of a reading."""
+    facts = json.loads(line.removeprefix("# "))
+    calibration = facts.get("calibration")
+    return {
+        "integration_s": float(facts["integration_s"]),
+        "saturation_counts": float(facts["saturation_counts"]),
+        "dark_pixels": tuple(int(pixel) for pixel in facts["dark_pixels"]),
+        "nonlinearity": tuple(float(coefficient) for coefficient in facts["nonlinearity"]),
+        "calibration": None if calibration is None else _spectrum(calibration),
     }
 
 
@@ -300,18 +327,11 @@ def read_spectrometer_reading(path: str | os.PathLike[str]) -> SpectrometerReadi
     try:
         if len(lines) < 4 or lines[0] != FORMAT:
             raise ValueError(f"it does not begin with '{FORMAT}'")
-        facts = json.loads(lines[1].removeprefix("# "))
-        calibration = facts.pop("calibration", None)
-        table = np.array([line.split(",") for line in lines[3:]], dtype=np.float64)
-        return SpectrometerReading(
-            wavelength_nm=table[:, 0],
-            raw_counts=table[:, 1:].T,
-            integration_s=float(facts["integration_s"]),
-            saturation_counts=float(facts["saturation_counts"]),
-            dark_pixels=tuple(int(pixel) for pixel in facts["dark_pixels"]),
-            nonlinearity=tuple(float(coefficient) for coefficient in facts["nonlinearity"]),
-            calibration=None if calibration is None else _spectrum(calibration),
-        )
+        if "" in lines:
+            raise ValueError("a line is empty")
+        facts = _facts(lines[1])
+        table = np.loadtxt(lines[3:], delimiter=",", comments=None, ndmin=2)
+        return SpectrometerReading(table[:, 0], table[:, 1:].T, **facts)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise DataError(
             f"{path}: expected a reading of a spectrometer, got something else "

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig.acquire import (
     ILLUMINANTS_OFF,
@@ -26,6 +25,7 @@ from labrig.bench_optics import illuminant_exposures
 from labrig.errors import ProtocolError, UsageError
 from labrig.optics import read_light
 from labrig.record import RunFolder
+from tests.quick_yaml import read_quickly, write_quickly
 
 from .fakes import Watching
 
@@ -41,7 +41,7 @@ LAMPS: dict[str, dict[str, Any]] = {
 def rig(make_rig: Make) -> Path:
     """The simulated rig with a bank of three lamps."""
     path = make_rig()
-    content = yaml.safe_load(path.read_text())
+    content = read_quickly(path.read_text())
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     kinds = {0: "daylight", 2: "halogen", 5: "ultraviolet"}
     content["simulation"]["illuminants"] = [
@@ -50,7 +50,7 @@ def rig(make_rig: Make) -> Path:
     content["devices"]["illuminants"] = {
         "driver": "numato_lamp_bank", "address": "sim://room/lamps", "lamps": LAMPS,
     }  # fmt: skip
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     return path
 
 
@@ -106,10 +106,10 @@ def test_a_lamp_that_is_not_there_and_another_driver_are_named(rig: Path) -> Non
 def test_a_bank_of_the_other_kind_is_refused(
     rig: Path, key: str, driver: str, keys: dict[str, Any], said: str
 ) -> None:
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     content["devices"][key] = {"driver": driver, "address": "COM3"} | keys
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     with pytest.raises(UsageError, match=f"the driver '{driver}' {said}") as caught:
         plan(Lit(protocol="lit"), read_rig_file(rig), str(rig))
     assert "\n" not in str(caught.value)
@@ -124,10 +124,10 @@ def test_a_bank_of_the_other_kind_is_refused(
     ],
 )
 def test_bad_keys_of_a_bank_are_one_clear_line(rig: Path, lamps: object, said: str) -> None:
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     content["devices"]["illuminants"]["lamps"] = lamps
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     with pytest.raises(UsageError, match=said) as caught:
         plan(Lit(protocol="lit", lamps=("a",)), read_rig_file(rig), str(rig))
     assert "\n" not in str(caught.value)
@@ -149,10 +149,10 @@ def test_the_light_is_that_of_file_illuminant_or_band_behind_its_filter(rig: Pat
 
 
 def test_nothing_known_of_a_lamp_and_no_bank_are_one_clear_line(rig: Path, make_rig: Make) -> None:
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     content["devices"]["illuminants"]["lamps"] = {"dim": {"relay": 1}}
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     with pytest.raises(UsageError, match="nothing is known of the light of lamp 'dim'"):
         illuminant_exposures(read_rig_file(rig), str(rig))
     without = make_rig()

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig.acquire import (
     LAMP_OFF,
@@ -37,6 +36,7 @@ from labrig.guard import guarding
 from labrig.record import RunFolder
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 from .fakes import Watching
 
@@ -50,12 +50,12 @@ def rig(make_rig: Make) -> Path:
     path = make_rig(
         leds=[{"relay": 1, "centre": 450}, {"relay": 2, "centre": 525}],
     )
-    content = yaml.safe_load(path.read_text())
+    content = read_quickly(path.read_text())
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     content["devices"]["leds"] = {
         "driver": "numato_led_bank", "address": "sim://room/relays", "relays": BANK,
     }  # fmt: skip
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     return path
 
 
@@ -176,7 +176,7 @@ def thorlabs(make_rig: Make) -> Path:
         leds=[{"relay": 1 + n, "centre": 400 + 50 * n, "fwhm": 20} for n in range(5)],
         led_board="dc4100",
     )
-    content = yaml.safe_load(path.read_text())
+    content = read_quickly(path.read_text())
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     channels: dict[str, dict[str, Any]] = {
         f"{400 + 50 * n} nm": {"output": n % 4 + 1, "centre": 400 + 50 * n, "fwhm": 20}
@@ -187,7 +187,7 @@ def thorlabs(make_rig: Make) -> Path:
     content["devices"]["leds"] = {
         "driver": "thorlabs_dc4100", "address": "sim://room/dc4100-1", "channels": channels,
     }  # fmt: skip
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     return path
 
 
@@ -249,7 +249,7 @@ def test_every_bank_says_what_is_known_of_its_light(driver: str, tmp_path: Path)
     }
     leds["a"] |= light
     path = tmp_path / "rig.yaml"
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     lights = led_lights(read_rig_file(path), str(path))
     assert [led.settling for led in lights.values()] == [0.5, 0.0]
     assert lights["a"].peak_nm() == 447
@@ -260,7 +260,7 @@ def test_every_bank_says_what_is_known_of_its_light(driver: str, tmp_path: Path)
     with pytest.raises(UsageError, match=r"measured\.csv"):
         planned_rig(read_rig_file(path), str(path))
     leds["a"] |= {"centre": 450, "fwhm": 20}
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     with pytest.raises(UsageError, match="expected 'spectrum', or 'centre' and 'fwhm'"):
         led_lights(read_rig_file(path), str(path))
 
@@ -282,10 +282,10 @@ def test_the_guard_watches_them() -> None:
 
 
 def test_a_rig_with_leds_only_is_guarded(rig: Path) -> None:
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     del content["devices"]["lamp"]
     content |= {"simulation": None}
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     with guarding(read_rig_file(rig), str(rig)) as guard:
         assert guard is not None
         assert guard.lights == {"leds"}

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig.acquire import (
     LEDS,
@@ -31,6 +30,7 @@ from labrig.errors import DataError, DeviceLostError, ProtocolError
 from labrig.optics import read_spectrometer_reading
 from labrig.record import FRAMES, RunFolder, damaged_frames, read_run
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 from .fakes import Watching
 
@@ -48,7 +48,7 @@ def make(make_rig: Make) -> Make:
         path = make_rig(
             leds=[{"relay": 1, "centre": 450}, {"relay": 2, "centre": 620}], **simulation
         )
-        content = yaml.safe_load(path.read_text())
+        content = read_quickly(path.read_text())
         content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
         relays = {name: {"relay": n, "settling": "0.5 s"} for n, name in enumerate(NAMES, start=1)}
         content["devices"] |= {
@@ -59,7 +59,7 @@ def make(make_rig: Make) -> Make:
                 "driver": "seabreeze_spectrometer", "address": "sim://room/spectrometer",
             },
         }  # fmt: skip
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(write_quickly(content))
         return path
 
     return write

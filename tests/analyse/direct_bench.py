@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from labrig import resources
@@ -19,6 +18,7 @@ from labrig.sim.opening import PIXEL_STREAM
 from labrig.sim.spectrometer import Detector
 from labrig.sim.surfaces import Surfaces
 from tests.analyse.recorded import quietly
+from tests.quick_yaml import read_quickly, write_quickly
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ SETTLED_S = 125.0
 
 def write_bench(folder: Path, seed: int = 1, **simulation: Any) -> Path:
     """The shipped rig without a camera, changed as told."""
-    content = yaml.safe_load((resources.folder("config") / "sim-fluorescent.yaml").read_text())
+    content = read_quickly((resources.folder("config") / "sim-fluorescent.yaml").read_text())
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "seed": seed} | simulation
     content["simulation"]["sensor"] = {"width": 96, "height": 64}
     del content["devices"]["camera"]
@@ -45,7 +45,7 @@ def write_bench(folder: Path, seed: int = 1, **simulation: Any) -> Path:
     content["devices"]["spectrometer"]["calibration"] = "./scale.csv"
     content["optics"]["grey_card"] = "./card.csv"
     path = folder / "rig.yaml"
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     return path
 
 
@@ -59,7 +59,7 @@ def recording(
     folder: Path, protocol: dict[str, Any], seed: int = 1, **simulation: Any
 ) -> Recording:
     path = folder / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"protocol": "direct_bispectral"} | protocol))
+    path.write_text(write_quickly({"protocol": "direct_bispectral"} | protocol))
     return Recording.prepare(path, write_bench(folder, seed, **simulation), folder / "runs")
 
 
@@ -69,7 +69,7 @@ def record(folder: Path, protocol: dict[str, Any], seed: int = 1, **simulation: 
 
 
 def shipped_leds() -> tuple[LedSettings, ...]:
-    content = yaml.safe_load((resources.folder("config") / "sim-fluorescent.yaml").read_text())
+    content = read_quickly((resources.folder("config") / "sim-fluorescent.yaml").read_text())
     return tuple(LedSettings.model_validate(led) for led in content["simulation"]["leds"])
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from labrig import resources
@@ -26,6 +25,7 @@ from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from labrig.sim.lvf import PIECES, Lvf, pieces
 from labrig.sim.optics import emission
 from tests.acquire.fakes import Watching
+from tests.quick_yaml import read_quickly, write_quickly
 
 FloatArray = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ WIDTH, HEIGHT = 96, 64
 
 def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path:
     """The shipped rig for phosphors, changed as told, with its true LVF beside it."""
-    content = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
+    content = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     content["simulation"] |= simulation
@@ -45,14 +45,14 @@ def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path
     content["optics"]["lvf"] = "lvf.yaml"
     LVF_KIND.write(folder, true_lvf_file())
     path = folder / name
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     return path
 
 
 @cache
 def true_lvf_file(width: int = WIDTH, height: int = HEIGHT) -> LvfFile:
     """What a calibration without error would find of the shipped rig's LVF before the camera."""
-    content = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
+    content = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
     settings = LvfSettings.model_validate(content["simulation"]["lvf"])
     x, y, wide, high = settings.before_camera.region
     strip = Strip(
@@ -100,7 +100,7 @@ def _quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObser
 def record(folder: Path, protocol: dict[str, Any], **simulation: Any) -> Path:
     """The folder of a run of that protocol on `write_bench`'s rig."""
     path = folder / "protocol.yaml"
-    path.write_text(yaml.safe_dump({"sample": {"name": "test"}} | protocol))
+    path.write_text(write_quickly({"sample": {"name": "test"}} | protocol))
     rig = write_bench(folder, **simulation)
     return Recording.prepare(path, rig, folder / "runs").record(_quietly)
 

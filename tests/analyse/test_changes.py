@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig.process.result_changes import changes
 from labrig.process.run import new_result, put_in_place
 from labrig.results import FittedDecay, write_fitted_decay
+from tests.quick_yaml import write_quickly
 from tests.results.made import decay_result as fit
 
 Put = Callable[..., Path]
@@ -25,7 +25,7 @@ def put(tmp_path: Path) -> Put:
         folder = tmp_path / name
         (folder / patch).mkdir(parents=True, exist_ok=True)
         if made_with:
-            (folder / "provenance.yaml").write_text(yaml.safe_dump(made_with))
+            (folder / "provenance.yaml").write_text(write_quickly(made_with))
         if fit:
             write_fitted_decay(folder / patch / "fit.json", fit)
         return folder

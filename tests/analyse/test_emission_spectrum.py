@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-import yaml
 
 from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse
@@ -50,6 +49,7 @@ from tests.analyse.spectral_bench import (
     record,
 )
 from tests.fit import lvf_pictures as made
+from tests.quick_yaml import write_quickly
 
 QUICK = {"protocol": "emission_spectrum", "charge": "2 min", "times": ["2 s", "12 s", "30 s"],
          "longest": "8 s"}  # fmt: skip
@@ -88,7 +88,7 @@ def two_colours(path: Path) -> Path:
             )
         ],
     }  # fmt: skip
-    path.write_text(yaml.safe_dump(content))
+    path.write_text(write_quickly(content))
     return path
 
 

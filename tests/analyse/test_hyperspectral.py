@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig.analyse import CubeList, matrix_from_cubes
 from labrig.material import ReradiationMatrix, read_any_material, read_reradiation
 from labrig.results import DirectColumns
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
 NM = np.arange(396.0, 800.0, 3.0)
@@ -71,12 +71,12 @@ def write_cubes(folder: Path, seed: int, **changes: Any) -> Path:
         "lights": [{"name": f"{peak} nm", "cube": f"{peak}.npz"} for peak in PEAKS],
     } | changes
     path = folder / "felt.yaml"
-    path.write_text(yaml.safe_dump({key: value for key, value in content.items() if value}))
+    path.write_text(write_quickly({key: value for key, value in content.items() if value}))
     return path
 
 
 def columns_of(path: Path) -> DirectColumns:
-    return matrix_from_cubes(CubeList.model_validate(yaml.safe_load(path.read_text())), path)[0]
+    return matrix_from_cubes(CubeList.model_validate(read_quickly(path.read_text())), path)[0]
 
 
 def true_columns(output_nm: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
@@ -130,10 +130,10 @@ def test_white_images_of_their_own_and_lights_as_bands(labrig: Labrig, tmp_path:
         lights.append(
             {"name": f"{peak}", "cube": f"cloth-{peak}.npz", "white": f"white-{peak}.npz"}
         )
-    content = yaml.safe_load(path.read_text()) | {"lights": lights, "white_region": None}
+    content = read_quickly(path.read_text()) | {"lights": lights, "white_region": None}
     del content["dark"]
     np.savez(tmp_path / "dark-one.npz", wavelength_nm=NM, values=np.full((SIDE, SIDE, 135), 0.02))
-    path.write_text(yaml.safe_dump(content | {"dark": "dark-one.npz"}))
+    path.write_text(write_quickly(content | {"dark": "dark-one.npz"}))
     out = tmp_path / "felt.csv"
     assert labrig("material", "from-cubes", path, out, "--lights-only").code == 0
     assert len(read_reradiation(out).input_nm) == len(PEAKS)

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-import yaml
 
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BLANK_KIND
@@ -13,6 +12,7 @@ from labrig.process import process_run
 from tests.analyse.recorded import record
 from tests.calibration.test_blank_and_fade_files import BLANK
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly
 
 DECAY = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "40 s",
          "first": "3 s", "exposure": "1 s"}  # fmt: skip
@@ -32,7 +32,7 @@ def test_one_that_came_later_is_used_and_recorded(tmp_path: Path) -> None:
     assert not any("falls on the blank" in said for said in process_run(run).warnings)
     result = process_run(run, Overrides.parse([], [], optics=[f"blank={file}"]))
     assert any("DN/s in G falls on the blank" in said for said in result.warnings)
-    made_with = yaml.safe_load((run / "result" / "provenance.yaml").read_text())
+    made_with = read_quickly((run / "result" / "provenance.yaml").read_text())
     assert made_with["optics"] == {"blank": str(file)}
 
 

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-import yaml
 
 from labrig.acquire import read_protocol
 from labrig.calibration import IRRADIANCE_KIND
@@ -16,6 +15,7 @@ from labrig.record import read_run
 from labrig.results.phosphor import PhosphorResult
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.quick_yaml import write_quickly
 from tests.results.made import assert_read_back
 
 WIDTH, HEIGHT = 192, 48
@@ -94,7 +94,7 @@ def test_a_chain_that_cannot_be_is_one_clear_line(
     parts: list[dict[str, object]], said: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "chain.yaml"
-    path.write_text(yaml.safe_dump({"protocol": "phosphor", "parts": parts}))
+    path.write_text(write_quickly({"protocol": "phosphor", "parts": parts}))
     with pytest.raises(UsageError) as caught:
         read_protocol(path)
     assert said in str(caught.value)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given, strategies as st
 
 from labrig.acquire import read_protocol, read_rig_file
@@ -28,6 +27,7 @@ from labrig.results.emission_spectrum import read_emission_spectrum
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.analyse.recorded import record
 from tests.analyse.spectral_bench import emitted, true_lvf_file
+from tests.quick_yaml import write_quickly
 
 WIDTH, HEIGHT = 192, 64
 PAINTS: dict[str, Region] = {
@@ -245,7 +245,7 @@ def test_patches_that_cannot_be_are_one_clear_line(
     keys: dict[str, Any], said: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "chain.yaml"
-    path.write_text(yaml.safe_dump(chain(**keys)))
+    path.write_text(write_quickly(chain(**keys)))
     with pytest.raises(UsageError) as caught:
         read_protocol(path)
     assert said in str(caught.value)
@@ -255,7 +255,7 @@ def test_patches_that_cannot_be_are_one_clear_line(
 def test_a_part_may_move_the_patches_of_the_chain(tmp_path: Path) -> None:
     moved = {name: [x, y, width, 0.2] for name, (x, y, width, _) in PAINTS.items()}
     path = tmp_path / "chain.yaml"
-    path.write_text(yaml.safe_dump(chain(parts=[PARTS[1] | {"patches": moved}, SHORT])))
+    path.write_text(write_quickly(chain(parts=[PARTS[1] | {"patches": moved}, SHORT])))
     decay, excitation = (dict(part.protocol.patches) for part in parts_of(path))
     assert {name: list(region) for name, region in decay.items()} == moved
     assert excitation == PAINTS

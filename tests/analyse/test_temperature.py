@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.acquire import plan, read_protocol, read_rig_file
@@ -12,6 +11,7 @@ from labrig.material import read_material
 from labrig.process import process_run
 from labrig.record import read_run
 from tests.analyse.recorded import record
+from tests.quick_yaml import read_quickly, write_quickly
 
 DECAY: dict[str, Any] = {
     "protocol": "decay", "charge": "30 s", "first": "1 s", "every": "25 s", "for": "10 min",
@@ -76,13 +76,13 @@ def test_a_thermometer_that_fails_does_not_end_a_run(
 
 
 def test_no_plan_takes_longer_for_it(tmp_path: Path) -> None:
-    content = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
+    content = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-    (tmp_path / "decay.yaml").write_text(yaml.safe_dump(DECAY))
+    (tmp_path / "decay.yaml").write_text(write_quickly(DECAY))
     protocol = read_protocol(tmp_path / "decay.yaml")
     plans = []
     for name in ("with", "without"):
-        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(content))
+        (tmp_path / f"{name}.yaml").write_text(write_quickly(content))
         plans.append(plan(protocol, read_rig_file(tmp_path / f"{name}.yaml"), name))
         content["devices"].pop("thermometer", None)
     assert plans[0] == plans[1]

@@ -15,6 +15,7 @@ from labrig.calibration import (
 )
 from labrig.errors import DataError, UsageError
 from labrig.results import Transient
+from tests.quick_yaml import write_quickly
 
 BLANK = BlankFile(
     iso=400,
@@ -101,10 +102,8 @@ def test_a_fade_is_what_the_excitation_fit_takes() -> None:
 def test_a_malformed_fade_is_one_clear_line(
     tmp_path: Path, changes: dict[str, object], said: str
 ) -> None:
-    import yaml
-
     path = tmp_path / "fade.yaml"
-    path.write_text(yaml.safe_dump({**fade().model_dump(mode="json"), **_plain(changes)}))
+    path.write_text(write_quickly({**fade().model_dump(mode="json"), **_plain(changes)}))
     with pytest.raises(UsageError) as caught:
         FADE_KIND.read(path)
     assert said in str(caught.value)

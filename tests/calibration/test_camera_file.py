@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 from labrig.calibration import CAMERA_KIND, CameraFile, Linearity, Noise
 from labrig.errors import DataError, UsageError
 from labrig.optics import Factor, Flat
+from tests.quick_yaml import write_quickly
 
 BODY = "Canon EOS 5D Mark II, serial 7, firmware 2.1.2"
 
@@ -72,10 +73,8 @@ def test_a_written_camera_reads_back_as_itself(
 def test_a_malformed_file_is_one_clear_line(
     tmp_path: Path, changes: dict[str, object], said: str
 ) -> None:
-    import yaml
-
     path = tmp_path / "camera.yaml"
-    path.write_text(yaml.safe_dump(camera().model_dump(mode="json") | changes))
+    path.write_text(write_quickly(camera().model_dump(mode="json") | changes))
     with pytest.raises(UsageError) as caught:
         CAMERA_KIND.read(path)
     assert said in str(caught.value)

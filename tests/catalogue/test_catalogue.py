@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig.catalogue import RunFilter, compare_runs, list_runs, summarise
 from labrig.cli.exit_codes import guarded
 from labrig.results import write_fitted_decay
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 from tests.results.made import decay_result
 
 Labrig = Callable[..., Ended]
@@ -28,7 +28,7 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (3, "blue-paint", 2, {"repeats": 2}),
         (4, "green-paint", 3, {}),
     ):
-        rig = yaml.safe_load((Path(__file__).parents[2] / "config" / "sim.yaml").read_text())
+        rig = read_quickly((Path(__file__).parents[2] / "config" / "sim.yaml").read_text())
         rig["simulation"] |= {
             "sensor": {"width": 96, "height": 64},
             "epoch": f"2026-01-0{day}T00:00:00Z",
@@ -45,7 +45,7 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Path:
             **keys,
         }
         for name, content in (("rig.yaml", rig), ("protocol.yaml", protocol)):
-            (folder / name).write_text(yaml.safe_dump(content))
+            (folder / name).write_text(write_quickly(content))
         place = [str(folder / "protocol.yaml"), "--rig", str(folder / "rig.yaml")]
         assert guarded(["run", *place, "--runs", str(folder / "runs")]) == 0
     cut = folder / "runs" / "2026-01-05T00-00-00_decay_blue-paint"
@@ -200,9 +200,9 @@ def test_one_patch_is_compared_with_one_patch_whatever_it_is_called(
 ) -> None:
     first, again, *_ = (run.folder for run in list_runs(week, RunFilter()))
     renamed = shutil.copytree(again, tmp_path / "renamed")
-    protocol = yaml.safe_load((renamed / "protocol.yaml").read_text())
+    protocol = read_quickly((renamed / "protocol.yaml").read_text())
     protocol["patches"] = {"paint": protocol["patches"]["sample"]}
-    (renamed / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+    (renamed / "protocol.yaml").write_text(write_quickly(protocol))
     compared = compare_runs(first, renamed)
     assert [patch.patch for patch in compared.patches] == ["sample"]
     assert compared.missing == ()

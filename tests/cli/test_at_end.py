@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-import yaml
 
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
@@ -22,7 +22,7 @@ NOTES = (
 
 def telling(make_rig: Make, command: object, **simulation: object) -> Path:
     path = make_rig(**simulation)
-    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"on_finish": command}))
+    path.write_text(write_quickly(read_quickly(path.read_text()) | {"on_finish": command}))
     return path
 
 
@@ -64,7 +64,7 @@ def test_a_command_in_a_folder_from_elsewhere_is_run_only_if_asked_for(
     run = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path, "--no-process")
     path = run.run_folder / "rig.yaml"
     command = [sys.executable, "-c", NOTES, str(told)]
-    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"on_finish": command}))
+    path.write_text(write_quickly(read_quickly(path.read_text()) | {"on_finish": command}))
     ended = labrig("resume", run.run_folder, "--no-process")
     assert (ended.code, told.exists()) == (0, False)
     (note,) = [line for line in ended.err.splitlines() if line.startswith("note:")]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TextIO
 
 import pytest
-import yaml
 
 from labrig.acquire import (
     LAMP_OFF,
@@ -27,6 +26,7 @@ from labrig.clock import Interrupted
 from labrig.errors import UsageError
 from labrig.record import read_run
 from labrig.recording import Recording
+from tests.quick_yaml import read_quickly, write_quickly
 from tests.test_doors import middle
 
 STEP = ManualStep("put filter 37 in", "its transmission is measured", "filter 37")
@@ -115,11 +115,11 @@ class Pieces(ProtocolModel):
 def recording(make_rig: Callable[..., Path], tmp_path: Path) -> Callable[..., Recording]:
     def make(devices: dict[str, object]) -> Recording:
         path = make_rig()
-        content = yaml.safe_load(path.read_text())
+        content = read_quickly(path.read_text())
         content["devices"] |= devices
         content["devices"]["camera"]["warm_up"] = "0 s"
         content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(write_quickly(content))
         protocol, rig = Pieces(protocol="pieces"), read_rig_file(path)
         return Recording(protocol, rig, path, tmp_path / "runs", plan(protocol, rig, str(path)))
 

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig import plugins
 from labrig.record import RunLock, read_run
 from labrig.results import DecayResult, read_result
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
@@ -75,9 +75,9 @@ def test_a_plan_is_refused_before_anything_moves(
     said: str,
 ) -> None:
     path = make_rig()
-    rig = yaml.safe_load(path.read_text())
+    rig = read_quickly(path.read_text())
     change(rig)
-    path.write_text(yaml.safe_dump(rig))
+    path.write_text(write_quickly(rig))
     for command in ("plan", "run"):
         ended = labrig(command, "decay", "--rig", path, "--runs", tmp_path / "runs")
         one_line(ended, 5 if said == "free" else 2, said)
@@ -139,9 +139,9 @@ def test_a_device_that_is_not_there_is_exit_code_3(
     labrig: Labrig, make_rig: Make, tmp_path: Path
 ) -> None:
     path = make_rig()
-    rig = yaml.safe_load(path.read_text())
+    rig = read_quickly(path.read_text())
     rig["devices"]["lamp"]["address"] = str(tmp_path / "ttyACM7")
-    path.write_text(yaml.safe_dump(rig))
+    path.write_text(write_quickly(rig))
     one_line(
         labrig("run", "decay", "--rig", path, "--runs", tmp_path / "runs"), 3, "ttyACM7", "nothing"
     )
@@ -160,7 +160,7 @@ def test_a_run_ends_in_a_result_that_agrees_with_itself(labrig: Labrig, finished
     fit = json.loads((result / "fit.json").read_text())
     (state,) = fit["states"]
     assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_sigma_per_s"]
-    material = yaml.safe_load((result / "material.yaml").read_text())
+    material = read_quickly((result / "material.yaml").read_text())
     assert material["states"][0]["k_r_per_s"] == state["k_r_per_s"]
     assert material["states"][0]["r0"] is None, "a decay alone does not tell r(0)"
     again = labrig("fit", "decay", result / "series.csv", "--json")

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig.acquire import DOOR, plan, planned_rig, read_protocol, read_rig_file
 from labrig.record import RunSize, read_run
 from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
@@ -20,7 +20,7 @@ Make = Callable[..., Path]
 
 def written(folder: Path, **keys: Any) -> Path:
     path = folder / "protocol.yaml"
-    path.write_text(yaml.safe_dump(keys))
+    path.write_text(write_quickly(keys))
     return path
 
 
@@ -64,8 +64,8 @@ def test_a_rig_whose_parts_are_unknown_is_refused(
     labrig: Labrig, make_rig: Make, simulation: Any, optics: Any, said: str
 ) -> None:
     path = make_rig(**simulation)
-    rig = yaml.safe_load(path.read_text())
-    path.write_text(yaml.safe_dump(rig | {"optics": rig["optics"] | optics}))
+    rig = read_quickly(path.read_text())
+    path.write_text(write_quickly(rig | {"optics": rig["optics"] | optics}))
     ended = labrig("plan", "decay", "--rig", path)
     assert (ended.code, ended.err.count("\n")) == (2, 1)
     assert said in ended.err
@@ -75,9 +75,9 @@ def test_a_camera_that_contradicts_its_simulation_is_refused(
     labrig: Labrig, make_rig: Make
 ) -> None:
     path = make_rig()
-    rig = yaml.safe_load(path.read_text())
+    rig = read_quickly(path.read_text())
     rig["devices"]["camera"]["frame_pixels"] = [5634, 3752]
-    path.write_text(yaml.safe_dump(rig))
+    path.write_text(write_quickly(rig))
     ended = labrig("plan", "decay", "--rig", path)
     assert ended.code == 2
     assert "frame_pixels [96, 64]" in ended.err
@@ -168,7 +168,7 @@ def test_a_disk_that_is_too_small_is_refused_by_plan_run_and_resume(
     content = read_yaml(folder / "rig.yaml")
     content["devices"]["camera"]["frame_size"] = "90000 GB"
     for path in (rig, folder / "rig.yaml"):
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(write_quickly(content))
     for arguments in (
         ("plan", make_protocol(), "--rig", rig),
         ("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs"),

@@ -8,7 +8,6 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-import yaml
 from serial.tools.list_ports_common import ListPortInfo
 
 from labrig import resources
@@ -20,6 +19,7 @@ from labrig.errors import DeviceError
 from labrig.setup import Host
 from labrig.yaml_file import read_yaml, validate, yaml_text
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Report = dict[str, Any]
 Labrig = Callable[..., Ended]
@@ -122,9 +122,9 @@ def test_a_warning_does_not_keep_a_run_from_starting(
     labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:
     rig = make_rig()
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     content["devices"]["camera"]["isos"] = [100, 125, 400]
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     report = json.loads(labrig("rig", "check", rig, "--json").out)
     warned = [f for f in device(report, "camera")["findings"] if f["severity"] == "warn"]
     assert ["ISO 125, which is not native" in finding["what"] for finding in warned] == [True]
@@ -190,9 +190,9 @@ def test_a_device_that_is_not_there_is_one_line(
     labrig: Labrig, make_rig: Make, tmp_path: Path
 ) -> None:
     path = make_rig()
-    rig = yaml.safe_load(path.read_text())
+    rig = read_quickly(path.read_text())
     rig["devices"]["lamp"]["address"] = str(tmp_path / "ttyACM7")
-    path.write_text(yaml.safe_dump(rig))
+    path.write_text(write_quickly(rig))
     ended = labrig("rig", "check", path)
     assert ended.code == 3
     assert len(ended.err.splitlines()) == 1
@@ -232,9 +232,9 @@ def test_what_is_listed_is_a_rig_file(
 
 
 def with_viewfinder(path: Path, address: str) -> Path:
-    rig = yaml.safe_load(path.read_text())
+    rig = read_quickly(path.read_text())
     rig["devices"]["viewfinder"] = {"driver": "uvc_preview", "address": address}
-    path.write_text(yaml.safe_dump(rig))
+    path.write_text(write_quickly(rig))
     return path
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.calibration import LVF_KIND, LvfFile
@@ -21,6 +20,7 @@ from labrig.results import RunResult
 from labrig.results.phosphor import PhosphorResult
 from tests.analyse.spectral_bench import true_lvf_file
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
 
@@ -40,7 +40,7 @@ class Calibrated(RunResult):
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A decay of a phosphor with two states, processed."""
     folder = tmp_path_factory.mktemp("compared")
-    rig = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
+    rig = read_quickly((resources.folder("config") / "sim.yaml").read_text())
     rig["simulation"] |= {
         "sensor": {"width": 96, "height": 64},
         "epoch": "2026-01-01T00:00:00Z",
@@ -54,8 +54,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "for": "90 s",
         "repeats": 2,
     }
-    (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
-    (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+    (folder / "rig.yaml").write_text(write_quickly(rig))
+    (folder / "protocol.yaml").write_text(write_quickly(protocol))
     quiet = io.StringIO()
     with contextlib.redirect_stdout(quiet), contextlib.redirect_stderr(quiet):
         code = guarded(
@@ -156,9 +156,9 @@ def test_curves_that_a_calibration_found_go_before_the_rigs(
     of_rig = compared(labrig, copy)
     if found_by == "an earlier run":
         LVF_KIND.write(tmp_path, lvf)
-        rig = yaml.safe_load((copy / "rig.yaml").read_text())
+        rig = read_quickly((copy / "rig.yaml").read_text())
         rig["optics"]["lvf"] = str(tmp_path / "lvf.yaml")
-        (copy / "rig.yaml").write_text(yaml.safe_dump(rig))
+        (copy / "rig.yaml").write_text(write_quickly(rig))
     else:
         calibration = Calibrated(file=lvf)
         chain = PhosphorResult(parts={"lvf_calibration": calibration}, failed={}, materials={})
@@ -177,9 +177,9 @@ def test_without_camera_curves_it_says_so_and_does_the_rest(
 ) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(run, copy)
-    rig = yaml.safe_load((copy / "rig.yaml").read_text())
+    rig = read_quickly((copy / "rig.yaml").read_text())
     del rig["optics"]
-    (copy / "rig.yaml").write_text(yaml.safe_dump(rig))
+    (copy / "rig.yaml").write_text(write_quickly(rig))
     said = compared(labrig, copy)
     assert "linear sRGB" in said["description"]
     assert said["spectra"] == {}

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.acquire import Plan, RunObserver, read_rig_file
@@ -20,6 +19,7 @@ from labrig.recording import Recording
 from labrig.results import read_result
 from labrig.results.decay import DecayResult
 from tests.acquire.fakes import Watching
+from tests.quick_yaml import read_quickly, write_quickly
 
 #: The rest of the frame stays dark.
 SAMPLE = [{"material": "blue-paint", "region": [0.25, 0.25, 0.5, 0.5]}]
@@ -49,7 +49,7 @@ def with_dark_patch(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 def finish(folder: Path, **keys: object) -> Finished:
     """A short decay."""
-    rig = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
+    rig = read_quickly((resources.folder("config") / "sim.yaml").read_text())
     rig["simulation"] |= {"sensor": {"width": 96, "height": 64}, "sample": SAMPLE}
     rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     protocol = {
@@ -62,7 +62,7 @@ def finish(folder: Path, **keys: object) -> Finished:
     paths = {}
     for name, content in (("rig", rig), ("protocol", protocol | keys)):
         paths[name] = folder / f"{name}.yaml"
-        paths[name].write_text(yaml.safe_dump(content))
+        paths[name].write_text(write_quickly(content))
     run = Recording.prepare(paths["protocol"], paths["rig"], folder / "runs").record(quietly)
     process_run(run)
     record = read_run(run)

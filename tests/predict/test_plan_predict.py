@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.cli.exit_codes import guarded
@@ -16,6 +15,7 @@ from labrig.material import read_material
 from labrig.predict.reference import read_reference
 from labrig.record import read_run
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
@@ -25,15 +25,15 @@ Make = Callable[..., Path]
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with protocol.yaml, rig.yaml and a run of them."""
     folder = tmp_path_factory.mktemp("measured")
-    rig = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
+    rig = read_quickly((resources.folder("config") / "sim.yaml").read_text())
     rig["simulation"] |= {
         "sensor": {"width": 96, "height": 64},
         "epoch": "2026-01-01T00:00:00Z",
         "initial": {"lamp": "off"},
     }
     protocol = {"protocol": "decay", "charge": "10 min", "for": "100 s", "every": "4 s"}
-    (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
-    (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+    (folder / "rig.yaml").write_text(write_quickly(rig))
+    (folder / "protocol.yaml").write_text(write_quickly(protocol))
     quiet = io.StringIO()
     with contextlib.redirect_stdout(quiet), contextlib.redirect_stderr(quiet):
         code = guarded(
@@ -51,9 +51,9 @@ def run_in(measured: Path) -> Path:
 
 def predicted(labrig: Labrig, measured: Path, *more: object, **keys: object) -> dict[str, Any]:
     """JSON of a prediction for the measured material, the protocol changed as told."""
-    protocol = yaml.safe_load((measured / "protocol.yaml").read_text()) | keys
+    protocol = read_quickly((measured / "protocol.yaml").read_text()) | keys
     path = measured / "changed.yaml"
-    path.write_text(yaml.safe_dump(protocol))
+    path.write_text(write_quickly(protocol))
     material = run_in(measured) / "result" / "material.yaml"
     ended = labrig(
         "plan", path, "--rig", measured / "rig.yaml", "--predict", material, *more, "--json"

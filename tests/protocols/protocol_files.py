@@ -4,17 +4,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
 from labrig.errors import UsageError
+from tests.quick_yaml import write_quickly
 
 
 def written(folder: Path, **keys: Any) -> Path:
     """Write a protocol file of these keys."""
     path = folder / "protocol.yaml"
-    path.write_text(yaml.safe_dump(keys))
+    path.write_text(write_quickly(keys))
     return path
 
 

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
@@ -13,6 +12,7 @@ from labrig.errors import ProtocolError, UsageError
 from labrig.record import read_run
 from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
+from tests.quick_yaml import write_quickly
 
 GOLDEN = Path(__file__).parent / "decay.timeline.txt"
 PROTOCOLS = sorted(path.stem for path in resources.folder("protocols").glob("*.yaml"))
@@ -120,7 +120,7 @@ def test_a_written_protocol_reads_back_as_itself(make_protocol: Callable[..., Pa
                  "background": [0, 0, 0.1, 0.1]}):  # fmt: skip
         protocol = read_protocol(make_protocol(**keys))
         path = make_protocol()
-        path.write_text(yaml.safe_dump(protocol.model_dump(mode="json", by_alias=True)))
+        path.write_text(write_quickly(protocol.model_dump(mode="json", by_alias=True)))
         assert read_protocol(path) == protocol
 
 
@@ -169,7 +169,7 @@ def test_a_charge_until_the_plateau_ends_when_the_glow_stops_growing(
     rig = read_yaml(make_rig())
     rig["devices"]["lamp"]["warm_up"] = "30 s"
     path = tmp_path / "cold.yaml"
-    path.write_text(yaml.safe_dump(rig))
+    path.write_text(write_quickly(rig))
     ended = labrig("run", protocol, "--rig", path, "--runs", tmp_path / "runs")
     assert ended.code == 0, ended.err
     run = read_run(ended.run_folder)

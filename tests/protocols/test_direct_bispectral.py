@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.process import process_run
@@ -19,6 +18,7 @@ from tests.protocols.protocol_files import (
     assert_timeline_as_agreed,
     written,
 )
+from tests.quick_yaml import read_quickly, write_quickly
 
 NAME = "direct_bispectral"
 QUICK: dict[str, Any] = {"leds": ["430 nm"], "samples": ["felt"], "repetitions": 4}
@@ -83,9 +83,9 @@ def test_a_spectrometer_that_is_unplugged_ends_the_run_and_it_is_resumed(
     assert "spectrometer" in said
     (folder,) = runs.iterdir()
     assert list(read_run(folder).completed())[:2] == ["white: dark", "white: 430 nm"]
-    content = yaml.safe_load((folder / "rig.yaml").read_text())
+    content = read_quickly((folder / "rig.yaml").read_text())
     content["simulation"] |= {"faults": []}
-    (folder / "rig.yaml").write_text(yaml.safe_dump(content))
+    (folder / "rig.yaml").write_text(write_quickly(content))
     assert labrig("resume", folder, "--yes", "--no-process").code == 0
     # The samples lay in the white reference's place when the devices were connected again.
     result = process_run(folder)

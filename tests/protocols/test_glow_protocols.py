@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from labrig.acquire import read_protocol
 from labrig.cli.exit_codes import guarded
@@ -17,6 +16,7 @@ from tests.protocols.protocol_files import (
     planned,
     written,
 )
+from tests.quick_yaml import read_quickly, write_quickly
 
 PROTOCOLS = ("emission_spectrum", "isotropy", "saturation")
 
@@ -75,7 +75,7 @@ def test_a_written_protocol_reads_back_as_itself(tmp_path: Path) -> None:
          "exposure": "2 s"},
     ):  # fmt: skip
         protocol = read_protocol(written(tmp_path, **keys))
-        again = yaml.safe_dump(protocol.model_dump(mode="json", by_alias=True))
+        again = write_quickly(protocol.model_dump(mode="json", by_alias=True))
         (tmp_path / "again.yaml").write_text(again)
         assert read_protocol(tmp_path / "again.yaml") == protocol
 
@@ -119,10 +119,10 @@ def test_a_run_that_had_no_disk_left_goes_on_where_it_was(tmp_path: Path) -> Non
     (folder,) = runs.iterdir()
     before = read_run(folder).completed()
     assert list(before) == ["dark", "meter-halogen"]
-    content = yaml.safe_load((folder / "rig.yaml").read_text())
+    content = read_quickly((folder / "rig.yaml").read_text())
     content["simulation"] |= {"faults": []}
     content["simulation"]["initial"] |= {"manual_steps": ["lvf before camera"]}
-    (folder / "rig.yaml").write_text(yaml.safe_dump(content))
+    (folder / "rig.yaml").write_text(write_quickly(content))
     assert guarded(["resume", str(folder), "--yes", "--no-process"]) == 0
     after = read_run(folder).completed()
     assert tuple(after) == laid_out.units

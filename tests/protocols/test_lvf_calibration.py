@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.acquire import ManualStep, Plan, RunObserver, plan, read_protocol, read_rig_file
@@ -28,6 +27,7 @@ from tests.analyse.lvf_calibration.room_truth import (
     true_irradiance,
 )
 from tests.conftest import Ended
+from tests.quick_yaml import read_quickly, write_quickly
 from tests.results.made import assert_read_back
 
 Make = Callable[..., Path]
@@ -51,7 +51,7 @@ def write(tmp_path: Path) -> Make:
         else:
             content |= {"filters": list(FEW), "stripes": "2 min", "rising": True}
         path = tmp_path / f"{protocol}.yaml"
-        path.write_text(yaml.safe_dump(content | keys))
+        path.write_text(write_quickly(content | keys))
         return path
 
     return make
@@ -98,21 +98,21 @@ def test_all_filters_are_those_that_the_rig_has(
         table = resources.folder("config/optics/filters") / f"{name}.csv"
         shutil.copy(table, own / f"mine-{name}.csv")
     rig = make_rig(base="sim-phosphor", filters=str(own))
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     content["optics"]["filters"] = "./my filters"
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     protocol = write(filters="all")
     if in_a_chain:
-        parts = [yaml.safe_load(protocol.read_text())]
-        protocol.write_text(yaml.safe_dump({"protocol": "phosphor", "parts": parts}))
+        parts = [read_quickly(protocol.read_text())]
+        protocol.write_text(write_quickly({"protocol": "phosphor", "parts": parts}))
     recording = Recording.prepare(protocol, rig, tmp_path)
     units = [name.split("/")[-1] for name in recording.plan.units]
     filters = [name for name in units if name.startswith("filter-")]
     assert filters == ["filter-none", "filter-mine-longpass-440", "filter-mine-shortpass-585"]
     # What is recorded holds for resume and processing, whatever becomes of the folder.
     recorded = recording.protocol.model_dump(mode="json", by_alias=True)
-    (tmp_path / "recorded.yaml").write_text(yaml.safe_dump(recorded))
+    (tmp_path / "recorded.yaml").write_text(write_quickly(recorded))
     again = read_protocol(tmp_path / "recorded.yaml")
     assert tuple(unit.name for unit in again.units()) == recording.plan.units
     shutil.rmtree(own)
@@ -195,10 +195,10 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     on_sample = np.interp(at, np.array(file.position), drawn.centre_nm)
     assert np.abs(on_sample - there.centre_nm)[inside].max() < 3.5
 
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     content["optics"]["lvf"] = str(folder)
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     ended = labrig("run", write("irradiance"), "--rig", rig, "--runs", tmp_path, "--yes")
     assert ended.code == 0, ended.err
     light = IRRADIANCE_KIND.read(ended.run_folder / "result" / "irradiance.yaml")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
+from tests.quick_yaml import read_quickly
 
 #: What changes of labrig that do not say otherwise may move a number by: in σ, or relative to it.
 MAX_SIGMAS, MAX_RELATIVE = 1e-6, 1e-9
@@ -151,7 +151,7 @@ def _read_json(path: Path) -> Any:
 
 
 def _read_yaml(path: Path) -> Any:
-    return yaml.safe_load(path.read_text(encoding="utf-8"))
+    return read_quickly(path.read_text(encoding="utf-8"))
 
 
 _READERS = {".csv": _read_csv, ".json": _read_json, ".yaml": _read_yaml}

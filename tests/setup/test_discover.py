@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 import usb.core
-import yaml
 
 from labrig import plugins
 from labrig.acquire.rig_file import DeviceEntry
@@ -17,6 +16,7 @@ from labrig.setup import Host, Process, discover, host as host_module
 from labrig.sim import open_room
 from labrig.sim.camera import SimulatedCamera
 from labrig.yaml_file import parse_yaml, validate
+from tests.quick_yaml import read_quickly
 
 DRIVERS = ("numato_relay", "ptp_camera")
 
@@ -143,7 +143,7 @@ def test_a_board_has_the_line_of_its_driver(
 
 def test_snippets_are_yaml_that_names_driver_and_address() -> None:
     found = discover(pc([Plugged("COM4", "USB", 0x2A19, 0x0C05)], cameras()), DRIVERS)
-    devices = yaml.safe_load("\n".join(d.snippet for d in (*found.ports, *found.cameras)))
+    devices = read_quickly("\n".join(d.snippet for d in (*found.ports, *found.cameras)))
     assert devices["lamp"] == {
         "driver": "numato_relay", "address": "COM4", "relay": 0, "warm_up": "15 min",
     }  # fmt: skip
@@ -186,7 +186,7 @@ def test_a_makers_own_commands_are_left_to_libgphoto2(
     device.idVendor = vendor
     around = pc(usb_devices=[device], platform=platform)
     (found,) = discover(around, (*DRIVERS, "gphoto2_camera")).cameras
-    camera = yaml.safe_load(found.snippet)["camera"] if found.snippet else {}
+    camera = read_quickly(found.snippet)["camera"] if found.snippet else {}
     assert camera.get("driver") == driver
     assert any("labrig[gphoto2]" in hint for hint in found.hints) == (driver != "ptp_camera")
 

@@ -5,7 +5,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from labrig.fit.bispectral import BispectralColumns, LitSpectrum
 from labrig.optics import SpectrometerReading
@@ -39,6 +38,8 @@ TOLD_LEFT = 2e-3
 
 def second_peak(name: str, light: LitSpectrum, window_nm: Window) -> str | None:
     """Return what to say of a light whose band on the white reference has two peaks."""
+    from scipy.signal import find_peaks  # takes as long to load as half of labrig
+
     low_nm, high_nm = window_nm
     nm = light.wavelength_nm
     inside = (nm >= low_nm) & (nm <= high_nm)

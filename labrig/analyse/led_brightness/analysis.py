@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc
 
 from labrig.acquire import led_lights
 from labrig.analyse.inputs import Part
@@ -333,7 +333,7 @@ class _Calibration:
                 name: Measured(float(amount / light.max()), float(amount / light.max() * sigma))
                 for name, amount, sigma in zip(names, light, noise, strict=True)
             },
-            float(chi2_distribution.sf(chi2, len(rows) - 1)),
+            float(chdtrc(len(rows) - 1, chi2)),
             names[int(np.argmax(np.abs(pulls)))],
         )
 

@@ -9,7 +9,7 @@ are standard normal, or smaller, and have no order.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from labrig.fit.excitation.parameters import Parameters, Rates, is_fitted
 from labrig.results import ChargingSeries, FloatArray
@@ -68,7 +68,7 @@ def law_test(
     ]
     power = float(np.square(pulls[of_lamp]).sum())
     count = columns.lacking.stop - columns.scale.start
-    return LawTest(max(trends, key=abs), float(chi2.sf(power, count)))
+    return LawTest(max(trends, key=abs), float(chdtrc(count, power)))
 
 
 def _trend(charging: ChargingSeries, pulls: FloatArray) -> float:

@@ -284,13 +284,13 @@ class _Model:
         by_shape = np.zeros((3, self.count, self.count, base.shape[2]))
         for number, led in enumerate(self.leds):
             for kind, sigma in enumerate(_shape_errors(led)):
+                if sigma == 0:
+                    continue
                 step = np.where(np.arange(3) == kind, SHAPE_STEP, 0.0)
                 ahead, behind = (
                     seen(_shaped(led, self.shapes[:, number] + sign * step))[0] for sign in (1, -1)
                 )
-                by_shape[kind, number, number] = (
-                    (ahead - behind) / (2 * SHAPE_STEP) if sigma > 0 else 0.0
-                )
+                by_shape[kind, number, number] = (ahead - behind) / (2 * SHAPE_STEP)
         by_curves = np.moveaxis(base[:, 1:], 1, 0)
         return base[:, 0], np.concatenate([*by_shape, by_curves])
 

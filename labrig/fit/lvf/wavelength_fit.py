@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtri
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
@@ -59,7 +59,7 @@ def fit_wavelengths(lines: LocatedLines, span: tuple[float, float]) -> Wavelengt
     sigma_nm = np.hypot(lines.sigma * nm_per_unit, FLOOR_NM)
     straight, _, straight_chi2 = _weighted(powers[:, :2], lines.wavelength_nm, sigma_nm, np.inf)
     bent, covariance, bent_chi2 = _weighted(powers, lines.wavelength_nm, sigma_nm, USUAL_BEND_NM)
-    order = 2 if straight_chi2 - bent_chi2 > chi2_distribution.isf(RARE, 1) else 1
+    order = 2 if straight_chi2 - bent_chi2 > chdtri(1, RARE) else 1
     if order == 1:
         coefficients = np.append(straight, 0.0)
         # What was not believed is an error that the straight map may have.

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig.analyse.excitation.analysis import USUAL
 from labrig.analyse.excitation.charge_intervals import charge_frames
@@ -29,6 +28,7 @@ from labrig.sim.lvf import Lvf
 from labrig.sim.phosphor import band_cells
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.calibration.test_camera_file import camera
+from tests.quick_yaml import read_quickly
 from tests.results.made import assert_read_back
 
 #: Wide, so that a slice of the strip is ten pixels; low, so that it is fast.
@@ -49,7 +49,7 @@ TILT = np.radians(1.0)
 
 def true_irradiance(width: int = WIDTH, height: int = HEIGHT) -> IrradianceFile:
     """What an irradiance run without error would find on the shipped rig with such a sensor."""
-    lvf_settings = yaml.safe_load(Path("config/sim-phosphor.yaml").read_text())["simulation"]["lvf"]
+    lvf_settings = read_quickly(Path("config/sim-phosphor.yaml").read_text())["simulation"]["lvf"]
     lvf = Lvf(LvfSettings.model_validate(lvf_settings))
     down = 0.42 * width / height * np.tan(TILT)
     strip = Strip(left=(0.08, 0.5 + down), right=(0.92, 0.5 - down), height=0.3, rising=False)

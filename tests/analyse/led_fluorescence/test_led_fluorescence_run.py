@@ -196,6 +196,7 @@ def _on_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:
 FEW = QUICK | {
     "leds": ["430 nm", "455 nm", "530 nm", "625 nm"],
     "patches": {"felt": QUICK["patches"]["felt"]},
+    "repeats": 1,
 }
 RELAYS = {"430 nm": 1, "455 nm": 2, "530 nm": 3, "625 nm": 4}
 
@@ -308,7 +309,7 @@ def test_a_method_is_refused_where_there_is_none_to_choose() -> None:
 
 def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Path) -> None:
     patches = {name: QUICK["patches"][name] for name in ("yellow", "felt")}
-    asked = FEW | {"lamps": ["halogen"], "patches": patches, "repeats": 1}
+    asked = FEW | {"lamps": ["halogen"], "patches": patches}
     run = record(tmp_path, asked)
     done = process_and_report(run)
     part, result = part_of(run), done.result
@@ -338,7 +339,7 @@ def test_a_lamp_that_does_not_light_is_left_out_and_the_leds_go_on(tmp_path: Pat
     def unplugged(rig: dict[str, Any]) -> None:
         rig["devices"]["illuminants"]["lamps"]["halogen"]["relay"] = 7
 
-    asked = FEW | {"lamps": ["halogen"], "repeats": 1}
+    asked = FEW | {"lamps": ["halogen"]}
     result = analyse(part_of(record(tmp_path, asked, unplugged)))
     assert result.leds == ("430 nm", "455 nm", "530 nm", "625 nm")
     assert _said(result, "halogen: left out, frames of the card are dark; the lamp did not light")

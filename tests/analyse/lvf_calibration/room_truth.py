@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 from scipy.interpolate import PchipInterpolator
 
 from labrig.fit.least_squares import FloatArray
@@ -14,6 +13,7 @@ from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.lvf import Lvf, pieces
 from labrig.sim.phosphor import band_cells
 from labrig.sim.simulation import Simulation
+from tests.quick_yaml import read_quickly
 
 FINE_NM = np.arange(383.0, 730.0, 0.05)
 
@@ -27,7 +27,7 @@ class TrueBands:
 
 
 def simulation_of(run: Path) -> Simulation:
-    rig = yaml.safe_load((run / "rig.yaml").read_text(encoding="utf-8"))
+    rig = read_quickly((run / "rig.yaml").read_text(encoding="utf-8"))
     return Simulation.model_validate(rig["simulation"])
 
 

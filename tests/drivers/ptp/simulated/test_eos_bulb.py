@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from labrig import resources
 from labrig.acquire import ExposureSettings
@@ -18,6 +17,7 @@ from labrig.reduce.dark import fit_dark
 from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera
 from tests.conftest import Ended
 from tests.drivers.ptp.simulated.wired import Picture, StoppingClock, Wired
+from tests.quick_yaml import read_quickly, write_quickly
 
 ADDRESS = "sim://room/camera"
 LONG, SHORT = ExposureSettings(64.0, 400, 4.0), ExposureSettings(0.5, 400, 4.0)
@@ -134,13 +134,13 @@ def test_a_slow_decay_in_exposures_of_64_s(
     tmp_path: Path,
 ) -> None:
     k_r_per_s = 0.004
-    sample = yaml.safe_load((resources.folder("config/materials") / "blue-paint.yaml").read_text())
+    sample = read_quickly((resources.folder("config/materials") / "blue-paint.yaml").read_text())
     sample["states"][0]["k_r_per_s"] = k_r_per_s
-    (tmp_path / "slow.yaml").write_text(yaml.safe_dump(sample))
+    (tmp_path / "slow.yaml").write_text(write_quickly(sample))
     rig = make_rig(sample=str(tmp_path / "slow.yaml"))
-    content = yaml.safe_load(rig.read_text())
+    content = read_quickly(rig.read_text())
     content["devices"]["camera"]["longest_exposure"] = "64 s"
-    rig.write_text(yaml.safe_dump(content))
+    rig.write_text(write_quickly(content))
     protocol = make_protocol(
         exposure="64 s", every="70 s", camera={"iso": 100, "f_number": 16}, **{"for": "12 min"}
     )
