@@ -113,6 +113,7 @@ CAMPAIGNS = {
         _module("emission_spectra", "3"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
         _module("rate_information"),
+        _module("veiling_glare"),
         _module("sao_charge_and_decay"),
         _module("lightlogger"),
         _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),

@@ -90,6 +90,16 @@ def _white_reference(printed: str) -> str:
     )
 
 
+def _glare(printed: str) -> str:
+    row = r"^glare [\d.]+%: of (\d+) samples (\d+) off by more than 2 σ, (\d+) with"
+    (samples, _), (clean_far, far), (clean_other, other) = columns(row, printed)
+    return (
+        f"at $g$ = 0.5 % the rates of {far:.0f} of the {samples:.0f} samples of `decay-eleven` were "
+        f"wrong by more than $2\\sigma$ and {other:.0f} had a wrong number of states, against "
+        f"{clean_far:.0f} and {clean_other:.0f} without glare"
+    )
+
+
 def _charge_console(printed: str) -> str:
     return printed[printed.index("columns  time t") :].rstrip()
 
@@ -210,6 +220,7 @@ QUOTES = (
     Quote(f"{EXPLANATION}/phosphorescence.md", "rate_information", _approached_span),
     Quote(f"{EXPLANATION}/linear_variable_filter.md", "lvf_in_the_room", _variable_filter),
     Quote(f"{EXPLANATION}/linear_variable_filter.md", "spectrum_through_lvf", _white_reference),
+    Quote(f"{EXPLANATION}/from_raw_to_linear.md", "veiling_glare", _glare),
     Quote(f"{EXPLANATION}/decay_fit.md", "reference_data", _certified),
     Quote(f"{DECISIONS}/0011-least-squares.md", "reference_data", _certified),
     Quote(f"{DECISIONS}/0011-least-squares.md", "least_squares_starts", _starts),

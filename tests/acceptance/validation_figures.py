@@ -301,7 +301,7 @@ FIGURES = (
     ),
     Figure(
         "Decay fit by itself, one to three states, flicker and dark level known or not, flicker "
-        "that the fit is not told of among them, 100 seeds in each case: fraction of the rates",
+        "that the fit does not allow for among them, 100 seeds in each case: fraction of the rates",
         "coverage_decay_fit",
         _decay_fit,
     ),
@@ -328,7 +328,7 @@ FIGURES = (
         _predicted,
     ),
     Figure(
-        "Same runs: chance that both states are told apart, where prediction and runs differ most",
+        "Same runs: probability that both states are resolved, where prediction and runs differ most",
         "predicted_sigmas",
         _told,
     ),
