@@ -113,6 +113,7 @@ CAMPAIGNS = {
         _module("emission_spectra", "3"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
         _module("rate_information"),
+        _module("manual_examples"),
         _module("veiling_glare"),
         _module("sao_charge_and_decay"),
         _module("lightlogger"),
@@ -129,7 +130,7 @@ CAMPAIGNS = {
         _module("lamp_off_however_it_ends"),
         _module("gphoto2_latency"),
         _module("least_squares_starts"),
-        _module("led_matrices"),
+        _module("led_matrices", "exact", "per-led", "reflecting", "calibrated"),
         *(
             _module(
                 "led_matrices", "exact", "--library", which, called=f"led_matrices_library_{which}"

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from tests.acceptance.printed import Extract, columns, part, span
+from tests.acceptance.printed import Extract, columns, match, part, span
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,25 @@ def _glare(printed: str) -> str:
     row = r"^glare [\d.]+%: of (\d+) samples (\d+) off by more than 2 σ, (\d+) with"
     (samples, _), (clean_far, far), (clean_other, other) = columns(row, printed)
     return (
-        f"at $g$ = 0.5 % the rates of {far:.0f} of the {samples:.0f} samples of `decay-eleven` were "
-        f"wrong by more than $2\\sigma$ and {other:.0f} had a wrong number of states, against "
+        f"at $g$ = 0.5 % the rates of {far:.0f} of the {samples:.0f} samples of `decay-eleven` "
+        f"were wrong by more than $2\\sigma$ and {other:.0f} had a wrong number of states, against "
         f"{clean_far:.0f} and {clean_other:.0f} without glare"
     )
+
+
+def _tutorial_rate(printed: str) -> str:
+    shown = match(r"^1 +([\d.]+\(\d+\)) ", printed)
+    value = match(r"k_r 1 (\S+ ± \S+) →", printed)
+    return f"`{shown}` is {value} per second"
+
+
+def _refitted(printed: str) -> str:
+    again = printed[printed.index("$ labrig process") :]
+    return "\n".join(match(row, again) for row in (r"^(state  k .*)$", r"^(1  .*)$"))
+
+
+def _changed(printed: str) -> str:
+    return match(r"^  (k_r 1 .*? σ\); a 1 .*? σ\));", printed)
 
 
 def _charge_console(printed: str) -> str:
@@ -226,6 +241,9 @@ QUOTES = (
     Quote(f"{DECISIONS}/0011-least-squares.md", "least_squares_starts", _starts),
     Quote(f"{DECISIONS}/0006-own-ptp.md", "gphoto2_latency", _release),
     Quote(f"{DECISIONS}/0010-guard.md", "lamp_off_however_it_ends", _lamp_off),
+    Quote("docs/tutorial.md", "manual_examples", _tutorial_rate),
+    Quote(f"{HOW_TO}/refit.md", "manual_examples", _refitted),
+    Quote(f"{HOW_TO}/refit.md", "manual_examples", _changed),
     Quote(f"{HOW_TO}/fit_a_table.md", "sao_charge_and_decay", _charge_console),
     Quote(FLUORESCENT, "led_matrices", _leds_exact),
     Quote(FLUORESCENT, "led_matrices", _leds_calibrated),

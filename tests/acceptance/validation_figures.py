@@ -328,7 +328,8 @@ FIGURES = (
         _predicted,
     ),
     Figure(
-        "Same runs: probability that both states are resolved, where prediction and runs differ most",
+        "Same runs: probability that both states are resolved, where prediction and runs differ "
+        "most",
         "predicted_sigmas",
         _told,
     ),
