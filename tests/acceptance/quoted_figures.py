@@ -150,9 +150,10 @@ def _starts(printed: str) -> str:
     row = r"^all +(\d+) +(\d+) +(\d+) +\d+/(\d+) +(\d+) +(\d+) "
     ((better,), (equal,), (worse,), (count,), (no_minimum,), (local,)) = columns(row, printed)
     return (
-        f"On {count:.0f} generated problems from far and rank-deficient starts the core is better "
-        f"than `trf` in {better:.0f}, equal in {equal:.0f} and worse in {worse:.0f}; of those "
-        f"that are called a minimum {no_minimum:.0f} are none, and {local:.0f} are local ones"
+        f"On {count:.0f} problems, classical, NIST's and generated, from far and rank-deficient "
+        f"starts the core is better than `trf` in {better:.0f}, equal in {equal:.0f} and worse in "
+        f"{worse:.0f}; of the ends that it calls a minimum {no_minimum:.0f} are none and "
+        f"{local:.0f} are local ones"
     )
 
 
@@ -209,6 +210,16 @@ def _leds_otherwise(printed: str) -> str:
     )
 
 
+def _led_bench(printed: str) -> str:
+    medians, highs = (
+        columns(rf"^ *{percent} % +([\d.]+) +([\d.]+) ", printed) for percent in (50, 90)
+    )
+    (d65,), (a,) = medians
+    (high_d65,), (high_a,) = highs
+    rms = match(r"^errors over σ of .* rms ([\d.]+),", printed)
+    return f"{d65:.2f} and {a:.2f} (90 %: {high_d65:.2f} and {high_a:.2f}; errors over σ {rms} rms)"
+
+
 def _emissions(library: str) -> Extract:
     """Return the row of a library of emissions."""
 
@@ -249,6 +260,8 @@ QUOTES = (
     Quote(FLUORESCENT, "led_matrices", _leds_calibrated),
     Quote(FLUORESCENT, "led_matrices", _leds_otherwise),
     Quote(FLUORESCENT, "led_matrices", _emissions("none")),
+    Quote(FLUORESCENT, "led_bench_calibrated", _led_bench),
+    Quote(FLUORESCENT, "led_bench", _led_bench),
     Quote(FLUORESCENT, "led_matrices_library_others", _emissions("the other 43")),
     Quote(FLUORESCENT, "led_matrices_library_own", _emissions("all 44")),
     Quote(
