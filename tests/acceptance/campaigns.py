@@ -82,6 +82,13 @@ def _module(name: str, *arguments: str, called: str = "") -> Campaign:
     return Campaign(called or name, (f"tests.acceptance.{name}", *arguments))
 
 
+#: How `mixture_colours` scales its mixtures: words of the output's name, and arguments.
+MIXTURE_SCALES = {
+    ("integral",): ("--scale", "integral"),
+    ("colour",): ("--scale", "colour"),
+    ("integral", "skewed"): ("--scale", "integral", "--skewed"),
+    ("colour", "skewed"): ("--scale", "colour", "--skewed"),
+}
 CAMPAIGNS = {
     campaign.name: campaign
     for campaign in (
@@ -105,6 +112,9 @@ CAMPAIGNS = {
         _module("spectrum_through_lvf", "40"),
         _module("emission_spectra", "3"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
+        _module("rate_information"),
+        _module("manual_examples"),
+        _module("veiling_glare"),
         _module("sao_charge_and_decay"),
         _module("lightlogger"),
         _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),
@@ -119,6 +129,20 @@ CAMPAIGNS = {
         _module("suspended", "--trials", "20"),
         _module("lamp_off_however_it_ends"),
         _module("gphoto2_latency"),
+        _module("least_squares_starts"),
+        _module("led_matrices", "exact", "per-led", "reflecting", "calibrated"),
+        *(
+            _module(
+                "led_matrices", "exact", "--library", which, called=f"led_matrices_library_{which}"
+            )
+            for which in ("others", "own", "wrong")
+        ),
+        _module("led_fluorescence_bench", "--calibrated", called="led_bench_calibrated"),
+        _module("led_fluorescence_bench", called="led_bench"),
+        *(
+            _module("mixture_colours", *arguments, called="_".join(("mixture_colours", *words)))
+            for words, arguments in MIXTURE_SCALES.items()
+        ),
         Campaign(
             "benchmarks",
             ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),

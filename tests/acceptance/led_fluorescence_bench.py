@@ -1,8 +1,8 @@
 """All measured re-radiating matrices as samples on the simulated bench with LEDs, in one capture.
 
-    python -m tests.acceptance.led_fluorescence_bench FOLDER [--seed N] [--calibrated]
+    python -m tests.acceptance.led_fluorescence_bench [FOLDER] [--seed N] [--calibrated]
         [--lamps daylight halogen] [--width 702]
-    python -m tests.acceptance.led_fluorescence_bench FOLDER --patches 100
+    python -m tests.acceptance.led_fluorescence_bench [FOLDER] --patches 100
 
 The bench is `sim-fluorescent`: lopsided LEDs that droop and are not where the rig file says, and
 a camera whose curves are bent. From seed 2 on, other LEDs are drawn: peaks off by 1 nm rms as of
@@ -12,7 +12,8 @@ file's data-sheet values count. With --lamps, photographs under these broadband 
 estimate. ΔE2000 of the estimated matrix, of the thesis's method and of the sample without
 fluorescence, against the matrix in the room; errors of colours over their σ.
 
-The matrix in the room has no anti-Stokes side, where an instrument finds its noise only.
+FOLDER keeps the runs. The matrix in the room has no anti-Stokes side, where an instrument finds its
+noise only.
 
 With --patches, as many samples lie in one capture, each matrix again where there are more of them,
 and the time that the estimates take is printed, in all and for one patch: processor time, and the
@@ -21,6 +22,7 @@ wall's, which is longer where other programs run.
 
 import argparse
 import math
+import tempfile
 import time
 from collections.abc import Iterable
 from dataclasses import replace
@@ -52,15 +54,21 @@ CENTRE_NM, WIDTH, ASYMMETRY = 1.0, 0.1, 0.15
 
 
 def main() -> None:
-    """Record, process, compare, print."""
+    """Measure in the folder that is asked for, or in one that does not stay."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--calibrated", action="store_true")
     parser.add_argument("--patches", type=int)
     parser.add_argument("--lamps", nargs="*", default=[])
     parser.add_argument("--width", type=int, default=1404)
     asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        measure(asked, asked.folder or Path(scratch))
+
+
+def measure(asked: argparse.Namespace, folder: Path) -> None:
+    """Record and process in a folder, compare, print."""
     files = [
         path
         for path in matrix_files(FOLDER)
@@ -78,14 +86,14 @@ def main() -> None:
     ]
     if asked.seed > 1:
         _draw_leds(rig["simulation"]["leds"], np.random.default_rng(asked.seed))
-    asked.folder.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     if asked.calibrated:
-        run = _recorded(asked.folder, rig, {"protocol": "led_brightness"})
+        run = _recorded(folder, rig, {"protocol": "led_brightness"})
         process_run(run)
         rig["optics"]["leds"] = str(run.resolve())
     patches = {name: _inside(region) for name, region in regions.items()}
     protocol = {"protocol": "led_fluorescence", "patches": patches, "lamps": asked.lamps}
-    run = _recorded(asked.folder, rig, protocol)
+    run = _recorded(folder, rig, protocol)
     start_s, start_cpu_s = time.perf_counter(), time.process_time()
     result = analyse(part_of(run))
     wall_s, cpu_s = time.perf_counter() - start_s, time.process_time() - start_cpu_s

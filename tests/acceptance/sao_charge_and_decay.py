@@ -11,15 +11,19 @@ The charging curve of this phosphor is convex for its first minute and a half. U
 every state of the rate equation approaches its equilibrium ever more slowly, and so does any sum of
 them: no number of states can follow that. States of general order can; they are fitted by
 `fit_charge_and_decay`, with the share η of carriers that recombine at once where their trap is
-filled held at 0, at 1, or free.
+filled held at 0, at 1, or free;
+last, what `labrig fit charge` prints of the table.
 """
 
+import io
+from contextlib import redirect_stdout
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.cli.exit_codes import guarded
 from labrig.fit import ChargeFit, LeastSquaresFit, fit_charge_and_decay, least_squares
 from labrig.material.rates import concentration, phi1
 
@@ -131,7 +135,9 @@ def main() -> None:
             parts = f"{candidate.chi2_charge:8.2f}{candidate.chi2_decay:8.2f}"
             print(f"{name:<7}{candidate.label:<29}{parts}")
     print()
-    print(fits["1"])
+    with redirect_stdout(io.StringIO()) as shown:
+        guarded(["fit", "charge", str(TABLE), "--on", f"{ON_S:g}", "--off", f"{OFF_S:g}"])
+    print(shown.getvalue().strip())
 
 
 if __name__ == "__main__":

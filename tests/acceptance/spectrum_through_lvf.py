@@ -6,8 +6,9 @@ Two tables. How often the truth lies in the credible band of every 10 nm, over a
 those above 2 % of the peak, for lights of three kinds, seen with the curves that the fit has or
 with those of another laboratory. And CIEDE2000 of the ColorChecker under a halogen lamp for the 2°
 observer of 1931, all patches scaled by one factor that makes white's Y right; white is the lamp
-itself, or the lamp as measured through the filter, too, by which a person who took a picture of a
-grey card would divide.
+itself, or the lamp as measured through the filter, too. With another laboratory's curves the fit
+allows for their errors and has a picture of a grey card under the lamp, as `emission_spectrum` by
+default; or it has no such picture (`white: false`); or it takes the curves for exact.
 """
 
 import sys
@@ -16,6 +17,7 @@ from collections.abc import Sequence
 import colour
 import numpy as np
 
+from labrig.analyse.emission_spectrum.forward_model import conditioned_on_white
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import (
     CurveError,
@@ -23,7 +25,7 @@ from labrig.fit.spectrum import (
     fit_spectrum,
     system_through_lvf,
 )
-from labrig.optics import CameraResponse, Lvf, Spectrum
+from labrig.optics import CameraResponse, Lvf, Spectrum, signal_through
 from labrig.optics.piecewise import band_means
 from tests.fit import lvf_pictures as made
 
@@ -89,12 +91,20 @@ def main(count: int) -> None:
     lvf, ours, theirs = made.curved_lvf(), made.of_the_house(), made.of_another_laboratory()
     exact = system_through_lvf(lvf, ours, made.KNOTS_NM)
     unsure = system_through_lvf(lvf, ours, made.KNOTS_NM, CurveError())
+    lamp = made.halogen_lamp()
+    card = made.photographed(lamp, lvf, theirs, np.random.default_rng(1))
+    expected = signal_through(lvf, ours, lamp).ravel()
+    default = conditioned_on_white(unsure, card.value, card.sigma, lamp, expected)
     kinds = {
         "fluorophores": made.fluorophores(count),
         "LEDs": made.narrow_leds(count),
         "mercury lines": [made.mercury_lamp(np.random.default_rng(k)) for k in range(count)],
     }
-    cases = [("same curves", ours, exact), ("another laboratory's", theirs, unsure)]
+    cases = [
+        ("same curves", ours, exact),
+        ("another's, grey card", theirs, default),
+        ("another's, no card", theirs, unsure),
+    ]
     print(f"{'light':15s}{'camera':22s}{'68 %':>7s}{'95 %':>7s}   bright: 68 %   95 %")
     for kind, lights in kinds.items():
         for name, camera, system in cases:

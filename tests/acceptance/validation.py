@@ -2,8 +2,10 @@
 
     python -m tests.acceptance.validation run NAME ...
     python -m tests.acceptance.validation table
+    python -m tests.acceptance.validation quotes
 
-`run` keeps in `outputs/` what campaigns print; `table` makes `docs/validation.md` of what is kept.
+`run` keeps in `outputs/` what campaigns print; `table` makes `docs/validation.md` of what is kept;
+`quotes` prints what other pages should say of it and do not.
 """
 
 import sys
@@ -11,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from tests.acceptance.campaigns import CAMPAIGNS, ROOT, Campaign, Output
+from tests.acceptance.quoted_figures import QUOTES, Quote
 from tests.acceptance.validation_figures import FIGURES
 
 TEMPLATE = Path(__file__).with_name("validation.md")
@@ -47,6 +50,8 @@ def _missing(campaigns: Iterable[Campaign]) -> Iterator[str]:
         for figure in FIGURES:
             if figure.campaign == campaign.name:
                 yield f"  - {figure.what}"
+        for quoting in sorted({quote.page for quote in QUOTES if quote.campaign == campaign.name}):
+            yield f"  - Figures of [](/{quoting.removeprefix('docs/')})"
         yield ""
 
 
@@ -60,6 +65,19 @@ def _anchor(name: str) -> str:
     return f"output-{name.replace('_', '-')}"
 
 
+def says(quote: Quote, output: Output) -> bool:
+    """Whether a page says what the campaign printed."""
+    text = (ROOT / quote.page).read_text(encoding="utf-8")
+    return " ".join(quote.text(output.printed).split()) in " ".join(text.split())
+
+
+def _print_quotes() -> None:
+    for quote in QUOTES:
+        output = CAMPAIGNS[quote.campaign].kept
+        if output is not None and not says(quote, output):
+            print(f"{quote.page}, {quote.campaign}:\n{quote.text(output.printed)}\n")
+
+
 def main(arguments: list[str]) -> None:
     """Run campaigns, or write the page."""
     match arguments:
@@ -68,6 +86,8 @@ def main(arguments: list[str]) -> None:
                 print(f"{name}: exit status {CAMPAIGNS[name].run()}", flush=True)
         case ["table"]:
             PAGE.write_text(page(), encoding="utf-8")
+        case ["quotes"]:
+            _print_quotes()
         case _:
             print(__doc__, "Campaigns:", *CAMPAIGNS, sep="\n")
             sys.exit(2)

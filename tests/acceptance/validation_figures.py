@@ -1,10 +1,9 @@
 """Figures that say how good labrig is, and how each is found in what its campaign printed."""
 
 import re
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-Extract = Callable[[str], str]
+from tests.acceptance.printed import Extract, columns, furthest, match, part, span
 
 
 @dataclass(frozen=True)
@@ -24,36 +23,6 @@ class Figure:
     extract: Extract
 
 
-def _match(pattern: str, printed: str) -> str:
-    found = re.search(pattern, printed, re.M)
-    if found is None:
-        raise ValueError(f"not in the output: {pattern}")
-    return found[1]
-
-
-def _columns(pattern: str, printed: str) -> list[tuple[float, ...]]:
-    """Groups of all matches as numbers, column by column."""
-    rows = [tuple(map(float, match.groups())) for match in re.finditer(pattern, printed, re.M)]
-    if not rows:
-        raise ValueError(f"not in the output: {pattern}")
-    return list(zip(*rows, strict=True))
-
-
-def _part(printed: str, begin: str) -> str:
-    """Return the lines from the one that begins so to the next empty one."""
-    return _match(rf"(^{re.escape(begin)}(?:.|\n)*?)(?:\n\n|\Z)", printed)
-
-
-def _span(values: Iterable[float], digits: int = 0) -> str:
-    known = sorted(values)
-    low, high = (f"{value:.{digits}f}" for value in (known[0], known[-1]))
-    return low if low == high else f"{low} to {high}"
-
-
-def _furthest(values: Iterable[float]) -> float:
-    return max(map(abs, values))
-
-
 #: Of the pipeline's rows: within 1 σ, within 2 σ, bias in σ, scatter over the Cramér-Rao bound.
 _RATE = (
     r"^\S+ +[\d.]+ +\d+ +([\d.]+) ± [\d.]+ +([\d.]+) ± [\d.]+ +([+-][\d.]+) ± [\d.]+"
@@ -63,125 +32,125 @@ _RATE = (
 
 def _coverage(scenario: str) -> Extract:
     def extract(printed: str) -> str:
-        one, two, bias, _ = _columns(_RATE, _part(printed, scenario))
+        one, two, bias, _ = columns(_RATE, part(printed, scenario))
         return (
-            f"{_span(one)} % within 1 σ, {_span(two)} % within 2 σ, "
-            f"bias at most {_furthest(bias):.2f} σ"
+            f"{span(one)} % within 1 σ, {span(two)} % within 2 σ, "
+            f"bias at most {furthest(bias):.2f} σ"
         )
 
     return extract
 
 
 def _efficiency(printed: str) -> str:
-    *_, of_bound = _columns(_RATE, _part(printed, "baseline"))
-    return f"{_span(of_bound, 2)} ×"
+    *_, of_bound = columns(_RATE, part(printed, "baseline"))
+    return f"{span(of_bound, 2)} ×"
 
 
 def _wrong_states(printed: str) -> str:
-    ((seeds,),) = _columns(r"^baseline.*: (\d+) seeds", printed)
-    part = _part(printed, "baseline")
-    wrong = {name: int(n) for name, n in re.findall(r"^([a-z-]+) +[\d.]+ +(\d+) ", part, re.M)}
+    ((seeds,),) = columns(r"^baseline.*: (\d+) seeds", printed)
+    rows = part(printed, "baseline")
+    wrong = {name: int(n) for name, n in re.findall(r"^([a-z-]+) +[\d.]+ +(\d+) ", rows, re.M)}
     return f"{sum(wrong.values())} of {seeds * len(wrong):.0f} fits"
 
 
 def _decay_fit(printed: str) -> str:
-    one, two = _columns(r"within σ (\d+) %, 2σ (\d+) %", printed)
-    return f"{_span(one)} % within 1 σ, {_span(two)} % within 2 σ"
+    one, two = columns(r"within σ (\d+) %, 2σ (\d+) %", printed)
+    return f"{span(one)} % within 1 σ, {span(two)} % within 2 σ"
 
 
 def _power_laws(printed: str) -> str:
-    (flagged,) = _columns(r"^power law .*power law ([\d.]+) %", printed)
-    return f"{_span(flagged)} %"
+    (flagged,) = columns(r"^power law .*power law ([\d.]+) %", printed)
+    return f"{span(flagged)} %"
 
 
 def _certified(printed: str) -> str:
-    first, second = _columns(r"^\w+ +([\d.]+) +([\d.]+)$", _part(printed, "NIST set"))
-    return f"{_span([*first, *second])} digits"
+    first, second = columns(r"^\w+ +([\d.]+) +([\d.]+)$", part(printed, "NIST set"))
+    return f"{span([*first, *second])} digits"
 
 
 def _predicted(printed: str) -> str:
-    (ratio, _) = _columns(r"× ([\d.]+) +\S+ × ([\d.]+)", printed)
-    return f"{_span(ratio, 2)} × in {len(ratio)} rates"
+    (ratio, _) = columns(r"× ([\d.]+) +\S+ × ([\d.]+)", printed)
+    return f"{span(ratio, 2)} × in {len(ratio)} rates"
 
 
 def _told(printed: str) -> str:
-    predicted, found = _columns(r" k1 .* (\d+) % +(\d+) %$", printed)
+    predicted, found = columns(r" k1 .* (\d+) % +(\d+) %$", printed)
     far = max(zip(predicted, found, strict=True), key=lambda pair: abs(pair[0] - pair[1]))
     return f"{far[0]:.0f} % predicted, {far[1]:.0f} % found"
 
 
 def _excitation(printed: str) -> str:
-    in_sigma, percent = _columns(r"^[a-z]+ .* ([\d.]+) +([\d.]+)$", _part(printed, "material"))
+    in_sigma, percent = columns(r"^[a-z]+ .* ([\d.]+) +([\d.]+)$", part(printed, "material"))
     return f"k_e within {max(percent):.1f} %, all within {max(in_sigma):.1f} σ"
 
 
 def _excitation_sigma(printed: str) -> str:
     said = []
     for name in ("k_r", "Λ", "k_e"):
-        (rms,) = _columns(rf"^state \d  {name}[ \d]* ([\d.]+) +[+-]", printed)
-        said.append(f"{name} {_span(rms, 2)}")
+        (rms,) = columns(rf"^state \d  {name}[ \d]* ([\d.]+) +[+-]", printed)
+        said.append(f"{name} {span(rms, 2)}")
     return ", ".join(said)
 
 
 def _phosphor(printed: str) -> str:
-    k_r, r0, percent, k_e, radiated = _columns(
+    k_r, r0, percent, k_e, radiated = columns(
         r"k_r +(\S+) σ +r\(0\) .*? ([+-][\d.]+) σ +k_e +(\S+) % +(\S+) σ .* Λ +(\S+) σ", printed
     )
     return (
-        f"k_e of bands ≥ 0.002 /s within {_furthest(percent):.1f} % and {_furthest(k_e):.1f} σ, "
-        f"k_r within {_furthest(k_r):.1f} σ, Λ within {_furthest(radiated):.1f} σ, "
-        f"r(0) within {_furthest(r0):.1f} σ"
+        f"k_e of bands ≥ 0.002 /s within {furthest(percent):.1f} % and {furthest(k_e):.1f} σ, "
+        f"k_r within {furthest(k_r):.1f} σ, Λ within {furthest(radiated):.1f} σ, "
+        f"r(0) within {furthest(r0):.1f} σ"
     )
 
 
 def _phosphor_sigma(printed: str) -> str:
     names = {"k_r": "k_r", "r0_off": "r(0)", "k_e": "k_e", "radiated": "Λ"}
-    rms = {name: _match(rf" {name} ([\d.]+) σ", printed) for name in names}
+    rms = {name: match(rf" {name} ([\d.]+) σ", printed) for name in names}
     return ", ".join(f"{names[name]} {value}" for name, value in rms.items())
 
 
 def _variable_filter(printed: str) -> str:
-    (centre,) = _columns(r"^ +centre / nm +[\d.]+ +([\d.]+)", printed)
-    (width,) = _columns(r"^ +width / 1 +[\d.]+ +([\d.]+)", printed)
+    (centre,) = columns(r"^ +centre / nm +[\d.]+ +([\d.]+)", printed)
+    (width,) = columns(r"^ +width / 1 +[\d.]+ +([\d.]+)", printed)
     return f"centres within {max(centre):.3f} nm, widths within {100 * max(width):.1f} %"
 
 
 def _variable_filter_sigma(printed: str) -> str:
     said = []
     for name in ("centre / nm", "width / 1"):
-        (rms,) = _columns(rf"^ +{name} +[\d.]+ +[\d.]+ +[\d.]+ +([\d.]+)", printed)
-        said.append(f"{name.split()[0]} {_span(rms, 2)}")
+        (rms,) = columns(rf"^ +{name} +[\d.]+ +[\d.]+ +[\d.]+ +([\d.]+)", printed)
+        said.append(f"{name.split()[0]} {span(rms, 2)}")
     return ", ".join(said)
 
 
 def _irradiance(printed: str) -> str:
-    (off,) = _columns(r"^ +irradiance / 1 +[\d.]+ +([\d.]+)", printed)
+    (off,) = columns(r"^ +irradiance / 1 +[\d.]+ +([\d.]+)", printed)
     return f"{100 * max(off):.1f} %"
 
 
 def _colours(camera: str) -> Extract:
     def extract(printed: str) -> str:
-        row = rf"^{camera} +the lamp  +([\d.]+) +([\d.]+)"
-        mean, percentile = _columns(row, printed)
-        return f"{mean[0]:.2f}, {percentile[0]:.2f}"
+        row = rf"^{camera} +the lamp  +([\d.]+) +([\d.]+) +([\d.]+)"
+        mean, percentile, largest = columns(row, printed)
+        return f"mean {mean[0]:.2f}, 95 % {percentile[0]:.2f}, largest {largest[0]:.2f}"
 
     return extract
 
 
-def _spectrum_bands(kind: str) -> Extract:
+def _spectrum_bands(kind: str, camera: str) -> Extract:
     def extract(printed: str) -> str:
-        row = rf"^{kind} +same curves .* ([\d.]+)% +([\d.]+)%$"
-        one, two = _columns(row, printed)
+        row = rf"^{kind} +{camera} .* ([\d.]+)% +([\d.]+)%$"
+        one, two = columns(row, printed)
         return f"{one[0]:.0f} %, {two[0]:.0f} %"
 
     return extract
 
 
 def _emission(printed: str) -> str:
-    furthest, one, two = _columns(r"^\S+ +yes +[\d.]+ +([\d.]+) +(\d+)% +(\d+)%", printed)
+    furthest, one, two = columns(r"^\S+ +yes +[\d.]+ +([\d.]+) +(\d+)% +(\d+)%", printed)
     return (
         f"within {100 * max(furthest):.1f} % of the peak; "
-        f"{_span(one)} % within 1 σ, {_span(two)} % within 2 σ"
+        f"{span(one)} % within 1 σ, {span(two)} % within 2 σ"
     )
 
 
@@ -189,46 +158,47 @@ def _decays(printed: str) -> str:
     pulls = [float(pull) for pull in re.findall(r"\(([+-][\d.]+) σ\)", printed)]
     wrong = len(re.findall("WRONG n|NOT FLAGGED", printed))
     return (
-        f"{len(pulls)} rates within {_furthest(pulls):.1f} σ; "
+        f"{len(pulls)} rates within {furthest(pulls):.1f} σ; "
         f"{wrong} times a wrong number of states or a power law that is not flagged"
     )
 
 
 def _real_charge(printed: str) -> str:
-    rows = _columns(r"^ +(\d) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+)$", printed)
+    rows = columns(r"^ +(\d) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+)$", printed)
     two = [column[1] for column in rows]
     return f"{two[2]:.0f} %, {two[3]:.0f} %, {two[4]:.0f} %, {two[5]:.0f} %"
 
 
 def _real_charge_of_general_order(printed: str) -> str:
-    ((charge,), (decay,)) = _columns(r"^1 +2 states of general order +([\d.]+) +([\d.]+)$", printed)
+    row = r"^reduced χ² +charge ([\d.]+) .*decay ([\d.]+) "
+    ((charge,), (decay,)) = columns(row, printed)
     return f"{charge:.1f}, {decay:.1f}"
 
 
 def _narrow_lights(printed: str) -> str:
-    thirds = _columns(r"^every third.* ([\d.]+) +([\d.]+) +([\d.]+) +[\d.]+ +([\d.]+)$", printed)
+    thirds = columns(r"^every third.* ([\d.]+) +([\d.]+) +([\d.]+) +[\d.]+ +([\d.]+)$", printed)
     (low,), (median,), (high,), (worst,) = thirds
     return f"median {median:.1f} nm, quartiles {low:.1f} nm and {high:.1f} nm, worst {worst:.1f} nm"
 
 
 def _narrow_lights_halved(printed: str) -> str:
-    median = _match(r"^every second.* ([\d.]+) +[\d.]+ +[\d.]+ +[\d.]+$", printed)
+    median = match(r"^every second.* ([\d.]+) +[\d.]+ +[\d.]+ +[\d.]+$", printed)
     return f"median {median} nm"
 
 
 def _wrong(printed: str) -> str:
-    wrong = _match(r"^(\d+ of \d+) went wrong", printed)
+    wrong = match(r"^(\d+ of \d+) went wrong", printed)
     return f"{wrong} trials wrong"
 
 
 def _kills(printed: str) -> str:
-    *killed, wrong = _columns(r"outside (\d+), writing (\d+), result (\d+) .* (\d+)$", printed)
+    *killed, wrong = columns(r"outside (\d+), writing (\d+), result (\d+) .* (\d+)$", printed)
     kills = sum(map(sum, killed))
     return f"{kills:.0f} kills in {len(wrong)} protocols, {sum(wrong):.0f} wrong"
 
 
 def _disk(printed: str) -> str:
-    failures, frames, wrong = _columns(r"^(?:run|result), \w+ +(\d+) +(\d+) +\d+ +(\d+) ", printed)
+    failures, frames, wrong = columns(r"^(?:run|result), \w+ +(\d+) +(\d+) +\d+ +(\d+) ", printed)
     return (
         f"{sum(wrong):.0f} of {sum(failures):.0f} wrong (run not usable, an acknowledged frame of "
         f"{sum(frames):.0f} lost, more than one unit done again)"
@@ -236,13 +206,13 @@ def _disk(printed: str) -> str:
 
 
 def _refused(printed: str) -> str:
-    (longest_s,) = _columns(r" ([\d.]+) s  ", printed)
-    wrong = _match(r"^(\d+ of \d+) went wrong", printed)
+    (longest_s,) = columns(r" ([\d.]+) s  ", printed)
+    wrong = match(r"^(\d+ of \d+) went wrong", printed)
     return f"{wrong} wrong; longest refusal {max(longest_s):.1f} s"
 
 
 def _containers(printed: str) -> str:
-    cases, failures = _columns(r"^.+? +(\d+) cases, (\d+) failures", printed)
+    cases, failures = columns(r"^.+? +(\d+) cases, (\d+) failures", printed)
     return f"{sum(failures):.0f} failures in {sum(cases):.0f} containers, {len(cases)} ways"
 
 
@@ -250,7 +220,7 @@ def _off_after(ways: str) -> Extract:
     """The longest of the ways to end that match."""
 
     def extract(printed: str) -> str:
-        times = _columns(rf"^(?:{ways}) +\d+ +[\d.]+ +([\d.]+|inf) +\d+$", printed)
+        times = columns(rf"^(?:{ways}) +\d+ +[\d.]+ +([\d.]+|inf) +\d+$", printed)
         return f"at most {max(times[0]):.1f} s"
 
     return extract
@@ -259,17 +229,17 @@ def _off_after(ways: str) -> Extract:
 def _latency(printed: str) -> str:
     said = []
     for name in ("ptp_camera", "gphoto2, remote button", "gphoto2, trigger_capture"):
-        (median,) = _columns(rf"^{name} +[AM]F +([\d.]+)", printed)
-        said.append(f"{name} {_span(median, 1)} ms")
+        (median,) = columns(rf"^{name} +[AM]F +([\d.]+)", printed)
+        said.append(f"{name} {span(median, 1)} ms")
     return "; ".join(said)
 
 
 def _times(what: str, *peers: str) -> Extract:
     def extract(printed: str) -> str:
         row = r"^{} +(\d\S* \S+) \(.*?\) +{} +(\d\S* \S+) \("
-        ours = _match(row.format(re.escape(what), ".*?"), printed)
+        ours = match(row.format(re.escape(what), ".*?"), printed)
         theirs = [
-            _match(row.format(re.escape(what), re.escape(peer)).replace("(", "(?:", 1), printed)
+            match(row.format(re.escape(what), re.escape(peer)).replace("(", "(?:", 1), printed)
             for peer in peers
         ]
         said = (f"{peer} {time}" for peer, time in zip(peers, theirs, strict=True))
@@ -327,11 +297,11 @@ FIGURES = (
     Figure(
         "A sample whose glow falls by a power law, 60 seeds: fits that say so",
         "coverage_pipeline_other_scenarios",
-        lambda printed: _match(r"flagged as such (\d+ of \d+)", printed),
+        lambda printed: match(r"flagged as such (\d+ of \d+)", printed),
     ),
     Figure(
         "Decay fit by itself, one to three states, flicker and dark level known or not, flicker "
-        "that the fit is not told of among them, 100 seeds in each case: fraction of the rates",
+        "that the fit does not allow for among them, 100 seeds in each case: fraction of the rates",
         "coverage_decay_fit",
         _decay_fit,
     ),
@@ -349,7 +319,7 @@ FIGURES = (
     Figure(
         "Mercury lines of a real germicidal lamp: rms of four wavelengths about a straight line",
         "reference_data",
-        lambda printed: _match(r"^visible +\d+ +([\d.]+)$", printed) + " nm",
+        lambda printed: match(r"^visible +\d+ +([\d.]+)$", printed) + " nm",
     ),
     Figure(
         "Scatter of fitted rates over the σ that `labrig plan --predict` states, materials of two "
@@ -358,7 +328,8 @@ FIGURES = (
         _predicted,
     ),
     Figure(
-        "Same runs: chance that both states are told apart, where prediction and runs differ most",
+        "Same runs: probability that both states are resolved, where prediction and runs differ "
+        "most",
         "predicted_sigmas",
         _told,
     ),
@@ -407,31 +378,48 @@ FIGURES = (
         _irradiance,
     ),
     Figure(
-        "ColorChecker under a halogen lamp through a variable filter, camera curves known: mean "
-        "and 95th percentile of the 24 colour differences ΔE2000",
+        "ColorChecker under a halogen lamp through a variable filter, another laboratory's curves "
+        "of the camera, their uncertainty and a picture of a grey card taken into account as "
+        "`emission_spectrum` does by default: ΔE2000 of the 24 patches",
         "spectrum_through_lvf",
-        _colours("same curves"),
+        _colours("another's, grey card"),
     ),
     Figure(
-        "The same with another laboratory's curves of the camera, taken for exact",
+        "The same without the picture of the grey card (`white: false`)",
+        "spectrum_through_lvf",
+        _colours("another's, no card"),
+    ),
+    Figure(
+        "The same with the other laboratory's curves taken for exact",
         "spectrum_through_lvf",
         _colours("another's, taken for exact"),
     ),
     Figure(
-        "The same with another laboratory's curves of the camera, their uncertainty allowed for",
+        "The same with the camera's true curves",
         "spectrum_through_lvf",
-        _colours("another laboratory's"),
+        _colours("same curves"),
     ),
     Figure(
-        "Emission of 40 fluorophores through a variable filter, camera curves known: fraction of "
+        "Emission of 40 fluorophores through a variable filter, camera's true curves: fraction of "
         "the bands above 2 % of the peak within their credible bands of 68 % and 95 %",
         "spectrum_through_lvf",
-        _spectrum_bands("fluorophores"),
+        _spectrum_bands("fluorophores", "same curves"),
     ),
     Figure(
-        "The same for 40 mercury lamps, whose lines are narrower than the filter's pass band",
+        "The same with another laboratory's curves and the picture of a grey card",
         "spectrum_through_lvf",
-        _spectrum_bands("mercury lines"),
+        _spectrum_bands("fluorophores", "another's, grey card"),
+    ),
+    Figure(
+        "The same without the picture of the grey card",
+        "spectrum_through_lvf",
+        _spectrum_bands("fluorophores", "another's, no card"),
+    ),
+    Figure(
+        "The same for 40 mercury lamps, whose lines are narrower than the filter's pass band, "
+        "camera's true curves",
+        "spectrum_through_lvf",
+        _spectrum_bands("mercury lines", "same curves"),
     ),
     Figure(
         "Emission spectra of five paints in the simulated room, camera curves as far off as "
@@ -456,7 +444,7 @@ FIGURES = (
     Figure(
         "Every third held out: rms of error over σ (1 if σ is right)",
         "lightlogger",
-        lambda printed: _match(r"rms of error over σ ([\d.]+)$", printed),
+        lambda printed: match(r"rms of error over σ ([\d.]+)$", printed),
     ),
     Figure(
         "Charge and decay of a real SrAl2O4:Eu,Dy, two states: rms of misfit over glow in the "
@@ -465,8 +453,8 @@ FIGURES = (
         _real_charge,
     ),
     Figure(
-        "The same, two states of general order, the charge's energy conserved: χ² per reading in "
-        "the charge, in the decay",
+        "The same by `labrig fit charge`, two states of general order: χ² per reading in the "
+        "charge, in the decay",
         "sao_charge_and_decay",
         _real_charge_of_general_order,
     ),

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from tests.acceptance.campaigns import CAMPAIGNS, OUTPUTS, ROOT
-from tests.acceptance.validation import PAGE, page
+from tests.acceptance.quoted_figures import QUOTES, Quote
+from tests.acceptance.validation import PAGE, page, says
 from tests.acceptance.validation_figures import FIGURES, Figure
 
 KEPT = {name: output for name, one in CAMPAIGNS.items() if (output := one.kept) is not None}
@@ -37,8 +38,20 @@ def test_a_figure_is_found(figure: Figure) -> None:
     assert re.search(r"\d", figure.extract(KEPT[figure.campaign].printed))
 
 
+@pytest.mark.parametrize(
+    "quote",
+    [one for one in QUOTES if one.campaign in KEPT],
+    ids=lambda one: f"{one.page}-{one.campaign}",
+)
+def test_a_page_says_what_was_printed(quote: Quote) -> None:
+    output = KEPT[quote.campaign]
+    assert re.search(r"\d", quote.text(output.printed))
+    assert says(quote, output), f"{quote.page} should say\n{quote.text(output.printed)}"
+
+
 def test_every_campaign_has_figures() -> None:
-    assert {figure.campaign for figure in FIGURES} == CAMPAIGNS.keys()
+    used = {figure.campaign for figure in FIGURES} | {quote.campaign for quote in QUOTES}
+    assert used == CAMPAIGNS.keys()
 
 
 @pytest.mark.parametrize("name", KEPT)
