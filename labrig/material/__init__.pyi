@@ -28,9 +28,12 @@ from .fluorescent import (
 from .general_order import (
     BecquerelDecay as BecquerelDecay,
     Charged as Charged,
+    DarkStep as DarkStep,
     becquerel_of as becquerel_of,
     dark_concentration as dark_concentration,
+    dark_step as dark_step,
     lit_concentration as lit_concentration,
+    mean_emission as mean_emission,
     steady_concentration as steady_concentration,
 )
 from .rates import (
