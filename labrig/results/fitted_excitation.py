@@ -19,11 +19,16 @@ class ExcitedState:
     Attributes
     ----------
     k_r_per_s, k_r_sigma_per_s
-        Re-radiation rate in 1/s.
+        Re-radiation rate in 1/s, that of a full state.
     amplitude, amplitude_sigma
         Glow Λ* k_r of a fully charged sample in the brightest channel, in the unit of the values.
     k_e_per_s, k_e_sigma_per_s
         Excitation rates in 1/s per unit of the first series' irradiance, shape (B,).
+    kinetic_order, kinetic_order_sigma
+        Kinetic order b; its σ is 0 where it is held.
+    is_level_known
+        Whether the charge is known from both sides: light enough that the state saturates. Else
+        amplitude, k_r and k_e of an order other than 1 are not known apart.
     """
 
     k_r_per_s: float
@@ -32,6 +37,14 @@ class ExcitedState:
     amplitude_sigma: float
     k_e_per_s: FloatArray
     k_e_sigma_per_s: FloatArray
+    kinetic_order: float = 1.0
+    kinetic_order_sigma: float = 0.0
+    is_level_known: bool = True
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether the state decays as an exponential, whatever its charge."""
+        return self.kinetic_order == 1
 
     @property
     def seen(self) -> BoolArray:
@@ -55,8 +68,11 @@ class ConcentrationAtOff:
     r0, r0_sigma
         Concentrations, shape (N,).
     amplitude, amplitude_sigma
-        Amplitudes a = Λ* k_r r(0) of the decay from there, which are better determined than their
+        Amplitudes a = Λ* k_r r(0)ᵇ of the decay from there, which are better determined than their
         factors, shape (N,).
+    decay_time_s, decay_time_sigma_s
+        τ of the decay from there, a (1 + t/τ)^(−b/(b − 1)) with τ = 1/((b − 1) k_r r(0)^(b − 1)),
+        as `labrig fit charge` states it; 1/k_r of the first order, shape (N,).
     """
 
     series: str
@@ -66,6 +82,8 @@ class ConcentrationAtOff:
     r0_sigma: FloatArray
     amplitude: FloatArray
     amplitude_sigma: FloatArray
+    decay_time_s: FloatArray
+    decay_time_sigma_s: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +106,9 @@ class FittedExcitation:
         Limits of the fit and remedies, a line each.
     residuals
         Residuals of every series in σ without flicker, shape (n, P, C) each.
+    order_gain
+        Fall of χ² that is expected if the kinetic orders, held at 1, were fitted; 0 where they are
+        not held at 1.
     """
 
     states: tuple[ExcitedState, ...]
@@ -99,6 +120,18 @@ class FittedExcitation:
     covariance: FloatArray
     warnings: tuple[str, ...]
     residuals: tuple[FloatArray, ...]
+    order_gain: float = 0.0
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether all states are of first order."""
+        return all(state.is_first_order for state in self.states)
+
+    @property
+    def are_orders_fitted(self) -> bool:
+        """Whether the kinetic orders are parameters of the fit."""
+        states, bands = self.k_e().shape
+        return bool(len(self.covariance) > states * (2 + bands))
 
     @property
     def reduced_chi2(self) -> float:
@@ -107,14 +140,26 @@ class FittedExcitation:
 
     @property
     def covariance_parameters(self) -> tuple[str, ...]:
-        """Names of the rows of `covariance`: k_r of all states, amplitudes, k_e of all bands."""
+        """Names of the rows of `covariance`.
+
+        They are k_r of all states, amplitudes, k_e of all bands and, where they are fitted, kinetic
+        orders.
+        """
         states = range(1, len(self.states) + 1)
         bands = range(1, self.k_e().shape[1] + 1)
+        orders = states if self.are_orders_fitted else ()
         return (
             *(f"k_r_per_s {state}" for state in states),
             *(f"amplitude_at_full_charge {state}" for state in states),
             *(f"k_e_per_s {state} {band}" for state in states for band in bands),
+            *(f"kinetic_order {state}" for state in orders),
         )
+
+    def orders(self) -> FloatArray | None:
+        """Return the kinetic orders of all states, shape (N,); None if all are 1."""
+        if self.is_first_order:
+            return None
+        return np.array([state.kinetic_order for state in self.states])
 
     def k_e(self) -> FloatArray:
         """Return the excitation rates of all states in 1/s, shape (N, B)."""
