@@ -96,13 +96,19 @@ def _states(prediction: "Prediction", patch: str) -> "Table":
 
     predicted = prediction.patches[patch]
     table = Table(title=_title(prediction, patch), title_justify="left")
-    for heading in ("state", "k_r / s⁻¹", "σ", "σ of amplitude", "noise"):
+    has_order = any(order != 1 for order in predicted.kinetic_order)
+    rate_heading = "rate at lamp off / s⁻¹" if has_order else "k_r / s⁻¹"
+    for heading in (
+        "state", rate_heading, "σ", *(["order b"] if has_order else []), "σ of amplitude", "noise"
+    ):  # fmt: skip
         table.add_column(heading)
-    for i, rate in enumerate(predicted.k_r_per_s):
+    orders = list(zip(predicted.kinetic_order, predicted.kinetic_order_sigma, strict=True))
+    for i, rate in enumerate(predicted.rate_per_s):
         table.add_row(
             str(i + 1),
-            with_uncertainty(rate, predicted.k_r_sigma_per_s[i]),
-            _percent(predicted.k_r_sigma_per_s[i] / rate),
+            with_uncertainty(rate, predicted.rate_sigma_per_s[i]),
+            _percent(predicted.rate_sigma_per_s[i] / rate),
+            *([with_uncertainty(*orders[i])] if has_order else []),
             _percent(predicted.amplitude_sigma_dn_per_s[i] / predicted.amplitude_dn_per_s[i]),
             _noise(predicted, i),
         )
@@ -139,12 +145,12 @@ def _doubts(prediction: "Prediction", patch: str) -> list[str]:
         cheapest = min(sufficient, key=lambda remedy: remedy.extra_time_s, default=None)
         would = f"'{cheapest.change.description}' would" if cheapest else "nothing below is enough"
         doubts.append(
-            f"the fit may not resolve these {len(predicted.k_r_per_s)} states: it "
+            f"the fit may not resolve these {len(predicted.rate_per_s)} states: it "
             f"sees all of them with a chance of {100 * predicted.chance_of_all_states:.0f} %, and "
             f"their rates {predicted.least_apart:.1f} σ from each other; {would}"
         )
-    for i, rate in enumerate(predicted.k_r_per_s):
-        rate_sigma = predicted.k_r_sigma_per_s[i] / rate
+    for i, rate in enumerate(predicted.rate_per_s):
+        rate_sigma = predicted.rate_sigma_per_s[i] / rate
         amplitude_sigma = predicted.amplitude_sigma_dn_per_s[i] / predicted.amplitude_dn_per_s[i]
         if max(rate_sigma, amplitude_sigma) > HARDLY_KNOWN:
             doubts.append(
@@ -158,7 +164,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
     from rich.table import Table
 
     predicted = prediction.patches[patch]
-    count = len(predicted.k_r_per_s)
+    count = len(predicted.rate_per_s)
     table = Table(title="what would halve it", title_justify="left")
     table.add_column("change")
     for heading in ("σ",) if count == 1 else [f"σ {i + 1}" for i in range(count)]:
@@ -175,7 +181,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
             remedy.change.description,
             *(
                 _percent(sigma / rate)
-                for sigma, rate in zip(after.k_r_sigma_per_s, after.k_r_per_s, strict=True)
+                for sigma, rate in zip(after.rate_sigma_per_s, after.rate_per_s, strict=True)
             ),
             f"{remedy.gain:.2f}",
             *(

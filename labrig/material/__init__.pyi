@@ -12,6 +12,7 @@ from .decay_laws import (
     DecayLaw as DecayLaw,
 )
 from .file import (
+    MAX_ORDER as MAX_ORDER,
     IrradianceNorm as IrradianceNorm,
     Material as Material,
     Provenance as Provenance,
@@ -28,9 +29,12 @@ from .fluorescent import (
 from .general_order import (
     BecquerelDecay as BecquerelDecay,
     Charged as Charged,
+    DarkStep as DarkStep,
     becquerel_of as becquerel_of,
     dark_concentration as dark_concentration,
+    dark_step as dark_step,
     lit_concentration as lit_concentration,
+    mean_emission as mean_emission,
     steady_concentration as steady_concentration,
 )
 from .rates import (

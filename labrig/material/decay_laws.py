@@ -84,17 +84,17 @@ def becquerel_means(
     """
     phase = rate_per_s * t_s
     growth = 1 + shape * phase
-    log_ratio, log_slope = _log_ratio(shape * phase)
+    ratio, ratio_slope = log_ratio(shape * phase)
     z = rate_per_s * exposure_s / growth
     y = shape * z
-    ell, ell_slope = _log_ratio(y)
+    ell, ell_slope = log_ratio(y)
     psi, psi_slope = _growth((shape - 1) * z * ell)
-    mean = np.exp(-phase * log_ratio) * ell * psi
+    mean = np.exp(-phase * ratio) * ell * psi
     # Derivatives of log(mean), by log k and by u, through z, y = u z and (u − 1) z ℓ(y).
     slopes = np.empty((len(t_s), 2))
     z_slopes = z / growth, -z * phase / growth
     y_slopes = shape * z_slopes[0], z / growth
-    begins = -phase / growth, -(phase**2) * log_slope
+    begins = -phase / growth, -(phase**2) * ratio_slope
     by_shape = 0.0, z * ell
     for column in range(2):
         exponent = (
@@ -205,11 +205,11 @@ def _trap(rate_per_s: float, shape: float, t_s: FloatArray) -> _Trap:
     )
 
 
-def _log_ratio(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return ℓ(x) = log(1 + x)/x and its derivative, x ≥ 0."""
-    small = x < SERIES_BELOW
+def log_ratio(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ℓ(x) = log(1 + x)/x and its derivative, x > −1."""
+    small = np.abs(x) < SERIES_BELOW
     safe = np.where(small, 1.0, x)
-    y = np.minimum(x, SERIES_BELOW)
+    y = np.clip(x, -SERIES_BELOW, SERIES_BELOW)
     powers = y[..., None] ** np.arange(9)
     series = powers @ ((-1.0) ** np.arange(9) / np.arange(1, 10))
     series_slope = powers[..., :8] @ (

@@ -23,7 +23,9 @@ from labrig.finite import NotNegative
 from labrig.yaml_file import read_model, write_yaml
 
 Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Order = Annotated[float, Field(ge=1, le=4)]
+#: Largest kinetic order; above 2 it is empirical.
+MAX_ORDER = 4.0
+Order = Annotated[float, Field(ge=1, le=MAX_ORDER)]
 Concentration = Annotated[float, Field(ge=0, le=1)]
 Series = tuple[NotNegative, ...]
 
@@ -59,7 +61,7 @@ class State(_Part):
     Attributes
     ----------
     k_r_per_s
-        Re-radiation rate k_r of the state, in 1/s.
+        Re-radiation rate k_r of the state, in 1/s; of a kinetic order that of a full state.
     kinetic_order
         Kinetic order b of the state, which re-radiates k_r times its concentration to this power. 1
         is the rate equation of Nalbach et al., and not written; the light of a higher order decays

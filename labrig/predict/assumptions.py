@@ -132,7 +132,7 @@ def collect_assumptions(
     measured = {
         patch: glow
         for patch, material in materials.items()
-        if (glow := measured_glow(material, own_runs[patch])) is not None
+        if (glow := measured_glow(material, protocol, own_runs[patch])) is not None
     }
     relative = {
         patch: relative_glow(material, protocol, camera, sources.response)

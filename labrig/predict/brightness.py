@@ -10,7 +10,7 @@ from labrig.material import Material
 from labrig.optics import CameraResponse
 from labrig.predict.camera import CameraFigures
 from labrig.predict.expectation import Bench, expected_schedule
-from labrig.predict.glow import Glow, measured_amplitudes, radiated, rates
+from labrig.predict.glow import Glow, laws, measured_amplitudes, radiated
 from labrig.predict.reference import Reference
 from labrig.protocols.decay import Decay
 
@@ -21,13 +21,13 @@ BISECTIONS = 50
 HALF_A_THIRD_STOP = 2 ** (1 / 6)
 
 
-def measured_glow(material: Material, reference: Reference | None) -> Glow | None:
+def measured_glow(material: Material, protocol: Decay, reference: Reference | None) -> Glow | None:
     """Return the glow of a material that the reference run measured; None for others."""
     amplitude = measured_amplitudes(material)
     if reference is None or amplitude is None:
         return None
     return Glow(
-        rates(material),
+        *laws(material, _charge_s(protocol)),
         amplitude,
         reference.channel_weights,
         reference.camera.iso,
@@ -48,7 +48,7 @@ def relative_glow(
     UsageError
         If the relative strengths of its states are not known.
     """
-    charge_s = protocol.charge if isinstance(protocol.charge, float) else np.inf
+    charge_s = _charge_s(protocol)
     weights: Mapping[str, float] = {}
     amplitude = measured_amplitudes(material)
     if amplitude is None and len(material.states) == 1:
@@ -67,8 +67,17 @@ def relative_glow(
         }
     settings = protocol.camera
     return Glow(
-        rates(material), amplitude / amplitude.sum(), weights, settings.iso, settings.f_number
+        *laws(material, charge_s),
+        amplitude / amplitude.sum(),
+        weights,
+        settings.iso,
+        settings.f_number,
     )
+
+
+def _charge_s(protocol: Decay) -> float:
+    """Return the length of the charge in seconds, infinite up to the plateau."""
+    return protocol.charge if isinstance(protocol.charge, float) else np.inf
 
 
 def brightness_metered_as(

@@ -103,10 +103,10 @@ def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
     series, clipped = {}, {}
     for patch, glow in bench.glows.items():
         series[patch], clipped[patch] = _series(protocol, offers, bench, patch, schedule)
-        if protocol.states not in ("auto", len(glow.k_r_per_s)):
+        if protocol.states not in ("auto", len(glow.rate_per_s)):
             warnings.append(
                 f"{patch}: the protocol asks for {protocol.states} states, the material has "
-                f"{len(glow.k_r_per_s)}; predicted is a fit of {len(glow.k_r_per_s)}"
+                f"{len(glow.rate_per_s)}; predicted is a fit of {len(glow.rate_per_s)}"
             )
     return Expectation(
         exposures_s=tuple(schedule.exposures_s),
@@ -156,7 +156,7 @@ def _series(
     decay = expected_series(glow, t_s, frames, darks, background, bench.flicker)
     usable = np.asarray(~is_clipped(frames.saturated, 1.0).any(axis=1))
     clipped = int(np.count_nonzero(~usable))
-    if len(usable) - clipped < 2 * len(glow.k_r_per_s):
+    if len(usable) - clipped < 2 * len(glow.rate_per_s):
         raise ProtocolError(
             f"{patch}: {clipped} of {len(usable)} frames will clip, so that too few are left to "
             "fit; expose for less (or exposure: auto), or lower camera.iso"

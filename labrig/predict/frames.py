@@ -6,9 +6,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from labrig.fit import FloatArray
-from labrig.material import exponential_means
 from labrig.predict.camera import CameraFigures
 from labrig.predict.glow import Glow
+from labrig.predict.state_means import state_means
 from labrig.reduce import ROUNDING_VARIANCE, ChannelStats, FrameMeasurement
 from labrig.region import Region
 
@@ -114,7 +114,8 @@ def glow_frames(
     glow: Glow, camera: CameraFigures, region: Region, t_s: FloatArray, exposure_s: FloatArray
 ) -> ExpectedFrames:
     """Return the expected frames of a glow that begin `t_s` (n,) seconds after lamp off."""
-    decay = exponential_means(glow.k_r_per_s, t_s, exposure_s) @ glow.amplitude
+    means, _ = state_means(glow.rate_per_s, glow.shape, t_s, exposure_s)
+    decay = means @ glow.amplitude
     light_dn = np.multiply.outer(exposure_s * decay, np.array([*glow.weights.values()]))
     return _frames(camera, region, tuple(glow.weights), exposure_s, light_dn)
 

@@ -8,7 +8,13 @@ import numpy as np
 
 from labrig.errors import UsageError
 from labrig.fit import FloatArray
-from labrig.material import Material, State
+from labrig.material import (
+    Material,
+    State,
+    becquerel_of,
+    lit_concentration,
+    steady_concentration,
+)
 from labrig.optics import CHANNELS, CameraResponse
 
 #: Largest number of states that a fit resolves; a file with more approximates a power law.
@@ -17,12 +23,17 @@ MAX_STATES = 3
 
 @dataclass(frozen=True, eq=False)
 class Glow:
-    """Glow Σ_i a_i exp(−k_i t) with one weight per channel, for given camera settings.
+    """Glow of m states with one weight per channel, for given camera settings.
+
+    A state is a_i exp(−k_i t), or of a kinetic order b Becquerel's law of that rate at lamp off.
 
     Attributes
     ----------
-    k_r_per_s
-        Rates in 1/s, descending, shape (m,).
+    rate_per_s
+        Relative fall of each state at lamp off in 1/s, by descending k_r: k_r, or b k_r r(0)^(b −
+        1), shape (m,).
+    shape
+        (b − 1)/b of each state, 0 of an exponential, shape (m,).
     amplitude
         Amplitudes at lamp off in the brightest channel in DN/s, shape (m,).
     weights
@@ -33,7 +44,8 @@ class Glow:
         Aperture of the camera; None if it is not known.
     """
 
-    k_r_per_s: FloatArray
+    rate_per_s: FloatArray
+    shape: FloatArray
     amplitude: FloatArray
     weights: Mapping[str, float]
     iso: float
@@ -62,14 +74,8 @@ def check_states(material: Material) -> None:
     Raises
     ------
     UsageError
-        If it has more states than a fit can resolve, two with the same rate, or one of a kinetic
-        order.
+        If it has more states than a fit can resolve, or two with the same rate.
     """
-    if not material.is_first_order:
-        raise UsageError(
-            f"{material.name}: expected states of first order, got 'kinetic_order'; what is "
-            "predicted is a fit of exponentials, which its decay is not"
-        )
     rates = sorted((state.k_r_per_s for state in material.states), reverse=True)
     if len(rates) > MAX_STATES:
         raise UsageError(
@@ -96,15 +102,25 @@ def by_falling_rate(material: Material) -> Sequence[State]:
     return sorted(material.states, key=lambda state: -state.k_r_per_s)
 
 
-def rates(material: Material) -> FloatArray:
-    """Return the rates k_r of the states in 1/s, descending, shape (m,)."""
-    return np.array([state.k_r_per_s for state in by_falling_rate(material)])
+def laws(material: Material, charge_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return rates at lamp off in 1/s and shapes of the states by descending k_r, (m,) each.
+
+    The decay of a kinetic order depends on the charge; `charge_s` is that of `radiated`.
+    """
+    states = by_falling_rate(material)
+    levels = _concentrations(material, charge_s)
+    becquerel = [
+        becquerel_of(float(level), state.k_r_per_s, state.kinetic_order)
+        for state, level in zip(states, levels, strict=True)
+    ]
+    rate_per_s, shape = np.array(becquerel).T
+    return rate_per_s, shape
 
 
 def radiated(
     material: Material, response: CameraResponse | None, charge_s: float
 ) -> tuple[FloatArray, dict[str, float]] | None:
-    """Return relative amplitudes Λ_i k_r,i r_i(0) and channel weights.
+    """Return relative amplitudes Λ_i k_r,i r_i(0)ᵇ and channel weights.
 
     Parameters
     ----------
@@ -126,7 +142,8 @@ def radiated(
         return None
     edges = np.array(material.bands_nm)
     bands = np.array([state.reradiation for state in states])
-    emitted = bands * (rates(material) * _concentrations(material, charge_s))[:, np.newaxis]
+    k_r, order = _rates_and_orders(material)
+    emitted = bands * (k_r * _concentrations(material, charge_s) ** order)[:, np.newaxis]
     if response is None:
         return emitted @ np.diff(edges), {}
     wavelength = response.wavelength_nm
@@ -156,6 +173,14 @@ def _concentrations(material: Material, charge_s: float) -> FloatArray:
         return np.ones(len(states))
     k_e = np.array([state.k_e_per_s for state in states])
     kappa = k_e.sum(axis=1) * norm.value / math.sqrt(k_e.shape[1])
-    total = kappa + rates(material)
-    concentrations: FloatArray = kappa / total * -np.expm1(-total * charge_s)
-    return concentrations
+    k_r, order = _rates_and_orders(material)
+    if math.isinf(charge_s):
+        return steady_concentration(kappa, k_r, order)
+    return lit_concentration(0.0, kappa, k_r, order, charge_s).value
+
+
+def _rates_and_orders(material: Material) -> tuple[FloatArray, FloatArray]:
+    """Return k_r in 1/s and kinetic orders of the states by descending k_r, (m,) each."""
+    states = by_falling_rate(material)
+    k_r, order = np.array([(state.k_r_per_s, state.kinetic_order) for state in states]).T
+    return k_r, order

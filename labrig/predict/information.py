@@ -1,9 +1,10 @@
 """Fisher information of a decay fit's parameters, and their error budget.
 
-The decay model is that of `labrig.fit`: Σ_i a_i g(k_i) times one weight per channel, plus an
-offset per channel with the σ of the dark frames as prior; Cov = diag(σ²) + ρ² s sᵀ within a frame.
-Rates and amplitudes are marginalised over weights and offsets. The inverse information is the
-covariance of the best unbiased estimator (Cramér and Rao), which the weighted fit attains.
+The decay model is that of `labrig.fit`: Σ_i a_i g(k_i) times one weight per channel, with the shape
+of states that are not of the first order, plus an offset per channel with the σ of the dark frames
+as prior; Cov = diag(σ²) + ρ² s sᵀ within a frame. Rates and amplitudes are marginalised over
+weights and offsets. The inverse information is the covariance of the best unbiased estimator
+(Cramér and Rao), which the weighted fit attains.
 """
 
 from collections.abc import Mapping
@@ -13,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit import EPSILON, FloatArray
-from labrig.material import exponential_means_and_slopes
 from labrig.predict.series import DARK, FLICKER, ExpectedSeries
 
 
@@ -21,12 +21,15 @@ from labrig.predict.series import DARK, FLICKER, ExpectedSeries
 class Information:
     """Expected covariance of the parameters k1, a1, k2, a2, … of a fit with m states.
 
+    The shapes of the s states that are not of the first order follow.
+
     Attributes
     ----------
     covariance
-        Covariance, shape (2m, 2m); variances are infinite for parameters that are not determined.
+        Covariance, shape (2m + s, 2m + s); variances are infinite for parameters that are not
+        determined.
     budget
-        Fractions of each variance by source of noise, shape (2m,); they sum to 1.
+        Fractions of each variance by source of noise, shape (2m + s,); they sum to 1.
     """
 
     covariance: FloatArray
@@ -34,7 +37,7 @@ class Information:
 
     @property
     def sigma(self) -> FloatArray:
-        """Standard uncertainties of k1, a1, …, shape (2m,)."""
+        """Standard uncertainties of k1, a1, …, and of the shapes, shape (2m + s,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
@@ -64,7 +67,7 @@ def information(series: ExpectedSeries) -> Information:
     covariance = estimator @ estimator.T
     covariance[undetermined, :], covariance[:, undetermined] = 0.0, 0.0
     covariance[undetermined, undetermined] = np.inf
-    reported = slice(0, 2 * len(series.k_r_per_s))
+    reported = slice(0, 2 * len(series.rate_per_s) + np.count_nonzero(series.shape))
     total = np.sum(list(parts.values()), axis=0)
     return Information(
         covariance=covariance[reported, reported],
@@ -85,21 +88,27 @@ def _whitening(series: ExpectedSeries, signal: FloatArray) -> FloatArray:
 def _slopes(series: ExpectedSeries) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives by all parameters, shape (n, C, p), and the signal, shape (n, C).
 
-    The parameters are k1, a1, …, the weights of the other channels, and the offsets.
+    The parameters are k1, a1, …, the shapes that are not 0, the weights of the other channels, and
+    the offsets.
     """
-    rates, weights = series.k_r_per_s, series.weights
-    means, log_rate_slopes = exponential_means_and_slopes(rates, series.t_s, series.exposure_s)
+    rates, weights = series.rate_per_s, series.weights
+    means, state_slopes = series.means()
     curve = means @ series.amplitude
     other_channels = [c for c in range(len(weights)) if c != int(np.argmax(weights))]
     offset_channels = [c for c in range(len(weights)) if series.offset_sigma[c] > 0]
-    n_shape = 2 * len(rates)
+    of_order = np.flatnonzero(series.shape)
+    n_rates = 2 * len(rates)
+    n_shape = n_rates + len(of_order)
     slopes = np.zeros(
         (len(curve), len(weights), n_shape + len(other_channels) + len(offset_channels))
     )
-    slopes[:, :, 0:n_shape:2] = np.einsum(
-        "fi,c->fci", log_rate_slopes * series.amplitude / rates, weights
+    slopes[:, :, 0:n_rates:2] = np.einsum(
+        "fi,c->fci", state_slopes[..., 0] * series.amplitude / rates, weights
     )
-    slopes[:, :, 1:n_shape:2] = np.einsum("fi,c->fci", means, weights)
+    slopes[:, :, 1:n_rates:2] = np.einsum("fi,c->fci", means, weights)
+    slopes[:, :, n_rates:n_shape] = np.einsum(
+        "fi,c->fci", (state_slopes[..., 1] * series.amplitude)[:, of_order], weights
+    )
     for place, channel in enumerate(other_channels, start=n_shape):
         slopes[:, channel, place] = curve
     for place, channel in enumerate(offset_channels, start=n_shape + len(other_channels)):

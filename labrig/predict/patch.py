@@ -22,11 +22,14 @@ def chance_of_all_states(series: ExpectedSeries) -> float:
     """Return the probability that the fit resolves as many states as there are.
 
     A fit with one state less is made to the expected signal without noise; its χ² is the
-    noncentrality of the F-test and of the BIC by which the fit chooses (`labrig.fit`).
+    noncentrality of the F-test and of the BIC by which the fit chooses (`labrig.fit`). Of general
+    order it fits one state.
     """
-    states, frames = len(series.k_r_per_s), len(series.t_s)
+    states, frames = len(series.rate_per_s), len(series.t_s)
     if states == 1:
         return 1.0
+    if series.shape.any():
+        return 0.0
     try:
         fit = fit_decay(
             series.t_s,
@@ -58,10 +61,15 @@ class PatchPrediction:
 
     Attributes
     ----------
-    k_r_per_s
-        Rates assumed in 1/s, shape (m,).
-    k_r_sigma_per_s
+    rate_per_s
+        Rates assumed at lamp off in 1/s, shape (m,): k_r, or b k_r r(0)^(b − 1) of a kinetic order.
+    rate_sigma_per_s
         Standard uncertainties of the rates in 1/s, shape (m,); infinite if undetermined.
+    kinetic_order
+        Kinetic orders b assumed, shape (m,).
+    kinetic_order_sigma
+        Standard uncertainties of the orders, shape (m,); 0 of the first order, which is not fitted,
+        infinite if undetermined.
     amplitude_dn_per_s
         Amplitudes assumed in DN/s, shape (m,).
     amplitude_sigma_dn_per_s
@@ -77,8 +85,10 @@ class PatchPrediction:
         Number of frames of one decay that clip and are left out.
     """
 
-    k_r_per_s: tuple[float, ...]
-    k_r_sigma_per_s: tuple[float, ...]
+    rate_per_s: tuple[float, ...]
+    rate_sigma_per_s: tuple[float, ...]
+    kinetic_order: tuple[float, ...]
+    kinetic_order_sigma: tuple[float, ...]
     amplitude_dn_per_s: tuple[float, ...]
     amplitude_sigma_dn_per_s: tuple[float, ...]
     budget: Mapping[str, tuple[float, ...]]
@@ -96,13 +106,15 @@ class PatchPrediction:
         return {
             "states": [
                 {
-                    "k_r_per_s": self.k_r_per_s[i],
-                    "k_r_sigma_per_s": _finite(self.k_r_sigma_per_s[i]),
+                    "rate_per_s": self.rate_per_s[i],
+                    "rate_sigma_per_s": _finite(self.rate_sigma_per_s[i]),
+                    "kinetic_order": self.kinetic_order[i],
+                    "kinetic_order_sigma": _finite(self.kinetic_order_sigma[i]),
                     "amplitude_dn_per_s": self.amplitude_dn_per_s[i],
                     "amplitude_sigma_dn_per_s": _finite(self.amplitude_sigma_dn_per_s[i]),
                     "noise": {source: part[i] for source, part in self.budget.items()},
                 }
-                for i in range(len(self.k_r_per_s))
+                for i in range(len(self.rate_per_s))
             ],
             "chance_of_all_states": self.chance_of_all_states,
             "least_apart_sigmas": _finite(self.least_apart),
@@ -135,17 +147,24 @@ def predicted_patches(expectation: Expectation) -> dict[str, PatchPrediction]:
     patches = {}
     for patch, series in expectation.series.items():
         fit_information = expectation.found[patch]
+        rates = slice(0, 2 * len(series.rate_per_s), 2)
+        amplitudes = slice(1, 2 * len(series.rate_per_s), 2)
+        order = 1 / (1 - series.shape)
+        shape_sigma = np.zeros_like(order)
+        shape_sigma[series.shape > 0] = fit_information.sigma[2 * len(order) :]
         patches[patch] = PatchPrediction(
-            k_r_per_s=tuple(series.k_r_per_s.tolist()),
-            k_r_sigma_per_s=tuple(fit_information.sigma[0::2].tolist()),
+            rate_per_s=tuple(series.rate_per_s.tolist()),
+            rate_sigma_per_s=tuple(fit_information.sigma[rates].tolist()),
+            kinetic_order=tuple(order.tolist()),
+            kinetic_order_sigma=tuple((order**2 * shape_sigma).tolist()),
             amplitude_dn_per_s=tuple(series.amplitude.tolist()),
-            amplitude_sigma_dn_per_s=tuple(fit_information.sigma[1::2].tolist()),
+            amplitude_sigma_dn_per_s=tuple(fit_information.sigma[amplitudes].tolist()),
             budget={
-                source: tuple(part[0::2].tolist())
+                source: tuple(part[rates].tolist())
                 for source, part in fit_information.budget.items()
             },
             chance_of_all_states=chance_of_all_states(series) if expectation.states_chosen else 1.0,
-            least_apart=_least_apart(series.k_r_per_s, fit_information.covariance[0::2, 0::2]),
+            least_apart=_least_apart(series.rate_per_s, fit_information.covariance[rates, rates]),
             clipped=expectation.clipped[patch],
         )
     return patches

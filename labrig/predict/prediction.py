@@ -119,7 +119,7 @@ def predict(
     >>> plan = labrig.plan(protocol, rig, "rig.yaml")
     >>> prediction = predict(protocol, plan, rig, "rig.yaml", Sources({"": "blue-paint"}))
     >>> patch = prediction.patches["sample"]
-    >>> f"k_r = {patch.k_r_per_s[0]} ± {patch.k_r_sigma_per_s[0]:.0e} 1/s"
+    >>> f"k_r = {patch.rate_per_s[0]} ± {patch.rate_sigma_per_s[0]:.0e} 1/s"
     'k_r = 0.032 ± 6e-05 1/s'
     >>> prediction.remedies[0].change.description
     'for: 3 min'

@@ -111,7 +111,7 @@ class Trials:
 
 
 def _rate_sigmas(patches: Mapping[str, PatchPrediction]) -> list[float]:
-    return [sigma for patch in patches.values() for sigma in patch.k_r_sigma_per_s]
+    return [sigma for patch in patches.values() for sigma in patch.rate_sigma_per_s]
 
 
 def _geometric_mean_ratio(after: Sequence[float], before: Sequence[float]) -> float:

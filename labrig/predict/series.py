@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit import FloatArray
-from labrig.material import exponential_means
 from labrig.predict.frames import ExpectedFrames
 from labrig.predict.glow import Glow
+from labrig.predict.state_means import StateMeans, state_means
 from labrig.reduce import TWO_DEGREES, fit_dark
 
 PHOTONS, READING, FLICKER, DARK = "photons", "reading", "flicker", "dark"
@@ -25,8 +25,10 @@ class ExpectedSeries:
         Begins of the exposures in seconds after lamp off, shape (n,).
     exposure_s
         Exposure times in seconds, shape (n,).
-    k_r_per_s
-        Rates in 1/s, shape (m,).
+    rate_per_s
+        Relative fall of each state at lamp off in 1/s, k_r of the first order, shape (m,).
+    shape
+        (b − 1)/b of each state, 0 of the first order, whose order is not fitted, shape (m,).
     amplitude
         Amplitudes in DN/s, shape (m,).
     weights
@@ -41,7 +43,8 @@ class ExpectedSeries:
 
     t_s: FloatArray
     exposure_s: FloatArray
-    k_r_per_s: FloatArray
+    rate_per_s: FloatArray
+    shape: FloatArray
     amplitude: FloatArray
     weights: FloatArray
     variances: Mapping[str, FloatArray]
@@ -51,9 +54,12 @@ class ExpectedSeries:
     @property
     def curve(self) -> FloatArray:
         """Signal of the brightest channel in DN/s, shape (n,)."""
-        means = exponential_means(self.k_r_per_s, self.t_s, self.exposure_s)
-        curve: FloatArray = means @ self.amplitude
+        curve: FloatArray = self.means().value @ self.amplitude
         return curve
+
+    def means(self) -> StateMeans:
+        """Return the means of the states over the exposures, with derivatives."""
+        return state_means(self.rate_per_s, self.shape, self.t_s, self.exposure_s)
 
     @property
     def variance(self) -> FloatArray:
@@ -101,7 +107,8 @@ def expected_series(
     return ExpectedSeries(
         t_s=t_s,
         exposure_s=frames.exposure_s,
-        k_r_per_s=glow.k_r_per_s,
+        rate_per_s=glow.rate_per_s,
+        shape=glow.shape,
         amplitude=glow.amplitude,
         weights=np.array([*glow.weights.values()]),
         variances={source: part / per_second**2 for source, part in variances.items()},
@@ -130,7 +137,8 @@ def repeated(series: ExpectedSeries, usable: NDArray[np.bool_], times: int) -> E
     return ExpectedSeries(
         t_s=np.tile(series.t_s[usable], times),
         exposure_s=np.tile(series.exposure_s[usable], times),
-        k_r_per_s=series.k_r_per_s,
+        rate_per_s=series.rate_per_s,
+        shape=series.shape,
         amplitude=series.amplitude,
         weights=series.weights,
         variances={name: np.tile(v[usable], (times, 1)) for name, v in series.variances.items()},

@@ -21,6 +21,7 @@ from .camera_calibration import (
 from .charging_series import (
     Charge as Charge,
     ChargingSeries as ChargingSeries,
+    EarlierCharge as EarlierCharge,
     Transient as Transient,
 )
 from .decay import (
@@ -69,6 +70,7 @@ from .fitted_decay import (
 )
 from .fitted_excitation import (
     ConcentrationAtOff as ConcentrationAtOff,
+    ExcitationModel as ExcitationModel,
     ExcitedState as ExcitedState,
     FittedExcitation as FittedExcitation,
 )

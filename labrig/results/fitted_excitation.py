@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.results.measured import BoolArray, FloatArray
+from labrig.results.measured import BoolArray, FloatArray, Measured
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
@@ -19,11 +19,16 @@ class ExcitedState:
     Attributes
     ----------
     k_r_per_s, k_r_sigma_per_s
-        Re-radiation rate in 1/s.
+        Re-radiation rate in 1/s, that of a full state.
     amplitude, amplitude_sigma
         Glow Λ* k_r of a fully charged sample in the brightest channel, in the unit of the values.
     k_e_per_s, k_e_sigma_per_s
         Excitation rates in 1/s per unit of the first series' irradiance, shape (B,).
+    kinetic_order, kinetic_order_sigma
+        Kinetic order b; its σ is 0 where it is held.
+    is_level_known
+        Whether the charge is known from both sides: light enough that the state saturates. Else
+        amplitude, k_r and k_e of an order other than 1 are not known apart.
     """
 
     k_r_per_s: float
@@ -32,6 +37,22 @@ class ExcitedState:
     amplitude_sigma: float
     k_e_per_s: FloatArray
     k_e_sigma_per_s: FloatArray
+    kinetic_order: float = 1.0
+    kinetic_order_sigma: float = 0.0
+    is_level_known: bool = True
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether the state decays as an exponential, whatever its charge."""
+        return self.kinetic_order == 1
+
+    @property
+    def exponent(self) -> Measured | None:
+        """Exponent p = b/(b − 1) of the decay; None of the first order, an exponential."""
+        beyond = self.kinetic_order - 1
+        if beyond == 0:
+            return None
+        return Measured(self.kinetic_order / beyond, self.kinetic_order_sigma / beyond**2)
 
     @property
     def seen(self) -> BoolArray:
@@ -42,6 +63,39 @@ class ExcitedState:
     def k_e_upper_per_s(self) -> FloatArray:
         """Upper limit of k_e in 1/s with 95 % probability, shape (B,)."""
         return self.k_e_per_s + UPPER_SIGMAS * self.k_e_sigma_per_s
+
+
+@dataclass(frozen=True)
+class ExcitationModel:
+    """A model that was tried.
+
+    Attributes
+    ----------
+    states
+        Number of its states.
+    order
+        Kinetic order of all states; None where each has its own.
+    n_parameters
+        Number of fitted parameters, without those of the light, which all models share.
+    reduced_chi2
+        χ² per degree of freedom.
+    bic
+        Bayesian information criterion, with the noise enlarged to the misfit of the best model.
+    """
+
+    states: int
+    order: float | None
+    n_parameters: int
+    reduced_chi2: float
+    bic: float
+
+    @property
+    def label(self) -> str:
+        """The model in words."""
+        number = f"{self.states} state{'s' if self.states > 1 else ''}"
+        if self.order is None:
+            return f"{number} of general order"
+        return f"{number} of {'first order' if self.order == 1 else f'order {self.order:g}'}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +109,11 @@ class ConcentrationAtOff:
     r0, r0_sigma
         Concentrations, shape (N,).
     amplitude, amplitude_sigma
-        Amplitudes a = Λ* k_r r(0) of the decay from there, which are better determined than their
+        Amplitudes a = Λ* k_r r(0)ᵇ of the decay from there, which are better determined than their
         factors, shape (N,).
+    decay_time_s, decay_time_sigma_s
+        τ of the decay from there, a (1 + t/τ)^(−b/(b − 1)) with τ = 1/((b − 1) k_r r(0)^(b − 1)),
+        as `labrig fit charge` states it; 1/k_r of the first order, shape (N,).
     """
 
     series: str
@@ -66,6 +123,8 @@ class ConcentrationAtOff:
     r0_sigma: FloatArray
     amplitude: FloatArray
     amplitude_sigma: FloatArray
+    decay_time_s: FloatArray
+    decay_time_sigma_s: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +147,11 @@ class FittedExcitation:
         Limits of the fit and remedies, a line each.
     residuals
         Residuals of every series in σ without flicker, shape (n, P, C) each.
+    order_gain
+        Fall of χ² that is expected if the kinetic orders, held at 1, were fitted; 0 where they are
+        not held at 1.
+    models
+        Models that were tried, of which this is one.
     """
 
     states: tuple[ExcitedState, ...]
@@ -99,6 +163,19 @@ class FittedExcitation:
     covariance: FloatArray
     warnings: tuple[str, ...]
     residuals: tuple[FloatArray, ...]
+    order_gain: float = 0.0
+    models: tuple[ExcitationModel, ...] = ()
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether all states are of first order."""
+        return all(state.is_first_order for state in self.states)
+
+    @property
+    def are_orders_fitted(self) -> bool:
+        """Whether the kinetic orders are parameters of the fit."""
+        states, bands = self.k_e().shape
+        return bool(len(self.covariance) > states * (2 + bands))
 
     @property
     def reduced_chi2(self) -> float:
@@ -107,14 +184,26 @@ class FittedExcitation:
 
     @property
     def covariance_parameters(self) -> tuple[str, ...]:
-        """Names of the rows of `covariance`: k_r of all states, amplitudes, k_e of all bands."""
+        """Names of the rows of `covariance`.
+
+        They are k_r of all states, amplitudes, k_e of all bands and, where they are fitted, kinetic
+        orders.
+        """
         states = range(1, len(self.states) + 1)
         bands = range(1, self.k_e().shape[1] + 1)
+        orders = states if self.are_orders_fitted else ()
         return (
             *(f"k_r_per_s {state}" for state in states),
             *(f"amplitude_at_full_charge {state}" for state in states),
             *(f"k_e_per_s {state} {band}" for state in states for band in bands),
+            *(f"kinetic_order {state}" for state in orders),
         )
+
+    def orders(self) -> FloatArray | None:
+        """Return the kinetic orders of all states, shape (N,); None if all are 1."""
+        if self.is_first_order:
+            return None
+        return np.array([state.kinetic_order for state in self.states])
 
     def k_e(self) -> FloatArray:
         """Return the excitation rates of all states in 1/s, shape (N, B)."""

@@ -138,12 +138,12 @@ def lines(case: Case, said: dict[str, Any], fits: list[Fitted]) -> list[str]:
     made = []
     for i, state in enumerate(said["states"]):
         rates = np.array([fit.rates[i] for fit in complete])
-        expected = state["k_r_sigma_per_s"]
+        expected = state["rate_sigma_per_s"]
         enough = len(rates) > 2
         scatter = rates.std(ddof=1) if enough else np.nan
         own = np.median([fit.sigmas[i] for fit in complete]) if enough else np.nan
         made.append(
-            f"{case.material:18}{case.name:20} k{i + 1} {state['k_r_per_s']:.4f}"
+            f"{case.material:18}{case.name:20} k{i + 1} {state['rate_per_s']:.4f}"
             f" {expected:10.2e} {scatter:10.2e} × {scatter / expected:.2f}"
             f" {own:10.2e} × {own / expected:.2f}"
             f" {100 * said['chance_of_all_states']:5.0f} %{100 * told:5.0f} %"

@@ -73,7 +73,7 @@ def test_excitation(against: Against) -> None:
     exact = levels(series, k_r, k_e).value
     assert np.abs(integrated(series, k_r, k_e) / exact - 1).max() < 1e-5
     problem = ExcitationProblem([series], 2, 1, RelativeSigmas())
-    theta = problem.parameters.as_stated(k_r, bench.amplitudes(), k_e, np.ones(3))
+    theta = problem.parameters.as_stated(k_r, bench.amplitudes(), k_e, np.ones(3), np.ones(2))
 
     def ours() -> None:
         for _ in range(STEPS):

@@ -248,6 +248,7 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
         np.array([2500.0, 500.0]),
         random.uniform(0.001, 0.1, (2, 8)),
         np.array([0.3, 1.0, 0.7]),
+        np.ones(2),
     )
     columns = problem.parameters.columns
     theta[columns.scale], theta[columns.brightness], theta[columns.lacking] = 0.01, 0.005, 0.02

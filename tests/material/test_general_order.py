@@ -10,7 +10,9 @@ from labrig.material import (
     becquerel_of,
     concentration,
     dark_concentration,
+    dark_step,
     lit_concentration,
+    mean_emission,
     steady_concentration,
 )
 
@@ -85,6 +87,8 @@ def test_the_second_order_is_riccati_s_equation() -> None:
 def test_derivatives(start: float, kappa: float, k: float, b: float, t_s: float) -> None:
     charged = lit_concentration(start, kappa, k, b, t_s)
     step = 1e-4
+    ends = [lit_concentration(start + by, kappa, k, b, t_s).value for by in (0.0, 1e-7)]
+    assert charged.by_start == pytest.approx((ends[1] - ends[0]) / 1e-7, rel=1e-3, abs=1e-6)
     analytic = (charged.by_kappa * kappa, charged.by_k_r * k, charged.by_order)
     for slope, (up, down) in zip(
         analytic,
@@ -114,3 +118,26 @@ def test_light_in_the_dark_is_becquerel_s_law(b: float) -> None:
     means, _ = DECAY_LAWS["becquerel"].means(*law, t_s, exposure_s)
     fall = dark_concentration(start, k, b, t_s) - dark_concentration(start, k, b, t_s + exposure_s)
     assert k * start**b * means == pytest.approx(fall / exposure_s, rel=1e-9)
+
+
+@given(st.floats(1e-3, 1.0), rates, st.floats(1.01, 3.9), durations)
+def test_derivatives_in_the_dark(start: float, k: float, b: float, t_s: float) -> None:
+    step = 1e-5
+    for function in (dark_step, mean_emission):
+        found = function(start, k, b, t_s)
+        for slope, up, down in (
+            (found.by_start * start, (start * (1 + step), k, b), (start * (1 - step), k, b)),
+            (found.by_k_r * k, (start, k * (1 + step), b), (start, k * (1 - step), b)),
+            (found.by_order, (start, k, b + step), (start, k, b - step)),
+        ):
+            numeric = (function(*up, t_s).value - function(*down, t_s).value) / (2 * step)
+            assert slope == pytest.approx(numeric, rel=1e-4, abs=1e-6 * float(found.value))
+
+
+@pytest.mark.parametrize("b", [1.0, 1.5, 3.0])
+def test_back_in_the_dark_and_forth_again(b: float) -> None:
+    earlier = dark_step(0.6, 0.3, b, -0.4).value
+    assert dark_concentration(earlier, 0.3, b, 0.4) == pytest.approx(0.6, rel=1e-13)
+    short, shorter = (float(mean_emission(0.6, 0.3, b, T).value) for T in (1e-3, 1e-5))
+    assert shorter == pytest.approx(0.6**b, rel=1e-5)
+    assert short == pytest.approx(shorter * (1 - b * 0.3 * 0.6 ** (b - 1) * 4.95e-4), rel=1e-7)

@@ -32,7 +32,8 @@ def series(
     return ExpectedSeries(
         t_s=times_s,
         exposure_s=exposures_s,
-        k_r_per_s=np.array([k for k, _ in states]),
+        rate_per_s=np.array([k for k, _ in states]),
+        shape=np.zeros(len(states)),
         amplitude=np.array([a for _, a in states]),
         weights=truths.RGB_WEIGHTS,
         variances={
@@ -52,7 +53,7 @@ def fitted(expected: ExpectedSeries, values: truths.FloatArray, flicker: float |
         np.sqrt(expected.variance),
         exposure_s=expected.exposure_s,
         channels="RGB",
-        n_states=len(expected.k_r_per_s),
+        n_states=len(expected.rate_per_s),
         offset_sigma=expected.offset_sigma,
         flicker=flicker,
     )
@@ -101,6 +102,23 @@ def test_they_are_what_the_fit_gives_for_data_without_noise(
         np.testing.assert_allclose(found.sigma, sigma, rtol=1e-3)
     parts = np.sum(list(found.budget.values()), axis=0)
     np.testing.assert_allclose(parts, 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [0.2, 0.5])
+def test_of_a_kinetic_order_they_are_what_becquerels_law_gives(shape: float) -> None:
+    expected = replace(
+        series(((0.06, 1.0),), flicker=0.0, offset_sigma=(1e-3, 1e-3, 1e-3)),
+        shape=np.array([shape]),
+    )
+    (law,) = [
+        law
+        for law in fitted(expected, without_noise(expected), 0.0).laws
+        if law.name == "becquerel"
+    ]
+    assert (law.rate_per_s, law.shape) == pytest.approx((0.06, shape), rel=1e-4)
+    found = information(expected)
+    amplitude, rate, exponent, _ = np.sqrt(np.diag(law.covariance))
+    np.testing.assert_allclose(found.sigma, [rate, amplitude, exponent], rtol=2e-3)
 
 
 def test_fits_of_noisy_data_scatter_by_them() -> None:

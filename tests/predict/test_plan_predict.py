@@ -65,7 +65,7 @@ def predicted(labrig: Labrig, measured: Path, *more: object, **keys: object) -> 
 
 def sigma(said: dict[str, Any]) -> float:
     (patch,) = said["patches"].values()
-    return float(patch["states"][0]["k_r_sigma_per_s"])
+    return float(patch["states"][0]["rate_sigma_per_s"])
 
 
 def test_the_run_that_follows_finds_what_was_predicted(labrig: Labrig, measured: Path) -> None:
@@ -75,7 +75,7 @@ def test_the_run_that_follows_finds_what_was_predicted(labrig: Labrig, measured:
     assert said["exposures_s"] == pytest.approx(taken, rel=0.27), "within a third of a stop"
     (found,) = json.loads((run / "result" / "fit.json").read_text())["states"]
     (state,) = said["patches"]["sample"]["states"]
-    assert state["k_r_sigma_per_s"] == pytest.approx(found["k_r_sigma_per_s"], rel=0.25)
+    assert state["rate_sigma_per_s"] == pytest.approx(found["k_r_sigma_per_s"], rel=0.25)
     assert state["amplitude_sigma_dn_per_s"] == pytest.approx(found["amplitude_sigma"], rel=0.25)
     assert said["patches"]["sample"]["brightness_known"]
     assert sum(state["noise"].values()) == pytest.approx(1)
@@ -193,11 +193,6 @@ def test_a_plan_without_a_material_is_the_timeline_for_programs_too(labrig: Labr
         ("states: []", [], "states"),
         ("states: [{k_r_per_s: 0.1}, {k_r_per_s: 0.01}]", [], "'amplitude' or 'reradiation'"),
         ("states: [{k_r_per_s: 0.1}, {k_r_per_s: 0.1}]", [], "same rate"),
-        (
-            "states: [{k_r_per_s: 0.1, kinetic_order: 1.5}]",
-            [],
-            "expected states of first order, got 'kinetic_order'",
-        ),
         ("power-law", [], "no decay tells so many apart"),
         ("blu-paint", [], "did you mean 'blue-paint'?"),
         ("smaple=blue-paint", [], "did you mean 'sample'?"),
@@ -232,4 +227,21 @@ def test_materials_from_a_paper_can_be_predicted(labrig: Labrig, name: str) -> N
     assert ended.code == 0, ended.err
     states = json.loads(ended.out)["patches"]["sample"]["states"]
     assert len(states) == len(read_material(name).states)
-    assert all(0 < state["k_r_sigma_per_s"] < state["k_r_per_s"] for state in states)
+    assert all(0 < state["rate_sigma_per_s"] < state["rate_per_s"] for state in states)
+
+
+def test_a_kinetic_order_bends_the_decay_that_is_predicted(labrig: Labrig, tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "name: mine\nkind: phosphor\nbands_nm: [400, 700]\n"
+        "irradiance_norm: {kind: vector_length, value: 1}\n"
+        "states: [{k_r_per_s: 0.1, kinetic_order: 1.5, k_e_per_s: [0.1], reradiation: [1]}]\n"
+    )
+    ended = labrig("plan", "decay", "--rig", "sim", "--predict", path, "--json")
+    (state,) = json.loads(ended.out)["patches"]["sample"]["states"]
+    # r∞ is the root of (1 − r) κ = k rᵇ for κ = k: r = 0.56984.
+    assert state["rate_per_s"] == pytest.approx(1.5 * 0.1 * 0.56984**0.5, rel=1e-3)
+    assert state["kinetic_order"] == pytest.approx(1.5)
+    assert 0 < state["kinetic_order_sigma"] < 0.02
+    shown = labrig("plan", "decay", "--rig", "sim", "--predict", path).out
+    assert "order b" in shown

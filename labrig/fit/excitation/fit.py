@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from labrig.errors import FitError
 from labrig.fit.excitation.lamp_pulls import law_test
 from labrig.fit.excitation.levels import levels_at_off
-from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of
+from labrig.fit.excitation.order_gain import order_gain
+from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.start import channel_weights, starts
 from labrig.fit.least_squares import Ending, FloatArray, LeastSquaresFit, least_squares
@@ -27,10 +28,14 @@ ROUGH, FINE = 1e-3, 1e-6
 #: any effect.
 WHITENINGS = (ROUGH, ROUGH, FINE)
 MAX_ITERATIONS = 60
+#: Number of iterations of a starting point of general order.
+ROUGH_ITERATIONS = 15
 #: Relative error of the light on a place, which the starting points take for noise.
 LIGHT_SIGMA = 0.05
 #: Factor from its start value within which the starting points leave a k_r.
 ROUGH_K_R_FACTOR = 2.0
+#: Gain in χ² of a step at which a starting point of general order is near enough.
+ROUGH_GAIN = 0.1
 #: Relative σ of an amplitude above which a warning is given.
 LEVEL_KNOWN = 0.3
 #: Reduced χ² above which a warning is given.
@@ -43,6 +48,7 @@ def fit_excitation(
     fractions: ArrayLike,
     uncertain: RelativeSigmas | None = None,
     near: FittedExcitation | None = None,
+    order: float | None = 1.0,
 ) -> FittedExcitation:
     """Fit all series together.
 
@@ -57,6 +63,8 @@ def fit_excitation(
         Further sources of scatter; none by default.
     near
         A fit of nearly the same series as start; by default several levels of charge are tried.
+    order
+        Kinetic order of all states; None fits one of each.
 
     Raises
     ------
@@ -68,7 +76,7 @@ def fit_excitation(
     uncertain = uncertain or RelativeSigmas()
     rates = np.asarray(k_r_per_s, dtype=np.float64)
     reference = _brightest(series)
-    problem = ExcitationProblem(series, len(rates), reference, uncertain)
+    problem = ExcitationProblem(series, len(rates), reference, uncertain, order)
     if near is None:
         theta = _roughly(problem, rates, np.asarray(fractions, dtype=np.float64), reference)
     else:
@@ -115,6 +123,7 @@ def _roughly(
         len(k_r_per_s),
         0,
         RelativeSigmas(),
+        problem.parameters.order,
     )
     fits = [
         _minimised(rough, start, ROUGH, ROUGH_K_R_FACTOR)
@@ -122,15 +131,19 @@ def _roughly(
     ]
     best = rough.parameters.unpack(min(fits, key=_chi2).parameters)
     weights = channel_weights(problem, reference)
-    return problem.parameters.as_stated(best.k_r_per_s, best.amplitude, best.k_e_per_s, weights)
+    return problem.parameters.as_stated(
+        best.k_r_per_s, best.amplitude, best.k_e_per_s, weights, best.order
+    )
 
 
 def _as_fitted(problem: ExcitationProblem, fit: FittedExcitation, reference: int) -> FloatArray:
-    k_r, amplitude = np.array([(s.k_r_per_s, s.amplitude) for s in fit.states]).T
+    k_r, amplitude, order = np.array(
+        [(s.k_r_per_s, s.amplitude, s.kinetic_order) for s in fit.states]
+    ).T
     weights = fit.channel_weights
     at_reference = weights[reference]
     return problem.parameters.as_stated(
-        k_r, amplitude * at_reference, fit.k_e(), weights / at_reference
+        k_r, amplitude * at_reference, fit.k_e(), weights / at_reference, order
     )
 
 
@@ -141,13 +154,16 @@ def _minimised(
     lower, upper = problem.parameters.bounds()
     k_r = problem.parameters.columns.k_r
     lower[k_r], upper[k_r] = start[k_r] - np.log(k_r_factor), start[k_r] + np.log(k_r_factor)
+    # Steps of general order take their time; a starting point need not be at its minimum.
+    is_slow_start = np.isfinite(k_r_factor) and not problem.parameters.is_first_order
     return least_squares(
         problem.residuals,
         start,
         lower=lower,
         upper=upper,
-        max_iterations=MAX_ITERATIONS,
+        max_iterations=ROUGH_ITERATIONS if is_slow_start else MAX_ITERATIONS,
         tolerance=tolerance,
+        least_gain=ROUGH_GAIN if is_slow_start else 0.0,
     )
 
 
@@ -158,21 +174,29 @@ def _chi2(fit: LeastSquaresFit) -> float:
 def _result(
     problem: ExcitationProblem, solution: LeastSquaresFit, reference: int, uncertain: RelativeSigmas
 ) -> FittedExcitation:
-    n, bands = problem.parameters.states, problem.parameters.bands
+    n, bands, columns = (
+        problem.parameters.states,
+        problem.parameters.bands,
+        problem.parameters.columns,
+    )
     rates, theta = problem.parameters.unpack(solution.parameters), solution.parameters
-    n_own = 2 * n + n * bands
+    n_rates = 2 * n + n * bands
+    own = np.concatenate([np.arange(n_rates), np.arange(columns.order.start, columns.order.stop)])
     stated = problem.parameters.stated_slopes(rates)
     covariance = propagated_covariance(solution.covariance, stated)
-    total_covariance = covariance[:n_own, :n_own].copy()
+    total_covariance = covariance[np.ix_(own, own)]
     # E enters k_e one to one, band by band, whatever is measured.
     light_sigma = np.broadcast_to(uncertain.irradiance, bands)
     for band in range(bands):
-        by_light = np.zeros(n_own)
-        by_light[2 * n + band :: bands] = rates.k_e_per_s[:, band]
+        by_light = np.zeros(len(own))
+        by_light[2 * n + band : n_rates : bands] = rates.k_e_per_s[:, band]
         total_covariance += light_sigma[band] ** 2 * np.outer(by_light, by_light)
     sigma = np.sqrt(np.diag(total_covariance))
-    order = np.argsort(-rates.k_r_per_s, kind="stable")
-    k_e_sigma = sigma[2 * n :].reshape(n, bands)
+    falling = np.argsort(-rates.k_r_per_s, kind="stable")
+    k_e_sigma = sigma[2 * n : n_rates].reshape(n, bands)
+    order_sigma = sigma[n_rates:] if is_fitted(columns.order) else np.zeros(n)
+    inverse = columns.inverse_gain
+    gain_sigma = rates.gain * np.sqrt(np.diag(solution.covariance)[inverse])
     states = tuple(
         ExcitedState(
             float(rates.k_r_per_s[i]),
@@ -181,17 +205,25 @@ def _result(
             float(sigma[n + i]),
             rates.k_e_per_s[i],
             k_e_sigma[i],
+            float(rates.order[i]),
+            float(order_sigma[i]),
+            bool(gain_sigma[i] < LEVEL_KNOWN),
         )
-        for i in order
+        for i in falling
     )
     weights_sigma = np.zeros(len(rates.weights))
     others = [c for c in range(len(rates.weights)) if c != reference]
-    weights_sigma[others] = np.sqrt(np.diag(covariance)[n_own : n_own + len(others)])
+    weights_sigma[others] = np.sqrt(np.diag(covariance)[columns.weights])
     kept = np.concatenate(
-        [order, n + order, *(2 * n + i * bands + np.arange(bands) for i in order)]
+        [
+            falling,
+            n + falling,
+            *(2 * n + i * bands + np.arange(bands) for i in falling),
+            *([n_rates + falling] if is_fitted(columns.order) else []),
+        ]
     )
     # By way of θ: A and k_e may trade off so far that their covariance has no digits left of this.
-    at_off = _at_off(problem, rates, stated[:n_own], solution.covariance, order)
+    at_off = _at_off(problem, rates, stated[own], solution.covariance, falling)
     return FittedExcitation(
         states=states,
         channel_weights=rates.weights,
@@ -202,6 +234,7 @@ def _result(
         covariance=total_covariance[np.ix_(kept, kept)],
         warnings=(*_warnings(problem, solution, states), *_law_warnings(problem, rates, theta)),
         residuals=problem.plain_residuals(theta),
+        order_gain=order_gain(problem, theta, reference, uncertain),
     )
 
 
@@ -210,38 +243,55 @@ def _at_off(
     rates: Rates,
     stated: FloatArray,
     covariance: FloatArray,
-    order: NDArray[np.intp],
+    falling: NDArray[np.intp],
 ) -> tuple[ConcentrationAtOff, ...]:
     """Return the brightest lamp off level of every series, σ by linear propagation.
 
-    `stated` has the derivatives of k_r, A and k_e by θ, `covariance` is that of θ.
+    `stated` has the derivatives of k_r, A, k_e and fitted orders by θ, `covariance` is that of θ.
     """
     n, bands = problem.parameters.states, problem.parameters.bands
+    first_order = 2 * n + n * bands
+    b, a, k_r = rates.order, rates.amplitude, rates.k_r_per_s
     levels_at_charge = []
     for charging in problem.illuminated_series(rates):
-        level = levels_at_off(charging, rates.k_r_per_s, rates.k_e_per_s)
-        glow = level.value @ rates.amplitude
+        orders = None if problem.parameters.is_first_order else b
+        level = levels_at_off(charging, k_r, rates.k_e_per_s, orders)
+        glow = level.value**b @ a
         charge, site = np.unravel_index(int(np.argmax(glow)), glow.shape)
-        r0, a = level.value[charge, site], rates.amplitude
-        gradient = np.zeros((n, 2 * n + n * bands))
+        r0 = level.value[charge, site]
+        by = np.zeros((3, n, len(stated)))
         for i in range(n):
-            gradient[i, i] = level.by_k_r[charge, site, i]
-            gradient[i, 2 * n + i * bands : 2 * n + (i + 1) * bands] = level.by_k_e[charge, site, i]
-        amplitude_gradient = a[:, None] * gradient
-        amplitude_gradient[:, n : 2 * n] += np.diag(r0)
-        sigmas = [
-            np.sqrt(np.diag(propagated_covariance(covariance, jacobian @ stated)))
-            for jacobian in (gradient, amplitude_gradient)
-        ]
+            by[0, i, i] = level.by_k_r[charge, site, i]
+            by[0, i, 2 * n + i * bands : 2 * n + (i + 1) * bands] = level.by_k_e[charge, site, i]
+            if len(stated) > first_order:
+                by[0, i, first_order + i] = level.by_order[charge, site, i]
+        log_r0 = np.log(np.maximum(r0, np.finfo(float).tiny))
+        # τ = 1/((b − 1) k r(0)^(b − 1)), or 1/k where b is 1; a = A r(0)ᵇ.
+        beyond = np.where(b > 1, b - 1, 1.0)
+        time_s = 1 / (beyond * k_r * r0 ** (b - 1))
+        by[1] = (a * b * r0 ** (b - 1))[:, None] * by[0]
+        by[2] = -(time_s * (b - 1) / r0)[:, None] * by[0]
+        each = np.arange(n)
+        by[1, each, n + each] += r0**b
+        by[2, each, each] -= time_s / k_r
+        if len(stated) > first_order:
+            by[1, each, first_order + each] += a * r0**b * log_r0
+            by[2, each, first_order + each] -= time_s * (1 / beyond + log_r0)
+        r0_sigma, a_sigma, time_sigma_s = (
+            np.sqrt(np.diag(propagated_covariance(covariance, jacobian @ stated)))[falling]
+            for jacobian in by
+        )
         levels_at_charge.append(
             ConcentrationAtOff(
                 charging.name,
                 int(charge),
                 int(site),
-                r0[order],
-                sigmas[0][order],
-                (a * r0)[order],
-                sigmas[1][order],
+                r0[falling],
+                r0_sigma,
+                (a * r0**b)[falling],
+                a_sigma,
+                time_s[falling],
+                time_sigma_s,
             )
         )
     return tuple(levels_at_charge)

@@ -1,56 +1,19 @@
 """Concentration of every site at every exposure, with derivatives: exact steps, no integrator.
 
 κ = Σ_j k_e,j E_j is constant within a step: the steady lamp is one, its turn-on and turn-off
-transients a few dozen. Steps are affine in r, and so is a charge: all charges of a series are
-computed at once, each from r = 0, and then chained.
+transients a few dozen. Of first order steps are affine in r, and so is a charge: all charges of a
+series are computed at once, each from r = 0, and then chained. Other orders are those of
+`levels_of_order`.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.material import phi1, phi2, relaxation_with_slopes
+from labrig.fit.excitation import levels_of_order
+from labrig.fit.excitation.level_slopes import Levels
+from labrig.material import relaxation_with_slopes
 from labrig.results import ChargingSeries, FloatArray
-
-
-class Levels(NamedTuple):
-    """Concentrations of N states at P sites, and their derivatives.
-
-    Attributes
-    ----------
-    value
-        Concentrations r, mean over each exposure, shape (n, P, N).
-    by_k_r
-        Derivatives by the state's own k_r in s, shape (n, P, N).
-    by_k_e
-        Derivatives by the state's own k_e of every band in s, shape (n, P, N, B).
-    """
-
-    value: FloatArray
-    by_k_r: FloatArray
-    by_k_e: FloatArray
-
-    def of(self, which: NDArray[np.intp]) -> "Levels":
-        """Return the levels at some indices, in their order."""
-        return Levels(self.value[which], self.by_k_r[which], self.by_k_e[which])
-
-    def meaned(self, places: int) -> "Levels":
-        """Average over `places` per site, given all sites for one place after the other."""
-        parts = (part.reshape(len(part), places, -1, *part.shape[2:]) for part in self)
-        return Levels(*(part.mean(axis=1) for part in parts))
-
-    def decayed(self, k_r_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray) -> "Levels":
-        """Return the levels in the dark, averaged over exposures that begin `t_s` later, (n,)."""
-        t, x = t_s[:, None, None], exposure_s[:, None, None] * k_r_per_s
-        mean = phi1(x)
-        decay = np.exp(-k_r_per_s * t) * mean
-        slope = exposure_s[:, None, None] * (phi2(x) - mean) / mean - t
-        return Levels(
-            self.value * decay,
-            (self.by_k_r + self.value * slope) * decay,
-            self.by_k_e * decay[..., None],
-        )
 
 
 class _Charges(NamedTuple):
@@ -72,8 +35,13 @@ class _Charges(NamedTuple):
     gained: Levels
 
 
-def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """Return the levels of all exposures of a series.
+def levels(
+    series: ChargingSeries,
+    k_r_per_s: FloatArray,
+    k_e_per_s: FloatArray,
+    order: FloatArray | None = None,
+) -> Levels:
+    """Return the light rᵇ of all exposures of a series, over that of full states.
 
     Parameters
     ----------
@@ -81,29 +49,45 @@ def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
         The charging series.
     k_r_per_s, k_e_per_s
         Re-radiation rates (N,) and excitation rates (N, B) in 1/s.
+    order
+        Kinetic orders (N,); None: all are 1, and no derivative by them is wanted.
     """
     if series.across is not None:
-        spread_levels = levels(series.spread(), k_r_per_s, k_e_per_s)
+        spread_levels = levels(series.spread(), k_r_per_s, k_e_per_s, order)
         return spread_levels.meaned(len(series.across))
     charges = series.charges
     shots = [len(charge.start_s) for charge in charges]
-    start_s = np.concatenate([charge.start_s for charge in charges])
     exposure_s = np.concatenate([charge.exposure_s for charge in charges])
-    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s).of(
-        np.repeat(np.arange(len(charges)), shots)
+    dark_s = np.concatenate([charge.start_s for charge in charges]) - np.repeat(
+        _dark_s(series), shots
     )
-    return after_charges.decayed(k_r_per_s, start_s - np.repeat(_dark_s(series), shots), exposure_s)
+    of_charge = np.repeat(np.arange(len(charges)), shots)
+    if order is None:
+        after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s).of(of_charge)
+        return after_charges.decayed(k_r_per_s, dark_s, exposure_s)
+    after_charges = levels_of_order.levels_after_charges(series, k_r_per_s, k_e_per_s, order)
+    begins = levels_of_order.decayed(after_charges.of(of_charge), k_r_per_s, order, dark_s)
+    return levels_of_order.emitted(begins, k_r_per_s, order, exposure_s)
 
 
-def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """Return the levels after every charge, traced back in the dark to lamp off.
+def levels_at_off(
+    series: ChargingSeries,
+    k_r_per_s: FloatArray,
+    k_e_per_s: FloatArray,
+    order: FloatArray | None = None,
+) -> Levels:
+    """Return the concentrations after every charge, traced back in the dark to lamp off.
 
     The turn-off transient itself charges a little: this is the r(0) to which the amplitude of a
-    decay belongs.
+    decay belongs. The arguments are those of `levels`.
     """
     zeros = np.zeros(len(series.charges))
-    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s)
-    return after_charges.decayed(k_r_per_s, zeros - series.fade.total_s, zeros)
+    back_s = zeros - series.fade.total_s
+    if order is None:
+        after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s)
+        return after_charges.decayed(k_r_per_s, back_s, zeros)
+    after_charges = levels_of_order.levels_after_charges(series, k_r_per_s, k_e_per_s, order)
+    return levels_of_order.decayed(after_charges, k_r_per_s, order, back_s)
 
 
 def _dark_s(series: ChargingSeries) -> FloatArray:
@@ -118,7 +102,7 @@ def _levels_after_charges(
     charges = _independent_charges(series, k_r_per_s, k_e_per_s)
     on_s = np.array([charge.on_s for charge in series.charges])
     dark_s = on_s[1:] - _dark_s(series)[:-1]
-    value, by_k_r, by_k_e = charges.gained
+    value, by_k_r, by_k_e, _ = charges.gained
     for number, charge in enumerate(series.charges):
         if charge.saturated:
             value[number] = np.exp(-k_r_per_s * series.fade.total_s)
@@ -169,6 +153,7 @@ def _independent_charges(
             r_before[-1].reshape(shape),
             by_k_r.reshape(shape),
             by_fraction * light[:, :, None, :],
+            np.zeros(shape),
         ),
     )
 

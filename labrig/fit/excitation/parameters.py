@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from labrig.errors import FitError
+from labrig.material import MAX_ORDER
 from labrig.results import ChargingSeries, FloatArray
 
 #: Amplitudes over the largest value: of a state which is not there, and of one so far from
@@ -36,6 +37,10 @@ class Rates(NamedTuple):
         Amplitudes z of `ChargingSeries.site_modes`, series by series, shape (M,).
     offset
         Dark level that was not subtracted, shape (C,), or (0,) if it is not fitted.
+    order
+        Kinetic orders b, shape (N,).
+    gain
+        (A/S)^(1/b) with the unit S of θ, shape (N,).
     """
 
     k_r_per_s: FloatArray
@@ -47,6 +52,8 @@ class Rates(NamedTuple):
     lacking: FloatArray
     off: FloatArray
     offset: FloatArray
+    order: FloatArray
+    gain: FloatArray
 
 
 @dataclass(frozen=True)
@@ -83,19 +90,24 @@ class RelativeSigmas:
 
 
 class ParameterLayout(NamedTuple):
-    """Slices of θ = [ln k_r, 1/A, A k_e, weights, parameters with a prior].
+    """Slices of θ = [ln k_r, 1/A, A k_e, weights, orders, parameters with a prior].
 
     The glow y of a state obeys dy/dt = A k_e E (1 − y/A) − k_r y. A weakly charged sample
     determines how fast it grows, A k_e, far better than A and k_e, and of A hardly more than that
     it is large. With A k_e as parameter the search need not follow the hyperbola on which A and k_e
     trade off; with 1/A it finds its way back from amplitudes without end, where the model is flat
     in A. The slice of a parameter that is not fitted is empty.
+
+    Of order b the glow is S yᵇ with the unit S and y = G r, G = (A/S)^(1/b): dy/dt = G k_e E (1 −
+    y/G) − k_r G^(1 − b) yᵇ. So G takes the place of A, and k_r G^(1 − b), the rate where the glow
+    is S, that of k_r. S is 1 where the orders are held, else the brightest value.
     """
 
     k_r: slice
-    inverse_amplitude: slice
+    inverse_gain: slice
     growth: slice
     weights: slice
+    order: slice
     scale: slice
     brightness: slice
     lacking: slice
@@ -121,6 +133,8 @@ class Parameters:
         Index of the channel whose weight is 1.
     uncertain
         Further sources of scatter.
+    order
+        Kinetic order of all states; None fits one of each.
 
     Attributes
     ----------
@@ -128,6 +142,8 @@ class Parameters:
         Numbers N of states and B of bands.
     others
         Indices of the channels whose weights are fitted.
+    order
+        Kinetic order of all states, None where they are fitted.
     columns
         Layout of θ.
     prior_sigma
@@ -140,12 +156,15 @@ class Parameters:
         states: int,
         reference: int,
         uncertain: RelativeSigmas,
+        order: float | None = 1.0,
     ) -> None:
         self.states, self.bands, self._series = states, bands_of(series), len(series)
         channels = series[0].values.shape[2]
         brightest = max(float(np.nanmax(charging.values)) for charging in series)
-        self._least_amplitude = LEAST_AMPLITUDE * brightest
-        self._largest_amplitude = LARGEST_AMPLITUDE * brightest
+        self.order = order
+        self._unit = brightest if order is None else 1.0
+        self._least_gain = LEAST_AMPLITUDE * brightest / self._unit
+        self._largest_gain = LARGEST_AMPLITUDE * brightest / self._unit
         self.others = [channel for channel in range(channels) if channel != reference]
         self._first_charge = _begins([len(charging.charges) for charging in series])
         self._first_mode = _begins(
@@ -159,10 +178,21 @@ class Parameters:
         ]
         sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold_deficit, 1.0]
         self.prior_sigma: FloatArray = np.concatenate([np.repeat(sigmas, counts), uncertain.offset])
-        free_counts = [states, states, states * self.bands, len(self.others)]
+        free_counts = [
+            states,
+            states,
+            states * self.bands,
+            len(self.others),
+            states if order is None else 0,
+        ]
         ends = _begins([*free_counts, *counts, len(uncertain.offset)])
         self.columns = ParameterLayout(*(slice(*limits) for limits in pairwise(ends)))
         self.count = ends[-1]
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether all states are held at first order."""
+        return self.order == 1
 
     def charges(self, number: int) -> slice:
         """Return the slice of a series' charges among those of all series."""
@@ -176,8 +206,9 @@ class Parameters:
         """Return bounds of θ: excitation rates and weights ≥ 0, amplitudes in their range."""
         lower, upper = np.full(self.count, -np.inf), np.full(self.count, np.inf)
         lower[self.columns.growth.start : self.columns.weights.stop] = 0.0
-        lower[self.columns.inverse_amplitude] = 1 / self._largest_amplitude
-        upper[self.columns.inverse_amplitude] = 1 / self._least_amplitude
+        lower[self.columns.inverse_gain] = 1 / self._largest_gain
+        upper[self.columns.inverse_gain] = 1 / self._least_gain
+        lower[self.columns.order], upper[self.columns.order] = 1.0, MAX_ORDER
         return lower, upper
 
     def as_stated(
@@ -186,21 +217,27 @@ class Parameters:
         amplitude: FloatArray,
         k_e_per_s: FloatArray,
         weights: FloatArray,
+        order: FloatArray,
     ) -> FloatArray:
         """Return θ of some rates, with all parameters that have a prior at 0."""
         theta = np.zeros(self.count)
         columns = self.columns
-        theta[columns.k_r] = np.log(k_r_per_s)
-        amplitude = np.clip(amplitude, self._least_amplitude, self._largest_amplitude)
-        theta[columns.inverse_amplitude] = 1 / amplitude
-        theta[columns.growth] = (amplitude[:, None] * k_e_per_s).ravel()
+        gain = np.clip(
+            (amplitude / self._unit) ** (1 / order), self._least_gain, self._largest_gain
+        )
+        theta[columns.k_r] = np.log(k_r_per_s) + (1 - order) * np.log(gain)
+        theta[columns.inverse_gain] = 1 / gain
+        theta[columns.growth] = (gain[:, None] * k_e_per_s).ravel()
         theta[columns.weights] = weights[self.others]
+        if is_fitted(columns.order):
+            theta[columns.order] = order
         return theta
 
     def unpack(self, theta: FloatArray) -> Rates:
         """Return the parameters in θ by name."""
         columns = self.columns
-        amplitude = 1 / theta[columns.inverse_amplitude]
+        gain = 1 / theta[columns.inverse_gain]
+        order = theta[columns.order] if self.order is None else np.full(self.states, self.order)
         weights = np.ones(len(self.others) + 1)
         weights[self.others] = theta[columns.weights]
         log_scale, log_brightness = np.zeros(self._series), np.zeros(self._first_charge[-1])
@@ -209,27 +246,34 @@ class Parameters:
         if is_fitted(columns.brightness):
             log_brightness[:] = theta[columns.brightness]
         return Rates(
-            np.exp(theta[columns.k_r]),
-            amplitude,
-            theta[columns.growth].reshape(self.states, self.bands) / amplitude[:, None],
+            np.exp(theta[columns.k_r]) * gain ** (order - 1),
+            self._unit * gain**order,
+            theta[columns.growth].reshape(self.states, self.bands) / gain[:, None],
             weights,
             log_scale,
             log_brightness,
             theta[columns.lacking],
             theta[columns.off],
             theta[columns.offset],
+            order,
+            gain,
         )
 
     def stated_slopes(self, rates: Rates) -> FloatArray:
-        """Return the derivatives by θ of θ with k_r, A and k_e for ln k_r, 1/A and A k_e."""
+        """Return the derivatives by θ of θ with k_r, A and k_e for its own parameters of these."""
         columns, slopes = self.columns, np.eye(self.count)
+        gain, order = rates.gain, rates.order
+        inverse = columns.inverse_gain
         slopes[columns.k_r, columns.k_r] = np.diag(rates.k_r_per_s)
-        inverse = columns.inverse_amplitude
-        slopes[inverse, inverse] = -np.diag(rates.amplitude**2)
+        slopes[columns.k_r, inverse] = np.diag((1 - order) * rates.k_r_per_s * gain)
+        slopes[inverse, inverse] = -np.diag(order * rates.amplitude * gain)
         growth = np.arange(columns.growth.start, columns.growth.stop)
         state = np.repeat(np.arange(self.states), self.bands)
-        slopes[growth, growth] = 1 / rates.amplitude[state]
-        slopes[growth, inverse.start + state] = (rates.amplitude[:, None] * rates.k_e_per_s).ravel()
+        slopes[growth, growth] = 1 / gain[state]
+        slopes[growth, inverse.start + state] = (gain[:, None] * rates.k_e_per_s).ravel()
+        if is_fitted(columns.order):
+            slopes[columns.k_r, columns.order] = np.diag(rates.k_r_per_s * np.log(gain))
+            slopes[inverse, columns.order] = np.diag(rates.amplitude * np.log(gain))
         return slopes
 
 

@@ -1,7 +1,8 @@
 """Residuals of all series as a function of rates, amplitudes and parameters with a prior.
 
-The signal of a site is w_c Σ_i A_i r_i: one amplitude A_i = Λ* k_r,i for every state, the signal of
-a fully charged sample in the brightest channel, and one weight per channel.
+The signal of a site is w_c Σ_i A_i r_iᵇ with b = 1 of the first order: one amplitude A_i = Λ* k_r,i
+for every state, the signal of a fully charged sample in the brightest channel, and one weight per
+channel.
 """
 
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from labrig.fit.excitation.level_slopes import Levels
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.parameters import Parameters, Rates, RelativeSigmas, is_fitted
 from labrig.results import ChargingSeries, FloatArray
@@ -28,6 +30,8 @@ class ExcitationProblem:
         Index of the channel whose weight is 1.
     uncertain
         Further sources of scatter.
+    order
+        Kinetic order of all states; None fits one of each.
     """
 
     def __init__(
@@ -36,9 +40,10 @@ class ExcitationProblem:
         states: int,
         reference: int,
         uncertain: RelativeSigmas,
+        order: float | None = 1.0,
     ) -> None:
         self.series = tuple(series)
-        self.parameters = Parameters(series, states, reference, uncertain)
+        self.parameters = Parameters(series, states, reference, uncertain, order)
         self._flicker = uncertain.flicker
         self._inverse_sigma = [
             np.where(
@@ -64,9 +69,7 @@ class ExcitationProblem:
         """Return the model of every series, shape (n, P, C) each."""
         rates = self.parameters.unpack(theta)
         return [
-            _signal(
-                levels(charging, rates.k_r_per_s, rates.k_e_per_s).value @ rates.amplitude, rates
-            )
+            _signal(self._levels(charging, rates).value @ rates.amplitude, rates)
             for charging in self.illuminated_series(rates)
         ]
 
@@ -124,20 +127,30 @@ class ExcitationProblem:
             illuminated.append(replace(charging, charges=charges, irradiance=scaled))
         return illuminated
 
+    def _levels(self, charging: ChargingSeries, rates: Rates) -> Levels:
+        order = None if self.parameters.is_first_order else rates.order
+        return levels(charging, rates.k_r_per_s, rates.k_e_per_s, order)
+
     def _series_residuals(
         self, number: int, charging: ChargingSeries, rates: Rates
     ) -> tuple[FloatArray, FloatArray]:
-        level = levels(charging, rates.k_r_per_s, rates.k_e_per_s)
+        level = self._levels(charging, rates)
         shots, sites = level.value.shape[:2]
         columns = self.parameters.columns
         glow = level.value @ rates.amplitude
         # By θ of the glow, before channels come into it.
         slopes = np.zeros((shots, sites, self.parameters.count))
-        slopes[..., columns.k_r] = level.by_k_r * (rates.amplitude * rates.k_r_per_s)
-        # A k_e is held where 1/A is varied, and k_e with it.
-        by_amplitude = level.value - np.einsum("fpnb,nb->fpn", level.by_k_e, rates.k_e_per_s)
-        slopes[..., columns.inverse_amplitude] = -(rates.amplitude**2) * by_amplitude
-        slopes[..., columns.growth] = level.by_k_e.reshape(shots, sites, -1)
+        amplitude, order, gain = rates.amplitude, rates.order, rates.gain
+        slopes[..., columns.k_r] = level.by_k_r * (amplitude * rates.k_r_per_s)
+        # G k_e and k_r G^(1 − b) are held where 1/G is varied, and k_e and k_r with it.
+        by_gain = order * level.value - np.einsum("fpnb,nb->fpn", level.by_k_e, rates.k_e_per_s)
+        by_gain += (order - 1) * rates.k_r_per_s * level.by_k_r
+        slopes[..., columns.inverse_gain] = -(amplitude * gain) * by_gain
+        by_growth = (amplitude / gain)[:, None] * level.by_k_e
+        slopes[..., columns.growth] = by_growth.reshape(shots, sites, -1)
+        if is_fitted(columns.order):
+            by_log_gain = level.value + rates.k_r_per_s * level.by_k_r
+            slopes[..., columns.order] = amplitude * (level.by_order + np.log(gain) * by_log_gain)
         self._set_light_derivatives(number, charging, rates, slopes)
         inverse = self._inverse_sigma[number]
         jacobian = slopes[:, :, None, :] * (rates.weights * inverse)[..., None]
@@ -153,7 +166,7 @@ class ExcitationProblem:
     ) -> None:
         """Set the derivatives by all parameters of the light, from those by A k_e."""
         columns, charges = self.parameters.columns, self.parameters.charges(number)
-        growth = rates.amplitude[:, None] * rates.k_e_per_s
+        growth = rates.gain[:, None] * rates.k_e_per_s
         by_growth = slopes[..., columns.growth].reshape(*slopes.shape[:2], *growth.shape)
         by_band = np.einsum("fpnb,nb->fpb", by_growth, growth)
         by_light = by_band.sum(axis=2)

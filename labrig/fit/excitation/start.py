@@ -11,6 +11,8 @@ from labrig.results import ChargingSeries, FloatArray
 
 #: Guesses of the concentration of the brightest site, the least certain start value.
 GUESSED_LEVELS = (0.05, 0.2, 0.5, 0.9)
+#: Kinetic order at the start where orders are fitted.
+START_ORDER = 1.5
 #: Grid of κ over k_r.
 KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
 
@@ -38,11 +40,15 @@ def starts(
         kappa, design = np.concatenate(site_kappas), _irradiances(problem)
         k_e = nonnegative_least_squares(design, kappa)
         # A state that decays faster charges no further by the same light.
+        order = START_ORDER if problem.parameters.order is None else problem.parameters.order
+        # The glow at that level, and its rate, are those of the decay for any order.
+        ease = guess ** (1 - order)
         yield problem.parameters.as_stated(
-            k_r_per_s,
-            total * fractions,
+            k_r_per_s * ease / order,
+            total * fractions * ease,
             np.outer(k_r_per_s / mean_rate, np.maximum(k_e, 1e-3 * k_e.max())),
             channel_weights(problem, reference),
+            np.full(len(k_r_per_s), order),
         )
 
 
