@@ -6,10 +6,10 @@ import numpy as np
 
 from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
-from labrig.fit.decay.flicker_correlation import flicker_correlation
 from labrig.fit.decay.further_state import hidden_state
 from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.misfit_covariance import with_misfit
+from labrig.fit.decay.noise_correlation import noise_correlation
 from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
@@ -42,9 +42,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     series, joint = data.series, fit.joint
     fitted_covariance = _fitted_covariance(fit, data, evidence)
     hidden = hidden_state(data, fit)
-    correlation = flicker_correlation(
-        data, fit, evidence.noise, is_estimated=len(evidence.noise.likely_flickers) > 1
-    )
+    correlation = noise_correlation(data, fit, evidence.noise)
     for source in (hidden, correlation):
         if source is not None:
             fitted_covariance = fitted_covariance + source.covariance
