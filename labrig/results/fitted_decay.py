@@ -181,6 +181,9 @@ class FittedDecay:
         End of the last exposure in seconds after lamp off.
     scatter
         Uncertainties of the values from their scatter; None if they were given.
+    sigma_factor
+        Factor by which the given uncertainties were multiplied, since the values scatter so much
+        more; 1 if they do not.
     """
 
     states: tuple[DecayState, ...]
@@ -204,6 +207,7 @@ class FittedDecay:
     rate_spectrum: FittedRateSpectrum | None
     measured_until_s: float
     scatter: ScatterSigma | None = field(default=None, kw_only=True)
+    sigma_factor: float = field(default=1.0, kw_only=True)
 
     @property
     def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
@@ -437,6 +441,7 @@ class FittedDecay:
             "law_comparison": [asdict(law) for law in self.compared_laws],
             "measured_until_s": self.measured_until_s,
             "sigma_from_scatter": asdict(self.scatter) if self.scatter else None,
+            "sigma_factor": self.sigma_factor,
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -665,6 +670,7 @@ def _from_dict(content: Any) -> FittedDecay:
         rate_spectrum=None if spectrum is None else fitted_rate_spectrum(spectrum),
         measured_until_s=float(content["measured_until_s"]),
         scatter=None if scatter is None else ScatterSigma(**scatter),
+        sigma_factor=float(content["sigma_factor"]),
     )
 
 

@@ -20,6 +20,7 @@ from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.laws import LawFit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation
 from labrig.fit.decay.selection import CLEAR_BIC
+from labrig.fit.decay.sigma_scale import SigmaScale
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import Ending, FloatArray
@@ -52,6 +53,8 @@ class Evidence:
         Envelope, and its degrees of freedom if σ or flicker were estimated from it, else inf.
     scatter
         Uncertainties of the values from their scatter; None if they were given.
+    sigma_scale
+        Factor of the given σ; None if they agree with the scatter of the values.
     candidates
         Numbers of states that were tried.
     law
@@ -68,6 +71,7 @@ class Evidence:
     noise: Envelope
     noise_dof: float
     scatter: ScatterSigma | None
+    sigma_scale: SigmaScale | None
     candidates: tuple[Candidate, ...]
     law: str
     laws: tuple[LawFit, ...]
@@ -167,6 +171,12 @@ def warnings_about(
         warnings.append(
             f"σ was taken from the scatter of {max(evidence.noise_dof, 0):.0f} values to spare: "
             "give each value's σ in a column sigma, or record more"
+        )
+    elif evidence.sigma_scale is not None:
+        factor = rounded(evidence.sigma_scale.factor, 2)
+        warnings.append(
+            f"the values scatter {factor} times as much as their σ says: it was multiplied by that; "
+            "check its column and its unit"
         )
     elif evidence.noise_dof < FEWEST_NOISE_DOF:
         warnings.append(

@@ -118,11 +118,13 @@ def noise_correlation(
     ):
         return None
     direction = along[used] / brightness[used, None]
-    parts = _parts(data, noise, brightness[used])
+    deviation, design = _against_curve(data, noise, used, direction)
+    # The scatter of a σ that is too large is smaller, which is no correlation.
+    scatter = float(np.linalg.norm(deviation)) / max(len(deviation) - design.shape[1], 1) ** 0.5
+    parts = _parts(data, noise, brightness[used], scatter)
     if not parts:
         return None
     told = slice(0, MOST_VALUES)
-    deviation, design = _against_curve(data, noise, used, direction)
     n_told = len(deviation[told])
     log_posterior = np.stack([
         _log_restricted_likelihoods(deviation[told], design[told], part.covariances(n_told))
@@ -158,7 +160,9 @@ def noise_correlation(
     )
 
 
-def _parts(data: WhitenedSeries, noise: Envelope, brightness: FloatArray) -> list[_Part]:
+def _parts(
+    data: WhitenedSeries, noise: Envelope, brightness: FloatArray, scatter: float
+) -> list[_Part]:
     """Return what may correlate: the flicker, and all noise of a single channel.
 
     Photons and readings of a camera's channels are independent from frame to frame; what the σ of
@@ -176,7 +180,7 @@ def _parts(data: WhitenedSeries, noise: Envelope, brightness: FloatArray) -> lis
     if len(data.series.channels) == 1:
         ones = np.ones_like(brightness)
         log_prior = np.full_like(FACTORS, -np.log(len(FACTORS)))
-        parts.append(_Part(ones, np.zeros_like(ones), FACTORS, log_prior))
+        parts.append(_Part(ones, np.zeros_like(ones), scatter * FACTORS, log_prior))
     return parts
 
 

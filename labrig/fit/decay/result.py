@@ -15,7 +15,7 @@ from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import DecayState, FittedDecay, ScatterSigma
+from labrig.results import DecayState, FittedDecay
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         rate_spectrum=evidence.rate_spectrum,
         measured_until_s=float((series.t + series.exposure + series.start).max()) * series.span_s,
         scatter=evidence.scatter,
+        sigma_factor=evidence.sigma_scale.factor if evidence.sigma_scale else 1.0,
         sigma=sigma_used,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
@@ -120,18 +121,20 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     """
     covariance, noise = fit.joint.least_squares.covariance, evidence.noise
     if evidence.scatter is not None:
-        return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter)
+        return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter.dof)
+    if evidence.sigma_scale is not None:
+        return covariance * student_factor(evidence.sigma_scale.dof)
     if len(noise.likely_flickers) == 1:
         return covariance
     matrices = noise_matrices(data, fit.signal(data.series), noise)
     return np.asarray(np.mean(fit.covariances_under(data.series, matrices), axis=0))
 
 
-def student_factor(scatter: ScatterSigma | None) -> float:
+def student_factor(dof: float) -> float:
     """Return ν/(ν − 2), the factor of a variance whose σ was told by ν degrees of freedom."""
-    if scatter is None:
+    if np.isinf(dof):
         return 1.0
-    return scatter.dof / (scatter.dof - 2) if scatter.dof > 2 else float("inf")
+    return dof / (dof - 2) if dof > 2 else float("inf")
 
 
 def noise_matrices(data: WhitenedSeries, signal: FloatArray, noise: Envelope) -> list[FloatArray]:
