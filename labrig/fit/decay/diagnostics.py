@@ -14,8 +14,8 @@ from labrig.results import DecayState
 MISFIT_LEVEL = 5e-4
 #: Number of frames below which the order of residuals is not tested.
 FEWEST_FOR_ORDER = 8
-#: Reduced χ² below which σ is doubted: 0.7 of the scatter that it says, if not by chance.
-TOO_SMALL_CHI2 = 0.5
+#: Reduced χ² below which σ is doubted: 0.6 of the scatter that it says, if not by chance.
+TOO_SMALL_CHI2 = 0.36
 #: Ratio to the slowest rate searched below which a rate is at that bound.
 NEAR_BOUND = 1.001
 BELOW_ZERO_SIGMAS = 5.0

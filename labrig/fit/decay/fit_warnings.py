@@ -175,8 +175,8 @@ def warnings_about(
     elif evidence.sigma_scale is not None:
         factor = rounded(evidence.sigma_scale.factor, 2)
         warnings.append(
-            f"the values scatter {factor} times as much as their σ says: it was multiplied by that; "
-            "check its column and its unit"
+            f"the values scatter {factor} times as much as their σ says, and it was multiplied by "
+            "that: check its column and its unit"
         )
     elif evidence.noise_dof < FEWEST_NOISE_DOF:
         warnings.append(
