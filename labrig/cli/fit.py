@@ -185,8 +185,8 @@ def charge(
     typer.echo(
         f"material: {reported.material}"
         if reported.material
-        else "no material file: this charge does not tell k_r and r(0) of its states apart; fit.json "
-        "has amplitude, τ and p after this charge"
+        else "no material file: this charge does not tell k_r and r(0) of its states apart; "
+        "fit.json has amplitude, τ and p after this charge"
     )
     typer.echo(f"report: {reported.report}")
 

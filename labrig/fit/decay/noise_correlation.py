@@ -15,7 +15,9 @@ with φ > 0.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
+from labrig.fit.decay.diagnostics import BELOW_ZERO_SIGMAS
 from labrig.fit.decay.envelope import USUAL_FLICKER, Envelope
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
@@ -91,6 +93,22 @@ class _Part:
         scaled = self.factors[None, :, None, None] ** 2 * powers[:, None]
         return np.asarray(scaled + np.diag(self.rest[:n_values] + INDEPENDENT))
 
+    def effect_of(self, effect: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return A V Aᵀ (p, p) of A (p, n), summed with weights of all φ > 0 and c (k − 1, m)."""
+        total = float(weights.sum()) * (effect * self.rest) @ effect.T
+        sized = effect * self.size
+        for phi, weight in zip(CORRELATIONS[1:], weights @ self.factors**2, strict=True):
+            total += weight * sized @ _correlated(phi, sized.T)
+        return np.asarray(total)
+
+
+def _correlated(phi: float, columns: FloatArray) -> FloatArray:
+    """Return φ^|f − g| (n, n) times columns (n, p), by its inverse, which has three diagonals."""
+    bands = np.empty((2, len(columns)))
+    bands[0], bands[1] = -phi, 1 + phi**2
+    bands[1, [0, -1]] = 1.0
+    return np.asarray(solveh_banded(bands / (1 - phi**2), columns))
+
 
 def noise_correlation(
     data: WhitenedSeries, fit: StatesFit, noise: Envelope
@@ -122,42 +140,46 @@ def noise_correlation(
     # The scatter of a σ that is too large is smaller, which is no correlation.
     scatter = float(np.linalg.norm(deviation)) / max(len(deviation) - design.shape[1], 1) ** 0.5
     parts = _parts(data, noise, brightness[used], scatter)
-    if not parts:
+    curve = np.einsum("fc,fcd,fd->f", direction, data.matrices[used], noise.signal[used])
+    if not parts or _ends_below_zero(deviation + curve):
         return None
     told = slice(0, MOST_VALUES)
     n_told = len(deviation[told])
-    log_posterior = np.stack([
+    log_posteriors = [
         _log_restricted_likelihoods(deviation[told], design[told], part.covariances(n_told))
         + part.log_prior
         for part in parts
-    ])  # fmt: skip
+    ]
     priors = _priors(len(series.channels))
-    posterior = np.exp(log_posterior - log_posterior.max()) * priors[:, None]
-    posterior /= posterior.sum()
-    probability = float(posterior[:, 1:].sum())
-    if probability <= LIKELY:
+    highest = max(float(each.max()) for each in log_posteriors)
+    posteriors = [np.exp(each - highest) * priors[:, None] for each in log_posteriors]
+    total = sum(float(each.sum()) for each in posteriors)
+    none = sum(float(each[0].sum()) for each in posteriors) / total
+    if 1 - none <= LIKELY:
         return None
-    correlated = posterior * (CORRELATIONS > 0)[:, None] / probability
-    mean = np.sum(
-        [
-            np.tensordot(weights, part.covariances(len(deviation)), 2)
-            for weights, part in zip(correlated, parts, strict=True)
-        ],
-        axis=0,
-    )
+    correlated = [each[1:] / (total * (1 - none)) for each in posteriors]
     n_values = data.values.size
     jacobian = solution.jacobian[:n_values].reshape(*data.values.shape, -1)[used]
     effect = solution.covariance @ np.einsum("fcp,fc->pf", jacobian, direction)
-    covariance = _positive(effect @ (mean - np.eye(len(mean))) @ effect.T, solution.covariance)
+    added = -(effect @ effect.T)
+    for weights, part in zip(correlated, parts, strict=True):
+        added += part.effect_of(effect, weights)
+    covariance = _positive(added, solution.covariance)
     rates = slice(0, 2 * fit.n_free, 2)
     independent = np.diag(solution.covariance)[rates]
     ratio = np.diag(covariance)[rates] / np.where(independent > 0, independent, np.inf)
     return NoiseCorrelation(
-        evidence=probability / max(1 - probability, TINY) * priors[0] / (1 - priors[0]),
-        correlation=float(correlated.sum(axis=(0, 2)) @ CORRELATIONS),
+        evidence=(1 - none) / max(none, TINY) * priors[0] / (1 - priors[0]),
+        correlation=sum(float(each.sum(axis=1) @ CORRELATIONS[1:]) for each in correlated),
         covariance=covariance,
         factor=float(np.sqrt(1 + ratio.max(initial=0.0))),
     )
+
+
+def _ends_below_zero(signal: FloatArray) -> bool:
+    """Whether the last quarter of a signal in σ (n,) is below zero: no curve follows it there."""
+    last = signal[-max(len(signal) // 4, 1) :]
+    return float(last.sum()) < -BELOW_ZERO_SIGMAS * np.sqrt(len(last))
 
 
 def _parts(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
+from labrig.fit.decay.diagnostics import MISFIT_LEVEL, order_p_value
 from labrig.fit.decay.envelope import MAX_FLICKER, monotone_curve
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import whitened
@@ -66,6 +67,9 @@ def sigma_scale(series: DecaySeries, flicker: float | None) -> SigmaScale | None
     dof = float(free.sum())
     chi2 = float(residual @ residual)
     if dof < FEWEST_DOF or chdtrc(dof, chi2) > SCALED_LEVEL:
+        return None
+    # Where neighbours agree it is no noise: the curve does not describe the signal, or a drift.
+    if order_p_value(residual) < MISFIT_LEVEL:
         return None
     factor = float(np.sqrt(chi2 / dof))
     robust = 1.4826 * float(np.median(np.abs(residual)) / np.sqrt(free.mean()))
