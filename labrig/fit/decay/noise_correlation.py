@@ -179,7 +179,7 @@ def noise_correlation(
 def _ends_below_zero(signal: FloatArray) -> bool:
     """Whether the last quarter of a signal in σ (n,) is below zero: no curve follows it there."""
     last = signal[-max(len(signal) // 4, 1) :]
-    return float(last.sum()) < -BELOW_ZERO_SIGMAS * np.sqrt(len(last))
+    return bool(last.sum() < -BELOW_ZERO_SIGMAS * np.sqrt(len(last)))
 
 
 def _parts(
