@@ -103,7 +103,9 @@ def test_a_persistent_phosphor_has_the_rates_of_an_independent_fit(
         )  # fmt: skip
         assert ended.code == 0, ended.err
         fits.append(json.loads(ended.out))
-    chi2 = [fit["reduced_chi2"] for fit in fits]
+    # Every count weighs 1.45: the values scatter more than √counts.
+    assert all(1.2 < fit["sigma_factor"] < 1.27 for fit in fits)
+    chi2 = [fit["reduced_chi2"] * fit["sigma_factor"] ** 2 for fit in fits]
     # Weighed by the counts that the fit expects; by the counts themselves 49.6, 3.85, 1.66.
     assert chi2 == pytest.approx([57.9, 3.85, 1.63], rel=0.01)
     rates = [state["k_r_per_s"] for state in fits[1]["states"]]

@@ -2,10 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
+from labrig.analyse.clipped_start import LowStart, low_start
+from labrig.analyse.counting_sigma import COUNTS, VarianceOfValue, variance_of_values
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import FitError, UsageError
 from labrig.fit import DecayFit
@@ -15,16 +20,16 @@ from labrig.results import (
     FloatArray,
     Series,
     TableLayout,
+    add_flag,
     join_series,
     read_described_series,
     require_law,
 )
 
-#: Least counts in a Poisson weight, since fewer would weigh a point too much.
-MIN_COUNTS = 5.0
-#: Fits in which the weights are those of the counts that the last fit expects. Weights from the
-#: counts themselves prefer the low ones: rates of dim decays came out 0.4 σ too high.
-COUNT_REWEIGHTINGS = 2
+#: Fits in which σ that follows from the values is that of the values that the last fit expects.
+REWEIGHTINGS = 2
+#: Flag of values at a detector's ceiling.
+CLIPPED = "clipped"
 #: Rise to the maximum, in σ of the scatter of neighbours and as a fraction of the maximum, from
 #: which a table does not begin with its decay.
 RISE_SIGMAS = 10.0
@@ -148,32 +153,126 @@ def fit_table(
         _require_sigma_or_one_channel(path, series, options)
         part = _from_origin(path, series, options)
         _refuse_rise(path, part, options)
-        if options.weights == "counts":
-            part = _with_counts_sigma(part, part.values)
-        flicker = options.flicker_fraction
-        # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
-        if np.isnan(part.sigma).all() and options.flicker == "auto":
-            flicker = 0.0
         try:
-            fit = fit_series(part, options.states, options.offset_sigma, flicker, law=options.law)
-            for _ in range(COUNT_REWEIGHTINGS if options.weights == "counts" else 0):
-                expected = part.values.copy()
-                expected[part.usable] -= fit.residuals
-                part = _with_counts_sigma(part, expected)
-                fit = fit_series(
-                    part, options.states, options.offset_sigma, flicker, law=options.law
-                )
+            part, fit = _fitted(part, options)
         except FitError as error:
             raise FitError(f"{path}: {error}") from None
-        sigma = part.sigma.copy()
-        sigma[part.usable] = fit.sigma
-        fits.append(FittedTable(part.region, replace(part, sigma=sigma), fit, columns))
+        fits.append(FittedTable(part.region, part, fit, columns))
     return fits
 
 
-def _with_counts_sigma(series: Series, counts: FloatArray) -> Series:
-    """Return the series with the σ of Poisson counts (n, C)."""
-    return replace(series, sigma=np.sqrt(np.maximum(counts, MIN_COUNTS)))
+def _fitted(series: Series, options: TableFitOptions) -> tuple[Series, DecayFit]:
+    """Return the series with the σ that its fit used, and the fit."""
+    variances = _variances(series, options)
+    series = _with_sigma(series, _smooth(series), variances)
+    fitting = partial(_fit, options=options)
+    low = low_start(series, fitting)
+    if low is not None and low.is_ceiling:
+        series = _flagged(series, low.number)
+    fit = fitting(series)
+    for _ in range(REWEIGHTINGS if any(variances) else 0):
+        expected = series.values.copy()
+        expected[series.usable] -= fit.residuals
+        series = _with_sigma(series, expected, variances)
+        fit = fitting(series)
+    sigma = series.sigma.copy()
+    sigma[series.usable] = fit.sigma
+    fit = replace(
+        fit,
+        sigma_origin=_origin(fit, variances, options),
+        warnings=(*_low_warnings(series, options, low), *fit.warnings),
+    )
+    return replace(series, sigma=sigma), fit
+
+
+def _fit(series: Series, options: TableFitOptions) -> DecayFit:
+    flicker = options.flicker_fraction
+    # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
+    if np.isnan(series.sigma).all() and options.flicker == "auto":
+        flicker = 0.0
+    return fit_series(series, options.states, options.offset_sigma, flicker, law=options.law)
+
+
+def _variances(series: Series, options: TableFitOptions) -> list[VarianceOfValue | None]:
+    """Return how the σ of each channel follow from its values, where they do."""
+    if options.weights == "counts":
+        return [COUNTS] * len(series.channels)
+    usable = series.usable
+    return [
+        variance_of_values(values, sigma)
+        for values, sigma in zip(series.values[usable].T, series.sigma[usable].T, strict=True)
+    ]
+
+
+def _with_sigma(
+    series: Series, expected: FloatArray, variances: Sequence[VarianceOfValue | None]
+) -> Series:
+    """Return the series with the σ of the expected values (n, C), in the channels that have one."""
+    sigma = series.sigma.copy()
+    for channel, variance in enumerate(variances):
+        if variance is not None:
+            sigma[:, channel] = variance.sigma(expected[:, channel])
+    return replace(series, sigma=sigma)
+
+
+def _smooth(series: Series) -> FloatArray:
+    """Return the median of each value and its neighbours in time (n, C)."""
+    order = np.argsort(series.t_s, kind="stable")
+    smooth = np.empty_like(series.values)
+    smooth[order] = median_filter(series.values[order], (NEIGHBOURS, 1), mode="nearest")
+    return smooth
+
+
+def _origin(
+    fit: DecayFit, variances: Sequence[VarianceOfValue | None], options: TableFitOptions
+) -> str:
+    """Return where the σ of the values came from, in words; empty if from their scatter."""
+    if fit.scatter is not None:
+        return ""
+    parts = ["counting" if options.weights == "counts" else "the table"]
+    formulas = list(dict.fromkeys(str(variance) for variance in variances if variance is not None))
+    if formulas:
+        parts.append(f"{', '.join(formulas)} of the fitted curve, not of the values")
+    if fit.sigma_factor != 1:
+        parts.append(f"times {fit.sigma_factor:.3g}, by which the values scatter more")
+    return ", ".join(parts)
+
+
+def _flagged(series: Series, number: int) -> Series:
+    """Return the series with its first usable values by time flagged as clipped."""
+    rows = _first_rows(series, number)
+    flags = [
+        add_flag(flag, CLIPPED) if row in rows else flag for row, flag in enumerate(series.flag)
+    ]
+    return replace(series, flag=tuple(flags))
+
+
+def _first_rows(series: Series, number: int) -> NDArray[np.intp]:
+    rows = np.flatnonzero(series.usable)
+    return rows[np.argsort(series.t_s[rows], kind="stable")][:number]
+
+
+def _low_warnings(series: Series, options: TableFitOptions, low: LowStart | None) -> list[str]:
+    """Return what is said of first values that lie below the law of the others."""
+    if low is None:
+        return []
+    if low.is_ceiling:
+        rows = [row for row, flag in enumerate(series.flag) if CLIPPED in flag]
+        last_s = max(series.t_s[rows]) + options.origin_s
+        return [
+            f"the first {low.number} values, until {last_s:.4g} s, are equal, "
+            f"{series.values[rows[0], 0]:.6g}, and lie below the law of the others: the detector "
+            "was saturated, and they were left out; measure them with less light or gain"
+        ]
+    first = _first_rows(series, low.number + 1)
+    which = "value lies" if low.number == 1 else f"{low.number} values lie"
+    until = "at" if low.number == 1 else "until"
+    last_s, next_s = (series.t_s[row] + options.origin_s for row in first[-2:])
+    return [
+        f"the first {which}, {until} {last_s:.4g} s, below the law of the others, by "
+        f"{low.sigmas:.0f} σ: was the detector saturated, or the lamp not off yet? Leave out what "
+        f"is wrong with '--from {next_s:.6g}'"
+    ]
 
 
 def _join_regions(parts: Sequence[Series]) -> list[Series]:

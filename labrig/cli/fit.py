@@ -153,7 +153,11 @@ def charge(
     time: Time = None,
     time_unit: TimeUnit = None,
     decimal: Decimal = None,
-    json: Annotated[bool, typer.Option("--json", help="Print the fit as JSON.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for result/: page, figures, fit.json, material.yaml."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print fit.json.")] = False,
 ) -> None:
     """States of general kinetic order that charge and decay as one series of readings does.
 
@@ -163,10 +167,28 @@ def charge(
     from labrig.analyse import ChargeTableOptions, fit_charge_table
     from labrig.results import TableLayout
 
+    if out is not None:
+        _require_folder(out)
     options = ChargeTableOptions(on, off, states, order, stimulated)
     layout = TableLayout(time, column, time_unit, decimal)
     fit, columns = fit_charge_table(table, options, layout)
     typer.echo(fit.to_json() if json else f"columns  {columns}\n{fit}")
+    if out is None:
+        return
+    from labrig.process import report_charge
+
+    reported = report_charge(table, fit, options, out)
+    if json:
+        return
+    for line in reported.changes:
+        typer.echo(line)
+    typer.echo(
+        f"material: {reported.material}"
+        if reported.material
+        else "no material file: this charge does not tell k_r and r(0) of its states apart; "
+        "fit.json has amplitude, τ and p after this charge"
+    )
+    typer.echo(f"report: {reported.report}")
 
 
 @app.command("luminance")

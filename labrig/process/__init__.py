@@ -1,5 +1,6 @@
 """Processing of a run folder, or of a table: analysis, report and exports."""
 
+from labrig.process.charge import ReportedCharge, report_charge
 from labrig.process.led_study import report_led_study
 from labrig.process.mixture import report_mixture
 from labrig.process.result_changes import other_settings
@@ -8,10 +9,12 @@ from labrig.process.table import report_table
 
 __all__ = [
     "Processed",
+    "ReportedCharge",
     "draw_figures",
     "other_settings",
     "process_and_report",
     "process_run",
+    "report_charge",
     "report_led_study",
     "report_mixture",
     "report_table",

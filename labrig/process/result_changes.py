@@ -1,5 +1,6 @@
 """Differences between two results of a run, in lines for people."""
 
+import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -131,8 +132,25 @@ def _fits(result: Path) -> dict[str, Parameters]:
     fits = {}
     for name, path in find_fitted_decays(result).items():
         with suppress(DataError):
-            fits[name] = _parameters(read_fitted_decay(path))
+            fits[name] = _parameters_of_charge(path) or _parameters(read_fitted_decay(path))
     return fits
+
+
+def _parameters_of_charge(path: Path) -> Parameters:
+    """Return value and σ of every parameter of a fit to charge and decay; none of other fits."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    if content.get("kind") != "charge":
+        return {}
+    named = {name: content[name] for name in ("prompt", "dark")}
+    for number, state in enumerate(content["states"], start=1):
+        named |= {f"{name} {number}": each for name, each in state.items() if each is not None}
+    return {
+        name: (each["value"], math.inf if each["sigma"] is None else each["sigma"])
+        for name, each in named.items()
+    }
 
 
 def _parameters(fit: FittedDecay) -> Parameters:

@@ -104,7 +104,7 @@ def report_table(
         sha256=hashlib.sha256(table.read_bytes()).hexdigest(),
         options={name: str(value) for name, value in asdict(options).items() if value is not None},
     )
-    sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted, options)]
+    sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted)]
     about = describe_without_run(table.stem, "decay", table.name, sample)
     sections, methods = table_sections(result, about)
     try:
@@ -120,12 +120,7 @@ def report_table(
     return Processed(result, folder / "result" / "report.html", (), changes)
 
 
-def _uncertainties(
-    fitted: Sequence[FittedTable], options: TableFitOptions
-) -> tuple[tuple[str, str], ...]:
+def _uncertainties(fitted: Sequence[FittedTable]) -> tuple[tuple[str, str], ...]:
     """Return where the uncertainties of the values came from."""
-    if fitted[0].fit.scatter is not None:
-        source = str(fitted[0].fit.scatter)
-    else:
-        source = "counting, √counts" if options.weights == "counts" else "the table"
-    return (("σ of the values", source),)
+    fit = fitted[0].fit
+    return (("σ of the values", str(fit.scatter or f"of {fit.sigma_origin}")),)

@@ -1,3 +1,6 @@
+from .charge import (
+    charge_report as charge_report,
+)
 from .colours import (
     camera_to_xyz as camera_to_xyz,
     css_colour as css_colour,

@@ -181,6 +181,11 @@ class FittedDecay:
         End of the last exposure in seconds after lamp off.
     scatter
         Uncertainties of the values from their scatter; None if they were given.
+    sigma_origin
+        Where the σ of a table's values came from, and what was done with them, in words.
+    sigma_factor
+        Factor by which the given uncertainties were multiplied, since the values scatter so much
+        more; 1 if they do not.
     """
 
     states: tuple[DecayState, ...]
@@ -204,6 +209,8 @@ class FittedDecay:
     rate_spectrum: FittedRateSpectrum | None
     measured_until_s: float
     scatter: ScatterSigma | None = field(default=None, kw_only=True)
+    sigma_origin: str = field(default="", kw_only=True)
+    sigma_factor: float = field(default=1.0, kw_only=True)
 
     @property
     def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
@@ -437,6 +444,8 @@ class FittedDecay:
             "law_comparison": [asdict(law) for law in self.compared_laws],
             "measured_until_s": self.measured_until_s,
             "sigma_from_scatter": asdict(self.scatter) if self.scatter else None,
+            "sigma_origin": self.sigma_origin,
+            "sigma_factor": self.sigma_factor,
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -472,8 +481,9 @@ class FittedDecay:
                 else f"{100 * self.flicker:.2g}"
             )
             lines.append(f"flicker  {percent} %{'' if self.flicker_sigma else ' (held)'}")
-        if self.scatter is not None:
-            lines += wrap(f"σ        {self.scatter}", LINE_WIDTH, subsequent_indent=" " * 9)
+        if self.scatter is not None or self.sigma_origin:
+            origin = f"σ        {self.scatter or f'of {self.sigma_origin}'}"
+            lines += wrap(origin, LINE_WIDTH, subsequent_indent=" " * 9)
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         if self.other_laws:
             lines += aligned([["law", "", "reduced χ²", "BIC"], *self._law_rows()])
@@ -665,6 +675,8 @@ def _from_dict(content: Any) -> FittedDecay:
         rate_spectrum=None if spectrum is None else fitted_rate_spectrum(spectrum),
         measured_until_s=float(content["measured_until_s"]),
         scatter=None if scatter is None else ScatterSigma(**scatter),
+        sigma_origin=content["sigma_origin"],
+        sigma_factor=float(content["sigma_factor"]),
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.material import dark_concentration, lit_concentration
+from labrig.material import dark_concentration, lit_concentration, read_material
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
@@ -57,3 +57,51 @@ def test_what_cannot_be_fitted_is_one_line(
     assert ended.code != 0
     assert said in ended.err
     assert len(ended.err.strip().splitlines()) == 1
+
+
+def test_out_has_page_files_and_material(labrig: Labrig, table: Path, tmp_path: Path) -> None:
+    options = ("--on", "30", "--off", "200", "--states", "1")
+    out = tmp_path / "glow"
+    ended = labrig("fit", "charge", table, *options, "--out", out)
+    assert ended.code == 0, ended.err
+    result = out / "result"
+    fit = json.loads((result / "fit.json").read_text(encoding="utf-8"))
+    assert (fit["kind"], fit["schema_version"]) == ("charge", 1)
+    (state,) = fit["states"]
+    (known,) = read_material(result / "material.yaml").states
+    assert known.kinetic_order == state["order"]["value"]
+    assert known.r0 == state["r0"]["value"]
+    # a = Λ k_r r(0)ᵇ
+    made = state["reradiation"]["value"] * known.k_r_per_s * known.r0**known.kinetic_order
+    assert known.amplitude == pytest.approx(made, rel=1e-6)
+    readings = np.genfromtxt(result / "readings.csv", delimiter=",", skip_header=1)
+    off = (readings[:, 1] - readings[:, 3]) / readings[:, 2]
+    lit = readings[:, 0] < 170
+    assert np.mean(off[lit] ** 2) == pytest.approx(fit["chi2_charge"], rel=1e-4)
+    assert np.mean(off[~lit] ** 2) == pytest.approx(fit["chi2_decay"], rel=1e-4)
+    page = (result / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg") >= 2
+    assert "1 state of general order" in page
+    again = labrig("fit", "charge", table, *options, "--out", out)
+    assert "the same result as before" in again.out
+    other = labrig("fit", "charge", table, *options, "--order", "first", "--out", out)
+    assert "order 1 " in other.out
+    assert (out / "result-1").is_dir()
+
+
+def test_without_saturation_there_is_no_material(labrig: Labrig, tmp_path: Path) -> None:
+    """A charge that stays straight tells k_r and r(0) of a general order only together."""
+    lit_s, dark_s = np.clip(T_S - 30, 0, 170), np.maximum(T_S - 200, 0)
+    charged = lit_concentration(0.0, 1e-5, 40.0, 2.0, lit_s).value
+    level = dark_concentration(charged, 40.0, 2.0, dark_s)
+    light = 1e10 * (40.0 * level**2 + np.where(dark_s == 0, 1e-5 * level, 0))
+    table, out = tmp_path / "weak.csv", tmp_path / "weak"
+    counts = np.random.default_rng(5).poisson(light)
+    np.savetxt(table, np.transpose([T_S, counts]), header="t_s counts", comments="")
+    ended = labrig(
+        "fit", "charge", table, "--on", "30", "--off", "200", "--states", "1", "--order",
+        "general", "--out", out,
+    )  # fmt: skip
+    assert ended.code == 0, ended.err
+    assert "no material file" in ended.out
+    assert not (out / "result" / "material.yaml").exists()

@@ -125,7 +125,7 @@ def test_the_drift_of_a_lamp_is_in_sigma() -> None:
             flicker=0.007,
             n_states=1,
         )
-        told += _says(each, "neighbouring frames correlates")
+        told += _says(each, "noise of neighbouring values correlates")
         pulls.append((each.states[0].k_r_per_s - 0.02) / each.states[0].k_r_sigma_per_s)
     # Correlations that are averaged over make σ a tenth too large: 0.9.
     assert 0.75 < np.sqrt(np.mean(np.square(pulls))) < 1.1

@@ -23,7 +23,7 @@ from labrig.fit.charge.model import (
     rates_of,
 )
 from labrig.fit.charge.readings import Readings, readings_of
-from labrig.fit.charge.result import ChargeCandidate, ChargeFit, OrderState
+from labrig.fit.charge.result import ChargeCandidate, ChargeFit, FittedReadings, OrderState
 from labrig.fit.least_squares import Ending, FloatArray, LeastSquaresFit, least_squares
 from labrig.material import MAX_ORDER
 from labrig.results import Measured
@@ -338,7 +338,16 @@ def _result(
         candidates=candidates,
         chosen=chosen,
         warnings=tuple(doubts),
+        readings=_readings(readings, fit),
     )
+
+
+def _readings(readings: Readings, fit: LeastSquaresFit) -> FittedReadings:
+    """Return what was fitted, and the light of the fit."""
+    times, sigma = readings.times, readings.sigma
+    middles = [times.lit_s, times.charge_s + times.dark_s + times.exposure_s / 2]
+    light = readings.values + fit.residuals[: len(readings.values)] * sigma
+    return FittedReadings(np.concatenate(middles), readings.values, sigma, light)
 
 
 def _covariance(problem: _Problem, fit: LeastSquaresFit, model: _Model) -> FloatArray:
@@ -378,7 +387,7 @@ def _state(
         axis=1,
     )
     sigma = np.sqrt(np.diag(jacobian @ covariance[own, own] @ jacobian.T))
-    order, amplitude, inverse_time, kappa, k_r, r0 = (
+    order, amplitude, inverse_time, kappa, k_r, r0, reradiation = (
         Measured(float(value), float(each)) for value, each in zip(values, sigma, strict=True)
     )
     log_kappa_sigma = float(np.sqrt(covariance[own, own][0, 0]))
@@ -396,16 +405,18 @@ def _state(
         kappa_per_s=Measured(kappa.value, kappa.sigma, "1/s") if is_known else None,
         k_r_per_s=Measured(k_r.value, k_r.sigma, "1/s") if is_known else None,
         r0=r0 if is_known else None,
+        reradiation=reradiation if is_known else None,
     )
 
 
 def _quantities(parameters: FloatArray, charge_s: float) -> FloatArray:
-    """Return b, amplitude, 1/τ, κ, k and r(0) of a state's parameters, (6,)."""
+    """Return b, amplitude, 1/τ, κ, k, r(0) and Λ of a state's parameters, (7,)."""
     rates = rates_of(parameters)
     b, r0 = rates.order, level_at_off(rates, charge_s)
     at_off = rates.k_r * r0 ** (b - 1)
     inverse_time = at_off * (b - 1 if b > 1 + 1e-3 else 1.0)
-    return np.array([b, rates.reradiation * at_off * r0, inverse_time, rates.kappa, rates.k_r, r0])
+    amplitude = rates.reradiation * at_off * r0
+    return np.array([b, amplitude, inverse_time, rates.kappa, rates.k_r, r0, rates.reradiation])
 
 
 def _warnings(

@@ -1,13 +1,15 @@
-"""Result of a fit to charge and decay, readable as text and as JSON."""
+"""Result of a fit to charge and decay, readable as text and as JSON; the file `fit.json`."""
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from labrig.number_format import aligned
-from labrig.results import Measured
+from labrig.results import FloatArray, Measured
 
 UNKNOWN = "–"
+#: Version of the JSON: another number means renamed keys or other meanings.
+SCHEMA_VERSION = 1
 
 
 @dataclass(frozen=True)
@@ -23,9 +25,10 @@ class OrderState:
     decay_time_s, exponent
         τ and p of (1 + t/τ)^(−p), the light after *this* charge; at b = 1, an exponential, τ is 1/k
         and there is no p.
-    kappa_per_s, k_r_per_s, r0
-        Excitation κ and re-radiation rate k in 1/s, and concentration at lamp off; only where the
-        charge saturates enough for κ to be known.
+    kappa_per_s, k_r_per_s, r0, reradiation
+        Excitation κ and re-radiation rate k in 1/s, concentration at lamp off, and Λ in the unit of
+        the values times s; only where the charge saturates enough for κ to be known from both
+        sides.
     """
 
     order: Measured
@@ -35,6 +38,7 @@ class OrderState:
     kappa_per_s: Measured | None
     k_r_per_s: Measured | None
     r0: Measured | None
+    reradiation: Measured | None
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,26 @@ class ChargeCandidate:
         return f"{number} of {'general' if self.is_general else 'first'} order"
 
 
+@dataclass(frozen=True, eq=False)
+class FittedReadings:
+    """Readings that were fitted, those under the lamp first.
+
+    Attributes
+    ----------
+    t_s
+        Middle of each reading in seconds after lamp on, shape (n,).
+    values, sigma
+        Values with the dark level, and their σ, shape (n,).
+    light
+        Light of the fit, shape (n,).
+    """
+
+    t_s: FloatArray
+    values: FloatArray
+    sigma: FloatArray
+    light: FloatArray
+
+
 @dataclass(frozen=True)
 class ChargeFit:
     """Charge and decay of one series, fitted with states of one kinetic order each.
@@ -99,6 +123,8 @@ class ChargeFit:
         Index of the model among `candidates`.
     warnings
         Doubts, one a line.
+    readings
+        What was fitted.
     """
 
     states: tuple[OrderState, ...]
@@ -114,6 +140,7 @@ class ChargeFit:
     candidates: tuple[ChargeCandidate, ...]
     chosen: int
     warnings: tuple[str, ...]
+    readings: FittedReadings = field(compare=False, repr=False)
 
     def __str__(self) -> str:
         """Return a table of the states, one of the models, and all warnings."""
@@ -122,34 +149,43 @@ class ChargeFit:
             f"reduced χ²  charge {self.chi2_charge:.2f} ({self.n_charge} readings), "
             f"decay {self.chi2_decay:.2f} ({self.n_decay})",
         ]
-        columns = [field.name for field in fields(OrderState)]
-        columns = [name for name in columns if any(getattr(s, name) for s in self.states)]
-        rows = [["state", *(COLUMN_LABELS[name] for name in columns)]]
-        for number, state in enumerate(self.states, start=1):
-            values = (getattr(state, name) for name in columns)
-            rows.append([str(number), *(_text(value) for value in values)])
-        lines += aligned(rows)
+        lines += aligned(self.state_rows())
         lines.append(
             f"light-stimulated η {_text(self.light_stimulated)}, prompt light "
             f"{_text(self.prompt)}, dark level {_text(self.dark)}"
         )
-        best = min(candidate.bic for candidate in self.candidates)
-        rows = [["model", "χ² charge", "χ² decay", "ΔBIC"]]
-        rows += [
-            [
-                candidate.label,
-                f"{candidate.chi2_charge:.2f}",
-                f"{candidate.chi2_decay:.2f}",
-                f"{candidate.bic - best:.0f}",
-            ]
-            for candidate in self.candidates
-        ]
-        lines += aligned(rows)
+        lines += aligned(self.model_rows())
         return "\n".join([*lines, *(f"! {line}" for line in self.warnings)])
 
+    def state_rows(self) -> list[list[str]]:
+        """Return what is known of the states as a table, its head first."""
+        columns = [each.name for each in fields(OrderState)]
+        columns = [name for name in columns if any(getattr(s, name) for s in self.states)]
+        rows = [["state", *(COLUMN_LABELS[name] for name in columns)]]
+        for number, state in enumerate(self.states, start=1):
+            rows.append([str(number), *(_text(getattr(state, name)) for name in columns)])
+        return rows
+
+    def model_rows(self) -> list[list[str]]:
+        """Return the models that were compared as a table, its head first."""
+        best = min(candidate.bic for candidate in self.candidates)
+        rows = [["model", "χ² charge", "χ² decay", "ΔBIC"]]
+        for number, candidate in enumerate(self.candidates):
+            rows.append(
+                [
+                    candidate.label + (" *" if number == self.chosen else ""),
+                    f"{candidate.chi2_charge:.2f}",
+                    f"{candidate.chi2_decay:.2f}",
+                    f"{candidate.bic - best:.0f}",
+                ]
+            )
+        return rows
+
     def to_json(self) -> str:
-        """Return all of it as JSON, numbers as `{"value": …, "sigma": …}`."""
+        """Return the text of `fit.json`, numbers as `{"value": …, "sigma": …}`."""
         content: dict[str, Any] = {
+            "kind": "charge",
+            "schema_version": SCHEMA_VERSION,
             "states": [_to_dict(state) for state in self.states],
             "light_stimulated": _number(self.light_stimulated),
             "prompt": _number(self.prompt),
@@ -176,6 +212,7 @@ COLUMN_LABELS = {
     "kappa_per_s": "κ / s⁻¹",
     "k_r_per_s": "k_r / s⁻¹",
     "r0": "r(0)",
+    "reradiation": "Λ / (unit · s)",
 }
 
 
@@ -184,7 +221,7 @@ def _text(measured: Measured | None) -> str:
 
 
 def _to_dict(state: OrderState) -> dict[str, Any]:
-    return {field.name: _number(getattr(state, field.name)) for field in fields(state)}
+    return {each.name: _number(getattr(state, each.name)) for each in fields(state)}
 
 
 def _number(measured: Measured | None) -> dict[str, float | None] | None:

@@ -14,8 +14,8 @@ from labrig.results import DecayState
 MISFIT_LEVEL = 5e-4
 #: Number of frames below which the order of residuals is not tested.
 FEWEST_FOR_ORDER = 8
-#: Reduced χ² below which σ is doubted: half the scatter that it says, if not by chance.
-TOO_SMALL_CHI2 = 0.25
+#: Reduced χ² below which σ is doubted: 0.6 of the scatter that it says, if not by chance.
+TOO_SMALL_CHI2 = 0.36
 #: Ratio to the slowest rate searched below which a rate is at that bound.
 NEAR_BOUND = 1.001
 BELOW_ZERO_SIGMAS = 5.0
@@ -102,8 +102,8 @@ def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> li
             "measured, and every σ given here is an upper bound; give the values' σ if it is known"
         ]
     return [
-        f"{closer}: σ is too large, or another quantity; check its column and its unit, or leave "
-        "it out, and it is taken from the scatter"
+        f"{closer}: σ is too large, and with it every σ given here, or another quantity; check its "
+        "column and its unit, or leave it out, and it is taken from the scatter"
     ]
 
 

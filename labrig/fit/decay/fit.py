@@ -16,6 +16,7 @@ from labrig.fit.decay.result import DecayFit, assemble, noise_matrices, student_
 from labrig.fit.decay.scatter import with_scatter_sigma
 from labrig.fit.decay.selection import CLEAR_BIC, PREFERRED_BIC, choose_states, is_needed
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
+from labrig.fit.decay.sigma_scale import sigma_scale
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
@@ -70,8 +71,10 @@ def fit_decay(
         Signals linear in light with the dark level subtracted, shape (n,) or (n, C), in any unit.
     sigma
         Standard uncertainties of the values without flicker, > 0, broadcast to `values`; inf
-        excludes a value. None, for a single channel only, estimates them from the scatter about the
-        best monotone curve, whatever the number of states; flicker is part of it and must be 0.
+        excludes a value. Of a single channel they are multiplied by the factor by which its scatter
+        exceeds them, if it is not by chance and no flicker. None, for a single channel only,
+        estimates them from the scatter about the best monotone curve, whatever the number of
+        states; flicker is part of it and must be 0.
     exposure_s
         Length of the exposures in seconds, ≥ 0, a scalar or of shape (n,).
     channels
@@ -145,14 +148,19 @@ def fit_decay(
     scatter: ScatterSigma | None = None
     if not series.sigma_given:
         series, scatter = with_scatter_sigma(series)
+    scale = sigma_scale(series, flicker)
+    if scale is not None:
+        series = replace(series, inverse_sigma=series.inverse_sigma / scale.factor)
+        flicker = flicker or 0.0
     smooth = envelope(series, flicker)
     series = smooth.series
     data = whitened(series, smooth.signal, smooth.flicker)
     refuse_if_rising(data, smooth.weights)
-    noise_dof = scatter.dof if scatter else smooth.dof if flicker is None else np.inf
+    told = scatter or scale
+    noise_dof = told.dof if told else smooth.dof if flicker is None else np.inf
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
     weights, offsets = chosen.joint.weights, chosen.joint.offsets
-    student = student_factor(scatter)
+    student = student_factor(told.dof if told else np.inf)
     noises = noise_matrices(data, smooth.signal, smooth)
     laws = fit_laws(data, weights, offsets, noises, student)
     spectrum = fit_rate_spectrum(data, weights, student)
@@ -171,6 +179,7 @@ def fit_decay(
             data=envelope_data,
             noise=smooth,
             scatter=scatter,
+            sigma_scale=scale,
             noise_dof=noise_dof,
             candidates=tuple(tried),
             law=chosen_law,

@@ -15,11 +15,12 @@ from labrig.fit.decay.diagnostics import (
     state_warnings,
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
-from labrig.fit.decay.flicker_correlation import FlickerCorrelation
 from labrig.fit.decay.further_state import HiddenState
 from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.laws import LawFit
+from labrig.fit.decay.noise_correlation import NoiseCorrelation
 from labrig.fit.decay.selection import CLEAR_BIC
+from labrig.fit.decay.sigma_scale import SigmaScale
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import Ending, FloatArray
@@ -52,6 +53,8 @@ class Evidence:
         Envelope, and its degrees of freedom if σ or flicker were estimated from it, else inf.
     scatter
         Uncertainties of the values from their scatter; None if they were given.
+    sigma_scale
+        Factor of the given σ; None if they agree with the scatter of the values.
     candidates
         Numbers of states that were tried.
     law
@@ -68,6 +71,7 @@ class Evidence:
     noise: Envelope
     noise_dof: float
     scatter: ScatterSigma | None
+    sigma_scale: SigmaScale | None
     candidates: tuple[Candidate, ...]
     law: str
     laws: tuple[LawFit, ...]
@@ -137,7 +141,7 @@ def warnings_about(
     log_rate_covariance: FloatArray,
     evidence: Evidence,
     hidden: HiddenState | None,
-    correlation: FlickerCorrelation | None,
+    correlation: NoiseCorrelation | None,
 ) -> list[str]:
     """Return the warnings about a fit, one line each.
 
@@ -154,7 +158,7 @@ def warnings_about(
     hidden
         A fast state that the data may hide; None if there is no room for one.
     correlation
-        Correlation of neighbouring frames' flicker; None if it is not told.
+        Correlation of neighbouring values' noise; None if it is not likely.
     """
     series, joint = data.series, fit.joint
     warnings = []
@@ -167,6 +171,12 @@ def warnings_about(
         warnings.append(
             f"σ was taken from the scatter of {max(evidence.noise_dof, 0):.0f} values to spare: "
             "give each value's σ in a column sigma, or record more"
+        )
+    elif evidence.sigma_scale is not None:
+        factor = rounded(evidence.sigma_scale.factor, 2)
+        warnings.append(
+            f"the values scatter {factor} times as much as their σ says, and it was multiplied by "
+            "that: check its column and its unit"
         )
     elif evidence.noise_dof < FEWEST_NOISE_DOF:
         warnings.append(
@@ -198,7 +208,8 @@ def warnings_about(
     closer = small_chi2_warnings(joint.chi2, fit.dof(data), evidence.scatter is not None)
     warnings += closer
     # The order of residuals that are far smaller than any scatter is that of rounding errors.
-    if not (closer and evidence.scatter) and evidence.law != RATE_SPECTRUM:
+    is_rounding = bool(closer) and evidence.scatter is not None
+    if not is_rounding and evidence.law != RATE_SPECTRUM:
         law = next((each for each in evidence.laws if each.fitted.name == evidence.law), None)
         judged = (data, joint) if law is None else (evidence.data, law.joint)
         number = "1 exponential does" if fit.n_states == 1 else f"{fit.n_states} exponentials do"
@@ -213,11 +224,11 @@ def warnings_about(
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     if not is_exponential:
         return warnings
-    if correlation is not None:
+    if correlation is not None and correlation.is_told and not is_rounding:
         warnings.append(
-            f"the flicker of neighbouring frames correlates (by {correlation.correlation:.1f}): σ "
+            f"the noise of neighbouring values correlates (by {correlation.correlation:.1f}): σ "
             f"allows for it, it is up to {correlation.factor:.2g} times as large as for "
-            "independent frames; find what drifts, or photograph a steady light beside the sample"
+            "independent values; find what drifts, or measure a steady light beside the sample"
         )
     if hidden is not None:
         warnings.append(_hidden_warning(hidden, fit.n_states, series.span_s))

@@ -6,16 +6,16 @@ import numpy as np
 
 from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
-from labrig.fit.decay.flicker_correlation import flicker_correlation
 from labrig.fit.decay.further_state import hidden_state
 from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.misfit_covariance import with_misfit
+from labrig.fit.decay.noise_correlation import noise_correlation
 from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import DecayState, FittedDecay, ScatterSigma
+from labrig.results import DecayState, FittedDecay
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     series, joint = data.series, fit.joint
     fitted_covariance = _fitted_covariance(fit, data, evidence)
     hidden = hidden_state(data, fit)
-    correlation = flicker_correlation(
-        data, fit, evidence.noise, is_estimated=len(evidence.noise.likely_flickers) > 1
-    )
+    correlation = noise_correlation(data, fit, evidence.noise)
     for source in (hidden, correlation):
         if source is not None:
             fitted_covariance = fitted_covariance + source.covariance
@@ -106,6 +104,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         rate_spectrum=evidence.rate_spectrum,
         measured_until_s=float((series.t + series.exposure + series.start).max()) * series.span_s,
         scatter=evidence.scatter,
+        sigma_factor=evidence.sigma_scale.factor if evidence.sigma_scale else 1.0,
         sigma=sigma_used,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
@@ -122,18 +121,20 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     """
     covariance, noise = fit.joint.least_squares.covariance, evidence.noise
     if evidence.scatter is not None:
-        return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter)
+        return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter.dof)
+    if evidence.sigma_scale is not None:
+        return covariance * student_factor(evidence.sigma_scale.dof)
     if len(noise.likely_flickers) == 1:
         return covariance
     matrices = noise_matrices(data, fit.signal(data.series), noise)
     return np.asarray(np.mean(fit.covariances_under(data.series, matrices), axis=0))
 
 
-def student_factor(scatter: ScatterSigma | None) -> float:
+def student_factor(dof: float) -> float:
     """Return ν/(ν − 2), the factor of a variance whose σ was told by ν degrees of freedom."""
-    if scatter is None:
+    if np.isinf(dof):
         return 1.0
-    return scatter.dof / (scatter.dof - 2) if scatter.dof > 2 else float("inf")
+    return dof / (dof - 2) if dof > 2 else float("inf")
 
 
 def noise_matrices(data: WhitenedSeries, signal: FloatArray, noise: Envelope) -> list[FloatArray]:

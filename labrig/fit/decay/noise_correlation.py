@@ -1,0 +1,257 @@
+"""Noise that correlates from value to value, as that of a lamp or a room that drifts does.
+
+Neighbouring values then err together, and what a sum of exponentials averages over is less than it
+seems. In units of their σ, the values deviate from the best monotone curve with the covariance
+V = D + c² S φ^|f − g| S: S is the part of σ that is flicker, or all of it, and D the independent
+rest. The restricted likelihood (D. Harville, J. Am. Stat. Assoc. 72, 1977) allows for what the
+curve took of the deviations, and weighs all φ and c. That there is no correlation is as probable
+before the data as all φ together, which have the reference prior (1 − φ²)^(−1/2) (J. O. Berger,
+R.-Y. Yang, Econometric Theory 10, 1994); of a camera's frames it is six times as probable, since
+the flicker of shutter and aperture, which dominates, has none. The fit, whose weights are those of
+independent values, has the covariance A V Aᵀ with A = (JᵀJ)⁻¹Jᵀ and V the mean of all covariances
+with φ > 0.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from labrig.fit.decay.diagnostics import BELOW_ZERO_SIGMAS
+from labrig.fit.decay.envelope import USUAL_FLICKER, Envelope
+from labrig.fit.decay.states import StatesFit
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+
+#: Correlations of neighbouring values that are weighed, and the prior probability of none, in a
+#: table of one value each and in the channels of a camera.
+CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92])
+PRIOR_OF_NONE, PRIOR_OF_NONE_IN_FRAMES = 0.5, 0.85
+#: Probability from which σ allows for it, and factor by which the data raise its odds from which a
+#: warning says so. Of tables with independent noise 15 and 1 % get there with 20 values, 5 and
+#: 0.5 % with 40.
+LIKELY, TOLD = 0.5, 5.7
+#: Factors c that are weighed: noise that correlates is larger than its scatter about a curve that
+#: follows it.
+FACTORS = np.geomspace(0.5, 4.0, 7)
+#: Values below which no correlation is told, and number of first values that tell it.
+FEWEST_VALUES, MOST_VALUES = 12, 100
+#: Diagonal of a triangular factor that stands for 0, and variance that is always independent.
+TINY, INDEPENDENT = 1e-300, 1e-6
+#: Least estimate: a flicker that drifts with the decay leaves hardly any scatter about a curve.
+LEAST_FLICKER = 0.002
+#: Mean fraction of the variance from which flicker matters.
+LEAST_FRACTION = 0.1
+
+
+@dataclass(frozen=True)
+class NoiseCorrelation:
+    """Correlation of neighbouring values' noise, and what it does to the fit.
+
+    Attributes
+    ----------
+    evidence
+        Factor by which the data raise the odds that there is one.
+    correlation
+        Its mean.
+    covariance
+        Its part in the covariance of the fitted parameters, shape (p, p).
+    factor
+        Factor by which the largest σ of a rate grows with it.
+    """
+
+    evidence: float
+    correlation: float
+    covariance: FloatArray
+    factor: float
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the data tell it clearly."""
+        return self.evidence > TOLD
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Part of the noise that may correlate.
+
+    `size` is its σ and `rest` the variance of the other noise, in units of all noise, shape (n,);
+    `factors` are the c that are weighed, and `log_prior` their prior log probability, shape (m,).
+    """
+
+    size: FloatArray
+    rest: FloatArray
+    factors: FloatArray
+    log_prior: FloatArray
+
+    def covariances(self, n_values: int) -> FloatArray:
+        """Return V of the first values for every φ and c, shape (k, m, n, n)."""
+        frames = np.arange(n_values)
+        distance = np.abs(np.subtract.outer(frames, frames))
+        size = self.size[:n_values]
+        powers = np.power(CORRELATIONS[:, None], frames)[:, distance] * np.outer(size, size)
+        scaled = self.factors[None, :, None, None] ** 2 * powers[:, None]
+        return np.asarray(scaled + np.diag(self.rest[:n_values] + INDEPENDENT))
+
+    def effect_of(self, effect: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return A V Aᵀ (p, p) of A (p, n), summed with weights of all φ > 0 and c (k − 1, m)."""
+        total = float(weights.sum()) * (effect * self.rest) @ effect.T
+        sized = effect * self.size
+        for phi, weight in zip(CORRELATIONS[1:], weights @ self.factors**2, strict=True):
+            total += weight * sized @ _correlated(phi, sized.T)
+        return np.asarray(total)
+
+
+def _correlated(phi: float, columns: FloatArray) -> FloatArray:
+    """Return φ^|f − g| (n, n) times columns (n, p), by its inverse, which has three diagonals."""
+    bands = np.empty((2, len(columns)))
+    bands[0], bands[1] = -phi, 1 + phi**2
+    bands[1, [0, -1]] = 1.0
+    return np.asarray(solveh_banded(bands / (1 - phi**2), columns))
+
+
+def noise_correlation(
+    data: WhitenedSeries, fit: StatesFit, noise: Envelope
+) -> NoiseCorrelation | None:
+    """Return how the noise correlates; None without it, or if too few values tell.
+
+    Parameters
+    ----------
+    data
+        The series in units of its noise, flicker included.
+    fit
+        The fit at its minimum.
+    noise
+        The curve that the noise is measured against, and the flicker.
+    """
+    series, solution = data.series, fit.joint.least_squares
+    along = np.einsum("fcd,fd->fc", data.matrices, fit.signal(series))
+    brightness = np.linalg.norm(along, axis=1)
+    used = brightness > 0
+    if not (
+        np.isfinite(solution.covariance).all()
+        and used.sum() >= FEWEST_VALUES
+        and len(series.repeats) == 1
+        and noise.shapes.size
+    ):
+        return None
+    direction = along[used] / brightness[used, None]
+    deviation, design = _against_curve(data, noise, used, direction)
+    # The scatter of a σ that is too large is smaller, which is no correlation.
+    scatter = float(np.linalg.norm(deviation)) / max(len(deviation) - design.shape[1], 1) ** 0.5
+    parts = _parts(data, noise, brightness[used], scatter)
+    curve = np.einsum("fc,fcd,fd->f", direction, data.matrices[used], noise.signal[used])
+    if not parts or _ends_below_zero(deviation + curve):
+        return None
+    told = slice(0, MOST_VALUES)
+    n_told = len(deviation[told])
+    log_posteriors = [
+        _log_restricted_likelihoods(deviation[told], design[told], part.covariances(n_told))
+        + part.log_prior
+        for part in parts
+    ]
+    priors = _priors(len(series.channels))
+    highest = max(float(each.max()) for each in log_posteriors)
+    posteriors = [np.exp(each - highest) * priors[:, None] for each in log_posteriors]
+    total = sum(float(each.sum()) for each in posteriors)
+    none = sum(float(each[0].sum()) for each in posteriors) / total
+    if 1 - none <= LIKELY:
+        return None
+    correlated = [each[1:] / (total * (1 - none)) for each in posteriors]
+    n_values = data.values.size
+    jacobian = solution.jacobian[:n_values].reshape(*data.values.shape, -1)[used]
+    effect = solution.covariance @ np.einsum("fcp,fc->pf", jacobian, direction)
+    added = -(effect @ effect.T)
+    for weights, part in zip(correlated, parts, strict=True):
+        added += part.effect_of(effect, weights)
+    covariance = _positive(added, solution.covariance)
+    rates = slice(0, 2 * fit.n_free, 2)
+    independent = np.diag(solution.covariance)[rates]
+    ratio = np.diag(covariance)[rates] / np.where(independent > 0, independent, np.inf)
+    return NoiseCorrelation(
+        evidence=(1 - none) / max(none, TINY) * priors[0] / (1 - priors[0]),
+        correlation=sum(float(each.sum(axis=1) @ CORRELATIONS[1:]) for each in correlated),
+        covariance=covariance,
+        factor=float(np.sqrt(1 + ratio.max(initial=0.0))),
+    )
+
+
+def _ends_below_zero(signal: FloatArray) -> bool:
+    """Whether the last quarter of a signal in σ (n,) is below zero: no curve follows it there."""
+    last = signal[-max(len(signal) // 4, 1) :]
+    return bool(last.sum() < -BELOW_ZERO_SIGMAS * np.sqrt(len(last)))
+
+
+def _parts(
+    data: WhitenedSeries, noise: Envelope, brightness: FloatArray, scatter: float
+) -> list[_Part]:
+    """Return what may correlate: the flicker, and all noise of a single channel.
+
+    Photons and readings of a camera's channels are independent from frame to frame; what the σ of
+    another instrument's table consists of is not known.
+    """
+    parts = []
+    is_estimated = len(noise.likely_flickers) > 1
+    if is_estimated or noise.flicker > 0:
+        size = (max(noise.flicker, LEAST_FLICKER) if is_estimated else noise.flicker) * brightness
+        factors = FACTORS if is_estimated else np.ones(1)
+        log_prior = -np.log1p((noise.flicker * factors / USUAL_FLICKER) ** 2)
+        if (size**2).mean() > LEAST_FRACTION:
+            rest = np.maximum(1 - (noise.flicker * brightness) ** 2, 0.0)
+            parts.append(_Part(size, rest, factors, log_prior - np.log(len(factors))))
+    if len(data.series.channels) == 1:
+        ones = np.ones_like(brightness)
+        log_prior = np.full_like(FACTORS, -np.log(len(FACTORS)))
+        parts.append(_Part(ones, np.zeros_like(ones), scatter * FACTORS, log_prior))
+    return parts
+
+
+def _against_curve(
+    data: WhitenedSeries, noise: Envelope, used: FloatArray, direction: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the deviations (n,) of the used values from the curve, and what it is made of (n, q).
+
+    Both are along the signal, in units of the noise.
+    """
+    series, matrices = data.series, data.matrices[used]
+    deviations = np.einsum(
+        "fcd,fd->fc", matrices, (series.values - noise.signal - noise.offsets)[used]
+    )
+    weighted = np.einsum("fc,fcd,d->f", direction, matrices, noise.weights)
+    design = weighted[:, None] * noise.shapes[used]
+    if series.fitted_offsets.size:
+        offsets = np.einsum("fc,fcd->fd", direction, matrices)[:, series.fitted_offsets]
+        design = np.column_stack([design, offsets])
+    return np.einsum("fc,fc->f", direction, deviations), design
+
+
+def _log_restricted_likelihoods(
+    deviation: FloatArray, design: FloatArray, covariances: FloatArray
+) -> FloatArray:
+    """Return the log likelihood of what a linear model (n, q) leaves of the deviations (n,).
+
+    The result is (k, m) for covariances (k, m, n, n).
+    """
+    choleskys = np.linalg.cholesky(covariances)
+    both = np.column_stack([design, deviation])
+    triangles = np.linalg.qr(np.linalg.solve(choleskys, both), mode="r")
+    # The diagonal is log|V⁻¹ᐟ² X| and, last, the norm of the residual.
+    diagonal = np.abs(np.diagonal(triangles, axis1=-2, axis2=-1))
+    volumes = np.log(np.diagonal(choleskys, axis1=-2, axis2=-1)).sum(axis=-1)
+    volumes += np.log(np.maximum(diagonal[..., :-1], TINY)).sum(axis=-1)
+    return np.asarray(-volumes - diagonal[..., -1] ** 2 / 2)
+
+
+def _positive(added: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return a covariance (p, p) that is added to another one, its negative part left out."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), TINY))
+    values, vectors = np.linalg.eigh(added / np.outer(scale, scale))
+    vectors = vectors * scale[:, None]
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def _priors(n_channels: int) -> FloatArray:
+    """Return the prior probability of every correlation, shape (k,)."""
+    none = PRIOR_OF_NONE if n_channels == 1 else PRIOR_OF_NONE_IN_FRAMES
+    reference = (1 - CORRELATIONS[1:] ** 2) ** -0.5
+    return np.append(none, (1 - none) * reference / reference.sum())
