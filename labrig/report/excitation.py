@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from labrig.number_format import plus_minus, rounded
+from labrig.report.exciting_bands import band_lines, band_picture
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,
@@ -31,6 +32,7 @@ from labrig.results import (
     ExcitationResult,
     FittedExcitation,
     FloatArray,
+    LightScatter,
     PatchExcitation,
     spans_decades,
 )
@@ -66,6 +68,7 @@ def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
         for (low, high), text in bands:
             yield f"  {low:.0f}-{high:.0f} nm: k_e {text} /s"
     yield f"reduced χ² {rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"
+    yield from band_lines(fit.by_band)
     yield f"closure: {_closure_line(patch.closure)}"
 
 
@@ -116,6 +119,13 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             "single values; flicker is not removed.",
         ),
     ]
+    if fit.by_band is not None:
+        channels = [
+            name
+            for name, weight in zip(patch.charging.whole.channels, fit.channel_weights, strict=True)
+            if weight != 1
+        ]
+        figures.append(band_picture(fit.by_band, irradiance.bands_nm, channels))
     if patch.closure is not None:
         figures.append(closure_picture(patch.closure))
     assumed = any(charge.saturated for charge in direct.charges)
@@ -126,6 +136,8 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             f"{len(direct.charges)} by the lamp itself, fitted together by the rate "
             "equation in exact steps. k_e belongs to an irradiance of vector length "
             f"{rounded(irradiance.vector_length)}.",
+            _light_line(patch.light),
+            *(f"{line[0].upper()}{line[1:]}." for line in band_lines(fit.by_band)),
             f"Closure: {_closure_line(patch.closure)}.",
         ),
         tuple(figures),
@@ -133,6 +145,16 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             _levels_table(fit, ASSUMED if assumed else MEASURED),
             _rates_table(fit, irradiance.bands_nm),
         ),
+    )
+
+
+def _light_line(light: LightScatter) -> str:
+    """Return the sentence on the errors of the light."""
+    return (
+        "As the glow itself shows, and as is in all σ, the lamp's brightness scatters by "
+        f"{rounded(100 * light.lamp, 2)} % from charge to charge, the light on single places by "
+        f"{rounded(100 * light.sites, 2)} %, and the filter's wavelengths are off by "
+        f"{rounded(light.wavelength_nm, 2)} nm beyond what the calibrations state."
     )
 
 

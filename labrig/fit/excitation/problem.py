@@ -178,6 +178,14 @@ class ExcitationProblem:
                 "fpb,mpb->fpm", by_band, charging.site_modes
             )
 
+    def whitened(self, number: int, columns: FloatArray) -> FloatArray:
+        """Return changes (n, P, C, k) of a series' signal in whitened σ, shape (n P C, k)."""
+        columns = columns * self._inverse_sigma[number][..., None]
+        columns = columns.reshape(len(columns), -1, columns.shape[-1])
+        for common in self._common[number]:
+            common.whiten(columns)
+        return columns.reshape(-1, columns.shape[-1])
+
     def _whitened(
         self, number: int, misfit: FloatArray, jacobian: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
