@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from labrig.number_format import plus_minus, rounded
+from labrig.report.exciting_bands import band_lines, band_picture
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,
@@ -31,6 +32,7 @@ from labrig.results import (
     ExcitationResult,
     FittedExcitation,
     FloatArray,
+    LightScatter,
     PatchExcitation,
     spans_decades,
 )
@@ -66,6 +68,7 @@ def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
     yield f"reduced χ² {rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"
     if len(fit.models) > 1:
         yield f"models: {_models_line(fit)}"
+    yield from band_lines(fit.by_band)
     yield f"closure: {_closure_line(patch.closure)}"
 
 
@@ -144,6 +147,13 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             "single values; flicker is not removed.",
         ),
     ]
+    if fit.by_band is not None:
+        channels = [
+            name
+            for name, weight in zip(patch.charging.whole.channels, fit.channel_weights, strict=True)
+            if weight != 1
+        ]
+        figures.append(band_picture(fit.by_band, irradiance.bands_nm, channels))
     if patch.closure is not None:
         figures.append(closure_picture(patch.closure))
     assumed = any(charge.saturated for charge in direct.charges)
@@ -154,6 +164,8 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             f"{len(direct.charges)} by the lamp itself, fitted together by the rate "
             "equation in exact steps. k_e belongs to an irradiance of vector length "
             f"{rounded(irradiance.vector_length)}.",
+            _light_line(patch.light),
+            *(f"{line[0].upper()}{line[1:]}." for line in band_lines(fit.by_band)),
             f"Closure: {_closure_line(patch.closure)}.",
             *([f"Models: {_models_line(fit)}."] if len(fit.models) > 1 else []),
         ),
@@ -162,6 +174,16 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             _levels_table(fit, ASSUMED if assumed else MEASURED),
             _rates_table(fit, irradiance.bands_nm),
         ),
+    )
+
+
+def _light_line(light: LightScatter) -> str:
+    """Return the sentence on the errors of the light."""
+    return (
+        "As the glow itself shows, and as is in all σ, the lamp's brightness scatters by "
+        f"{rounded(100 * light.lamp, 2)} % from charge to charge, the light on single places by "
+        f"{rounded(100 * light.sites, 2)} %, and the filter's wavelengths are off by "
+        f"{rounded(light.wavelength_nm, 2)} nm beyond what the calibrations state."
     )
 
 

@@ -45,6 +45,7 @@ from .emission_spectrum import (
 from .excitation import (
     Closure as Closure,
     ExcitationResult as ExcitationResult,
+    LightScatter as LightScatter,
     PatchCharging as PatchCharging,
     PatchExcitation as PatchExcitation,
     spans_decades as spans_decades,
@@ -69,6 +70,8 @@ from .fitted_decay import (
     write_fitted_decay as write_fitted_decay,
 )
 from .fitted_excitation import (
+    BandQuantity as BandQuantity,
+    BandTests as BandTests,
     ConcentrationAtOff as ConcentrationAtOff,
     ExcitationModel as ExcitationModel,
     ExcitedState as ExcitedState,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.results.measured import BoolArray, FloatArray
+from labrig.results.measured import BoolArray, FloatArray, IntArray
 
 #: Delay of the first photograph, in multiples of the median, beyond which a charge is left out
 #: (metering charges are photographed only before the next charge).
@@ -139,6 +139,9 @@ class ChargingSeries:
         Error modes of the sites' irradiance, shape (M, P, B): its logarithm in every band may be
         off by Σ_m z_m site_modes[m], the z_m independent and of unit variance, the same at every
         charge. None: it is exact.
+    mode_kind
+        Kind of each mode, from 0, shape (M,): modes of one kind have a common size that a fit may
+        find; −1 if the size is known. None: all sizes are known.
     across
         Irradiance at Q places within every site relative to the site's, shape (Q, P, B): in uneven
         light, the mean level is not the level of the mean light. None: the light is even.
@@ -155,6 +158,7 @@ class ChargingSeries:
     values: FloatArray
     sigma: FloatArray
     site_modes: FloatArray | None = None
+    mode_kind: IntArray | None = None
     across: FloatArray | None = None
     earlier: EarlierCharge | None = None
 
@@ -217,6 +221,8 @@ class ChargingSeries:
             modes.shape[1:] == (sites, bands) and np.isfinite(modes).all()
         ):
             raise FitError(f"{self.name}: expected finite 'site_modes' of {sites} x {bands}")
+        if self.mode_kind is not None and (modes is None or len(self.mode_kind) != len(modes)):
+            raise FitError(f"{self.name}: expected a kind of each of the 'site_modes'")
         if not (self.irradiance >= 0).all():
             raise FitError(f"{self.name}: expected irradiances of 0 or more, got a smaller one")
         measured = np.isfinite(self.values) & np.isfinite(self.sigma)

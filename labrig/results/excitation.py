@@ -11,7 +11,7 @@ from labrig.calibration import IrradianceFile
 from labrig.material import Material, write_material
 from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
-from labrig.results.fitted_excitation import FittedExcitation
+from labrig.results.fitted_excitation import BandTests, FittedExcitation
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
@@ -106,6 +106,25 @@ class PatchCharging:
     whole: Series
 
 
+@dataclass(frozen=True)
+class LightScatter:
+    """Errors of the light that no calibration states, as the glow shows them.
+
+    Attributes
+    ----------
+    lamp
+        Relative scatter of the lamp's brightness from charge to charge.
+    wavelength_nm
+        Error of the filter's wavelengths in nm, smooth along it.
+    sites
+        Relative scatter of the light on single places.
+    """
+
+    lamp: float
+    wavelength_nm: float
+    sites: float
+
+
 @dataclass(frozen=True, eq=False)
 class PatchExcitation:
     """Excitation of a patch.
@@ -119,6 +138,8 @@ class PatchExcitation:
     fit
         Fit of all charges together; its residuals are those of `charging.through`, then of
         `charging.direct`.
+    light
+        Scatter of the light, which is in all σ of `fit`.
     material
         Material by these rates, with re-radiance where the emission spectrum is known.
     closure
@@ -129,6 +150,7 @@ class PatchExcitation:
     charging: PatchCharging
     decay: FittedDecay
     fit: FittedExcitation
+    light: LightScatter
     material: Material
     closure: Closure | None
 
@@ -178,9 +200,10 @@ class ExcitationResult(RunResult):
             place = folder / name
             place.mkdir(exist_ok=True)
             write_material(place / "material.yaml", patch.material)
-            write_json(place / "excitation.json", finite(self._fit_content(patch.fit)))
+            write_json(place / "excitation.json", finite(self._fit_content(patch)))
 
-    def _fit_content(self, fit: FittedExcitation) -> dict[str, Any]:
+    def _fit_content(self, patch: PatchExcitation) -> dict[str, Any]:
+        fit, light = patch.fit, patch.light
         level_at_off = fit.at_off[-1]
         return {
             "schema_version": self.schema_version,
@@ -207,6 +230,12 @@ class ExcitationResult(RunResult):
                 }
                 for number, state in enumerate(fit.states)
             ],
+            "light": {
+                "lamp_scatter": light.lamp,
+                "wavelength_error_nm": light.wavelength_nm,
+                "site_scatter": light.sites,
+            },
+            "by_band": None if fit.by_band is None else _by_band(fit.by_band),
             "channel_weights": fit.channel_weights.tolist(),
             "reduced_chi2": fit.reduced_chi2,
             "dof": fit.dof,
@@ -215,3 +244,24 @@ class ExcitationResult(RunResult):
             "models": [vars(model) for model in fit.models],
             "warnings": list(fit.warnings),
         }
+
+
+def _by_band(tests: BandTests) -> dict[str, Any]:
+    """Return the tests of one glow for all bands as content of a file."""
+    quantities = {"amplitude": tests.amplitude, "rate": tests.rate, "hue": tests.hue}
+    return {
+        "bands": tests.bands.tolist(),
+        "light_variance": tests.light_variance.value,
+        "light_variance_sigma": tests.light_variance.sigma,
+        "is_thick": tests.is_thick,
+        **{
+            name: {
+                "deviation": quantity.deviation.tolist(),
+                "sigma": quantity.sigma.tolist(),
+                "p_value": quantity.p_value,
+                "differs": quantity.differs,
+            }
+            for name, quantity in quantities.items()
+            if quantity is not None
+        },
+    }

@@ -4,12 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.results.measured import BoolArray, FloatArray, Measured
+from labrig.results.measured import BoolArray, FloatArray, IntArray, Measured
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
 #: Significance in σ below which an excitation rate is an upper limit.
 SEEN_SIGMAS = 2.0
+#: Significance level of differences between exciting bands, as of all misfit tests.
+DIFFERENT = 5e-4
+#: Significance in σ from which a layer is optically thick.
+THICK_SIGMAS = 3.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +132,71 @@ class ConcentrationAtOff:
 
 
 @dataclass(frozen=True, eq=False)
+class BandQuantity:
+    """Quantity of the glow by the band that excites it, relative to the fit's common one.
+
+    Attributes
+    ----------
+    deviation, sigma
+        Logarithm of the quantity over the common one, and its standard uncertainty, with all
+        parameters of the fit free, shape (q, G): q values, such as of each channel, in G bands.
+    p_value
+        Probability of such deviations where the quantity is the same in all bands.
+    """
+
+    deviation: FloatArray
+    sigma: FloatArray
+    p_value: float
+
+    @property
+    def differs(self) -> bool:
+        """Whether the quantity depends on the exciting band."""
+        return self.p_value < DIFFERENT
+
+
+@dataclass(frozen=True, eq=False)
+class BandTests:
+    """Tests of one glow for all exciting light, as a thin layer of first order has it.
+
+    Attributes
+    ----------
+    bands
+        Numbers of the G bands, from 0, that excite some sites more than all others do, shape (G,).
+    light_variance
+        Variance of the exciting light over the depth of the layer, relative to its squared mean, of
+        the light that is absorbed most: (D ln 10)²/12 of a layer of optical density D < 1.
+    amplitude
+        Glow of the fully charged sample, by the curvature of its charging.
+    rate
+        Rates of the decay after a charge.
+    hue
+        Channels relative to the brightest one; None if there is one channel only.
+    """
+
+    bands: IntArray
+    light_variance: Measured
+    amplitude: BandQuantity
+    rate: BandQuantity
+    hue: BandQuantity | None
+
+    @property
+    def optical_density(self) -> float:
+        """Optical density D of a layer with this variance of the light, where it is below 1."""
+        return float(np.sqrt(12 * max(self.light_variance.value, 0.0)) / np.log(10))
+
+    @property
+    def optical_density_upper(self) -> float:
+        """Upper limit of D with 95 % probability, as far as it is below 1."""
+        value, sigma = self.light_variance.value, self.light_variance.sigma
+        return float(np.sqrt(12 * (max(value, 0.0) + UPPER_SIGMAS * sigma)) / np.log(10))
+
+    @property
+    def is_thick(self) -> bool:
+        """Whether light is absorbed so much that it charges the surface more than the depth."""
+        return self.light_variance.value > THICK_SIGMAS * self.light_variance.sigma
+
+
+@dataclass(frozen=True, eq=False)
 class FittedExcitation:
     """Rates of all states and bands, from all series together.
 
@@ -152,6 +221,12 @@ class FittedExcitation:
         not held at 1.
     models
         Models that were tried, of which this is one.
+    by_band
+        Tests whether all bands excite the same glow; None if the sites are excited by one band.
+    lamp_sigma
+        Relative scatter of the lamp's brightness from charge to charge, found or as given.
+    site_sizes
+        Size of each kind of the sites' error modes relative to that given, as found.
     """
 
     states: tuple[ExcitedState, ...]
@@ -163,6 +238,9 @@ class FittedExcitation:
     covariance: FloatArray
     warnings: tuple[str, ...]
     residuals: tuple[FloatArray, ...]
+    by_band: BandTests | None
+    lamp_sigma: float
+    site_sizes: tuple[float, ...] = ()
     order_gain: float = 0.0
     models: tuple[ExcitationModel, ...] = ()
 

@@ -71,6 +71,7 @@ def test_out_has_page_files_and_material(labrig: Labrig, table: Path, tmp_path: 
     (known,) = read_material(result / "material.yaml").states
     assert known.kinetic_order == state["order"]["value"]
     assert known.r0 == state["r0"]["value"]
+    assert known.r0 is not None
     # a = Λ k_r r(0)ᵇ
     made = state["reradiation"]["value"] * known.k_r_per_s * known.r0**known.kinetic_order
     assert known.amplitude == pytest.approx(made, rel=1e-6)

@@ -12,7 +12,12 @@ from labrig.errors import DiskError
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation
 from labrig.material import read_material
 from labrig.results import Series
-from labrig.results.excitation import ExcitationResult, PatchCharging, PatchExcitation
+from labrig.results.excitation import (
+    ExcitationResult,
+    LightScatter,
+    PatchCharging,
+    PatchExcitation,
+)
 from tests.analyse.excitation.test_excitation_run import true_irradiance
 from tests.fit.charged_samples import Bench, lvf_windows
 from tests.results.made import assert_read_back, decay_result
@@ -41,9 +46,9 @@ def result() -> ExcitationResult:
         k_e_per_s=[[0.01]], k_r_per_s=[0.03], full_level=[10.0],
     )  # fmt: skip
     charging = PatchCharging(through, direct, np.ones(3), whole)
-    decay = decay_result((0.03, 10.0))
-    patch = PatchExcitation(charging, decay, fit, material, closed)
-    untested = PatchExcitation(charging, decay, fit, material, None)
+    decay, light = decay_result((0.03, 10.0)), LightScatter(0.003, 0.2, 0.005)
+    patch = PatchExcitation(charging, decay, fit, light, material, closed)
+    untested = PatchExcitation(charging, decay, fit, light, material, None)
     return ExcitationResult(
         irradiance=true_irradiance(), patches={"left": patch, "right": untested}, warnings=("odd",)
     )

@@ -7,7 +7,13 @@ import numpy as np
 from labrig.analyse.excitation.charge_intervals import GLOWING
 from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
-from labrig.analyse.excitation.lamp_light import band_sigma, scale_sigma
+from labrig.analyse.excitation.lamp_light import (
+    LAMP_SIGMA,
+    LARGEST_FACTOR,
+    band_sigma,
+    light_scatter,
+    scale_sigma,
+)
 from labrig.analyse.excitation.material import excited_material
 from labrig.analyse.excitation.orders import OrderFits, refit
 from labrig.analyse.frames import require_intact
@@ -28,8 +34,6 @@ from labrig.results import (
     PatchExcitation,
 )
 
-#: Relative scatter of a lamp's brightness from charge to charge.
-LAMP = 0.01
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
 #: Deviation of the closure in σ that causes a warning.
@@ -82,13 +86,14 @@ def _patch_excitation(
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), MIN_DARK).tolist())
     relative_sigmas = RelativeSigmas(
         flicker=_flicker(part, decay),
-        lamp=LAMP,
+        lamp=LAMP_SIGMA,
         cold_deficit=warming.deficit_sigma,
         offset=dark,
         # The sensor warms and cools over hours of long exposures, more than dark frames show.
         common_mode=dark,
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
+        largest_factor=LARGEST_FACTOR,
     )
     fits = OrderFits(_series(charging), decay, relative_sigmas, _states(part, patch) is not None)
     fit = fits.chosen(part.overrides.order)
@@ -109,7 +114,7 @@ def _patch_excitation(
     )
     material = at_temperature(material, run, part.protocol.rate_frames)
     return (
-        PatchExcitation(charging, decay, fit, material, closure),
+        PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
         (*decay.warnings, *fit.warnings, *_closure_warnings(closure), *no_spectrum),
     )
 

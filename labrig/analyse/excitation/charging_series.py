@@ -5,7 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
-from labrig.analyse.excitation.lamp_light import across_sites, lamp_transients, site_modes
+from labrig.analyse.excitation.lamp_light import (
+    across_sites,
+    lamp_transients,
+    mode_kinds,
+    site_modes,
+)
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
@@ -96,7 +101,7 @@ def patch_chargings(
 
     through = ChargingSeries(
         "through the filter", charges(False), rise, fade, np.array(irradiance.through),
-        NOTHING, NOTHING, site_modes(irradiance), across_sites(irradiance),
+        NOTHING, NOTHING, site_modes(irradiance), mode_kinds(irradiance), across_sites(irradiance),
     )  # fmt: skip
     everywhere = np.tile(irradiance.direct, (len(irradiance.position), 1))
     direct_charges, last = charges(True), through.charges[-1]

@@ -96,7 +96,7 @@ def predicted_charging(
     cold_deficit = np.array([charge.cold_deficit for charge in charges])
     charge_variance = slopes[-1] ** 2 * (
         relative_sigmas.scale**2
-        + relative_sigmas.lamp**2
+        + fit.lamp_sigma**2
         + (relative_sigmas.cold_deficit * cold_deficit) ** 2
     )
     rate_variance = np.einsum("ic,ij,jc->c", slopes[:-1], fit.covariance, slopes[:-1])

@@ -5,16 +5,22 @@ the measured ones, or those of typical halogen lamps.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from labrig.calibration import Change, FadeFile, IrradianceFile
-from labrig.results import FloatArray, Transient
+from labrig.results import FittedExcitation, FloatArray, LightScatter, Transient
 
-#: Least relative σ of the light on a single place: bands are calibrated place by place, and their
-#: flanks scatter by so much. Smooth errors alone cannot describe it.
-MIN_SITE_SIGMA = 0.03
-#: Standard uncertainty of a filter's wavelengths in nm.
-WAVELENGTH_SIGMA_NM = 1.0
+#: Relative scatter of the light on single places: bands are calibrated place by place, and their
+#: flanks scatter, which smooth errors alone cannot describe; and error of a filter's wavelengths in
+#: nm beyond its calibration's. First values of a fit that finds the size of both.
+SITE_SIGMA, WAVELENGTH_SIGMA_NM = 0.03, 1.0
+#: Relative scatter of a lamp's brightness from charge to charge, likewise.
+LAMP_SIGMA = 0.01
+#: Factor of these values up to which sizes are tried.
+LARGEST_FACTOR = 3.0
+#: Kinds of error whose size the fit finds, in the order of its sizes; and of known size.
+WAVELENGTHS, SITES, KNOWN = 0, 1, -1
 #: Number of smooth modes along the filter: errors are uncorrelated over some 40 nm.
 SMOOTH_MODES = 9
 #: Largest relative σ of the light, within which its logarithm is linear.
@@ -53,7 +59,7 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
         np.clip((sigma / _positive_light(through)) ** 2 - light_sigma**2, 0.0, WORST**2)
     )
     bands = np.ones(through.shape[1])
-    independent = MIN_SITE_SIGMA * np.eye(len(position))[..., None]
+    independent = SITE_SIGMA * np.eye(len(position))[..., None]
     return np.concatenate(
         [
             smooth * light_sigma * bands,
@@ -61,6 +67,21 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
             smooth * shape_sigma,
             independent * bands,
         ]
+    )
+
+
+def mode_kinds(irradiance: IrradianceFile) -> NDArray[np.intp]:
+    """Return the kind of each of the `site_modes`, shape (M,)."""
+    smooth = np.repeat([KNOWN, WAVELENGTHS, KNOWN], SMOOTH_MODES)
+    return np.append(smooth, np.full(len(irradiance.position), SITES))
+
+
+def light_scatter(fit: FittedExcitation) -> LightScatter:
+    """Return the scatter of the light that a fit found."""
+    return LightScatter(
+        lamp=fit.lamp_sigma,
+        wavelength_nm=WAVELENGTH_SIGMA_NM * fit.site_sizes[WAVELENGTHS],
+        sites=SITE_SIGMA * fit.site_sizes[SITES],
     )
 
 

@@ -12,15 +12,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import FitError
+from labrig.fit.excitation.band_tests import band_tests
 from labrig.fit.excitation.lamp_pulls import law_test
 from labrig.fit.excitation.levels import levels_at_off
+from labrig.fit.excitation.light_errors import found_errors
 from labrig.fit.excitation.order_gain import order_gain
 from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.start import channel_weights, starts
 from labrig.fit.least_squares import Ending, FloatArray, LeastSquaresFit, least_squares
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import ChargingSeries, ConcentrationAtOff, ExcitedState, FittedExcitation
+from labrig.number_format import rounded
+from labrig.results import (
+    BandTests,
+    ChargingSeries,
+    ConcentrationAtOff,
+    ExcitedState,
+    FittedExcitation,
+)
 
 #: Tolerance of the relative step, for the starting points and for the result.
 ROUGH, FINE = 1e-3, 1e-6
@@ -85,7 +94,16 @@ def fit_excitation(
         problem.rewhiten(theta)
         solution = _minimised(problem, theta, tolerance)
         theta = solution.parameters
-    return _result(problem, solution, reference, uncertain)
+    # With errors of the sizes given: what is found may have grown to make good for another law.
+    law_warnings = _law_warnings(problem, theta)
+    if not uncertain.largest_factor:
+        return _result(problem, solution, reference, uncertain, law_warnings)
+    errors = found_errors(problem.parameters, solution, series, uncertain.largest_factor)
+    series, uncertain = errors.applied(series, uncertain)
+    problem = ExcitationProblem(series, len(rates), reference, uncertain, order)
+    problem.rewhiten(theta)
+    solution = _minimised(problem, theta, FINE)
+    return _result(problem, solution, reference, uncertain, law_warnings, errors.sites)
 
 
 def _brightest(series: Sequence[ChargingSeries]) -> int:
@@ -172,7 +190,12 @@ def _chi2(fit: LeastSquaresFit) -> float:
 
 
 def _result(
-    problem: ExcitationProblem, solution: LeastSquaresFit, reference: int, uncertain: RelativeSigmas
+    problem: ExcitationProblem,
+    solution: LeastSquaresFit,
+    reference: int,
+    uncertain: RelativeSigmas,
+    law_warnings: Sequence[str],
+    site_sizes: tuple[float, ...] = (),
 ) -> FittedExcitation:
     n, bands, columns = (
         problem.parameters.states,
@@ -224,6 +247,7 @@ def _result(
     )
     # By way of θ: A and k_e may trade off so far that their covariance has no digits left of this.
     at_off = _at_off(problem, rates, stated[own], solution.covariance, falling)
+    by_band = band_tests(problem, solution)
     return FittedExcitation(
         states=states,
         channel_weights=rates.weights,
@@ -232,9 +256,16 @@ def _result(
         chi2=solution.chi2,
         dof=problem.n_values + len(problem.parameters.prior_sigma) - solution.rank,
         covariance=total_covariance[np.ix_(kept, kept)],
-        warnings=(*_warnings(problem, solution, states), *_law_warnings(problem, rates, theta)),
+        warnings=(
+            *_warnings(problem, solution, states),
+            *law_warnings,
+            *(() if by_band is None else _band_warnings(by_band)),
+        ),
         residuals=problem.plain_residuals(theta),
         order_gain=order_gain(problem, theta, reference, uncertain),
+        by_band=by_band,
+        lamp_sigma=uncertain.lamp,
+        site_sizes=site_sizes,
     )
 
 
@@ -324,8 +355,41 @@ def _warnings(
     return messages
 
 
-def _law_warnings(problem: ExcitationProblem, rates: Rates, theta: FloatArray) -> list[str]:
+def _band_warnings(tests: BandTests) -> list[str]:
+    """Return a line for each quantity of the glow that depends on the exciting band."""
+    messages = []
+    variance = tests.light_variance
+    if tests.is_thick:
+        messages.append(
+            f"light that is absorbed most saturates the glow sooner than other light "
+            f"({variance.value / variance.sigma:.1f} σ), as in a layer of optical density "
+            f"{rounded(tests.optical_density, 2)}: Λ is too small, and k_e is a mean over the "
+            "depth; measure a thinner layer"
+        )
+    elif tests.amplitude.differs:
+        messages.append(
+            "the glow of the fully charged sample depends on the exciting band (p = "
+            f"{tests.amplitude.p_value:.1g}): the layer is thick, or some light empties traps; "
+            "Λ and r(0) are not to be trusted"
+        )
+    if tests.rate.differs:
+        messages.append(
+            "the decay depends on the exciting band (p = "
+            f"{tests.rate.p_value:.1g}): states are missing, another law holds, or stray light "
+            "empties traps; look at the rates by band"
+        )
+    if tests.hue is not None and tests.hue.differs:
+        messages.append(
+            f"the hue of the glow depends on the exciting band (p = {tests.hue.p_value:.1g}): "
+            "states of different spectra are excited differently, or light of something else is "
+            "in the photographs; look at the channels by band"
+        )
+    return messages
+
+
+def _law_warnings(problem: ExcitationProblem, theta: FloatArray) -> list[str]:
     """Return one line if charges of different lengths do not follow the rate equation."""
+    rates = problem.parameters.unpack(theta)
     test = law_test(problem.parameters, rates, theta, problem.series)
     if test is None or not test.fails:
         return []

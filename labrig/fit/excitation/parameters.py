@@ -78,6 +78,9 @@ class RelativeSigmas:
     irradiance
         Relative σ of E in every band, a scalar or (B,), common to all series: the fit cannot
         constrain it.
+    largest_factor
+        Factor up to which the fit finds the size of `lamp` and of each kind of the sites' error
+        modes, relative to that given; 0 if they are known.
     """
 
     flicker: float = 0.0
@@ -87,6 +90,7 @@ class RelativeSigmas:
     offset: tuple[float, ...] = ()
     common_mode: tuple[float, ...] = ()
     irradiance: float | tuple[float, ...] = 0.0
+    largest_factor: float = 0.0
 
 
 class ParameterLayout(NamedTuple):

@@ -69,7 +69,7 @@ class ExcitationProblem:
         """Return the model of every series, shape (n, P, C) each."""
         rates = self.parameters.unpack(theta)
         return [
-            _signal(self._levels(charging, rates).value @ rates.amplitude, rates)
+            _signal(self.levels(charging, rates).value @ rates.amplitude, rates)
             for charging in self.illuminated_series(rates)
         ]
 
@@ -127,14 +127,15 @@ class ExcitationProblem:
             illuminated.append(replace(charging, charges=charges, irradiance=scaled))
         return illuminated
 
-    def _levels(self, charging: ChargingSeries, rates: Rates) -> Levels:
+    def levels(self, charging: ChargingSeries, rates: Rates) -> Levels:
+        """Return the light of all exposures of a series over that of full states."""
         order = None if self.parameters.is_first_order else rates.order
         return levels(charging, rates.k_r_per_s, rates.k_e_per_s, order)
 
     def _series_residuals(
         self, number: int, charging: ChargingSeries, rates: Rates
     ) -> tuple[FloatArray, FloatArray]:
-        level = self._levels(charging, rates)
+        level = self.levels(charging, rates)
         shots, sites = level.value.shape[:2]
         columns = self.parameters.columns
         glow = level.value @ rates.amplitude
@@ -190,6 +191,14 @@ class ExcitationProblem:
             slopes[..., first + modes.start : first + modes.stop] = np.einsum(
                 "fpb,mpb->fpm", by_band, charging.site_modes
             )
+
+    def whitened(self, number: int, columns: FloatArray) -> FloatArray:
+        """Return changes (n, P, C, k) of a series' signal in whitened σ, shape (n P C, k)."""
+        columns = columns * self._inverse_sigma[number][..., None]
+        columns = columns.reshape(len(columns), -1, columns.shape[-1])
+        for common in self._common[number]:
+            common.whiten(columns)
+        return columns.reshape(-1, columns.shape[-1])
 
     def _whitened(
         self, number: int, misfit: FloatArray, jacobian: FloatArray

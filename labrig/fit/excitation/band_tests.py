@@ -1,0 +1,143 @@
+"""Tests whether light of every band excites the same glow: as much, as lasting, of the same hue.
+
+The rate equation of a thin layer has one Λ and one k_r of each state, whatever light excites it. In
+a thick layer the light that is absorbed most charges the surface only, and saturates sooner; light
+that empties traps shortens the decay of what it charges. Each test lets one quantity differ between
+the places that different bands excite, all parameters of the fit free besides, and asks how much χ²
+falls. The fit is linear within its σ, so that one step of Gauss and Newton is the whole of it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from labrig.fit.excitation.parameters import Rates
+from labrig.fit.excitation.problem import ExcitationProblem
+from labrig.fit.least_squares import EPSILON, FloatArray, LeastSquaresFit
+from labrig.results import BandQuantity, BandTests, IntArray, Measured
+
+#: Step of the derivatives by logarithms.
+STEP = 1e-4
+#: Step of the second derivatives by the light.
+DEPTH_STEP = 1e-2
+#: σ of a logarithm above which a band's glow says nothing about a quantity, and of the light's
+#: variance above which the glow says nothing about the layer.
+UNKNOWN, UNKNOWN_VARIANCE = 1.0, 1e3
+#: Relative σ of a channel over another on a place: in a colour filter array they lie up to a pixel
+#: apart, and the glow is steep along the filter.
+HUE_SIGMA = 0.02
+
+
+def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTests | None:
+    """Test all quantities at a fit's solution, by the first series; None if one band excites all.
+
+    Parameters
+    ----------
+    problem, solution
+        A fit, and its solution.
+    """
+    theta = solution.parameters
+    rates = problem.parameters.unpack(theta)
+    through = problem.illuminated_series(rates)[0]
+    growth = (rates.amplitude[:, None] * rates.k_e_per_s).sum(axis=0)
+    band_of_site: IntArray = np.argmax(growth * through.irradiance, axis=1)
+    bands = np.unique(band_of_site)
+    if len(bands) < 2:
+        return None
+    residual, jacobian = problem.residuals(theta)
+    basis = _column_space(jacobian)
+    reduced = max(solution.chi2 / max(problem.n_values - solution.rank, 1), 1.0)
+    masks = (band_of_site == bands[:, None]).astype(np.float64)
+
+    def quantity(changes: Sequence[FloatArray], tolerance: float = 0.0) -> BandQuantity:
+        columns = np.stack([mask[:, None] * change for change in changes for mask in masks], -1)
+        whitened = np.zeros((len(residual), columns.shape[-1]))
+        of_series = problem.whitened(0, columns)
+        whitened[: len(of_series)] = of_series
+        return _tested(residual, whitened, basis, reduced, (len(changes), len(bands)), tolerance)
+
+    columns, signal = problem.parameters.columns, problem.signal(theta)[0]
+    by_amplitude = np.zeros(len(theta))
+    by_amplitude[columns.inverse_gain] = -theta[columns.inverse_gain]
+    by_rate = np.zeros(len(theta))
+    by_rate[columns.k_r] = 1.0
+    channels = [np.eye(signal.shape[2])[channel] * signal for channel in problem.parameters.others]
+
+    def along(direction: FloatArray) -> FloatArray:
+        after, before = (problem.signal(theta + s * STEP * direction)[0] for s in (1, -1))
+        slope: FloatArray = (after - before) / (2 * STEP)
+        return slope
+
+    depth = np.concatenate(
+        [
+            problem.whitened(number, change[..., None])
+            for number, change in enumerate(_by_depth(problem, rates))
+        ]
+    )
+    whitened = np.zeros((len(residual), 1))
+    whitened[: len(depth)] = depth
+    of_depth = _tested(residual, whitened, basis, reduced, (1, 1), 0.0, UNKNOWN_VARIANCE)
+    return BandTests(
+        bands=bands,
+        light_variance=Measured(float(of_depth.deviation[0, 0]), float(of_depth.sigma[0, 0])),
+        amplitude=quantity([along(by_amplitude)]),
+        rate=quantity([along(by_rate)]),
+        hue=quantity(channels, HUE_SIGMA) if channels else None,
+    )
+
+
+def _by_depth(problem: ExcitationProblem, rates: Rates) -> list[FloatArray]:
+    """Return the change (n, P, C) of every series' signal by the variance of the light in depth.
+
+    Light of band b falls in a layer as 1 − c a_b z, z the depth, where a_b is the absorption by all
+    states. Its mean is part of k_e. Its variance c²/12, where a_b = 1, lowers the signal s by
+    ½ ∂²s/∂ε², E_b (1 + ε a_b), as far as the sites are saturated.
+    """
+    absorption = rates.k_e_per_s.sum(axis=0)
+    absorption = absorption / max(float(absorption.max()), 1e-300)
+    changes = []
+    for charging in problem.illuminated_series(rates):
+        signals = [
+            problem.levels(
+                replace(charging, irradiance=charging.irradiance * (1 + epsilon * absorption)),
+                rates,
+            ).value
+            @ rates.amplitude
+            for epsilon in (-DEPTH_STEP, 0.0, DEPTH_STEP)
+        ]
+        second = (signals[0] - 2 * signals[1] + signals[2]) / DEPTH_STEP**2
+        changes.append(np.multiply.outer(second / 2, rates.weights))
+    return changes
+
+
+def _column_space(jacobian: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (m, rank) of the changes that the fit's own parameters make."""
+    norm = np.linalg.norm(jacobian, axis=0)
+    left, values, _ = np.linalg.svd(jacobian[:, norm > 0] / norm[norm > 0], full_matrices=False)
+    return np.asarray(left[:, values > EPSILON * len(jacobian) * values[0]])
+
+
+def _tested(
+    residual: FloatArray,
+    columns: FloatArray,
+    basis: FloatArray,
+    reduced_chi2: float,
+    shape: tuple[int, int],
+    tolerance: float,
+    unknown: float = UNKNOWN,
+) -> BandQuantity:
+    """Return the deviations by further columns (m, k), and the probability of such large ones."""
+    own = columns - basis @ (basis.T @ columns)
+    values, vectors = np.linalg.eigh(own.T @ own / reduced_chi2)
+    known = values > 1 / unknown**2
+    variance = np.where(known, 1 / np.maximum(values, 1 / unknown**2), unknown**2)
+    along = np.where(known, -(vectors.T @ (own.T @ residual)) / reduced_chi2 * variance, 0.0)
+    chi2 = float((along**2 / (variance + tolerance**2)).sum())
+    sigma = np.sqrt(vectors**2 @ (variance + tolerance**2))
+    return BandQuantity(
+        deviation=(vectors @ along).reshape(shape),
+        sigma=sigma.reshape(shape),
+        p_value=float(chdtrc(known.sum(), chi2)) if known.any() else 1.0,
+    )
