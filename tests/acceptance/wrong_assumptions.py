@@ -53,9 +53,17 @@ WRONG_SIGMAS = 3.0
 #: ends three times as late as the last frame.
 SIGNALS_S = (0.5, 5.0, 20.0, 60.0, 150.0, 520.0)
 EXPOSURE_S = 1.0
+#: Time at which signals are made equal to the truth where they have no scale.
+SCALED_AT_S = 20.0
 LAST_FRAME_S = 180.0
+#: Part of the first signal that counts as darkness: nobody tells a tenth of it from none.
+DARKNESS = 1e-4
 #: Ratio of two rates beyond which they are not those of the same state.
 SAME_RATE = 3.0
+
+
+#: Error, σ and truth.
+Error = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -110,7 +118,9 @@ def record(case: Case, seed: int, folder: Path) -> None:
     if case.is_calibrated:
         case.write_calibration(seed, folder)
         _run(folder, "calibration", "--yes")
-        (camera_file,) = (folder / "calibration").glob("*/result/camera.yaml")
+        (made,) = (folder / "calibration").glob("*/result/camera.yaml")
+        camera_file = made.rename(folder / "camera.yaml")
+        shutil.rmtree(folder / "calibration")
     case.write(seed, folder, camera_file)
     rooms: list[sim.OpenRoom] = []
     open_room = sim.open_room
@@ -182,6 +192,8 @@ def judge(case: Case, seed: int, folder: Path) -> Judged:
             continue
         number = list(BESIDE).index(name) if case.with_neighbour else 0
         lens = 1.0 if case.is_calibrated else _seen_by_the_lens(case, patch)
+        if not case.has_scale:
+            lens = _scale(patch.fit, np.array(seen["signals"])[:, number])
         signals = lens * np.array(seen["signals"])[:, number]
         of_patch = dict(_signal_errors(patch.fit, signals))
         if case.has_rates and patch.fit.law == "exponentials":
@@ -202,18 +214,23 @@ def _seen_by_the_lens(case: Case, patch: DecayPatch) -> float:
     return float(falloff[y : y + high, x : x + wide].mean())
 
 
-Error = tuple[float, float, float]
+def _scale(fit: FittedDecay, signals: FloatArray) -> float:
+    """Return the signal found over the true one at a time at which both are well known."""
+    found = fit.forecast(SCALED_AT_S, EXPOSURE_S).value[0]
+    true = signals[SIGNALS_S.index(SCALED_AT_S), CHANNELS.index(fit.brightest_channel)]
+    return float(found / true)
 
 
 def _signal_errors(fit: FittedDecay, signals: FloatArray) -> Iterator[tuple[str, Error]]:
     """Return error, σ and truth of the signals in the brightest channel, by name."""
     forecast = fit.forecast(SIGNALS_S, EXPOSURE_S)
-    for t_s, true, value, sigma, low, high in zip(
-        SIGNALS_S, signals[:, CHANNELS.index(fit.brightest_channel)], forecast.value,
-        forecast.sigma, forecast.low, forecast.high, strict=True,
-    ):  # fmt: skip
-        is_bracketed = t_s > LAST_FRAME_S and low <= true <= high
-        yield f"{t_s:g} s", (0.0 if is_bracketed else value - true, sigma, true)
+    true = signals[:, CHANNELS.index(fit.brightest_channel)]
+    sigma = np.hypot(forecast.sigma, DARKNESS * true[0])
+    is_bracketed = (forecast.low <= true) & (true <= forecast.high)
+    is_bracketed &= np.array(SIGNALS_S) > LAST_FRAME_S
+    off = np.where(is_bracketed, 0.0, forecast.value - true)
+    for t_s, error in zip(SIGNALS_S, zip(off, sigma, true, strict=True), strict=True):
+        yield f"{t_s:g} s", error
 
 
 def _state_errors(fit: FittedDecay, truth: Truth, number: int, lens: float) -> dict[str, Error]:

@@ -10,8 +10,8 @@ import yaml
 from labrig import resources
 from tests.acceptance.decays_of_all_materials import shipped_rig
 
-#: Sensor that is read in milliseconds and has a thousand pixels for each sample.
-SENSOR = {"width": 96, "height": 64}
+#: Sensor that is read in milliseconds and has four thousand pixels for each sample.
+SENSOR = {"width": 192, "height": 128}
 #: One state and two.
 USUAL = ("blue-paint", "double-medium-bright")
 #: A dim sample beside a bright one, and the regions in which they are measured.
@@ -20,6 +20,13 @@ BESIDE = {"dim": [0.1, 0.3, 0.24, 0.4], "bright": [0.52, 0.2, 0.36, 0.6]}
 #: How far a long charge fills the two.
 DIM_CHARGE, BRIGHT_CHARGE = 0.01, 0.5
 CALIBRATED_CARD = {"card": [0.2, 0.1, 0.7, 0.8], "black": [0.02, 0.4, 0.12, 0.2]}
+
+
+THERMOMETER = {"driver": "numato_thermometer", "address": "sim://room/relays", "input": 0}
+
+
+#: Materials that fade within seconds, of which frames are taken closer together.
+FAST = ("bottle", "double-close-uneven", "green-paint", "yellow-paint")
 
 
 @dataclass(frozen=True)
@@ -44,8 +51,12 @@ class Case:
         Whether the camera is calibrated in the same room before, its glare by a black trap.
     has_rates
         Whether the sample decays exponentially, so that its rates have a truth.
-    protocol
-        Keys of the decay's protocol.
+    has_scale
+        Whether amplitudes have a truth: not that of a perfect camera or an even sample.
+    has_thermometer
+        Whether the rig reads the room's temperature.
+    camera_warm_up
+        Time from switching the camera on to the dark frames.
     """
 
     name: str
@@ -57,7 +68,9 @@ class Case:
     with_neighbour: bool = False
     is_calibrated: bool = False
     has_rates: bool = True
-    protocol: dict[str, Any] = field(default_factory=dict)
+    has_scale: bool = True
+    has_thermometer: bool = False
+    camera_warm_up: str = "20 min"
 
     @property
     def sensor(self) -> dict[str, Any]:
@@ -73,7 +86,7 @@ class Case:
         return self.materials[seed % len(self.materials)]
 
     def write(self, seed: int, folder: Path, camera_file: Path | None = None) -> None:
-        """Write `rig.yaml` and `protocol.yaml` into a folder, and a material with a hidden state."""
+        """Write `rig.yaml` and `protocol.yaml` into a folder, and a material if it is no usual one."""
         material = self.material(seed)
         if self.hidden is not None:
             material = _with_hidden(material, *self.hidden, folder)
@@ -82,13 +95,15 @@ class Case:
             patch["kinetics"] = self.kinetics
         sample = [patch]
         protocol: dict[str, Any] = {"protocol": "decay", "sample": {"name": "sample"}}
+        if self.material(seed) in FAST:
+            protocol |= {"every": "2 s", "for": "60 s"}
         if self.with_neighbour:
             patch |= {"region": list(DIM), "initial_charge": DIM_CHARGE}
             sample.append(
                 {"material": "white-paint", "region": list(BRIGHT), "initial_charge": BRIGHT_CHARGE}
             )
             protocol["patches"] = BESIDE
-        rig = shipped_rig(
+        rig: dict[str, Any] = shipped_rig(
             "sim",
             **(
                 self.simulation
@@ -96,9 +111,12 @@ class Case:
             ),
         )
         if camera_file is not None:
-            rig["optics"] = {**dict(rig["optics"]), "camera_file": str(camera_file)}  # type: ignore[call-overload]
+            rig["optics"]["camera_file"] = str(camera_file)
+        rig["devices"]["camera"]["warm_up"] = self.camera_warm_up
+        if self.has_thermometer:
+            rig["devices"]["thermometer"] = THERMOMETER
         (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
-        (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol | self.protocol))
+        (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
 
     def write_calibration(self, seed: int, folder: Path) -> None:
         """Write rig and protocol of the camera's calibration into a folder, with few cycles."""
@@ -168,7 +186,7 @@ DECAYS = [
         {"imaging": {"defocus_px": 3}},
         with_neighbour=True,
     ),
-    Case("texture 5 %", "surfaces are even", {"imaging": {"texture": 0.05}}),
+    Case("texture 5 %", "surfaces are even", {"imaging": {"texture": 0.05}}, has_scale=False),
     Case(
         "black wander 1 DN",
         "the black level stays",
@@ -186,7 +204,7 @@ DECAYS = [
     Case("non-linear 0.5 %", "the sensor is linear", _sensor(nonlinearity=0.005)),
     Case("non-linear 1 %", "the sensor is linear", _sensor(nonlinearity=0.01)),
     Case("non-linear 3 %", "the sensor is linear", _sensor(nonlinearity=0.03)),
-    Case("crosstalk 3 %", "pixels are independent", _sensor(crosstalk=0.03)),
+    Case("crosstalk 3 %", "pixels are independent", _sensor(crosstalk=0.03), has_scale=False),
     Case("row noise 0.5", "pixels are independent", _sensor(row_noise=0.5)),
     _law("retrapping 0.1", ALWAYS_FIRST, model="otor", retrapping=0.1),
     _law("retrapping 0.5", ALWAYS_FIRST, model="otor", retrapping=0.5),
@@ -211,6 +229,12 @@ DECAYS = [
         "temperature drift 10 K/h",
         "the temperature stays",
         {"temperature": {"drift_per_hour": 10}},
+    ),
+    Case(
+        "drift 3 K/h, thermometer",
+        "as above, with a thermometer",
+        {"temperature": {"drift_per_hour": 3}},
+        has_thermometer=True,
     ),
     Case("hidden state 8 %, 2 s", "frames resolve every state", hidden=(0.5, 0.08)),
     Case("hidden state 15 %, 3 s", "frames resolve every state", hidden=(1 / 3, 0.15)),
@@ -239,10 +263,16 @@ DECAYS = [
         "glow from before",
         "the sample is dark in the dark frames",
         {"initial": {"lamp": "off", "concentration": 0.5}},
-        materials=("double-wide-slow",),
+        materials=("blue-paint", "purple-paint"),
+        camera_warm_up="150 s",
     ),
 ]
 
-#: For the clean runs: all shipped materials that decay exponentially.
-MATERIALS = tuple(name for name in resources.names("config/materials") if name != "power-law")
+#: For the clean runs: all shipped materials that decay exponentially, but one that lives for longer
+#: than three minutes, of which labrig says so.
+MATERIALS = tuple(
+    name
+    for name in resources.names("config/materials")
+    if name not in ("power-law", "double-wide-slow")
+)
 CLEAN = Case("clean, all materials", "none: every assumption holds", materials=MATERIALS)
