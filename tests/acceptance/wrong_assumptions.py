@@ -5,15 +5,16 @@
 
 Every run is `labrig run decay` in a simulated room of `wrong_rooms`, from the lamp to fit and
 warnings. Its rates, amplitudes and signals, from the first frame to three times the last, are
-compared with the truth of the room that was measured. Wrong is a run of which one of these lies
-beyond 3 σ; of three times the last time the bracket of all laws counts, too. Where states have no
-rates, signals alone are compared.
+compared with the truth of the room that was measured; where states have no rates, signals alone.
+Rooms of `wrong_charging` are measured by a short `labrig run excitation`, and its rates, excitation
+rates and the level that was reached are compared. Wrong is a run of which one of these lies beyond
+3 σ; of three times the last time the bracket of all laws counts, too.
 
 The table has, for each case: runs; those that are wrong; those that are wrong and silent (goal: at
-most 1 of 30); those with a warning; the median of the furthest error in σ and in %, and how often
-which warning came. The goal for clean runs of all materials is at most 2 % with a warning. Runs that
-are kept are not made again, nor are those judged again that stand in the results, a line of JSON
-each.
+most 1 of 30); those with a warning; those that were refused; the median of the furthest error in σ
+and in %, and how often which warning came. The goal for clean runs of all materials is at most 2 %
+with a warning. Runs that are kept are not made again, nor are those judged again that stand in the
+results, a line of JSON each.
 """
 
 import argparse
@@ -36,13 +37,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import sim
+from labrig.calibration import CAMERA_KIND
 from labrig.cli.exit_codes import guarded
 from labrig.errors import LabrigError
 from labrig.process import process_run
 from labrig.region import region_pixels
-from labrig.results import DecayPatch, DecayResult, DecayState, FittedDecay
+from labrig.results import (
+    EXPONENTIALS,
+    DecayPatch,
+    DecayResult,
+    DecayState,
+    FittedDecay,
+    RunResult,
+)
 from labrig.sim.optics import CHANNELS, vignetting
 from labrig.sim.truth import TrueState, Truth
+from tests.acceptance.wrong_charging import CHARGES, Charging
 from tests.acceptance.wrong_rooms import BESIDE, CLEAN, DECAYS, Case
 
 FloatArray = NDArray[np.float64]
@@ -62,6 +72,7 @@ DARKNESS = 1e-4
 SAME_RATE = 3.0
 
 
+AnyCase = Case | Charging
 #: Error, σ and truth.
 Error = tuple[float, float, float]
 
@@ -106,7 +117,7 @@ class Judged:
         return self.is_wrong and not self.warnings and not self.failure
 
 
-def record(case: Case, seed: int, folder: Path) -> None:
+def record(case: AnyCase, seed: int, folder: Path) -> None:
     """Make a run in a folder, with the truth of its room beside it.
 
     Raises
@@ -114,14 +125,13 @@ def record(case: Case, seed: int, folder: Path) -> None:
     RuntimeError
         The run ended early.
     """
-    camera_file = None
-    if case.is_calibrated:
+    if isinstance(case, Case) and case.is_calibrated:
         case.write_calibration(seed, folder)
         _run(folder, "calibration", "--yes")
         (made,) = (folder / "calibration").glob("*/result/camera.yaml")
-        camera_file = made.rename(folder / "camera.yaml")
+        made.rename(folder / CAMERA_KIND.file_name)
         shutil.rmtree(folder / "calibration")
-    case.write(seed, folder, camera_file)
+    case.write(seed, folder)
     rooms: list[sim.OpenRoom] = []
     open_room = sim.open_room
 
@@ -132,7 +142,7 @@ def record(case: Case, seed: int, folder: Path) -> None:
             yield room
 
     with mock.patch.object(sim, "open_room", remembered):
-        said = _run(folder, "runs", "--no-process")
+        said = _run(folder, "runs", "--no-process", "--yes")
     room, truth = rooms[-1].room, rooms[-1].room.truth()
     assert truth.lamp_off_s is not None
     rooms[-1].clock.spend(4 * LAST_FRAME_S)
@@ -157,11 +167,11 @@ def _run(folder: Path, runs: str, *options: str) -> str:
              "--runs", f"{folder}/{runs}", *options]
         )  # fmt: skip
     if code:
-        raise RuntimeError(f"{folder.name} ended with {code}: {said.getvalue()[-500:]}")
+        raise RuntimeError(f"{folder} ended with {code}: {said.getvalue()[-500:]}")
     return said.getvalue()
 
 
-def judged(case: Case, keep: Path | None, seed: int) -> Judged:
+def judged(case: AnyCase, keep: Path | None, seed: int) -> Judged:
     """Return the judgement of a run, which is kept in a folder if there is one for it."""
     if keep is None:
         with tempfile.TemporaryDirectory() as made:
@@ -175,7 +185,7 @@ def judged(case: Case, keep: Path | None, seed: int) -> Judged:
     return judge(case, seed, folder)
 
 
-def judge(case: Case, seed: int, folder: Path) -> Judged:
+def judge(case: AnyCase, seed: int, folder: Path) -> Judged:
     """Return how far the results of a run are from the truth beside it."""
     truth = Truth.model_validate_json((folder / "truth.json").read_text())
     seen = json.loads((folder / "seen.json").read_text())
@@ -185,24 +195,36 @@ def judge(case: Case, seed: int, folder: Path) -> Judged:
         result = process_run(run)
     except LabrigError as error:
         return Judged(*about, {}, {}, tuple(seen["warnings"]), str(error))
+    errors = (
+        dict(case.errors(result, truth))
+        if isinstance(case, Charging)
+        else _decay_errors(case, result, truth, np.array(seen["signals"]))
+    )
+    pulls = {name: off / sigma for name, (off, sigma, _) in errors.items()}
+    percent = {name: 100 * off / true for name, (off, _, true) in errors.items()}
+    return Judged(*about, pulls, percent, (*seen["warnings"], *result.warnings))
+
+
+def _decay_errors(
+    case: Case, result: RunResult, truth: Truth, signals: FloatArray
+) -> dict[str, Error]:
+    """Return error, σ and truth of all results of a decay; `signals` is (times, patches, 3)."""
     assert isinstance(result, DecayResult)
     errors: dict[str, Error] = {}
     for name, patch in result.patches.items():
         if patch.fit is None:
             continue
         number = list(BESIDE).index(name) if case.with_neighbour else 0
+        of_patch = signals[:, number]
         lens = 1.0 if case.is_calibrated else _seen_by_the_lens(case, patch)
         if not case.has_scale:
-            lens = _scale(patch.fit, np.array(seen["signals"])[:, number])
-        signals = lens * np.array(seen["signals"])[:, number]
-        of_patch = dict(_signal_errors(patch.fit, signals))
-        if case.has_rates and patch.fit.law == "exponentials":
-            of_patch |= _state_errors(patch.fit, truth, number, lens)
+            lens = _scale(patch.fit, of_patch)
+        found = dict(_signal_errors(patch.fit, lens * of_patch))
+        if case.has_rates and patch.fit.law == EXPONENTIALS:
+            found |= _state_errors(patch.fit, truth, number, lens)
         prefix = f"{name} " if len(result.patches) > 1 else ""
-        errors |= {f"{prefix}{key}": error for key, error in of_patch.items()}
-    pulls = {name: off / sigma for name, (off, sigma, _) in errors.items()}
-    percent = {name: 100 * off / true for name, (off, _, true) in errors.items()}
-    return Judged(*about, pulls, percent, (*seen["warnings"], *result.warnings))
+        errors |= {f"{prefix}{key}": error for key, error in found.items()}
+    return errors
 
 
 def _seen_by_the_lens(case: Case, patch: DecayPatch) -> float:
@@ -234,7 +256,7 @@ def _signal_errors(fit: FittedDecay, signals: FloatArray) -> Iterator[tuple[str,
 
 
 def _state_errors(fit: FittedDecay, truth: Truth, number: int, lens: float) -> dict[str, Error]:
-    """Return error, σ and truth of rates and amplitudes; a state that there is not is infinitely off."""
+    """Return error, σ and truth of rates and amplitudes; of a state that is not there, infinity."""
     channel = CHANNELS.index(fit.brightest_channel)
     left = list(truth.patches[number].states)
     errors: dict[str, Error] = {}
@@ -266,14 +288,14 @@ def line(name: str, runs: Sequence[Judged]) -> str:
     return (
         f"{name:28}{len(runs):5}{sum(one.is_wrong for one in runs):6}"
         f"{sum(one.is_silent for one in runs):7}{sum(bool(one.warnings) for one in runs):7}"
-        f"{failed:7}{np.median(furthest):9.1f}{np.median(percent):9.2g}  "
+        f"{failed:8}{np.median(furthest):8.1f}{np.median(percent):9.2g}  "
         + "; ".join(f"{count} {text}" for text, count in said.most_common(3))
     )
 
 
 HEAD = (
-    f"{'case':28}{'runs':>5}{'wrong':>6}{'silent':>7}{'warned':>7}{'failed':>7}{'/ σ':>9}{'/ %':>9}  "
-    "warnings"
+    f"{'case':28}{'runs':>5}{'wrong':>6}{'silent':>7}{'warned':>7}{'refused':>8}{'/ σ':>8}"
+    f"{'/ %':>9}  warnings"
 )
 
 
@@ -300,7 +322,8 @@ def main() -> None:
     parser.add_argument("--results", type=Path)
     asked = parser.parse_args()
     known = results(asked.results)
-    cases = [case for case in DECAYS if not asked.case or case.name in asked.case]
+    every: list[AnyCase] = [*DECAYS, *CHARGES]
+    cases = [case for case in every if not asked.case or case.name in asked.case]
     wanted = [(case, asked.seeds) for case in cases] + [(CLEAN, asked.clean)]
     print(HEAD)
     with ProcessPoolExecutor(asked.jobs) as pool:

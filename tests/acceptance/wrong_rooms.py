@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 
 from labrig import resources
+from labrig.calibration import CAMERA_KIND
 from tests.acceptance.decays_of_all_materials import shipped_rig
 
 #: Sensor that is read in milliseconds and has four thousand pixels for each sample.
@@ -75,7 +76,7 @@ class Case:
     @property
     def sensor(self) -> dict[str, Any]:
         """Return the keys of the sensor."""
-        return SENSOR | self.simulation.get("sensor", {})
+        return {**SENSOR, **self.simulation.get("sensor", {})}
 
     def room_seed(self, seed: int) -> int:
         """Return the seed of the room, which is another one in every case."""
@@ -85,8 +86,8 @@ class Case:
         """Return the name of the sample's material."""
         return self.materials[seed % len(self.materials)]
 
-    def write(self, seed: int, folder: Path, camera_file: Path | None = None) -> None:
-        """Write `rig.yaml` and `protocol.yaml` into a folder, and a material if it is no usual one."""
+    def write(self, seed: int, folder: Path) -> None:
+        """Write `rig.yaml`, `protocol.yaml` and a material of its own; a camera file is used."""
         material = self.material(seed)
         if self.hidden is not None:
             material = _with_hidden(material, *self.hidden, folder)
@@ -110,7 +111,7 @@ class Case:
                 | {"sensor": self.sensor, "sample": sample, "seed": self.room_seed(seed)}
             ),
         )
-        if camera_file is not None:
+        if (camera_file := folder / CAMERA_KIND.file_name).is_file():
             rig["optics"]["camera_file"] = str(camera_file)
         rig["devices"]["camera"]["warm_up"] = self.camera_warm_up
         if self.has_thermometer:
@@ -124,7 +125,9 @@ class Case:
         rig = yaml.safe_load((folder / "rig.yaml").read_text())
         rig["devices"]["changer"] = {"driver": "text_changer", "address": "sim://room/changer"}
         rig["simulation"]["black_trap"] = CALIBRATED_CARD["black"]
-        protocol = {"protocol": "camera_calibration", "sample": {"name": "camera"}}
+        protocol: dict[str, Any] = {
+            "protocol": "camera_calibration", "sample": {"name": "camera"},
+        }  # fmt: skip
         protocol |= {"isos": [100, 400], "f_numbers": [4], "cycles": 2, **CALIBRATED_CARD}
         (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
         (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
