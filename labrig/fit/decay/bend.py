@@ -1,8 +1,8 @@
 """A sensor that bends: whether channels fall short of proportion where they are bright.
 
-In a frame all channels have flicker and decay in common, and only their ratios are compared. A
-sensor that shows s (1 + β s) of a level s changes them in proportion to the level. With c the column
-of that bend, across the signal in every frame, and J that of the channels' weights and offsets,
+In a frame all channels have flicker and decay in common: only their ratios are compared. A sensor
+that shows s (1 + β s) of a level s changes them in proportion to the level. With c the column of
+that bend, across the signal in every frame, and J that of the channels' weights and offsets,
 q = c − J J⁺c is what only the bend explains, and β = −q·r/q² ± 1/|q|. What it does to the fitted
 parameters is −β J⁺c, with J and c in full, along the signal, too.
 """
@@ -16,6 +16,7 @@ from labrig.fit.decay.diagnostics import MISFIT_LEVEL
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
+from labrig.results import with_uncertainty
 
 #: Significance of a bend in σ, a chance of 6 in 100,000 without one.
 BEND_SIGMAS = 4.0
@@ -103,13 +104,13 @@ def bend_warnings(found: Bend | None) -> list[str]:
     """Return a warning where a bend of the sensor matters."""
     if found is None or not found.is_evident:
         return []
-    percent, sigma = 100 * abs(found.at_brightest), 100 * found.sigma
-    how = "fall short" if found.at_brightest < 0 else "are too high"
+    percent = with_uncertainty(100 * abs(found.at_brightest), 100 * found.sigma)
+    how = "fall short of" if found.at_brightest < 0 else "exceed"
     return [
-        f"bright values {how} of proportion, by {percent:.2g} ± {sigma:.1g} % at the brightest: the "
-        "channels' ratios change with their level, as of a sensor that is not linear, which moves "
-        f"rates and amplitudes by up to {found.effect_sigmas:.2g} σ; expose for less, or it is the "
-        "states that differ in colour: fit the channels one by one"
+        f"bright values {how} proportion, by {percent} % at the brightest: the channels' ratios "
+        "change with their level, as of a sensor that is not linear, which moves rates and "
+        f"amplitudes by up to {found.effect_sigmas:.2g} σ; expose for less, or it is the states "
+        "that differ in colour: fit the channels one by one"
     ]
 
 
