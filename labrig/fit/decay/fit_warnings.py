@@ -218,7 +218,7 @@ def warnings_about(
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     if not is_exponential:
         return warnings
-    if correlation is not None and correlation.is_likely:
+    if correlation is not None:
         warnings.append(
             f"the flicker of neighbouring frames correlates (by {correlation.correlation:.1f}): σ "
             f"allows for it, it is up to {correlation.factor:.2g} times as large as for "

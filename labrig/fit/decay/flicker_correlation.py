@@ -21,9 +21,9 @@ from labrig.fit.least_squares import FloatArray
 #: tell: shutter and aperture, which dominate, have none.
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92])
 PRIOR_OF_NONE = 0.85
-#: Chance from which it is a part of σ, as far as it is probable: without one it is below 0.15 in 19
-#: of 20 series. Chance from which it is told, which is so in one of a hundred series without.
-COUNTS, LIKELY = 0.3, 0.5
+#: Chance from which it counts and is told: below, the data do not support it. It is above in less
+#: than one of a hundred series of independent frames, of most of which it is below 0.1.
+LIKELY = 0.7
 #: Values of an estimated ρ that are weighed, relative to the estimate: a correlated flicker is
 #: larger than its scatter about a curve that follows it.
 FLICKERS = np.geomspace(0.5, 4.0, 5)
@@ -49,14 +49,11 @@ class FlickerCorrelation:
         Its part in the covariance of the fitted parameters, shape (p, p).
     factor
         Factor by which the largest σ of a rate grows with it.
-    is_likely
-        Whether it is so probable that it is told.
     """
 
     correlation: float
     covariance: FloatArray
     factor: float
-    is_likely: bool
 
 
 def flicker_correlation(
@@ -109,7 +106,7 @@ def flicker_correlation(
     probability = np.exp(log_posterior - log_posterior.max())
     probability /= probability.sum()
     correlates = float(probability @ (phi > 0))
-    if correlates <= COUNTS:
+    if correlates <= LIKELY:
         return None
     variances = (probability * rho**2).reshape(len(CORRELATIONS), -1).sum(axis=1)
     all_powers = _powers(len(deviation))
@@ -122,7 +119,6 @@ def flicker_correlation(
         correlation=float(probability @ phi) / correlates,
         covariance=covariance,
         factor=float(np.sqrt(1 + ratio.max(initial=0.0))),
-        is_likely=correlates > LIKELY,
     )
 
 
