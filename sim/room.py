@@ -305,6 +305,34 @@ class Room:
             lvf=true_lvf(self._simulation),
         )
 
+    def true_dn_per_s(
+        self, start_s: float, exposure_s: float, iso: int = 400, f_number: float = 4.0
+    ) -> FloatArray:
+        """Return the glow of every patch in an exposure as a perfect camera would see it.
+
+        Parameters
+        ----------
+        start_s, exposure_s
+            Begin and duration of the exposure on the room's clock, in seconds; with the lamp off.
+        iso, f_number
+            Sensitivity and aperture of the camera.
+
+        Returns
+        -------
+        ndarray, shape (patches, 3)
+            Mean signal in R, G, B in DN per second of exposure, in the middle of the lens.
+        """
+        arrangement, lights = self._changer.arrangements.at(start_s), self._lights()
+        level = self._samples.level_at(start_s, lights, self._changer.arrangements)
+        glow_s = self._samples.glow(level, start_s, start_s + exposure_s, arrangement, lights)
+        electrons = self._curves.glow_electrons_per_s(glow_s / exposure_s, f_number)
+        means = []
+        for number in range(1, len(self._simulation.patches) + 1):
+            cells = self._layout.patch == number
+            pixels = self._layout.pixels[cells]
+            means.append(np.average(electrons[cells], axis=0, weights=pixels))
+        return np.array(means) / gain_electrons_per_dn(iso)
+
     def write_truth(self, path: Path) -> None:
         """Write `truth()` as a JSON file, next to a run, for tests."""
         self.truth().write(path)

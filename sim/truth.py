@@ -139,8 +139,9 @@ class Truth(_Part):
     lvf: TrueLvf | None
 
     def write(self, path: Path) -> None:
-        """Write the parameters as JSON."""
-        path.write_text(self.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        """Write the parameters as JSON, which can be read back: of kinetics the keys given."""
+        text = self.model_dump_json(indent=1, exclude_unset=True)
+        path.write_text(f"{text}\n", encoding="utf-8")
 
 
 def true_patches(

@@ -15,6 +15,7 @@ from labrig.analyse.frames import (
 from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
+from labrig.analyse.temperature import drift_warnings
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State
@@ -28,7 +29,15 @@ from labrig.reduce import (
     variance_terms,
 )
 from labrig.region import Region
-from labrig.results import DecayPatch, DecayResult, FittedDecay, FloatArray, NoiseBudget, Series
+from labrig.results import (
+    DecayPatch,
+    DecayResult,
+    FittedDecay,
+    FloatArray,
+    Measured,
+    NoiseBudget,
+    Series,
+)
 
 #: Terms of the photon-transfer line: constant, ∝ light, ∝ light².
 _TERMS = 3
@@ -138,6 +147,7 @@ def analyse(part: Part) -> DecayResult:
             *_clipping_warnings(series),
             *veiled,
             *_fit_warnings(fits),
+            *drift_warnings(run, part.protocol.rate_frames, _rates(fits)),
         ),
     )
 
@@ -232,6 +242,11 @@ def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
     for name, fit in fits.items():
         lines = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
         yield from (f"{_prefix(name, fits)}{text}" for text in lines)
+
+
+def _rates(fits: Mapping[str, DecayFit | str]) -> list[Measured]:
+    """Return the rates of all patches that were fitted."""
+    return [rate for fit in fits.values() if not isinstance(fit, str) for rate in fit.rates]
 
 
 def _prefix(name: str, patches: Mapping[str, object]) -> str:

@@ -1,6 +1,6 @@
 """Effect of a run's temperature on its rates."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from itertools import groupby
 
 import numpy as np
@@ -16,9 +16,12 @@ from labrig.record import (
     relative_rate_change,
     time_text,
 )
+from labrig.results import Measured
 
 #: Change in K from which a warning is given: rates then change by 4 %, more than their usual σ.
 MOVED_K = 0.5
+#: Time over which a drift is looked for, least readings that tell it, and its significance in σ.
+DRIFT_SEEN_S, FEWEST_READINGS, CLEAR_SIGMAS = 3600.0, 20, 5.0
 CHECK_IT = "check it before the next run (labrig rig check)"
 
 
@@ -67,6 +70,48 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
             f"the thermometer gave no reading after {time_text(course.time[-1])}: {CHECK_IT}"
         )
     return tuple(warnings)
+
+
+def drift_warnings(
+    run: RunRecord, roles: Collection[str], rates: Iterable[Measured]
+) -> tuple[str, ...]:
+    """Warn of a slow drift of the temperature that moves rates by more than their σ.
+
+    While a sample glows for minutes its thermometer hardly shows a drift; the hour before does.
+
+    Parameters
+    ----------
+    run
+        A recorded run.
+    roles
+        Roles of the frames that show the glow.
+    rates
+        Fitted rates.
+    """
+    photographs, readings = frames_in_roles(run, roles), run.temperatures()
+    if not photographs or len(readings) < FEWEST_READINGS:
+        return ()
+    first_s, last_s = photographs[0].start_time, photographs[-1].end_time
+    near = [reading for reading in readings if -DRIFT_SEEN_S < reading.time - last_s < 0]
+    time_s = np.array([reading.time for reading in near])
+    celsius = np.array([reading.temperature_c for reading in near])
+    if len(near) < FEWEST_READINGS or np.ptp(time_s) == 0:
+        return ()
+    (slope, _), covariance = np.polyfit(time_s - time_s.mean(), celsius, 1, cov=True)
+    moved_k = float(slope) * (last_s - first_s)
+    if abs(slope) < CLEAR_SIGMAS * np.sqrt(covariance[0, 0]) or abs(moved_k) >= MOVED_K:
+        return ()
+    middle_c = float(celsius.mean())
+    change = abs(relative_rate_change(middle_c, middle_c + moved_k))
+    sigmas = [rate.sigma / rate.value for rate in rates if 0 < rate.sigma < np.inf]
+    if not sigmas or change / 2 < min(sigmas):
+        return ()
+    return (
+        f"the temperature drifts by {3600 * slope:+.1f} K an hour, {moved_k:+.2g} K while the glow "
+        f"was photographed: k_r changes by about {100 * change:.1g} % over that, if traps are 0.65 "
+        f"eV deep, more than its σ of {100 * min(sigmas):.1g} %; rates are means over the decay, "
+        "keep the room steadier to know them better",
+    )
 
 
 def at_temperature(material: Material, run: RunRecord, roles: Collection[str]) -> Material:

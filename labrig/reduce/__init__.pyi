@@ -26,8 +26,10 @@ from .frame_reduction import (
     reduce_groups as reduce_groups,
 )
 from .glare import (
+    FRAME_TILES as FRAME_TILES,
     WHOLE_FRAME as WHOLE_FRAME,
     WHOLE_FRAME_NAME as WHOLE_FRAME_NAME,
+    frame_series as frame_series,
 )
 from .hdr import (
     HdrFrame as HdrFrame,

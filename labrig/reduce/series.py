@@ -9,7 +9,7 @@ import numpy as np
 from labrig.errors import DataError
 from labrig.optics import CameraModel
 from labrig.reduce.dark import DarkModel, fit_dark
-from labrig.reduce.glare import WHOLE_FRAME, WHOLE_FRAME_NAME, subtract_glare
+from labrig.reduce.glare import FRAME_TILES, frame_series, subtract_glare
 from labrig.reduce.hot_pixels import HotPixels, hot_pixels_of
 from labrig.reduce.measured_frames import (
     MeasuredFrame,
@@ -223,7 +223,7 @@ def reduce_patches(
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
     glare = None if camera is None or background is not None else camera.glare
     if glare is not None:
-        patches = {**patches, WHOLE_FRAME_NAME: WHOLE_FRAME}
+        patches = {**patches, **FRAME_TILES}
     hot = hot_pixels_of(darks)
     dark = {} if background else _patch_darks(darks, patches, hot)
     measured = measure_frames(frames, patches, background, hot)
@@ -237,7 +237,7 @@ def reduce_patches(
     }
     if glare is None:
         return calibrated
-    frame = calibrated.pop(WHOLE_FRAME_NAME)
+    frame = frame_series([calibrated.pop(name) for name in FRAME_TILES])
     return {
         name: subtract_glare(patch_series, frame, glare)
         for name, patch_series in calibrated.items()

@@ -57,6 +57,26 @@ def test_a_steady_room_is_shown_without_a_warning(tmp_path: Path) -> None:
     assert "<h2>Temperature</h2>" in (run / "result" / "report.html").read_text()
 
 
+def test_a_slow_drift_is_told_where_rates_are_known_better(tmp_path: Path) -> None:
+    """A quarter of a kelvin in the glow is less than the thermometer shows in its ten minutes."""
+
+    def recorded_for(drift_per_hour: float) -> list[str]:
+        def change(rig: dict[str, Any]) -> None:
+            rig["simulation"] |= {
+                "sensor": {"width": 48, "height": 32},
+                "temperature": {"drift_per_hour": drift_per_hour},
+            }
+
+        folder = tmp_path / str(drift_per_hour)
+        result = process_run(record(folder, DECAY | {"charge": "1 h"}, change))
+        return [line for line in result.warnings if "the temperature drifts by" in line]
+
+    assert recorded_for(0.0) == []
+    (said,) = recorded_for(1.8)
+    assert float(said.partition("drifts by ")[2].split()[0]) == pytest.approx(1.8, abs=0.4)
+    assert float(said.partition("changes by about ")[2].split()[0]) == pytest.approx(2.7, abs=0.8)
+
+
 @pytest.mark.parametrize(
     ("off", "readings", "told"),
     [

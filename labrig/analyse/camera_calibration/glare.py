@@ -11,9 +11,9 @@ from labrig.errors import DataError
 from labrig.optics import Glare
 from labrig.protocols.camera_calibration import CardFrames
 from labrig.record import FrameRecord
-from labrig.reduce import WHOLE_FRAME, reduce_patches
+from labrig.reduce import FRAME_TILES, frame_series, reduce_patches
 
-BLACK, FRAME = "black", "frame"
+BLACK = "black"
 #: Glare above which the trap is no trap.
 NOT_BLACK = 0.2
 
@@ -43,11 +43,11 @@ def measure_glare(
     flats = [frame for frame in lit if frame.role == CardFrames.FLAT]
     series = reduce_patches(
         [timed(frame, flats[0].start_time) for frame in flats],
-        {BLACK: black, FRAME: WHOLE_FRAME},
+        {BLACK: black, **FRAME_TILES},
         [untimed(frame) for frame in darks],
         camera=camera,
     )
-    frame_light = series[FRAME].values
+    frame_light = frame_series([series[name] for name in FRAME_TILES]).values
     fraction = series[BLACK].values / frame_light
     dark_sigma = np.nan_to_num(series[BLACK].dark_sigma / frame_light.mean(axis=0))
     # A lens's glare is not quite the same at all apertures and in all channels.

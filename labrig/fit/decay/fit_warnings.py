@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.errors import FitError
+from labrig.fit.decay.bend import Bend, bend_warnings
 from labrig.fit.decay.diagnostics import (
     Misfit,
     below_zero_warnings,
@@ -142,6 +143,7 @@ def warnings_about(
     evidence: Evidence,
     hidden: HiddenState | None,
     correlation: NoiseCorrelation | None,
+    bent: Bend | None,
 ) -> list[str]:
     """Return the warnings about a fit, one line each.
 
@@ -159,6 +161,8 @@ def warnings_about(
         A fast state that the data may hide; None if there is no room for one.
     correlation
         Correlation of neighbouring values' noise; None if it is not likely.
+    bent
+        Bend of the sensor; None if the channels do not tell it.
     """
     series, joint = data.series, fit.joint
     warnings = []
@@ -214,10 +218,11 @@ def warnings_about(
         judged = (data, joint) if law is None else (evidence.data, law.joint)
         number = "1 exponential does" if fit.n_states == 1 else f"{fit.n_states} exponentials do"
         warnings += misfit_warnings(
-            _misfit(*judged, evidence),
+            _misfit(*judged, evidence, bent),
             number if is_exponential else f"{LAW_LABELS[evidence.law]} does",
             f"{advice}; check background and times (labrig fit decay --offset, --origin, --from)",
         )
+    warnings += bend_warnings(bent)
     free_offset = bool(np.isinf(series.offset_sigma).any())
     if not free_offset:
         warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
@@ -277,17 +282,21 @@ def _law_warning(fit: StatesFit, evidence: Evidence) -> str:
     )
 
 
-def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence) -> Misfit:
+def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence, bent: Bend | None) -> Misfit:
+    """Return the residuals to test; an evident bend of the sensor is not told twice."""
     series = data.series
     frames, _ = joint.frame_residuals(data)
     n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
     along, across = joint.leverage(data)
     residuals = joint.least_squares.residuals[: series.values.size]
+    colour_chi2 = max(float(residuals @ residuals - frames @ frames), 0.0)
+    if bent is not None and bent.is_evident:
+        colour_chi2 = bent.rest_chi2
     return Misfit(
         t_s=(series.t + series.start) * series.span_s,
         frames=frames,
         frame_dof=n_frames - along,
-        colour_chi2=max(float(residuals @ residuals - frames @ frames), 0.0),
+        colour_chi2=colour_chi2,
         colour_dof=series.n_values - n_frames - across,
         noise_dof=evidence.noise_dof,
     )

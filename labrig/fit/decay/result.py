@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.fit.decay.bend import bend
 from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.further_state import hidden_state
@@ -96,6 +97,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
                 evidence,
                 hidden,
                 correlation,
+                bend(data, fit, fitted_covariance),
             )
         ),
         candidates=evidence.candidates,

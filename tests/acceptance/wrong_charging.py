@@ -1,0 +1,127 @@
+"""Simulated rooms that break an assumption about charging, each measured by a short excitation run.
+
+What is known of the light below the filter is the truth, so that nothing else is wrong.
+"""
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from labrig.calibration import IRRADIANCE_KIND
+from labrig.material import read_material
+from labrig.results import ExcitationResult, RunResult
+from labrig.sim.truth import Truth
+from tests.acceptance.decays_of_all_materials import shipped_rig
+from tests.analyse.excitation.test_excitation_run import HEIGHT, QUICK, WIDTH, true_irradiance
+
+#: Excitation rates in 1/s from which on they are to be measured, not limited.
+STRONG_PER_S = 0.002
+#: The room's lamp, in multiples of the irradiance to which Table 1's rates belong.
+LAMP = 4.0
+
+
+@dataclass(frozen=True)
+class Charging:
+    """A room with a broken assumption about the light, the filter or the sample.
+
+    Attributes
+    ----------
+    assumption
+        What labrig takes for granted and the room does not keep.
+    simulation
+        Keys of `simulation:`, beside those of the shipped rig for phosphors.
+    kinetics
+        Keys of `kinetics` of the sample; None: as in its file.
+    """
+
+    name: str
+    assumption: str
+    simulation: dict[str, Any] = field(default_factory=dict)
+    kinetics: dict[str, Any] | None = None
+
+    def material(self, seed: int) -> str:
+        """Return the name of the sample's material, which is the same for all seeds."""
+        del seed
+        return "blue-paint"
+
+    def write(self, seed: int, folder: Path) -> None:
+        """Write `rig.yaml`, `protocol.yaml` and the irradiance into a folder."""
+        IRRADIANCE_KIND.write(folder, true_irradiance())
+        patch: dict[str, Any] = {"material": self.material(seed), "region": [0.03, 0.1, 0.94, 0.8]}
+        if self.kinetics is not None:
+            patch["kinetics"] = self.kinetics
+        rig: dict[str, Any] = shipped_rig(
+            "sim-phosphor",
+            sample=[patch],
+            sensor={"width": WIDTH, "height": HEIGHT},
+            seed=1000 * (zlib.crc32(self.name.encode()) % 1_000_000) + seed,
+        )
+        for key, value in self.simulation.items():
+            of_rig = rig["simulation"].get(key)
+            rig["simulation"][key] = of_rig | value if isinstance(of_rig, dict) else value
+        rig["optics"]["irradiance"] = str(folder / IRRADIANCE_KIND.file_name)
+        rig["devices"]["lamp"]["warm_up"] = "0 s"
+        (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
+        (folder / "protocol.yaml").write_text(yaml.safe_dump(QUICK))
+
+    def errors(
+        self, result: RunResult, truth: Truth
+    ) -> Iterator[tuple[str, tuple[float, float, float]]]:
+        """Return error, σ and truth of rates, excitation rates and the level reached, by name."""
+        assert isinstance(result, ExcitationResult)
+        (patch,) = result.patches.values()
+        states, true = patch.fit.states, truth.patches[0].states[0]
+        for state in states[1:]:
+            yield f"state of {state.k_r_per_s:.2g} /s", (np.inf, 1.0, 1.0)
+        state = states[0]
+        k = true.k_r_per_s
+        yield "k_r", (state.k_r_per_s - k, state.k_r_sigma_per_s, k)
+        k_e_per_s = read_material(self.material(0)).states[0].k_e_per_s
+        assert k_e_per_s is not None
+        for band, k_e in enumerate(k_e_per_s):
+            if k_e >= STRONG_PER_S:
+                found, sigma = state.k_e_per_s[band] / LAMP, state.k_e_sigma_per_s[band] / LAMP
+                yield f"k_e {band + 1}", (found - k_e, sigma, k_e)
+        level, r0 = patch.fit.at_off[-1], true.concentration
+        assert r0 is not None
+        yield "r(0)", (level.r0[0] - r0, level.r0_sigma[0], r0)
+
+
+CHARGES = [
+    Charging("charging: clean", "none: every assumption holds"),
+    Charging(
+        "charging: offset 0.3",
+        "an empty trap is filled as easily as any",
+        kinetics={"charging_offset": 0.3},
+    ),
+    Charging("charging: density 1", "a layer is thin", kinetics={"optical_density": 1}),
+    Charging("charging: density 4", "a layer is thin", kinetics={"optical_density": 4}),
+    Charging(
+        "charging: smooth", "excitation is even within a band", kinetics={"excitation": "smooth"}
+    ),
+    Charging(
+        "charging: beyond 50 %",
+        "nothing excites beyond the bands",
+        kinetics={"excitation_beyond": 0.5},
+    ),
+    Charging(
+        "charging: retrapping 0.1",
+        "traps empty at one rate",
+        kinetics={"model": "otor", "retrapping": 0.1},
+    ),
+    Charging(
+        "charging: cooling 5 K/h", "the lamp keeps its colour", {"lamp": {"cooling_per_hour": 5}}
+    ),
+    Charging(
+        "charging: spread 1 %", "the filter's light stays below it", {"lvf": {"spread": 0.01}}
+    ),
+    Charging("charging: texture 5 %", "surfaces are even", {"imaging": {"texture": 0.05}}),
+    Charging(
+        "charging: non-linear 3 %", "the sensor is linear", {"sensor": {"nonlinearity": 0.03}}
+    ),
+]
