@@ -83,6 +83,11 @@ class Envelope:
     likely_flickers: FloatArray
     shapes: FloatArray
 
+    @property
+    def typical_flicker(self) -> float:
+        """Median of the likely values of ρ; unlike the likeliest one it is not zero by chance."""
+        return float(np.median(self.likely_flickers))
+
 
 def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     """Alternate fits of the curve, the channel weights, the repeats' levels and the flicker.

@@ -11,10 +11,11 @@ from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
 from labrig.fit.decay.law_ties import tie_warnings
 from labrig.fit.decay.laws import LawFit, fit_laws
+from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
 from labrig.fit.decay.result import DecayFit, assemble, noise_matrices, student_factor
 from labrig.fit.decay.scatter import with_scatter_sigma
-from labrig.fit.decay.selection import CLEAR_BIC, PREFERRED_BIC, choose_states, is_needed
+from labrig.fit.decay.selection import CLEAR_BIC, choose_states, is_needed, law_margin
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.sigma_scale import sigma_scale
 from labrig.fit.decay.states import StatesFit, refit
@@ -154,21 +155,22 @@ def fit_decay(
         flicker = flicker or 0.0
     smooth = envelope(series, flicker)
     series = smooth.series
-    data = whitened(series, smooth.signal, smooth.flicker)
+    data = whitened(series, smooth.signal, smooth.typical_flicker)
     refuse_if_rising(data, smooth.weights)
-    told = scatter or scale
-    noise_dof = told.dof if told else smooth.dof if flicker is None else np.inf
-    chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
+    estimated = scatter or scale
+    noise_dof = estimated.dof if estimated else smooth.dof if flicker is None else np.inf
+    likelihood = NoiseLikelihood.of(data, smooth)
+    chosen, tried = _supported_states(likelihood, numbers, fixed, smooth)
     weights, offsets = chosen.joint.weights, chosen.joint.offsets
-    student = student_factor(told.dof if told else np.inf)
+    student = student_factor(estimated.dof if estimated else np.inf)
     noises = noise_matrices(data, smooth.signal, smooth)
-    laws = fit_laws(data, weights, offsets, noises, student)
-    spectrum = fit_rate_spectrum(data, weights, student)
+    laws = fit_laws(likelihood, weights, offsets, noises, student)
+    spectrum = fit_rate_spectrum(likelihood, weights, student)
     if law == AUTO and n_states is not None:
         law = EXPONENTIALS
     is_choice = law == AUTO
     chosen_law = _chosen_law(law, chosen.n_states, tried, laws, spectrum)
-    all_needed = is_needed(data, chosen, tried, noise_dof)
+    all_needed = is_needed(likelihood, chosen, tried)
     envelope_data = data
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     refuse_if_constant(chosen, data)
@@ -251,14 +253,15 @@ def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
 
 
 def _supported_states(
-    data: WhitenedSeries, numbers: range, fixed: FloatArray, smooth: Envelope, noise_dof: float
+    likelihood: NoiseLikelihood,
+    numbers: range,
+    fixed: FloatArray,
+    smooth: Envelope,
 ) -> tuple[StatesFit, list[Candidate]]:
     """Return the selected states; fewer than requested if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
         n_states = range(fewest, max(numbers.stop, fewest + 1))
-        chosen, tried = choose_states(
-            data, n_states, fixed, smooth.weights, smooth.offsets, noise_dof
-        )
+        chosen, tried = choose_states(likelihood, n_states, fixed, smooth.weights, smooth.offsets)
         if chosen is not None:
             return chosen, tried
     raise FitError(NO_DECAY)
@@ -277,9 +280,8 @@ def _chosen_law(
     if spectrum is not None:
         bics[RATE_SPECTRUM] = spectrum.bic
     if law == AUTO:
-        # One exponential is the limit of every law, and a spectrum contains all of them: what
-        # contains the other has to be better by more.
-        margins = dict.fromkeys(bics, CLEAR_BIC if n_states == 1 else PREFERRED_BIC)
+        margins = dict.fromkeys(bics, law_margin(n_states))
+        # A spectrum contains all exponentials.
         margins |= {EXPONENTIALS: 0.0, RATE_SPECTRUM: CLEAR_BIC}
         return min(bics, key=lambda name: bics[name] + margins[name])
     if law not in bics:

@@ -12,8 +12,8 @@ import numpy as np
 
 from labrig.errors import FitError
 from labrig.fit.decay.joint import JointFit, Shape, covariances_under, fit_jointly
+from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.search import projection
-from labrig.fit.decay.selection import bic
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
@@ -49,7 +49,7 @@ class LawFit:
 
 
 def fit_law(
-    data: WhitenedSeries,
+    likelihood: NoiseLikelihood,
     law: DecayLaw,
     weights: FloatArray,
     offsets: FloatArray,
@@ -60,8 +60,8 @@ def fit_law(
 
     Parameters
     ----------
-    data
-        Whitened series.
+    likelihood
+        Likelihood of the whitened series.
     law
         The law.
     weights, offsets
@@ -76,6 +76,7 @@ def fit_law(
     LawFit or None
         The fit; None if the law has no signal.
     """
+    data = likelihood.data
     series = data.series
     low, high = _log_rate_bounds(series)
     shape = _shape(series, law)
@@ -104,18 +105,20 @@ def fit_law(
     covariance = np.mean(covariances, axis=0)
     with np.errstate(invalid="ignore"):
         covariance = np.where(covariance == 0, 0.0, student * covariance)
-    return LawFit(fit, _in_units(law, fit, series, covariance, bic(data, fit)))
+    return LawFit(fit, _in_units(law, fit, series, covariance, likelihood.bic(fit)))
 
 
 def fit_laws(
-    data: WhitenedSeries,
+    likelihood: NoiseLikelihood,
     weights: FloatArray,
     offsets: FloatArray,
     noises: Sequence[FloatArray],
     student: float,
 ) -> tuple[LawFit, ...]:
     """Fit every law; the arguments are those of `fit_law`."""
-    fits = (fit_law(data, law, weights, offsets, noises, student) for law in DECAY_LAWS.values())
+    fits = (
+        fit_law(likelihood, law, weights, offsets, noises, student) for law in DECAY_LAWS.values()
+    )
     return tuple(fit for fit in fits if fit is not None)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.search import projection
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
@@ -35,19 +36,19 @@ class _Smoothed:
     n_parameters: float
     penalty: FloatArray
 
-    def bic(self, independent: float) -> float:
-        return self.chi2 + self.n_parameters * float(np.log(independent))
+    def bic(self, deviance: float, independent: float) -> float:
+        return deviance + self.n_parameters * float(np.log(independent))
 
 
 def fit_rate_spectrum(
-    data: WhitenedSeries, weights: FloatArray, student: float
+    likelihood: NoiseLikelihood, weights: FloatArray, student: float
 ) -> FittedRateSpectrum | None:
     """Fit a smooth spectrum of rates at given channel weights.
 
     Parameters
     ----------
-    data
-        Whitened series.
+    likelihood
+        Likelihood of the whitened series.
     weights
         Weights of the channels, shape (C,).
     student
@@ -58,6 +59,7 @@ def fit_rate_spectrum(
     FittedRateSpectrum or None
         The spectrum in the user's units; None if it has no signal.
     """
+    data = likelihood.data
     series = data.series
     problem = projection(data, weights)
     low, high = series.log_rate_bounds
@@ -76,9 +78,10 @@ def fit_rate_spectrum(
     differences = np.sqrt(scale) * np.diff(padded, 2, axis=0)
     fits = _smoothed(design, target, differences, np.sqrt(STRENGTHS), n_others)
     independent = data.independent_data(weights)
-    best = min(fits, key=lambda fit: fit.bic(independent))
+    best = min(fits, key=lambda fit: fit.bic(fit.chi2, independent))
     if not best.amplitudes.any():
         return None
+    deviance = likelihood.deviance(problem.target - columns @ best.amplitudes)
     # Amplitudes are fitted at the first frame, given at lamp off.
     growth = np.append(np.exp(rates * series.start), 1.0) * series.peak
     kept = data.signal_design(problem.unit, means[:, best.kept])
@@ -98,7 +101,7 @@ def fit_rate_spectrum(
         channel_weights=tuple(weights.tolist()),
         offsets=tuple((offsets * series.peak).tolist()),
         reduced_chi2=best.chi2 / dof if dof > 0 else float("nan"),
-        bic=best.bic(independent),
+        bic=best.bic(deviance, independent),
     )
 
 

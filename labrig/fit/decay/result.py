@@ -11,7 +11,6 @@ from labrig.fit.decay.further_state import hidden_state
 from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.misfit_covariance import with_misfit
 from labrig.fit.decay.noise_correlation import noise_correlation
-from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
 from labrig.fit.least_squares import FloatArray
@@ -86,7 +85,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         flicker_sigma=evidence.noise.flicker_sigma,
         chi2=joint.chi2,
         dof=fit.dof(data),
-        bic=bic(data, joint),
+        bic=joint.chi2 + joint.n_parameters * float(np.log(data.independent_data(joint.weights))),
         covariance=covariance[np.ix_(kept, kept)],
         warnings=tuple(
             warnings_about(

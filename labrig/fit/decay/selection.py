@@ -9,10 +9,11 @@ common-mode flicker of the channels produces a spurious state.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import chdtrc, fdtrc
 
 from labrig.fit.decay.further_state import promising_rate
 from labrig.fit.decay.joint import JointFit
+from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
@@ -28,47 +29,51 @@ CREEPING_GAIN, GOOD_REDUCED_CHI2 = 4.0, 1.5
 MISSED_GAIN = 1.0
 #: Difference in BIC from which another model is clearly better: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
-#: Difference in BIC from which a law of one shape is taken instead of exponentials.
+#: Difference in BIC from which a law of one shape is taken instead of two exponentials, and three
+#: exponentials instead of a law.
 PREFERRED_BIC = 2.0
 #: Gain in BIC from which a further state is accepted though its rate is ill-determined: odds of
 #: e^5 = 150 : 1 against fewer states.
 REFUTING_BIC = 10.0
 
 
-def bic(data: WhitenedSeries, joint: JointFit) -> float:
-    """Return the Bayesian information criterion, without the constant of the common noise."""
-    independent = data.independent_data(joint.weights)
-    return joint.chi2 + joint.n_parameters * float(np.log(independent))
+def law_margin(n_states: int) -> float:
+    """Return by how much the BIC of a law of one shape has to be lower than that of exponentials.
+
+    One exponential is the limit of every law, which then has to be clearly better. Three can take
+    the shape of any law, and hardly ever is a decay of three states as smooth as a law.
+    """
+    if n_states <= 1:
+        return CLEAR_BIC
+    return PREFERRED_BIC if n_states == 2 else -PREFERRED_BIC
 
 
 def choose_states(
-    data: WhitenedSeries,
+    likelihood: NoiseLikelihood,
     numbers: range,
     fixed: FloatArray,
     weights: FloatArray,
     offsets: FloatArray,
-    noise_dof: float,
 ) -> tuple[StatesFit | None, list[Candidate]]:
     """Fit more and more states, `numbers` of them, until one more is not supported.
 
     Parameters
     ----------
-    data
-        Series whitened by the envelope's signal, so that χ² compares.
+    likelihood
+        Likelihood of the series whitened by the envelope's signal.
     numbers
         Total numbers of states, the fixed ones included.
     fixed
         Logarithms of the fixed rates, shape (f,).
     weights, offsets
         Start values of the channels, shape (C,).
-    noise_dof
-        Degrees of freedom of the noise estimate; inf if the noise was given.
 
     Returns
     -------
     fit, candidates
         The selected fit, None if not even the first is supported, and all candidates tried.
     """
+    data = likelihood.data
     chosen: StatesFit | None = None
     tried: list[Candidate] = []
     needed_chi2 = np.inf
@@ -78,9 +83,11 @@ def choose_states(
             fit = _better(data, chosen, fit)
         if fit is None:
             break
-        p_value = None if chosen is None else f_test(data, chosen.joint, fit.joint, noise_dof)
+        p_value = None if chosen is None else f_test(likelihood, chosen.joint, fit.joint)
         tried.append(
-            Candidate(n_states, fit.joint.least_squares.reduced_chi2, bic(data, fit.joint), p_value)
+            Candidate(
+                n_states, fit.joint.least_squares.reduced_chi2, likelihood.bic(fit.joint), p_value
+            )
         )
         if p_value is not None:
             needed_gain = 0.0 if fit.rates_are_determined else REFUTING_BIC
@@ -111,9 +118,12 @@ def _better(data: WhitenedSeries, fewer: StatesFit, found: StatesFit | None) -> 
 
 
 def is_needed(
-    data: WhitenedSeries, fit: StatesFit, candidates: Sequence[Candidate], noise_dof: float
+    likelihood: NoiseLikelihood,
+    fit: StatesFit,
+    candidates: Sequence[Candidate],
 ) -> bool:
     """Return whether one state fewer is refuted, fitting it if it is not among the candidates."""
+    data = likelihood.data
     if fit.n_free < 2:
         return True
     fewer_bic = next(
@@ -122,20 +132,24 @@ def is_needed(
     if fewer_bic is None:
         joint = fit.joint
         fewer = fit_states(data, fit.n_free - 1, fit.fixed, joint.weights, joint.offsets)
-        if fewer is None or f_test(data, fewer.joint, joint, noise_dof) > F_TEST_LEVEL:
+        if fewer is None or f_test(likelihood, fewer.joint, joint) > F_TEST_LEVEL:
             return False
-        fewer_bic = bic(data, fewer.joint)
-    return fewer_bic - bic(data, fit.joint) > REFUTING_BIC
+        fewer_bic = likelihood.bic(fewer.joint)
+    return fewer_bic - likelihood.bic(fit.joint) > REFUTING_BIC
 
 
-def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: float) -> float:
+def f_test(likelihood: NoiseLikelihood, fewer: JointFit, more: JointFit) -> float:
     """Return the chance of a gain in χ² as large as that from `fewer` to `more` parameters.
 
     The gain is compared with the scatter of all frames, or of the bright ones if that is larger:
     these produce the gain, and an unmodelled flicker appears only in them.
     """
+    data = likelihood.data
     added = more.n_parameters - fewer.n_parameters
+    residuals = more.least_squares.residuals
     frames, brightness2 = more.frame_residuals(data)
+    factors = likelihood.likeliest_factors(residuals)
+    frames, brightness2 = frames / np.sqrt(factors), brightness2 / factors
     dof = len(frames) - more.leverage(data)[0]
     if dof < 1 or added <= 0:
         return 1.0
@@ -144,5 +158,9 @@ def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: flo
     scatter = max(float(frames @ frames) / len(frames), bright_scatter) / free_fraction
     if scatter == 0:
         return 0.0
-    gain = max(fewer.chi2 - more.chi2, 0.0) / added
-    return float(fdtrc(added, min(dof, noise_dof), gain / scatter))
+    deviance = likelihood.deviance(fewer.least_squares.residuals) - likelihood.deviance(residuals)
+    gain = max(deviance, 0.0) / scatter
+    if likelihood.is_known:
+        return float(fdtrc(added, dof, gain / added))
+    # The deviance allows for a noise that is told by a few frames only.
+    return float(chdtrc(added, gain))
