@@ -105,6 +105,7 @@ CAMPAIGNS = {
         _module("spectrum_through_lvf", "40"),
         _module("emission_spectra", "3"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
+        _module("law_confusion", "--seeds", "100"),
         _module("sao_charge_and_decay"),
         _module("lightlogger"),
         _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),

@@ -32,7 +32,7 @@ from labrig.results import (
 
 #: Iterations in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
-REWEIGHTED_ENOUGH = 1e-9
+REWEIGHTED_ENOUGH = 1e-6
 FEWEST_FOR_FLICKER = 6
 MAX_STATES = 8
 
@@ -180,7 +180,7 @@ def fit_decay(
             rate_spectrum=spectrum,
             all_needed=all_needed,
             asked=n_states,
-            max_states=max_states,
+            most_states=numbers[-1],
             n_fixed=len(fixed),
         ),
     )
@@ -252,9 +252,7 @@ def _supported_states(
     """Return the selected states; fewer than requested if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
         n_states = range(fewest, max(numbers.stop, fewest + 1))
-        chosen, tried = choose_states(
-            likelihood, n_states, fixed, smooth.weights, smooth.offsets
-        )
+        chosen, tried = choose_states(likelihood, n_states, fixed, smooth.weights, smooth.offsets)
         if chosen is not None:
             return chosen, tried
     raise FitError(NO_DECAY)
@@ -291,10 +289,10 @@ def _reweighted(
     for _ in range(REWEIGHTINGS):
         data = whitened(data.series, fit.signal(data.series), flicker)
         old_shape = fit.joint.shape
-        fit = refit(data, fit)
+        fit = refit(data, fit, REWEIGHTED_ENOUGH)
         new_shape = fit.joint.shape
         if len(new_shape) == len(old_shape) and np.allclose(
             new_shape, old_shape, REWEIGHTED_ENOUGH, 0.0
         ):
             break
-    return data, fit
+    return data, refit(data, fit)
