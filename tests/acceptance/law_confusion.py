@@ -2,7 +2,7 @@
 
     python -m tests.acceptance.law_confusion [--seeds 100] [--results FILE.jsonl]
 
-Each seed is two runs of the command line in a simulated dark room with a small sensor and several
+Each seed is three runs of the command line in a simulated dark room with a small sensor and several
 samples side by side, by the default decay protocol; each sample is then fitted as if it were alone.
 In the first run are sums of two exponentials, states of general order and traps with retrapping,
 with rates and shares that the seed draws, at a signal-to-noise ratio of about 300; in the second
@@ -184,7 +184,7 @@ def one_trap(retrapping: float, rng: np.random.Generator) -> Sample:
 
 def _rate_per_s(rng: np.random.Generator) -> float:
     slowest, fastest = RATES_PER_S
-    return slowest * (fastest / slowest) ** float(rng.uniform())
+    return float(slowest * (fastest / slowest) ** rng.uniform())
 
 
 def _trap(k: float, retrapping: float) -> truths.Decay:

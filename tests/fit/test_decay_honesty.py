@@ -11,7 +11,7 @@ import pytest
 
 from labrig.analyse import TableFitOptions, fit_table
 from labrig.fit import DecayFit, fit_decay
-from tests.acceptance.decay_coverage import LAWS, fit, hidden_truth, is_right
+from tests.acceptance.decay_coverage import LAWS, exponentials, fit, hidden_truth, is_right
 from tests.fit import truths
 
 DOUBLE = ((0.1, 1.0), (0.02, 0.5))
@@ -84,6 +84,42 @@ def test_a_tie_of_laws_is_told() -> None:
         )
     assert all(each.law in LAWS[6].right or each.warnings for each in fits)
     assert any(_says(each, "the data do not tell") for each in fits)
+
+
+def test_states_that_all_frames_show_are_found_where_few_tell_the_flicker() -> None:
+    """The bright frames are over soon: their few degrees of freedom do not refuse slow states."""
+    truth = exponentials((0.2, 1.0), (0.04, 0.3), (0.008, 0.06))
+    assert [fit(truth, seed).n_states for seed in (90003, 90008, 90011)] == [3, 3, 3]
+
+
+def test_states_that_were_tried_are_not_advised() -> None:
+    """A lamp that swings is no state: two were tried, and the data do not support them."""
+    rng = np.random.default_rng(3)
+    t_s = np.linspace(0, 180, 90)
+    signal = np.exp(-0.02 * t_s) * (1 + 0.01 * np.sin(t_s / 8))
+    sigma = 0.002 * np.sqrt(signal)
+    each = fit_decay(t_s, signal + sigma * rng.normal(size=len(t_s)), sigma)
+    assert _says(each, "neighbouring residuals agree")
+    assert not _says(each, "allow more states")
+
+
+def test_a_free_offset_leaves_a_spectrum_of_rates_its_sigma() -> None:
+    """Rates so slow that an offset cancels them made its signal as uncertain as one likes."""
+    for seed in range(31201, 31205):
+        seen = truths.observe(truths.power_law(10, 1.5), seed)
+        each = fit_decay(
+            seen.t_s,
+            seen.values,
+            seen.sigma,
+            exposure_s=1.5,
+            channels="RGB",
+            flicker=0.007,
+            offset_sigma=np.inf,
+        )
+        at_s = np.array([5.0, 40.0, 100.0])
+        value, variance = each.signal(at_s, np.zeros(3), "rate-spectrum")
+        assert (np.sqrt(variance) < 0.05).all()
+        assert (np.abs(value - truths.power_law(10, 1.5)(at_s)) < 5 * np.sqrt(variance)).all()
 
 
 def test_a_free_offset_hides_no_flicker() -> None:

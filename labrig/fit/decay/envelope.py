@@ -20,13 +20,14 @@ from labrig.material import exponential_means
 from labrig.nonnegative import nonnegative_least_squares
 
 COARSE_RATES = 48
-#: Number of steps into which each iteration divides the distance of two rates.
-REFINEMENT = 4
-#: Iterations: the grid ratio falls from 1.2 to 1.003, the error of the curve below 1e−5.
-ROUNDS = 3
 #: Logarithm of the slowest rate, in 1/spans, beside a free offset. Slower ones and a negative
 #: offset cancel, but their light would flicker: ρ came out four times too small.
 SLOWEST_BESIDE_OFFSET = 0.0
+#: Number of steps into which each iteration divides the distance of two rates.
+REFINEMENT = 4
+#: Iterations: the grid ratio falls from 1.2 to 1.003, the error of the curve below 1e−5; and how
+#: many suffice as long as weights and flicker still change.
+ROUNDS, FIRST_ROUNDS = 3, 1
 #: Upper limit of the flicker of shutters, apertures and lamps: a larger scatter is due to a wrong
 #: dark level or model.
 MAX_FLICKER = 0.1
@@ -110,9 +111,11 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1), none)
     rho, rho_sigma = 0.0, 0.0
     likely = np.array([flicker or 0.0])
-    for _ in range(ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN):
+    alternations = ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN
+    for left in reversed(range(alternations)):
         data = whitened(series, signal, rho)
-        curve, offsets, leverage, shapes = monotone_curve(data, weights)
+        rounds = FIRST_ROUNDS if left else ROUNDS
+        curve, offsets, leverage, shapes = monotone_curve(data, weights, rounds)
         dof = max(series.n_frames - float(leverage.sum()), 1.0)
         if len(weights) > 1:
             weights, curve = _channel_weights(data, curve, offsets)
@@ -138,7 +141,7 @@ def _first_weights(series: DecaySeries) -> FloatArray:
 
 
 def monotone_curve(
-    data: WhitenedSeries, weights: FloatArray
+    data: WhitenedSeries, weights: FloatArray, rounds: int = ROUNDS
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the best completely monotone curve, offsets, leverage, and what it is made of.
 
@@ -150,6 +153,8 @@ def monotone_curve(
         Series in units of its noise.
     weights
         Weights of the channels, shape (C,).
+    rounds
+        Number of times that the grid of rates is refined.
     """
     series = data.series
     problem = projection(data, weights)
@@ -158,11 +163,11 @@ def monotone_curve(
         low = max(low, SLOWEST_BESIDE_OFFSET)
     log_rates = np.linspace(low, high, COARSE_RATES)
     step = (high - low) / (COARSE_RATES - 1)
-    for refinement in range(ROUNDS + 1):
+    for refinement in range(rounds + 1):
         means = exponential_means(np.exp(log_rates), series.t, series.exposure)
         amplitudes = nonnegative_least_squares(problem.columns(means), problem.target)
         used = amplitudes > 0
-        if refinement < ROUNDS:
+        if refinement < rounds:
             step /= REFINEMENT
             refinements = step * np.arange(-REFINEMENT, REFINEMENT + 1)
             log_rates = np.unique(np.add.outer(log_rates[used], refinements).round(12))

@@ -33,7 +33,7 @@ from labrig.results import (
 
 #: Iterations in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
-REWEIGHTED_ENOUGH = 1e-9
+REWEIGHTED_ENOUGH = 1e-6
 FEWEST_FOR_FLICKER = 6
 MAX_STATES = 8
 
@@ -189,7 +189,7 @@ def fit_decay(
             rate_spectrum=spectrum,
             all_needed=all_needed,
             asked=n_states,
-            max_states=max_states,
+            most_states=numbers[-1],
             n_fixed=len(fixed),
         ),
     )
@@ -298,10 +298,10 @@ def _reweighted(
     for _ in range(REWEIGHTINGS):
         data = whitened(data.series, fit.signal(data.series), flicker)
         old_shape = fit.joint.shape
-        fit = refit(data, fit)
+        fit = refit(data, fit, REWEIGHTED_ENOUGH)
         new_shape = fit.joint.shape
         if len(new_shape) == len(old_shape) and np.allclose(
             new_shape, old_shape, REWEIGHTED_ENOUGH, 0.0
         ):
             break
-    return data, fit
+    return data, refit(data, fit)

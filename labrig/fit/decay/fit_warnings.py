@@ -64,8 +64,8 @@ class Evidence:
         Other laws, and the spectrum of rates.
     all_needed
         Whether the data refute one state fewer.
-    asked, max_states, n_fixed
-        Requested number of states, largest number and number of fixed rates.
+    asked, most_states, n_fixed
+        Requested number of states, largest number that was to be tried and number of fixed rates.
     """
 
     data: WhitenedSeries
@@ -79,7 +79,7 @@ class Evidence:
     rate_spectrum: FittedRateSpectrum | None
     all_needed: bool
     asked: int | None
-    max_states: int
+    most_states: int
     n_fixed: int
 
     @property
@@ -202,13 +202,6 @@ def warnings_about(
     is_exponential = evidence.law == EXPONENTIALS
     if not is_exponential or evidence.is_another_better:
         warnings.append(_law_warning(fit, evidence))
-    advice = (
-        f"allow more states (--states {fit.n_states + 1})"
-        if is_exponential and fit.n_states < evidence.max_states
-        else "see the other laws that were fitted (--law)"
-        if evidence.is_another_better
-        else "no other law describes it clearly better"
-    )
     closer = small_chi2_warnings(joint.chi2, fit.dof(data), evidence.scatter is not None)
     warnings += closer
     # The order of residuals that are far smaller than any scatter is that of rounding errors.
@@ -220,7 +213,8 @@ def warnings_about(
         warnings += misfit_warnings(
             _misfit(*judged, evidence, bent),
             number if is_exponential else f"{LAW_LABELS[evidence.law]} does",
-            f"{advice}; check background and times (labrig fit decay --offset, --origin, --from)",
+            f"{_advice(fit, evidence)}; check background and times (labrig fit decay --offset, "
+            "--origin, --from)",
         )
     warnings += bend_warnings(bent)
     free_offset = bool(np.isinf(series.offset_sigma).any())
@@ -235,7 +229,7 @@ def warnings_about(
             f"allows for it, it is up to {correlation.factor:.2g} times as large as for "
             "independent values; find what drifts, or measure a steady light beside the sample"
         )
-    if hidden is not None:
+    if hidden is not None and hidden.is_likely:
         warnings.append(_hidden_warning(hidden, fit.n_states, series.span_s))
     low, high = series.log_rate_bounds
     return warnings + state_warnings(
@@ -246,6 +240,20 @@ def warnings_about(
         evidence.all_needed,
         free_offset,
     )
+
+
+def _advice(fit: StatesFit, evidence: Evidence) -> str:
+    """Return what there is to try if the residuals say that the shape is wrong."""
+    if fit.n_states == evidence.asked:
+        return f"allow more states (--states {fit.n_states + 1})"
+    if evidence.is_another_better:
+        return "see the other laws that were fitted (--law)"
+    if fit.n_states < evidence.most_states:
+        return (
+            f"{fit.n_states + 1} states were tried, the data do not support them, and no other law "
+            "describes it clearly better"
+        )
+    return "no other law describes it clearly better"
 
 
 def _hidden_warning(hidden: HiddenState, n_states: int, span_s: float) -> str:

@@ -28,9 +28,9 @@ PRIOR_ODDS = 0.2
 USUAL_SHARE = 0.4
 #: Ratio to the fastest rate found from which a further state is a fast one.
 FASTER = 2.0
-#: Chance from which a hidden state is told and counts: below, the data do not support it, and a σ
-#: that covered what they say nothing of would have no limit.
-LIKELY = 0.5
+#: Chance from which a hidden state counts: below, the data do not support it, and a σ that covered
+#: what they say nothing of would have no limit. And the chance from which a warning tells it.
+POSSIBLE, LIKELY = 0.1, 0.5
 #: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
 SHOWN_GAIN = 40.0
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
@@ -110,11 +110,14 @@ class HiddenState:
         Its share of all amplitudes at lamp off.
     covariance
         Its part in the covariance of the fitted parameters, shape (p, p).
+    is_likely
+        Whether it is likely enough to be told.
     """
 
     lifetime: float
     share: float
     covariance: FloatArray
+    is_likely: bool
 
 
 def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
@@ -148,7 +151,8 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
     largest = max(float(log_evidence.max()), 0.0)
     evidence = np.exp(log_evidence - largest) / len(z)
     probability = evidence / (evidence.sum() + np.exp(-largest))
-    if probability.sum() <= LIKELY:
+    chance = float(probability.sum())
+    if chance <= POSSIBLE:
         return None
     covariance = (further.effect * (probability * mean_square)) @ further.effect.T
     likeliest = int(np.argmax(probability))
@@ -160,4 +164,5 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
         lifetime=lifetime,
         share=at_lamp_off / max(total, at_lamp_off),
         covariance=covariance,
+        is_likely=chance > LIKELY,
     )

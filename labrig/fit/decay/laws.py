@@ -152,9 +152,9 @@ def _best_on_grid(
         grid.ravel() for grid in np.meshgrid(np.linspace(*log_rates, GRID[0]), shapes)
     )
     phase = np.multiply.outer(middle, np.exp(log_rate))
-    columns = problem.columns(law.value(phase, exponents))
-    moments = problem.target @ columns
-    norms2 = np.einsum("ij,ij->j", columns, columns)
+    values = law.value(phase, exponents)
+    moments = problem.pull @ values
+    norms2 = problem.information @ values**2 - ((problem.shadow @ values) ** 2).sum(axis=0)
     gains = np.maximum(moments, 0) ** 2 / np.where(norms2 > 0, norms2, np.inf)
     best = int(np.argmax(gains))
     if gains[best] == 0:

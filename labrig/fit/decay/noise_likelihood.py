@@ -1,10 +1,10 @@
 """How well residuals agree with a noise that only they tell.
 
-The flicker ρ, or without σ the scale of the noise, is taken from the scatter about the best monotone
-curve. Some dozens of frames tell it to 10 or 20 %, and so a χ² that is larger by ten may mean no
-more than that ρ came out small. Models are therefore compared by their likelihood with the noise
-that suits each of them best. No model can hide a misfit in it: their scatter contains that about
-the curve, and what a model adds to it counts as much as that allows.
+The flicker ρ, or without σ the scale of the noise, is taken from the scatter about the best
+monotone curve. Some dozens of frames tell it to 10 or 20 %, and so a χ² that is larger by ten may
+mean no more than that ρ came out small. Models are therefore compared by their likelihood with the
+noise that suits each of them best. No model can hide a misfit in it: the scatter about the curve
+is in the residuals of all models, and what one adds to it counts the more, the smaller it is.
 """
 
 from dataclasses import dataclass
@@ -67,9 +67,9 @@ class NoiseLikelihood:
         return chi2 + float(self._changes(residuals).min())
 
     def likeliest_factors(self, residuals: FloatArray) -> FloatArray:
-        """Return the variance along the signal that suits residuals best, over that assumed, (n,)."""
+        """Return the likeliest variance along the signal, over that assumed, shape (n,)."""
         if not self.data.series.sigma_given:
-            return self.factors[0]
+            return np.ones_like(self.factors[0])
         return np.asarray(self.factors[np.argmin(self._changes(residuals))])
 
     def _changes(self, residuals: FloatArray) -> FloatArray:

@@ -21,6 +21,9 @@ from labrig.results import FittedRateSpectrum
 
 #: Number of rates of the grid.
 RATES = 28
+#: Logarithm of the slowest rate, in 1/spans, beside a free offset. Slower ones and a negative
+#: offset cancel: the signal would be as uncertain as one likes.
+SLOWEST_BESIDE_OFFSET = -float(np.log(3.0))
 #: Strengths of the penalty relative to the data's own information on an amplitude. Below, a
 #: spectrum is no longer smooth: it is a few exponentials.
 STRENGTHS = 10.0 ** np.arange(-6.0, 0.1, 0.5)
@@ -63,6 +66,8 @@ def fit_rate_spectrum(
     series = data.series
     problem = projection(data, weights)
     low, high = series.log_rate_bounds
+    if np.isinf(series.offset_sigma).any():
+        low = max(low, SLOWEST_BESIDE_OFFSET)
     rates = np.exp(np.linspace(low, high, RATES))
     means = exponential_means(rates, series.t, series.exposure)
     columns = problem.columns(means)

@@ -22,10 +22,10 @@ from labrig.fit.least_squares import FloatArray
 from labrig.material import exponential_means
 
 #: Largest number of combinations of rates, which limits the grid.
-COMBINATIONS = 4000
+COMBINATIONS = 2000
 FINEST_GRID = 36
 #: Precision in log k at which the search ends and the joint fit starts.
-LOG_RATE_TOLERANCE = 3e-2
+LOG_RATE_TOLERANCE = 0.1
 MAX_EVALUATIONS = 200
 
 
@@ -43,17 +43,31 @@ class Projection:
         Orthonormal basis of what the offsets explain, shape (n C + p, m).
     target
         Whitened values without that part, shape (n C + p,).
+    information, pull
+        Squared length of `unit` in each frame, and its product with the target, shape (n,).
+    shadow
+        Product of `unit` in each frame with the offset directions, shape (m, n).
     """
 
     data: WhitenedSeries
     unit: FloatArray
     offset_directions: FloatArray
     target: FloatArray
+    information: FloatArray
+    pull: FloatArray
+    shadow: FloatArray
 
-    def rate_columns(self, log_rates: FloatArray) -> FloatArray:
-        """Return columns (n C + p, q) of exponentials (q,) of amplitude 1 at the first frame."""
+    def normal_equations(self, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return AᵀA (q, q) and Aᵀb (q,) of the columns A of shapes (n, q) and the target b."""
+        shadow = self.shadow @ shapes
+        gram = shapes.T @ (self.information[:, None] * shapes) - shadow.T @ shadow
+        return gram, self.pull @ shapes
+
+    def of_rates(self, log_rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the normal equations of exponentials (q,) of amplitude 1 at the first frame."""
         series = self.data.series
-        return self.columns(exponential_means(np.exp(log_rates), series.t, series.exposure))
+        means = exponential_means(np.exp(log_rates), series.t, series.exposure)
+        return self.normal_equations(means)
 
     def columns(self, shapes: FloatArray) -> FloatArray:
         """Return columns (n C + p, q) of shapes (n, q) without what the offsets explain."""
@@ -62,17 +76,27 @@ class Projection:
 
     def amplitudes(self, log_rates: FloatArray) -> tuple[FloatArray, float]:
         """Return the best amplitudes ≥ 0 and the remaining χ²."""
-        columns = self.rate_columns(log_rates)
-        values = nonnegative(columns.T @ columns, columns.T @ self.target)
-        residual = self.target - columns @ values
-        return values, float(residual @ residual)
+        gram, moments = self.of_rates(log_rates)
+        values = nonnegative(gram, moments)
+        explained = float((2 * moments - gram @ values) @ values)
+        return values, float(self.target @ self.target) - explained
 
 
 def projection(data: WhitenedSeries, weights: FloatArray) -> Projection:
     """Return the linear problem of `data` at channel weights (C,)."""
     directions = np.linalg.qr(data.offset_design)[0]
     target = data.target - directions @ (directions.T @ data.target)
-    return Projection(data, data.constant(weights), directions, target)
+    unit = data.constant(weights)
+    frames = slice(0, unit.size)
+    return Projection(
+        data=data,
+        unit=unit,
+        offset_directions=directions,
+        target=target,
+        information=np.einsum("fc,fc->f", unit, unit),
+        pull=np.einsum("fc,fc->f", unit, target[frames].reshape(unit.shape)),
+        shadow=np.einsum("fc,fcm->mf", unit, directions[frames].reshape(*unit.shape, -1)),
+    )
 
 
 def nonnegative(gram: FloatArray, moments: FloatArray) -> FloatArray:
@@ -113,15 +137,14 @@ def search_rates(problem: Projection, n_free: int, fixed: FloatArray) -> FloatAr
     """
     low, high = problem.data.series.log_rate_bounds
     start = _best_on_grid(problem, n_free, fixed, low, high)
-    if start is None:
-        return None
+    if start is None or n_free == 1:
+        # The joint fit finds the nearest minimum, which a single rate has between two of the grid.
+        return start
 
     def chi2(log_rates: FloatArray, gradient: FloatArray) -> float:
         return problem.amplitudes(np.concatenate([log_rates, fixed]))[1]
 
-    # BOBYQA needs two dimensions.
-    algorithm = nlopt.LN_BOBYQA if n_free > 1 else nlopt.LN_COBYLA
-    optimiser = nlopt.opt(algorithm, n_free)
+    optimiser = nlopt.opt(nlopt.LN_BOBYQA, n_free)
     optimiser.set_min_objective(chi2)
     optimiser.set_lower_bounds(np.full(n_free, low))
     optimiser.set_upper_bounds(np.full(n_free, high))
@@ -151,10 +174,10 @@ def _best_on_grid(
     """Return the best combination with all amplitudes positive, None if there is none."""
     grid = np.linspace(low, high, grid_size(n_free))
     log_rates = np.concatenate([grid, fixed])
-    columns = problem.rate_columns(log_rates)
-    norms = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-    columns = columns / np.where(norms > 0, norms, 1.0)
-    gram, moments = columns.T @ columns, columns.T @ problem.target
+    gram, moments = problem.of_rates(log_rates)
+    norms = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    norms = np.where(norms > 0, norms, 1.0)
+    gram, moments = gram / np.outer(norms, norms), moments / norms
     chosen = np.array(list(combinations(range(len(grid)), n_free)))
     fixed_columns = np.broadcast_to(np.arange(len(grid), len(log_rates)), (len(chosen), len(fixed)))
     chosen = np.hstack([chosen, fixed_columns])

@@ -78,9 +78,10 @@ def choose_states(
     tried: list[Candidate] = []
     needed_chi2 = np.inf
     for n_states in numbers:
-        fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets, needed_chi2)
-        if chosen is not None:
-            fit = _better(data, chosen, fit)
+        if chosen is None:
+            fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets)
+        else:
+            fit = _with_one_more(data, chosen, needed_chi2)
         if fit is None:
             break
         p_value = None if chosen is None else f_test(likelihood, chosen.joint, fit.joint)
@@ -94,20 +95,23 @@ def choose_states(
             if p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic - needed_gain:
                 break
         chosen = fit
-        weights, offsets = fit.joint.weights, fit.joint.offsets
         if fit.joint.least_squares.reduced_chi2 < GOOD_REDUCED_CHI2:
-            penalty = 2 * float(np.log(data.independent_data(weights)))
+            penalty = 2 * float(np.log(data.independent_data(fit.joint.weights)))
             needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
     return chosen, tried
 
 
-def _better(data: WhitenedSeries, fewer: StatesFit, found: StatesFit | None) -> StatesFit | None:
-    """Return the fit that was found, or a better one with the further state that promises more.
+def _with_one_more(data: WhitenedSeries, fewer: StatesFit, needed_chi2: float) -> StatesFit | None:
+    """Fit one state more, from the rate that promises most or, if that is enough, from all.
 
     A state that lasts for a frame is easily missed on the grid of rates, where others are so far
     from their best that their misfit outweighs it.
     """
     log_rate, amplitude, gain = promising_rate(data, fewer)
+    if gain < fewer.joint.chi2 - needed_chi2:
+        return fit_one_more(data, fewer, log_rate, amplitude)
+    weights, offsets = fewer.joint.weights, fewer.joint.offsets
+    found = fit_states(data, fewer.n_free + 1, fewer.fixed, weights, offsets, needed_chi2)
     reached = 0.0 if found is None else fewer.joint.chi2 - found.joint.chi2
     if gain < reached + MISSED_GAIN:
         return found

@@ -24,7 +24,7 @@ APART_SIGMAS = 3.0
 ILL_DETERMINED = 0.3
 #: Evaluations and relative step of a candidate, which is only compared by its χ².
 CANDIDATE_ITERATIONS = 100
-CANDIDATE_TOLERANCE = 1e-8
+CANDIDATE_TOLERANCE = 1e-6
 #: Gain in χ² of a step at which a candidate stops that does not come near the χ² it needs: a state
 #: too many creeps along a flat valley.
 CANDIDATE_GAIN = 0.01
@@ -189,29 +189,32 @@ def _are_merged(fit: StatesFit) -> bool:
     return len(rates) > 1 and float(np.diff(rates).min()) < MERGED_LOG_RATE
 
 
-def refit(data: WhitenedSeries, fit: StatesFit) -> StatesFit:
-    """Fit the same states to full precision, perhaps whitened anew, without vanishing ones."""
-    return _to_full_precision(
-        data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offsets
-    )
+def refit(data: WhitenedSeries, fit: StatesFit, tolerance: float = 0.0) -> StatesFit:
+    """Fit the same states, perhaps whitened anew, without vanishing ones.
+
+    The fit ends at a relative step below `tolerance`, or at full precision.
+    """
+    joint = fit.joint
+    return _refit_from(data, joint.shape, fit.fixed, joint.weights, joint.offsets, tolerance)
 
 
-def _to_full_precision(
+def _refit_from(
     data: WhitenedSeries,
     start: FloatArray,
     fixed: FloatArray,
     weights: FloatArray,
     offsets: FloatArray,
+    tolerance: float,
 ) -> StatesFit:
-    fit = _fit_from(data, start, fixed, weights, offsets, FINAL_ITERATIONS, 0.0)
+    fit = _fit_from(data, start, fixed, weights, offsets, FINAL_ITERATIONS, tolerance)
     kept, n_free = ~fit.vanished, fit.n_free
     if kept.all():
         return fit
     if not kept.any():
         raise FitError(NO_DECAY)
     still_present = np.concatenate([np.repeat(kept[:n_free], 2), kept[n_free:]])
-    return _to_full_precision(
-        data, fit.joint.shape[still_present], fixed[kept[n_free:]], weights, offsets
+    return _refit_from(
+        data, fit.joint.shape[still_present], fixed[kept[n_free:]], weights, offsets, tolerance
     )
 
 
