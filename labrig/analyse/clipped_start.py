@@ -21,9 +21,9 @@ MOST_LEFT_OUT = 3
 FEWEST_LEFT = 8
 #: Distance below the law of the others from which a value is too low, in σ; of values that are
 #: equal, which is evidence, too.
-LOW_SIGMAS, LOW_SIGMAS_IF_EQUAL = 4.5, 2.0
+LOW_SIGMAS, LOW_SIGMAS_IF_EQUAL = 4.5, 1.5
 #: Largest chance of noise to make values equal after rounding.
-EQUAL_CHANCE = 5e-3
+EQUAL_CHANCE = 0.02
 
 
 @dataclass(frozen=True)

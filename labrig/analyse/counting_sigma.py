@@ -82,7 +82,8 @@ def variance_of_values(values: FloatArray, sigma: FloatArray) -> VarianceOfValue
     rounding = np.maximum(_last_digit(sigma) / 2, ROUNDING * sigma)
     if above.sum() < FEWEST or np.ptp(sigma[above]) < RANGE_OF_ROUNDING * rounding.max():
         return None
-    tolerance = 1.1 * rounding
+    # Coefficients that were fitted to rounded σ are a little off, too.
+    tolerance = 1.5 * rounding
     kinds = np.stack([np.ones_like(values), values, values**2], axis=1)
     for used in _SUBSETS:
         coefficients = np.zeros(3)

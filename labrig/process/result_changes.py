@@ -144,9 +144,12 @@ def _parameters_of_charge(path: Path) -> Parameters:
         return {}
     if content.get("kind") != "charge":
         return {}
-    named = {name: content[name] for name in ("prompt", "dark")}
-    for number, state in enumerate(content["states"], start=1):
-        named |= {f"{name} {number}": each for name, each in state.items() if each is not None}
+    symbols = {"order": "b", "amplitude": "a", "decay_time_s": "τ"}
+    named = {
+        f"{symbol} {number}": state[name]
+        for number, state in enumerate(content["states"], start=1)
+        for name, symbol in symbols.items()
+    }
     return {
         name: (each["value"], math.inf if each["sigma"] is None else each["sigma"])
         for name, each in named.items()
@@ -192,7 +195,7 @@ def _move_texts(moves: list[_Move]) -> Iterator[str]:
     """Yield rates, amplitudes and held parameters one by one and the others in one line."""
     others = []
     for move in moves:
-        if move.name.startswith(("k_r", "a ")) or math.isinf(move.in_sigma):
+        if move.name.startswith(("k_r", "a ", "τ ")) or math.isinf(move.in_sigma):
             yield str(move)
         else:
             others.append(move)
@@ -204,5 +207,6 @@ def _move_texts(moves: list[_Move]) -> Iterator[str]:
 
 def _states_text(parameters: Parameters) -> str:
     """Return text such as `2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
-    rates = [plus_minus(*pair) for name, pair in parameters.items() if name.startswith("k_r")]
-    return f"{len(rates)} state{'s' if len(rates) > 1 else ''} (k_r {', '.join(rates)} 1/s)"
+    symbol, unit = ("τ", "s") if "τ 1" in parameters else ("k_r", "1/s")
+    each = [plus_minus(*pair) for name, pair in parameters.items() if name.startswith(symbol)]
+    return f"{len(each)} state{'s' if len(each) > 1 else ''} ({symbol} {', '.join(each)} {unit})"

@@ -1,6 +1,6 @@
 """Coverage of σ in fits of tables without σ: of values and of rates, over many seeds.
 
-    python -m tests.acceptance.coverage_table_sigma [--seeds 75] [--jobs 1] [--broken]
+    python -m tests.acceptance.coverage_table_sigma [--seeds 75] [--jobs 1] [--broken [--only TEXT]]
 
 With `--broken`, tables that break what a fit assumes: noise that correlates from value to value, σ
 that is √N of the value or wrong by a factor, a detector that is at its ceiling at first. Printed
@@ -290,6 +290,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=75)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--broken", action="store_true")
+    parser.add_argument("--only", default="", help="part of the names of broken tables")
     options = parser.parse_args()
     cases = [
         (decay, noise, n_values)
@@ -299,7 +300,7 @@ def main() -> None:
     ]
     seeds = range(1, options.seeds + 1)
     if options.broken:
-        for case in BROKEN:
+        for case in (case for case in BROKEN if options.only in case.name):
             print(broken_line(case, seeds), flush=True)
         return
     with ProcessPoolExecutor(options.jobs) as pool:

@@ -73,6 +73,7 @@ def test_out_has_page_files_and_material(labrig: Labrig, table: Path, tmp_path: 
     assert known.r0 == state["r0"]["value"]
     assert known.r0 is not None
     # a = Λ k_r r(0)ᵇ
+    assert known.r0 is not None
     made = state["reradiation"]["value"] * known.k_r_per_s * known.r0**known.kinetic_order
     assert known.amplitude == pytest.approx(made, rel=1e-6)
     readings = np.genfromtxt(result / "readings.csv", delimiter=",", skip_header=1)
@@ -86,7 +87,7 @@ def test_out_has_page_files_and_material(labrig: Labrig, table: Path, tmp_path: 
     again = labrig("fit", "charge", table, *options, "--out", out)
     assert "the same result as before" in again.out
     other = labrig("fit", "charge", table, *options, "--order", "first", "--out", out)
-    assert "order 1 " in other.out
+    assert "; τ 1 " in other.out
     assert (out / "result-1").is_dir()
 
 
