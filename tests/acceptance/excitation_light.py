@@ -168,7 +168,7 @@ class Outcome(NamedTuple):
 def measured(case: Case, material: str, seed: int) -> Outcome:
     """One sample and its fit."""
     bench = case.bench(read_material(material), flicker=0.007, photons=5.0, seed=seed)
-    file = irradiance_file(bench, case, np.random.default_rng(seed))
+    file = irradiance_file(bench, case, np.random.default_rng([seed, 1]))
     series = charging(bench, case, file)
     sigmas = RelativeSigmas(
         flicker=bench.flicker, lamp=LAMP_SIGMA, cold_deficit=0.005, offset=DARK,
