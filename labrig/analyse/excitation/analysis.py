@@ -36,6 +36,8 @@ from labrig.results import (
 
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
+#: Fraction of the largest size of the light's errors from which a warning is given.
+AT_END = 0.9
 #: Deviation of the closure in σ that causes a warning.
 CLOSURE_SIGMAS = 3.0
 #: Least standard uncertainty of a dark level in DN/s.
@@ -115,8 +117,26 @@ def _patch_excitation(
     material = at_temperature(material, run, part.protocol.rate_frames)
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
-        (*decay.warnings, *fit.warnings, *_closure_warnings(closure), *no_spectrum),
+        (
+            *decay.warnings,
+            *fit.warnings,
+            *_light_warnings(fit),
+            *_closure_warnings(closure),
+            *no_spectrum,
+        ),
     )
+
+
+def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
+    if max(fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes) > AT_END * LARGEST_FACTOR:
+        light = light_scatter(fit)
+        yield (
+            f"the light seems to be off by {100 * light.lamp:.1f} % from charge to charge, "
+            f"{100 * light.sites:.1f} % from place to place and {light.wavelength_nm:.1f} nm in "
+            "wavelength, which is about the most that is tried, so that σ may be too small: the "
+            "irradiance is of another bench or filter, excitation changes much within a band (give "
+            "narrower bands to irradiance), or the rate equation does not hold"
+        )
 
 
 def _closure_warnings(closure: Closure | None) -> Iterator[str]:

@@ -117,11 +117,18 @@ def test_rates_and_levels_are_the_true_ones(run: Path) -> None:
     assert patch.closure.rms_percent < 5
     assert patch.closure.rms_sigma < 3
     assert_read_back(done.result)
+    tests = patch.fit.by_band
+    assert tests is not None
+    assert not tests.is_thick
+    assert not tests.amplitude.differs
+    assert not tests.rate.differs
+    assert "exciting-bands" in done.report.read_text()
 
     folder = done.report.parent
     assert patch.material == read_material(folder / "material.yaml")
     fit = json.loads((folder / "excitation.json").read_text())
     assert fit["states"][0]["k_e_per_s"] == state.k_e_per_s.tolist()
+    assert fit["by_band"]["is_thick"] is False
     assert (folder / "figures").is_dir()
     assert done.lines[0].startswith("state 1: k_r ")
     assert done.lines[-1].startswith("closure: charging by the lamp itself is predicted within ")

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from labrig.analyse.excitation.charge_intervals import ChargeInterval, with_warmth
-from labrig.analyse.excitation.lamp_light import across_sites, band_sigma, site_modes
+from labrig.analyse.excitation.lamp_light import (
+    SITES,
+    WAVELENGTHS,
+    across_sites,
+    band_sigma,
+    mode_kinds,
+    site_modes,
+)
 from tests.analyse.excitation.test_excitation_run import true_irradiance
 
 
@@ -30,6 +37,18 @@ def test_what_is_reported_of_a_place_is_what_its_modes_add_up_to() -> None:
     far = leaks == 0.5
     assert np.sqrt(np.median((variance[1] - variance[0])[far])) == pytest.approx(0.5, rel=0.1)
     assert band_sigma(sure) == pytest.approx(np.full(8, 0.003))
+
+
+def test_the_modes_of_unknown_size_move_light_along_the_filter_or_on_single_places() -> None:
+    irradiance = true_irradiance()
+    modes, kind = site_modes(irradiance), mode_kinds(irradiance)
+    assert len(modes) == len(kind)
+    through = np.array(irradiance.through)
+    of_wavelengths = np.abs(modes[kind == WAVELENGTHS]).sum(axis=0)
+    steep = np.abs(np.gradient(np.log(through), axis=0))
+    assert np.corrcoef(of_wavelengths.ravel(), steep.ravel())[0, 1] > 0.95
+    lit = np.abs(modes[kind == SITES]) > 0
+    assert (lit.any(axis=2).sum(axis=1) == 1).all()
 
 
 def test_a_lamp_is_warm_after_a_long_charge_and_cools_in_the_dark() -> None:
