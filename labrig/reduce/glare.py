@@ -17,7 +17,7 @@ WHOLE_FRAME_NAME = "(whole frame)"
 
 #: Tiles of the frame, across and down. The vignetting is divided out in each: bright samples
 #: may lie where it is least, or most.
-TILES = 4
+TILES = 8
 FRAME_TILES: dict[str, Region] = {
     f"(tile {down + 1}.{across + 1})": (across / TILES, down / TILES, 1 / TILES, 1 / TILES)
     for down, across in product(range(TILES), repeat=2)
