@@ -1,6 +1,5 @@
 """The fit of one series: common to a run's processing and `labrig fit decay`."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +12,8 @@ from labrig.results import AUTO, Series
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
 TYPICAL_FLICKER = 0.007
-#: Significance in σ of some amplitude, or of their sum, from which a decay is detected.
+#: Significance in σ of some amplitude, or of the first frame's signal, from which a decay is
+#: detected.
 SEEN_SIGMA = 3.0
 
 
@@ -89,7 +89,7 @@ def fit_series(
         offset_correlation=usable.dark_correlation,
         law=law,
     )
-    if not _is_seen(fit):
+    if not _is_seen(fit, float(usable.t_s.min())):
         raise FitError(
             "expected a decay, got nothing that stands out of the noise by "
             f"{SEEN_SIGMA:g} σ; was the sample charged, is it its light that was measured, and for "
@@ -98,15 +98,13 @@ def fit_series(
     return fit
 
 
-def _is_seen(fit: DecayFit) -> bool:
-    """Whether an amplitude is significant, or the sum of all: nearly equal rates share theirs."""
-    amplitudes = [state.amplitude for state in fit.states]
-    sigmas = [state.amplitude_sigma for state in fit.states]
-    of_amplitudes = slice(1, 2 * len(amplitudes), 2)
-    variance = float(fit.covariance[of_amplitudes, of_amplitudes].sum())
-    return any(
-        amplitude >= SEEN_SIGMA * sigma
-        for amplitude, sigma in zip(
-            [*amplitudes, sum(amplitudes)], [*sigmas, math.sqrt(max(variance, 0.0))], strict=True
-        )
+def _is_seen(fit: DecayFit, first_s: float) -> bool:
+    """Whether an amplitude is significant, or the signal of the law taken at the first frame.
+
+    Nearly equal rates share their amplitudes, and exponentials that only describe another law have
+    none that are known.
+    """
+    value, variance = fit.signal(np.array([first_s]), np.zeros(1))
+    return bool(value[0] >= SEEN_SIGMA * np.sqrt(variance[0])) or any(
+        state.amplitude >= SEEN_SIGMA * state.amplitude_sigma for state in fit.states
     )
