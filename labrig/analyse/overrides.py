@@ -8,10 +8,14 @@ from typing import Any, Self, get_args
 
 from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
 from labrig.errors import UsageError
+from labrig.material import MAX_ORDER
 from labrig.record import FileRecord
 from labrig.region import Region, parse_region
 from labrig.results import AUTO, EstimateMethod, require_law
 from labrig.yaml_file import did_you_mean
+
+#: Kinetic orders that are fitted, one of each state.
+FREE = "free"
 
 
 def read_run_protocol(run: Path) -> ProtocolModel:
@@ -62,6 +66,8 @@ class Overrides:
         Rates in 1/s known from elsewhere, which are held in the fit; they count as states.
     law
         Law that describes a decay, or `auto`.
+    order
+        Kinetic order of excitation: `auto`, `free` or a number from 1 to 4.
     camera
         Camera curves for the report's colours instead of the rig file's.
     optics
@@ -75,6 +81,7 @@ class Overrides:
     states: int | None = None
     fixed_rates_per_s: tuple[float, ...] = ()
     law: str = AUTO
+    order: str = AUTO
     camera: str | None = None
     optics: Mapping[str, str] = field(default_factory=dict)
     method: EstimateMethod | None = None
@@ -90,6 +97,7 @@ class Overrides:
         optics: Sequence[str] = (),
         law: str = AUTO,
         method: str | None = None,
+        order: str = AUTO,
     ) -> Self:
         """Parse the texts of a command line.
 
@@ -111,13 +119,17 @@ class Overrides:
             Law that describes a decay, or `auto`.
         method
             Method of estimating re-radiation.
+        order
+            Kinetic order of excitation: `auto`, `free` or a number.
 
         Raises
         ------
         UsageError
-            A region, a rate or a calibration is malformed, or there is no such law or method.
+            A region, a rate, an order or a calibration is malformed, or there is no such law or
+            method.
         """
         require_law(law)
+        require_order(order)
         if invalid := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
             raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {invalid[0]}")
         named = {}
@@ -130,6 +142,7 @@ class Overrides:
             states,
             tuple(fixed_rates_per_s),
             law,
+            order,
             camera,
             dict(_parse_calibration(text) for text in optics),
             None if method is None else _parse_method(method),
@@ -210,6 +223,20 @@ def _parse_calibration(text: str) -> tuple[str, str]:
             f"{did_you_mean(key, list(Optics.model_fields))}"
         )
     return key, str(Path(named).resolve()) if Path(named).exists() else named
+
+
+def require_order(text: str) -> None:
+    """Refuse what is no kinetic order, nor `auto` or `free`."""
+    if text in (AUTO, FREE):
+        return
+    try:
+        is_order = 1 <= float(text) <= MAX_ORDER
+    except ValueError:
+        is_order = False
+    if not is_order:
+        raise UsageError(
+            f"--order: expected {AUTO}, {FREE} or a number from 1 to {MAX_ORDER:g}, got '{text}'"
+        )
 
 
 def _parse_method(text: str) -> EstimateMethod:

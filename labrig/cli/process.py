@@ -37,6 +37,14 @@ def process(
     law: Annotated[
         str, typer.Option("--law", help="Law of decay, as of 'labrig fit decay'.")
     ] = "auto",
+    order: Annotated[
+        str,
+        typer.Option(
+            "--order",
+            help="Kinetic order of excitation: 'auto' chooses, 1 is the rate equation, 'free' fits "
+            "one of each state, a number holds it.",
+        ),
+    ] = "auto",
     camera: Annotated[
         str | None,
         typer.Option("--camera", help="Camera curves to use instead, for the report's colours."),
@@ -77,7 +85,7 @@ def process(
     from labrig.record import read_run
 
     overrides = Overrides.parse(
-        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method
+        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method, order
     )
     folder = find_run(run, runs)
     if verify:

@@ -12,6 +12,7 @@ from .decay_laws import (
     DecayLaw as DecayLaw,
 )
 from .file import (
+    MAX_ORDER as MAX_ORDER,
     IrradianceNorm as IrradianceNorm,
     Material as Material,
     Provenance as Provenance,

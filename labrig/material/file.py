@@ -23,7 +23,9 @@ from labrig.finite import NotNegative
 from labrig.yaml_file import read_model, write_yaml
 
 Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Order = Annotated[float, Field(ge=1, le=4)]
+#: Largest kinetic order; above 2 it is empirical.
+MAX_ORDER = 4.0
+Order = Annotated[float, Field(ge=1, le=MAX_ORDER)]
 Concentration = Annotated[float, Field(ge=0, le=1)]
 Series = tuple[NotNegative, ...]
 

@@ -41,6 +41,8 @@ class Provenance(BaseModel):
         Rates in 1/s that the user held fixed.
     law
         Law of decay that the user asked for, or `auto`.
+    order
+        Kinetic order of excitation that the user asked for, `free` or `auto`.
     camera
         Name of the camera curves with which the report's pictures were coloured.
     frames
@@ -60,6 +62,7 @@ class Provenance(BaseModel):
     method: str | None
     fixed_rates_per_s: tuple[float, ...]
     law: str
+    order: str
     camera: str | None
     frames: dict[str, int]
     excluded: tuple[str, ...]
@@ -92,6 +95,7 @@ def provenance(
         method=overrides.method or getattr(protocol, "method", None),
         fixed_rates_per_s=overrides.fixed_rates_per_s,
         law=overrides.law,
+        order=overrides.order,
         camera=camera,
         frames=dict(Counter(frame.role for frame in frames if not overrides.excludes(frame))),
         excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),

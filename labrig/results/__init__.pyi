@@ -69,6 +69,7 @@ from .fitted_decay import (
 )
 from .fitted_excitation import (
     ConcentrationAtOff as ConcentrationAtOff,
+    ExcitationModel as ExcitationModel,
     ExcitedState as ExcitedState,
     FittedExcitation as FittedExcitation,
 )

@@ -190,6 +190,8 @@ class ExcitationResult(RunResult):
                 {
                     "k_r_per_s": state.k_r_per_s,
                     "k_r_sigma_per_s": state.k_r_sigma_per_s,
+                    "kinetic_order": state.kinetic_order,
+                    "kinetic_order_sigma": state.kinetic_order_sigma,
                     "amplitude_at_full_charge": state.amplitude,
                     "amplitude_at_full_charge_sigma": state.amplitude_sigma,
                     "k_e_per_s": state.k_e_per_s.tolist(),
@@ -197,6 +199,11 @@ class ExcitationResult(RunResult):
                     "k_e_upper_per_s": state.k_e_upper_per_s.tolist(),
                     "r0": float(level_at_off.r0[number]),
                     "r0_sigma": float(level_at_off.r0_sigma[number]),
+                    "is_level_known": state.is_level_known,
+                    "amplitude": float(level_at_off.amplitude[number]),
+                    "amplitude_sigma": float(level_at_off.amplitude_sigma[number]),
+                    "decay_time_s": float(level_at_off.decay_time_s[number]),
+                    "decay_time_sigma_s": float(level_at_off.decay_time_sigma_s[number]),
                 }
                 for number, state in enumerate(fit.states)
             ],
@@ -205,5 +212,6 @@ class ExcitationResult(RunResult):
             "dof": fit.dof,
             "covariance_parameters": list(fit.covariance_parameters),
             "covariance": fit.covariance.tolist(),
+            "models": [vars(model) for model in fit.models],
             "warnings": list(fit.warnings),
         }

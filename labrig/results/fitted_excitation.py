@@ -57,6 +57,39 @@ class ExcitedState:
         return self.k_e_per_s + UPPER_SIGMAS * self.k_e_sigma_per_s
 
 
+@dataclass(frozen=True)
+class ExcitationModel:
+    """A model that was tried.
+
+    Attributes
+    ----------
+    states
+        Number of its states.
+    order
+        Kinetic order of all states; None where each has its own.
+    n_parameters
+        Number of fitted parameters, without those of the light, which all models share.
+    reduced_chi2
+        χ² per degree of freedom.
+    bic
+        Bayesian information criterion, with the noise enlarged to the misfit of the best model.
+    """
+
+    states: int
+    order: float | None
+    n_parameters: int
+    reduced_chi2: float
+    bic: float
+
+    @property
+    def label(self) -> str:
+        """The model in words."""
+        number = f"{self.states} state{'s' if self.states > 1 else ''}"
+        if self.order is None:
+            return f"{number} of general order"
+        return f"{number} of {'first order' if self.order == 1 else f'order {self.order:g}'}"
+
+
 @dataclass(frozen=True, eq=False)
 class ConcentrationAtOff:
     """Charge of the N states at a lamp off, extrapolated back in the dark.
@@ -109,6 +142,8 @@ class FittedExcitation:
     order_gain
         Fall of χ² that is expected if the kinetic orders, held at 1, were fitted; 0 where they are
         not held at 1.
+    models
+        Models that were tried, of which this is one.
     """
 
     states: tuple[ExcitedState, ...]
@@ -121,6 +156,7 @@ class FittedExcitation:
     warnings: tuple[str, ...]
     residuals: tuple[FloatArray, ...]
     order_gain: float = 0.0
+    models: tuple[ExcitationModel, ...] = ()
 
     @property
     def is_first_order(self) -> bool:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from labrig.material import Material, read_material
 from labrig.results import Charge, ChargingSeries, Transient
+from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import LampSettings
@@ -50,6 +51,8 @@ class Bench:
         Of every photograph.
     photon
         Of a signal of 1.
+    kinetics
+        One trap of each state; its emission is the light of the state.
     """
 
     material: Material
@@ -59,6 +62,7 @@ class Bench:
     photons: float = 20.0
     lamp: LampSettings = field(default_factory=LampSettings)
     seed: int = 1
+    kinetics: KineticsSettings | None = None
 
     def __post_init__(self) -> None:
         self.random = np.random.default_rng(self.seed)
@@ -137,12 +141,14 @@ class Bench:
         return back
 
     def _samples(self, windows: FloatArray) -> Phosphor:
-        bare = phosphor([self.material], [None], self.irradiance)
+        bare = phosphor([self.material], [None], self.irradiance, [self.kinetics])
         states, sites = len(bare.k_r_per_s), len(windows)
+        each = np.tile(np.arange(states), sites)
         return Phosphor(
             np.tile(bare.k_r_per_s, sites),
             (windows[:, None, :] * bare.excitation).reshape(sites * states, -1),
             np.repeat(np.arange(sites), states),
+            traps=None if bare.traps is None else bare.traps.of(each),
         )
 
     def _glow(self, windows: FloatArray, lamp: Lamp, charges: Sequence[Charge]) -> FloatArray:

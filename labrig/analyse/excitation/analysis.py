@@ -9,6 +9,7 @@ from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
 from labrig.analyse.excitation.lamp_light import band_sigma, scale_sigma
 from labrig.analyse.excitation.material import excited_material
+from labrig.analyse.excitation.orders import OrderFits, refit
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
@@ -16,13 +17,13 @@ from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
-from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.fit.excitation import RelativeSigmas
 from labrig.record import FrameRole
 from labrig.results import (
+    ChargingSeries,
     Closure,
     ExcitationResult,
     FittedDecay,
-    FittedExcitation,
     PatchCharging,
     PatchExcitation,
 )
@@ -89,12 +90,11 @@ def _patch_excitation(
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
     )
-    fit = _fit(charging, decay, relative_sigmas)
+    fits = OrderFits(_series(charging), decay, relative_sigmas, _states(part, patch) is not None)
+    fit = fits.chosen(part.overrides.order)
+    refitted = refit(fit, relative_sigmas)
     closure = predicted_charging(
-        charging,
-        irradiance,
-        relative_sigmas,
-        lambda reduced: _fit(reduced, decay, relative_sigmas, fit),
+        charging, irradiance, relative_sigmas, lambda reduced: refitted(_series(reduced))
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
@@ -132,18 +132,8 @@ def _states(part: Part, patch: StripPatch) -> int | None:
     return states
 
 
-def _fit(
-    charging: PatchCharging,
-    decay: FittedDecay,
-    relative_sigmas: RelativeSigmas,
-    near: FittedExcitation | None = None,
-) -> FittedExcitation:
-    rates = [state.k_r_per_s for state in decay.states]
-    amplitudes = np.array([state.amplitude for state in decay.states])
-    fractions = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
-    return fit_excitation(
-        [charging.through, charging.direct], rates, fractions, relative_sigmas, near
-    )
+def _series(charging: PatchCharging) -> list[ChargingSeries]:
+    return [charging.through, charging.direct]
 
 
 def _flicker(part: Part, decay: FittedDecay) -> float:

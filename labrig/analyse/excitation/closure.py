@@ -7,6 +7,7 @@ import numpy as np
 
 from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_off
+from labrig.material import dark_concentration
 from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
 
 #: Step of the derivatives as a fraction of σ.
@@ -66,12 +67,19 @@ def predicted_charging(
     )
     dark_s = starts - np.array([charge.off_s for charge in charges])
     initial = _initial_concentrations(direct, fit)[list(first)]
+    order = np.array([state.kinetic_order for state in fit.states])
 
     def predicted(theta: FloatArray) -> FloatArray:
-        """Return the levels by k_r, amplitudes, k_e and ln of the light."""
-        n = len(fit.states)
+        """Return the levels by k_r, amplitudes, k_e, fitted orders and ln of the light."""
+        n, end = len(fit.states), 2 * len(fit.states) + fit.k_e().size
         light = np.array(irradiance.direct) * np.exp(theta[-1])
-        sample = Charging(theta[2 * n : -1].reshape(n, -1), theta[:n], theta[n : 2 * n], light)
+        sample = Charging(
+            theta[2 * n : end].reshape(n, -1),
+            theta[:n],
+            theta[n : 2 * n],
+            light,
+            theta[end:-1] if fit.are_orders_fitted else order,
+        )
         return sample.level(charge_s, initial, dark_s, exposures)
 
     theta = np.array(
@@ -79,6 +87,7 @@ def predicted_charging(
             *(state.k_r_per_s for state in fit.states),
             *(state.amplitude for state in fit.states),
             *fit.k_e().ravel(),
+            *(order if fit.are_orders_fitted else ()),
             0.0,
         ]
     )
@@ -102,6 +111,7 @@ def predicted_charging(
         r0=initial,
         dark_s=dark_s,
         exposure_s=exposures,
+        kinetic_order=order,
     )
 
 
@@ -124,13 +134,15 @@ def _equivalent_charge_s(
 def _initial_concentrations(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
     """Return the concentrations left of the previous charge at the begin of each charge, (K, N)."""
     k_r = np.array([state.k_r_per_s for state in fit.states])
-    ended = levels_at_off(direct, k_r, fit.k_e()).value.mean(axis=1)
+    order = np.array([state.kinetic_order for state in fit.states])
+    ended = levels_at_off(direct, k_r, fit.k_e(), fit.orders()).value.mean(axis=1)
     on_s, off_s = (
         np.array([getattr(charge, name) for charge in direct.charges]) for name in ("on_s", "off_s")
     )
     waited_s = on_s[1:] - off_s[:-1]
     fresh = np.array([charge.fresh for charge in direct.charges[1:]])
-    remaining = np.where(fresh[:, None], 0.0, ended[:-1] * np.exp(-np.outer(waited_s, k_r)))
+    waited = dark_concentration(ended[:-1], k_r, order, waited_s[:, None])
+    remaining = np.where(fresh[:, None], 0.0, waited)
     return np.vstack([np.zeros_like(k_r), remaining])
 
 

@@ -35,6 +35,8 @@ def excited_material(
             State(
                 k_r_per_s=state.k_r_per_s,
                 k_r_per_s_sigma=state.k_r_sigma_per_s,
+                kinetic_order=state.kinetic_order,
+                kinetic_order_sigma=state.kinetic_order_sigma,
                 amplitude=float(max(at_off.amplitude[number], 0.0)),
                 amplitude_sigma=float(at_off.amplitude_sigma[number]),
                 r0=float(np.clip(at_off.r0[number], 0.0, 1.0)),
@@ -57,8 +59,11 @@ def _reradiation(
     spectrum: EmissionSpectrum | None,
     bands_nm: FloatArray,
 ) -> dict[str, tuple[float, ...]]:
-    """Return Λ and its σ by band: A_i / k_r,i times the spectrum's mean, with all their errors."""
-    if spectrum is None:
+    """Return Λ and its σ by band: A_i / k_r,i times the spectrum's mean, with all their errors.
+
+    Of an order other than 1 Λ is only known where the charge is.
+    """
+    if spectrum is None or not (state.is_first_order or state.is_level_known):
         return {}
     states = len(fit.states)
     level = state.amplitude / state.k_r_per_s

@@ -25,12 +25,11 @@ from labrig.fit.charge.model import (
 from labrig.fit.charge.readings import Readings, readings_of
 from labrig.fit.charge.result import ChargeCandidate, ChargeFit, OrderState
 from labrig.fit.least_squares import Ending, FloatArray, LeastSquaresFit, least_squares
+from labrig.material import MAX_ORDER
 from labrig.results import Measured
 
 #: Largest number of states.
 MAX_STATES = 2
-#: Largest kinetic order; above 2 it is empirical.
-MAX_ORDER = 4.0
 #: Largest η that is tried; above 1 it conserves no energy.
 MAX_STIMULATED = 10.0
 #: Concentration after the charge at the least κ: saturation changes nothing.

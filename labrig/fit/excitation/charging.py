@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import DataError
-from labrig.material import concentration, phi1
+from labrig.material import dark_concentration, lit_concentration, mean_emission
 from labrig.results import Closure, FloatArray, spans_decades
 
 #: Number of points of the predicted curve.
 POINTS = 200
+#: Least κ in 1/s: no state gets so little light that it matters.
+LEAST_KAPPA = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,29 +27,35 @@ class Charging:
         Level of each state at r = 1, shape (m,).
     irradiance
         Normalised irradiance of each band, shape (b,).
+    kinetic_order
+        Kinetic orders, shape (m,).
     """
 
     k_e_per_s: FloatArray
     k_r_per_s: FloatArray
     full_level: FloatArray
     irradiance: FloatArray
+    kinetic_order: FloatArray
 
     def __post_init__(self) -> None:
         m, b = len(self.k_r_per_s), len(self.irradiance)
-        if self.k_e_per_s.shape != (m, b) or self.full_level.shape != (m,):
+        each = (self.full_level.shape, self.kinetic_order.shape)
+        if self.k_e_per_s.shape != (m, b) or each != ((m,), (m,)):
             raise DataError(
-                f"closure: expected k_e of shape {(m, b)} and {m} full levels, got "
-                f"{self.k_e_per_s.shape} and {self.full_level.shape}"
+                f"closure: expected k_e of shape {(m, b)}, {m} full levels and kinetic orders, got "
+                f"{self.k_e_per_s.shape}, {each[0]} and {each[1]}"
             )
 
     def level(
         self, charge_s: FloatArray, r0: FloatArray, dark_s: FloatArray, exposure_s: FloatArray
     ) -> FloatArray:
         """Return levels after charges from `r0` (n, m); all other arguments are (n,)."""
-        kappa, k_r = self.k_e_per_s @ self.irradiance, self.k_r_per_s
-        charged = concentration(r0, kappa, k_r, charge_s[:, np.newaxis])
-        faded = np.exp(-np.multiply.outer(dark_s, k_r)) * phi1(np.multiply.outer(exposure_s, k_r))
-        return np.asarray((charged * faded) @ self.full_level)
+        kappa = np.maximum(self.k_e_per_s @ self.irradiance, LEAST_KAPPA)
+        k_r, order = self.k_r_per_s, self.kinetic_order
+        charged = lit_concentration(r0, kappa, k_r, order, charge_s[:, np.newaxis]).value
+        begins = dark_concentration(charged, k_r, order, dark_s[:, np.newaxis])
+        emitted = mean_emission(begins, k_r, order, exposure_s[:, np.newaxis]).value
+        return np.asarray(emitted @ self.full_level)
 
 
 def closure(
@@ -62,11 +70,13 @@ def closure(
     r0: ArrayLike = 0.0,
     dark_s: ArrayLike = 0.0,
     exposure_s: ArrayLike = 0.0,
+    kinetic_order: ArrayLike = 1.0,
 ) -> Closure:
     """Predict levels after charges of different lengths and compare them with measured ones.
 
     With m states, b bands and n charges: κ_i = Σ_j k_e,ij E_j, r_i after the charge by the rate
-    equation, and level = Σ_i full_level_i r_i e^(−k_r,i d) averaged over an exposure.
+    equation of its kinetic order b, and level = Σ_i full_level_i r_iᵇ averaged over an exposure
+    that begins after a time in the dark.
 
     Parameters
     ----------
@@ -83,13 +93,17 @@ def closure(
         Concentrations before each charge: a scalar, (m,) or (n, m).
     dark_s, exposure_s
         Time from lamp off to the begin of the exposure, and its length, in s: a scalar or (n,).
+    kinetic_order
+        Kinetic order b of each state: a scalar or (m,).
 
     Raises
     ------
     DataError
         Shapes disagree, numbers are not finite, or a σ is not above 0.
     """
-    sample = Charging(*map(_floats, (k_e_per_s, k_r_per_s, full_level, irradiance)))
+    k_r = _floats(k_r_per_s)
+    order = np.broadcast_to(_floats(kinetic_order), k_r.shape)
+    sample = Charging(_floats(k_e_per_s), k_r, _floats(full_level), _floats(irradiance), order)
     charge, measured, noise = map(_floats, (charge_s, level, sigma))
     if not (charge.ndim == 1 and charge.shape == measured.shape == noise.shape and charge.size):
         raise DataError("closure: expected as many levels and σ as charges, at least one")
@@ -103,10 +117,10 @@ def closure(
     if not (noise > 0).all():
         raise DataError("closure: expected σ above 0")
     predicted = sample.level(charge, start, dark, exposure)
-    order, line_s = np.argsort(charge, kind="stable"), _line(charge)
+    by_length, line_s = np.argsort(charge, kind="stable"), _line(charge)
 
     def along(column: FloatArray) -> FloatArray:
-        return np.interp(line_s, charge[order], column[order])
+        return np.interp(line_s, charge[by_length], column[by_length])
 
     starts = np.stack([along(column) for column in start.T], axis=1)
     line = sample.level(line_s, starts, along(dark), along(exposure))

@@ -9,14 +9,13 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from labrig.fit.excitation.charging import LEAST_KAPPA
 from labrig.fit.excitation.level_slopes import Levels
 from labrig.material import dark_step, lit_concentration, mean_emission, relaxation_with_slopes
 from labrig.results import Charge, ChargingSeries, FloatArray, Transient
 
 #: Parts of a transient, each with its mean light.
 PARTS = 8
-#: Least κ in 1/s: no state gets so little light that it matters.
-LEAST_KAPPA = 1e-12
 
 
 class _State(NamedTuple):

@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from labrig.errors import FitError
+from labrig.material import MAX_ORDER
 from labrig.results import ChargingSeries, FloatArray
 
 #: Amplitudes over the largest value: of a state which is not there, and of one so far from
 #: saturation that its amplitude is without influence.
 LEAST_AMPLITUDE, LARGEST_AMPLITUDE = 1e-9, 1e9
-#: Largest kinetic order; above 2 it is empirical.
-MAX_ORDER = 4.0
 
 
 class Rates(NamedTuple):

@@ -1,0 +1,140 @@
+"""Choice of the kinetic orders of an excitation: 1, as of the rate equation, or one of each state.
+
+The fit of first order tells by its residuals whether another order is worth trying
+(`FittedExcitation.order_gain`), and the decay by Becquerel's law. Models are compared by the
+Bayesian information criterion with the noise enlarged to the misfit of the best, so that a misfit
+of all of them adds no orders.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labrig.analyse.overrides import FREE
+from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.results import (
+    AUTO,
+    ChargingSeries,
+    ExcitationModel,
+    FittedDecay,
+    FittedExcitation,
+    FloatArray,
+)
+
+#: Difference in BIC from which a model with more parameters is preferred: odds of e^3 = 20 : 1.
+CLEAR_BIC = 6.0
+#: Largest number of states that are fitted with orders.
+MAX_STATES = 2
+#: Least part of the glow of a state at the start.
+LEAST_FRACTION = 1e-3
+
+
+@dataclass(frozen=True)
+class OrderFits:
+    """Fits of the charges of one sample by several models.
+
+    Attributes
+    ----------
+    series
+        Charging series.
+    decay
+        Decay from which the rates start.
+    relative_sigmas
+        Relative uncertainties of the measurement.
+    states_given
+        Whether the number of states is given, not chosen.
+    """
+
+    series: Sequence[ChargingSeries]
+    decay: FittedDecay
+    relative_sigmas: RelativeSigmas
+    states_given: bool
+
+    def chosen(self, order: str) -> FittedExcitation:
+        """Return the fit with the kinetic orders asked for: `auto`, `free` or a number."""
+        if order in (AUTO, FREE):
+            return self._best(order)
+        fit = self._fit(self._start(), float(order))
+        return replace(
+            fit, models=(_model(fit, float(order)),), warnings=(*fit.warnings, *_doubt(fit))
+        )
+
+    def _best(self, order: str) -> FittedExcitation:
+        first = self._fit(self._start(), 1.0)
+        tried: list[tuple[FittedExcitation, float | None]] = []
+        if order == AUTO:
+            tried.append((first, 1.0))
+        if order == FREE or self._is_worth_while(first):
+            tried += [(fit, None) for fit in self._of_general_order(first)]
+        tried.sort(key=lambda each: _model(*each).n_parameters)
+        enlarged = max(1.0, min(fit.reduced_chi2 for fit, _ in tried))
+        models = tuple(_model(fit, orders, enlarged) for fit, orders in tried)
+        chosen = 0
+        for index, model in enumerate(models):
+            if model.bic < models[chosen].bic - CLEAR_BIC:
+                chosen = index
+        return replace(tried[chosen][0], models=models)
+
+    def _is_worth_while(self, first: FittedExcitation) -> bool:
+        """Whether general order may be preferred to first order."""
+        penalty = CLEAR_BIC + len(first.states) * np.log(first.dof)
+        if first.order_gain > penalty * max(1.0, first.reduced_chi2):
+            return True
+        becquerel = [law.bic for law in self.decay.laws if law.name == "becquerel"]
+        return len(first.states) > 1 and min(becquerel, default=np.inf) < self.decay.bic - CLEAR_BIC
+
+    def _of_general_order(self, first: FittedExcitation) -> Iterator[FittedExcitation]:
+        """Yield fits with an order of each state."""
+        k_r, fractions = self._start()
+        if len(k_r) <= MAX_STATES:
+            yield self._fit((k_r, fractions), None, first)
+        else:
+            yield self._fit((k_r[[0, -1]], fractions[[0, -1]]), None)
+        if len(k_r) > 1 and not self.states_given:
+            yield self._fit((np.array([fractions @ k_r]), np.ones(1)), None)
+
+    def _start(self) -> tuple[FloatArray, FloatArray]:
+        """Return rates in 1/s and fractions of the glow of the decay's states."""
+        k_r, amplitude = np.array(
+            [(state.k_r_per_s, state.amplitude) for state in self.decay.states]
+        ).T
+        return k_r, np.maximum(amplitude / amplitude.sum(), LEAST_FRACTION)
+
+    def _fit(
+        self,
+        start: tuple[FloatArray, FloatArray],
+        order: float | None,
+        near: FittedExcitation | None = None,
+    ) -> FittedExcitation:
+        return fit_excitation(self.series, *start, self.relative_sigmas, near, order)
+
+
+def refit(
+    fit: FittedExcitation, relative_sigmas: RelativeSigmas
+) -> Callable[[Sequence[ChargingSeries]], FittedExcitation]:
+    """Return the function that fits other series by the model of a fit, from its solution."""
+    order = None if fit.are_orders_fitted else fit.states[0].kinetic_order
+    k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in fit.states]).T
+
+    def again(series: Sequence[ChargingSeries]) -> FittedExcitation:
+        return fit_excitation(series, k_r, amplitude, relative_sigmas, fit, order)
+
+    return again
+
+
+def _model(fit: FittedExcitation, order: float | None, enlarged: float = 1.0) -> ExcitationModel:
+    states, bands = fit.k_e().shape
+    number = states * (2 + bands + (order is None)) + len(fit.channel_weights) - 1
+    bic = fit.chi2 / enlarged + number * float(np.log(fit.dof + number))
+    return ExcitationModel(states, order, number, fit.reduced_chi2, bic)
+
+
+def _doubt(fit: FittedExcitation) -> Iterator[str]:
+    """Yield a warning if orders that are held at 1 contradict the data."""
+    penalty = CLEAR_BIC + len(fit.states) * np.log(fit.dof)
+    if fit.order_gain > penalty * max(1.0, fit.reduced_chi2):
+        yield (
+            f"charges and decays contradict the first order (χ² {fit.chi2:.0f} would fall by "
+            f"{fit.order_gain:.0f} or more): fit the kinetic order with --order auto"
+        )
