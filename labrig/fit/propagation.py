@@ -12,7 +12,10 @@ def propagated_covariance(covariance: FloatArray, transform: FloatArray) -> Floa
     # What the data say nothing about may overflow: that is as good as infinite.
     with np.errstate(over="ignore", invalid="ignore"):
         result: FloatArray = transform @ finite @ transform.T
-    unbounded = (transform[:, ~is_finite] != 0).any(axis=1) | ~np.isfinite(np.diag(result))
+    variance = np.diag(result)
+    # Below 0 is what rounding leaves of variances that are as good as infinite, too.
+    is_bounded = np.isfinite(variance) & (variance >= 0)
+    unbounded = (transform[:, ~is_finite] != 0).any(axis=1) | ~is_bounded
     result[unbounded, :] = 0.0
     result[:, unbounded] = 0.0
     result[unbounded, unbounded] = np.inf

@@ -36,6 +36,7 @@ from labrig.results import (
 )
 
 HEIGHT_PT = 270.0
+UNKNOWN = "–"
 #: Number of positions along the filter whose charging is drawn.
 SHOWN = 5
 MEASURED = (
@@ -56,17 +57,44 @@ def render(result: ExcitationResult, source: Source) -> Rendered:
 
 def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
     """Yield the lines for the terminal: states, rates by band, χ² and closure."""
-    fit, off = patch.fit, patch.fit.at_off[-1]
-    for number, state in enumerate(fit.states):
-        yield (
-            f"state {number + 1}: k_r {plus_minus(state.k_r_per_s, state.k_r_sigma_per_s)} /s, "
-            f"r(0) {plus_minus(float(off.r0[number]), float(off.r0_sigma[number]))}"
-        )
+    fit = patch.fit
+    for number in range(len(fit.states)):
+        yield f"state {number + 1}: {_state_line(fit, number)}"
         bands = zip(pairwise(result.irradiance.bands_nm), _rates(fit, number), strict=True)
         for (low, high), text in bands:
             yield f"  {low:.0f}-{high:.0f} nm: k_e {text} /s"
     yield f"reduced χ² {rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"
+    if len(fit.models) > 1:
+        yield f"models: {_models_line(fit)}"
     yield f"closure: {_closure_line(patch.closure)}"
+
+
+def _state_line(fit: FittedExcitation, number: int) -> str:
+    """Return what is known of a state: its rates, or what its decay after this charge tells."""
+    state, off = fit.states[number], fit.at_off[-1]
+    r0 = plus_minus(float(off.r0[number]), float(off.r0_sigma[number]))
+    k_r = plus_minus(state.k_r_per_s, state.k_r_sigma_per_s)
+    if state.exponent is None:
+        return f"k_r {k_r} /s, r(0) {r0}"
+    order = plus_minus(state.kinetic_order, state.kinetic_order_sigma)
+    if state.is_level_known:
+        return f"k_r {k_r} /s, b {order}, r(0) {r0}"
+    amplitude = plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number]))
+    time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_sigma_s[number]))
+    exponent = plus_minus(state.exponent.value, state.exponent.sigma)
+    return (
+        f"b {order}; after the brightest charge by the lamp itself a {amplitude} DN/s, τ {time} s, "
+        f"p {exponent} (k_r, k_e and r(0) are not known apart)"
+    )
+
+
+def _models_line(fit: FittedExcitation) -> str:
+    """Return all models that were tried, with their distance from the best."""
+    best = min(model.bic for model in fit.models)
+    return "; ".join(
+        f"{model.label}, reduced χ² {rounded(model.reduced_chi2, 3)}, ΔBIC {model.bic - best:.0f}"
+        for model in fit.models
+    )
 
 
 def _closure_line(closure: Closure | None) -> str:
@@ -127,6 +155,7 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             "equation in exact steps. k_e belongs to an irradiance of vector length "
             f"{rounded(irradiance.vector_length)}.",
             f"Closure: {_closure_line(patch.closure)}.",
+            *([f"Models: {_models_line(fit)}."] if len(fit.models) > 1 else []),
         ),
         tuple(figures),
         (
@@ -137,22 +166,38 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
 
 
 def _levels_table(fit: FittedExcitation, caption: str) -> Table:
-    """Return the table of k_r, r(0) and amplitudes of the states."""
-    off = fit.at_off[-1]
-    return Table(
-        ("State", "k_r / s⁻¹", "Amplitude at r = 1 / (DN/s)", "r(0)", "Amplitude a / (DN/s)"),
-        tuple(
-            (
-                str(number + 1),
-                plus_minus(state.k_r_per_s, state.k_r_sigma_per_s),
-                plus_minus(state.amplitude, state.amplitude_sigma),
-                plus_minus(float(off.r0[number]), float(off.r0_sigma[number])),
-                plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number])),
-            )
-            for number, state in enumerate(fit.states)
-        ),
-        caption,
-    )
+    """Return the table of k_r, orders, r(0) and amplitudes of the states."""
+    head = ["State", "k_r / s⁻¹", "Amplitude at r = 1 / (DN/s)", "r(0)", "Amplitude a / (DN/s)"]
+    if not fit.is_first_order:
+        head += ["b", "τ / s", "p"]
+        caption += (
+            " b is the kinetic order; the glow after that charge decays as a (1 + t/τ)^(−p). k_r "
+            "and the amplitude belong to r = 1, and are left out where the charge does not tell "
+            "them from r(0)."
+        )
+    rows = tuple(_levels_row(fit, number) for number in range(len(fit.states)))
+    return Table(tuple(head), rows, caption)
+
+
+def _levels_row(fit: FittedExcitation, number: int) -> tuple[str, ...]:
+    state, off = fit.states[number], fit.at_off[-1]
+    is_known = state.is_first_order or state.is_level_known
+    cells = [
+        str(number + 1),
+        plus_minus(state.k_r_per_s, state.k_r_sigma_per_s) if is_known else UNKNOWN,
+        plus_minus(state.amplitude, state.amplitude_sigma) if is_known else UNKNOWN,
+        plus_minus(float(off.r0[number]), float(off.r0_sigma[number])) if is_known else UNKNOWN,
+        plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number])),
+    ]
+    if not fit.is_first_order:
+        time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_sigma_s[number]))
+        exponent = state.exponent
+        cells += [
+            plus_minus(state.kinetic_order, state.kinetic_order_sigma),
+            time,
+            UNKNOWN if exponent is None else plus_minus(exponent.value, exponent.sigma),
+        ]
+    return tuple(cells)
 
 
 def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.results.measured import BoolArray, FloatArray
+from labrig.results.measured import BoolArray, FloatArray, Measured
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
@@ -45,6 +45,14 @@ class ExcitedState:
     def is_first_order(self) -> bool:
         """Whether the state decays as an exponential, whatever its charge."""
         return self.kinetic_order == 1
+
+    @property
+    def exponent(self) -> Measured | None:
+        """Exponent p = b/(b − 1) of the decay; None of the first order, an exponential."""
+        beyond = self.kinetic_order - 1
+        if beyond == 0:
+            return None
+        return Measured(self.kinetic_order / beyond, self.kinetic_order_sigma / beyond**2)
 
     @property
     def seen(self) -> BoolArray:

@@ -36,7 +36,7 @@ def excited_material(
                 k_r_per_s=state.k_r_per_s,
                 k_r_per_s_sigma=state.k_r_sigma_per_s,
                 kinetic_order=state.kinetic_order,
-                kinetic_order_sigma=state.kinetic_order_sigma,
+                kinetic_order_sigma=state.kinetic_order_sigma or None,
                 amplitude=float(max(at_off.amplitude[number], 0.0)),
                 amplitude_sigma=float(at_off.amplitude_sigma[number]),
                 r0=float(np.clip(at_off.r0[number], 0.0, 1.0)),

@@ -28,10 +28,14 @@ ROUGH, FINE = 1e-3, 1e-6
 #: any effect.
 WHITENINGS = (ROUGH, ROUGH, FINE)
 MAX_ITERATIONS = 60
+#: Number of iterations of a starting point of general order.
+ROUGH_ITERATIONS = 15
 #: Relative error of the light on a place, which the starting points take for noise.
 LIGHT_SIGMA = 0.05
 #: Factor from its start value within which the starting points leave a k_r.
 ROUGH_K_R_FACTOR = 2.0
+#: Gain in χ² of a step at which a starting point of general order is near enough.
+ROUGH_GAIN = 0.1
 #: Relative σ of an amplitude above which a warning is given.
 LEVEL_KNOWN = 0.3
 #: Reduced χ² above which a warning is given.
@@ -150,13 +154,16 @@ def _minimised(
     lower, upper = problem.parameters.bounds()
     k_r = problem.parameters.columns.k_r
     lower[k_r], upper[k_r] = start[k_r] - np.log(k_r_factor), start[k_r] + np.log(k_r_factor)
+    # Steps of general order take their time; a starting point need not be at its minimum.
+    is_slow_start = np.isfinite(k_r_factor) and not problem.parameters.is_first_order
     return least_squares(
         problem.residuals,
         start,
         lower=lower,
         upper=upper,
-        max_iterations=MAX_ITERATIONS,
+        max_iterations=ROUGH_ITERATIONS if is_slow_start else MAX_ITERATIONS,
         tolerance=tolerance,
+        least_gain=ROUGH_GAIN if is_slow_start else 0.0,
     )
 
 

@@ -1,0 +1,144 @@
+"""Excitation of samples of general kinetic order, charged by an integrator."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from labrig.analyse.excitation.orders import OrderFits, refit
+from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation, levels_at_off
+from labrig.fit.excitation.levels import levels
+from labrig.material import becquerel_of, read_material
+from labrig.results import ChargingSeries, FittedExcitation
+from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.lamp import WAVELENGTH_NM
+from tests.fit.charged_samples import Bench, lvf_windows, two_states
+from tests.results.made import decay_result
+
+LVF = lvf_windows(np.array([420.0, 450.0, 490.0, 540.0, 600.0, 670.0]))
+BARE = np.ones((1, len(WAVELENGTH_NM)))
+UNCERTAIN = RelativeSigmas(0.005, 0.01)
+B = 1.5
+
+
+def bench(order: float, irradiance: float = 4.0, seed: int = 1) -> Bench:
+    kinetics = None if order == 1 else KineticsSettings(model="general_order", order=order)
+    return Bench(read_material("blue-paint"), irradiance=irradiance, kinetics=kinetics, seed=seed)
+
+
+def measured(sample: Bench) -> list[ChargingSeries]:
+    """The bare lamp first: its irradiance is E."""
+    bare = sample.series("bare lamp", BARE, (900.0,), shots=10, every_s=15.0)
+    return [bare, sample.series("through LVF", LVF, (8.0, 64.0, 256.0), shots=5)]
+
+
+def fitted(series: list[ChargingSeries], order: float | None) -> FittedExcitation:
+    """From the fit of first order, which is quick."""
+    near = fit_excitation(series, [0.03], [1.0], UNCERTAIN)
+    return fit_excitation(series, [0.03], [1.0], UNCERTAIN, near, order)
+
+
+def test_the_first_order_is_that_of_the_affine_steps() -> None:
+    series = Bench(two_states()).series("LVF", LVF, (8.0, 64.0), wait_s=60.0, shots=3)
+    series = replace(series, across=np.array([0.8, 1.2])[:, None, None] * np.ones((6, 8)))
+    k_r, k_e = np.array([0.08, 0.015]), np.linspace(0.001, 0.1, 16).reshape(2, 8)
+    affine, general = (levels(series, k_r, k_e, order) for order in (None, np.ones(2)))
+    for ours, theirs in zip(general[:3], affine[:3], strict=True):
+        assert ours == pytest.approx(theirs, rel=1e-4, abs=1e-5 * np.abs(theirs).max())
+
+
+def test_derivatives_of_levels_left_from_charges_before() -> None:
+    """One charge after the other without a wait, then a fresh sample, and a full one."""
+    series = Bench(two_states()).series("LVF", LVF[:2], (8.0, 64.0, 8.0, 20.0), 40.0, shots=3)
+    charges = list(series.charges)
+    charges[2] = replace(charges[2], fresh=True)
+    charges[3] = replace(charges[3], saturated=True)
+    series = replace(series, charges=tuple(charges))
+    k_r, order = np.array([0.08, 0.015]), np.array([1.4, 2.3])
+    k_e = np.linspace(0.001, 0.1, 16).reshape(2, 8)
+    for function in (levels, levels_at_off):
+        found = function(series, k_r, k_e, order)
+        for state in range(2):
+            at = np.eye(2)[state]
+            for slope, by in (
+                (found.by_k_r[..., state], (1e-6 * at, 0.0, 0.0)),
+                (found.by_k_e[..., state, 3], (0.0, 1e-6 * np.outer(at, np.eye(8)[3]), 0.0)),
+                (found.by_order[..., state], (0.0, 0.0, 1e-6 * at)),
+            ):
+                by_k_r, by_k_e, by_order = by
+                up, down = (
+                    function(series, k_r + s * by_k_r, k_e + s * by_k_e, order + s * by_order)
+                    for s in (1, -1)
+                )
+                numeric = (up.value - down.value)[..., state] / 2e-6
+                assert slope == pytest.approx(numeric, rel=1e-3, abs=1e-4 * np.abs(slope).max())
+
+
+def test_order_rates_and_level_of_a_sample() -> None:
+    sample = bench(B)
+    found = fitted(measured(sample), None)
+    (state,), (truth,) = found.states, sample.material.states
+    assert found.warnings == ()
+    assert found.reduced_chi2 == pytest.approx(1.0, abs=0.15)
+    assert state.is_level_known
+    assert state.kinetic_order_sigma < 0.05
+    assert abs(state.kinetic_order - B) < 3 * state.kinetic_order_sigma
+    assert abs(state.k_r_per_s - truth.k_r_per_s) < 3 * state.k_r_sigma_per_s
+    assert abs(state.amplitude - sample.amplitudes()[0]) < 3 * state.amplitude_sigma
+    off_k_e = state.k_e_per_s - np.array(truth.k_e_per_s)
+    assert (np.abs(off_k_e) < 3 * state.k_e_sigma_per_s + 1e-5).all()
+    assert found.covariance_parameters[-1] == "kinetic_order 1"
+    assert np.sqrt(found.covariance[-1, -1]) == pytest.approx(state.kinetic_order_sigma)
+    off = found.at_off[0]
+    law = becquerel_of(float(off.r0[0]), state.k_r_per_s, state.kinetic_order)
+    assert off.decay_time_s[0] == pytest.approx(1 / (law.shape * law.rate_per_s))
+
+
+def test_what_a_weak_charge_does_not_tell_is_not_known() -> None:
+    """κ, k_r and r(0) scale each other; the decay of the charge is known for all that."""
+    sample = bench(B, irradiance=0.05)
+    found = fitted(measured(sample), None)
+    (state,), off = found.states, found.at_off[0]
+    assert not state.is_level_known
+    assert state.k_r_sigma_per_s > 0.3 * state.k_r_per_s
+    assert off.amplitude_sigma[0] < 0.05 * off.amplitude[0]
+    assert off.decay_time_sigma_s[0] < 0.3 * off.decay_time_s[0]
+    assert any("Λ and r(0)" in said for said in found.warnings)
+
+
+def test_the_order_is_chosen_by_the_data_or_told() -> None:
+    for order in (1.0, B):
+        series = measured(bench(order, seed=3))
+        fits = OrderFits(series, decay_result((0.03, 10.0)), UNCERTAIN, states_given=False)
+        fit = fits.chosen("auto")
+        assert fit.are_orders_fitted == (order != 1)
+        assert [model.order for model in fit.models] == ([1.0] if order == 1 else [1.0, None])
+    held = fits.chosen("1")
+    assert held.is_first_order
+    assert any("contradict the first order" in said for said in held.warnings)
+    told = fits.chosen("1.5")
+    assert told.states[0].kinetic_order == B
+    assert told.states[0].kinetic_order_sigma == 0
+    assert not told.are_orders_fitted
+    assert told.chi2 == pytest.approx(fit.chi2, abs=12)
+    again = refit(fit, UNCERTAIN)(series)
+    assert again.chi2 == pytest.approx(fit.chi2, abs=0.01)
+
+
+def test_closure_predicts_the_bent_charge() -> None:
+    sample = bench(B)
+    series = sample.series("bare lamp", BARE, (4.0, 16.0, 64.0, 256.0), 3000.0, shots=1)
+    (truth,) = sample.material.states
+    charge_s = [charge.off_s - charge.on_s for charge in series.charges]
+    level = series.values[:, 0, 1]
+    known = {
+        "irradiance": series.irradiance[0],
+        "k_e_per_s": [truth.k_e_per_s],
+        "k_r_per_s": [truth.k_r_per_s],
+        "full_level": sample.amplitudes(),
+        "dark_s": [charge.start_s[0] - charge.off_s for charge in series.charges],
+        "exposure_s": 0.5,
+    }
+    bent = closure(charge_s, level, 0.02 * level, **known, kinetic_order=B)
+    assert bent.rms_percent < 2.0
+    assert closure(charge_s, level, 0.02 * level, **known).rms_percent > 10
