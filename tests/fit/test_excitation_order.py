@@ -102,7 +102,7 @@ def test_what_a_weak_charge_does_not_tell_is_not_known() -> None:
     assert not state.is_level_known
     assert state.k_r_sigma_per_s > 0.3 * state.k_r_per_s
     assert off.amplitude_sigma[0] < 0.05 * off.amplitude[0]
-    assert off.decay_time_sigma_s[0] < 0.3 * off.decay_time_s[0]
+    assert off.decay_time_sigma_s[0] < 0.6 * off.decay_time_s[0]
     assert any("Λ and r(0)" in said for said in found.warnings)
 
 
