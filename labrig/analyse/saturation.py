@@ -352,6 +352,6 @@ def _warnings(patch: PatchSaturation) -> Iterator[str]:
     if patch.order is not None and patch.order.verdict == "general order":
         yield (
             f"the glow falls as that of a state of kinetic order {patch.order.order}, the more "
-            "slowly the less it was charged: excitation is fitted with order 1 and will not "
-            "describe it"
+            "slowly the less it was charged: rates of exponentials hold for one charge only; "
+            "excitation finds the order, too"
         )

@@ -61,7 +61,7 @@ class State(_Part):
     Attributes
     ----------
     k_r_per_s
-        Re-radiation rate k_r of the state, in 1/s.
+        Re-radiation rate k_r of the state, in 1/s; of a kinetic order that of a full state.
     kinetic_order
         Kinetic order b of the state, which re-radiates k_r times its concentration to this power. 1
         is the rate equation of Nalbach et al., and not written; the light of a higher order decays
