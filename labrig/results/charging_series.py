@@ -102,6 +102,22 @@ class Charge:
 
 
 @dataclass(frozen=True, eq=False)
+class EarlierCharge:
+    """Last charge of the same sites before a series began, of which something may be left.
+
+    Attributes
+    ----------
+    charge
+        The charge, by the same lamp and on the same clock.
+    irradiance
+        Irradiance of every site in every band, shape (P, B).
+    """
+
+    charge: Charge
+    irradiance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class ChargingSeries:
     """Charges in one geometry, and n photographs of P sites in C channels.
 
@@ -110,7 +126,7 @@ class ChargingSeries:
     name
         Name of the series in messages and results.
     charges
-        Charges by rising time; the first finds the sample dark.
+        Charges by rising time; the first finds the sample dark, but for what `earlier` left.
     rise, fade
         Turn-on and turn-off transients of the lamp.
     irradiance
@@ -126,6 +142,9 @@ class ChargingSeries:
     across
         Irradiance at Q places within every site relative to the site's, shape (Q, P, B): in uneven
         light, the mean level is not the level of the mean light. None: the light is even.
+    earlier
+        Last charge before the first one of the series, which states of a kinetic order above 1
+        remember for long; None: there was none.
     """
 
     name: str
@@ -137,13 +156,18 @@ class ChargingSeries:
     sigma: FloatArray
     site_modes: FloatArray | None = None
     across: FloatArray | None = None
+    earlier: EarlierCharge | None = None
 
     def spread(self) -> Self:
         """Return the series with every place within the sites as a site, place by place."""
         if self.across is None:
             return self
         irradiance = (self.across * self.irradiance).reshape(-1, self.irradiance.shape[1])
-        return replace(self, irradiance=irradiance, across=None)
+        earlier = self.earlier
+        if earlier is not None:
+            everywhere = np.tile(earlier.irradiance, (len(self.across), 1))
+            earlier = replace(earlier, irradiance=everywhere)
+        return replace(self, irradiance=irradiance, across=None, earlier=earlier)
 
     def first_frames(self, usable: BoolArray) -> dict[int, int]:
         """Return the row of its first usable photograph for each charge.

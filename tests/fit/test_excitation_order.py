@@ -9,7 +9,7 @@ from labrig.analyse.excitation.orders import OrderFits, refit
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.material import becquerel_of, read_material
-from labrig.results import ChargingSeries, FittedExcitation
+from labrig.results import ChargingSeries, EarlierCharge, FittedExcitation
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
@@ -142,3 +142,20 @@ def test_closure_predicts_the_bent_charge() -> None:
     bent = closure(charge_s, level, 0.02 * level, **known, kinetic_order=B)
     assert bent.rms_percent < 2.0
     assert closure(charge_s, level, 0.02 * level, **known).rms_percent > 10
+
+
+def test_a_charge_of_the_series_before_is_not_forgotten() -> None:
+    """Two series of the same sites are one, of which the second begins later."""
+    sample = bench(B)
+    whole = sample.series("LVF", LVF, (256.0, 8.0), wait_s=120.0, shots=3)
+    first, second = whole.charges
+    later = replace(
+        whole, charges=(second,), values=whole.values[3:], sigma=whole.sigma[3:],
+        earlier=EarlierCharge(first, whole.irradiance),
+    )  # fmt: skip
+    (truth,) = sample.material.states
+    rates = np.array([truth.k_r_per_s]), np.array([truth.k_e_per_s]), np.array([B])
+    expected = levels(whole, *rates).value[3:]
+    assert levels(later, *rates).value == pytest.approx(expected, rel=1e-12)
+    forgotten = levels(replace(later, earlier=None), *rates).value
+    assert (forgotten < 0.9 * expected).all()

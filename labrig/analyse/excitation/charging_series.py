@@ -15,7 +15,15 @@ from labrig.optics import Strip
 from labrig.record import FrameRole
 from labrig.reduce import SensorLayout, reduce_patches, sensor_layout
 from labrig.region import Region
-from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, PatchCharging, Series
+from labrig.results import (
+    BoolArray,
+    Charge,
+    ChargingSeries,
+    EarlierCharge,
+    FloatArray,
+    PatchCharging,
+    Series,
+)
 
 #: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"
@@ -91,8 +99,11 @@ def patch_chargings(
         NOTHING, NOTHING, site_modes(irradiance), across_sites(irradiance),
     )  # fmt: skip
     everywhere = np.tile(irradiance.direct, (len(irradiance.position), 1))
+    direct_charges, last = charges(True), through.charges[-1]
+    is_earlier = last.off_s < direct_charges[0].on_s
     direct = ChargingSeries(
-        "by the lamp itself", charges(True), rise, fade, everywhere, NOTHING, NOTHING
+        "by the lamp itself", direct_charges, rise, fade, everywhere, NOTHING, NOTHING,
+        earlier=EarlierCharge(last, through.irradiance) if is_earlier else None,
     )  # fmt: skip
     chargings = {}
     for patch, slices in sites.items():

@@ -115,18 +115,19 @@ def levels_after_charges(
     sample = _Sample(k_r_per_s, k_e_per_s, order, series.irradiance)
     shape = len(series.irradiance), len(k_r_per_s)
     bands = series.irradiance.shape[1]
-    state, dark_s, ends = _State.of(np.zeros(shape), bands), 0.0, []
-    for number, charge in enumerate(series.charges):
+    empty = _State.of(np.zeros(shape), bands)
+    state, dark_s, ends = empty, -np.inf, []
+    if series.earlier is not None:
+        elsewhere = sample._replace(irradiance=series.earlier.irradiance)
+        state = _charged(elsewhere, empty, series, series.earlier.charge)
+        dark_s = series.earlier.charge.off_s + series.fade.total_s
+    for charge in series.charges:
         if charge.saturated:
             full = _State.of(np.ones(shape), bands)
             state = sample.in_darkness(full, series.fade.total_s)
         else:
-            is_empty = number == 0 or charge.fresh
-            state = (
-                _State.of(np.zeros(shape), bands)
-                if is_empty
-                else sample.in_darkness(state, charge.on_s - dark_s)
-            )
+            is_empty = charge.fresh or np.isinf(dark_s)
+            state = empty if is_empty else sample.in_darkness(state, charge.on_s - dark_s)
             state = _charged(sample, state, series, charge)
         dark_s = charge.off_s + series.fade.total_s
         ends.append(state)
