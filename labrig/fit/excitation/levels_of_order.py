@@ -15,7 +15,7 @@ from labrig.material import dark_step, lit_concentration, mean_emission, relaxat
 from labrig.results import Charge, ChargingSeries, FloatArray, Transient
 
 #: Parts of a transient, each with its mean light.
-PARTS = 8
+PARTS = 4
 
 
 class _State(NamedTuple):
@@ -69,9 +69,9 @@ class _Sample(NamedTuple):
         """Return the state after darkness."""
         return state.stepped(*dark_step(state.value, self.k_r_per_s, self.order, duration_s))
 
-    def in_transient(self, state: _State, brightness: float, transient: Transient) -> _State:
+    def in_transient(self, state: _State, brightness: float, parts: "_Parts") -> _State:
         """Return the state after a transient of the lamp."""
-        for duration_s, fraction in _parts(transient):
+        for duration_s, fraction in parts:
             light = brightness * fraction * self.irradiance
             state = self._in_short_light(state, light, duration_s)
         return state
@@ -79,7 +79,9 @@ class _Sample(NamedTuple):
     def _in_short_light(self, state: _State, light: FloatArray, duration_s: float) -> _State:
         """Return the state after light so short that r hardly changes."""
         kappa, k, b, r = light @ self.k_e_per_s.T, self.k_r_per_s, self.order, state.value
-        middle = (r + self._end_of_short_light(r, kappa, duration_s)) / 2
+        power = r ** (b - 1)
+        growth = kappa * (1 - r) - k * r * power
+        middle = r + growth * duration_s / (2 + (kappa + b * k * power) * duration_s)
         power = middle ** (b - 1)
         escape, drift = b * k * power, (b - 1) * k * middle * power
         step, slopes = relaxation_with_slopes(kappa + drift, escape - drift, duration_s)
@@ -96,17 +98,6 @@ class _Sample(NamedTuple):
             (slopes.kept * r + slopes.gained_by_kappa)[..., None] * light[:, None, :],
         )
 
-    def _end_of_short_light(
-        self, r: FloatArray, kappa: FloatArray, duration_s: float
-    ) -> FloatArray:
-        """Return r after a step with r^b as its tangent at the begin."""
-        power = r ** (self.order - 1)
-        drift = (self.order - 1) * self.k_r_per_s * r * power
-        escape = self.order * self.k_r_per_s * power
-        step, _ = relaxation_with_slopes(kappa + drift, escape - drift, duration_s)
-        end: FloatArray = step.kept * r + step.gained
-        return end
-
 
 def levels_after_charges(
     series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray, order: FloatArray
@@ -116,10 +107,11 @@ def levels_after_charges(
     shape = len(series.irradiance), len(k_r_per_s)
     bands = series.irradiance.shape[1]
     empty = _State.of(np.zeros(shape), bands)
+    transients = _parts(series.rise), _parts(series.fade)
     state, dark_s, ends = empty, -np.inf, []
     if series.earlier is not None:
         elsewhere = sample._replace(irradiance=series.earlier.irradiance)
-        state = _charged(elsewhere, empty, series, series.earlier.charge)
+        state = _charged(elsewhere, empty, transients, series.earlier.charge)
         dark_s = series.earlier.charge.off_s + series.fade.total_s
     for charge in series.charges:
         if charge.saturated:
@@ -128,7 +120,7 @@ def levels_after_charges(
         else:
             is_empty = charge.fresh or np.isinf(dark_s)
             state = empty if is_empty else sample.in_darkness(state, charge.on_s - dark_s)
-            state = _charged(sample, state, series, charge)
+            state = _charged(sample, state, transients, charge)
         dark_s = charge.off_s + series.fade.total_s
         ends.append(state)
     return Levels(*(np.stack(parts) for parts in _columns(ends)))
@@ -147,16 +139,23 @@ def emitted(
     return _chained(levels, *mean_emission(levels.value, k_r_per_s, order, length_s))
 
 
-def _charged(sample: _Sample, state: _State, series: ChargingSeries, charge: Charge) -> _State:
+def _charged(
+    sample: _Sample, state: _State, transients: tuple["_Parts", "_Parts"], charge: Charge
+) -> _State:
     """Return the state after a charge, when the lamp is dark."""
-    steady_s = charge.off_s - charge.on_s - series.rise.total_s
-    state = sample.in_transient(state, charge.brightness, series.rise)
+    rise, fade = transients
+    steady_s = charge.off_s - charge.on_s - sum(duration_s for duration_s, _ in rise)
+    state = sample.in_transient(state, charge.brightness, rise)
     state = sample.in_steady_light(state, charge.brightness, steady_s)
-    return sample.in_transient(state, charge.brightness, series.fade)
+    return sample.in_transient(state, charge.brightness, fade)
 
 
-def _parts(transient: Transient) -> list[tuple[float, FloatArray]]:
-    """Return duration in s and mean fraction (B,) of each part of a transient."""
+#: Duration in s and mean fraction (B,) of each part of a transient.
+_Parts = list[tuple[float, FloatArray]]
+
+
+def _parts(transient: Transient) -> _Parts:
+    """Divide a transient into few parts."""
     steps = len(transient.duration_s)
     return [
         (
