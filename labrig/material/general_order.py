@@ -205,7 +205,7 @@ def mean_emission(
     --------
     >>> from labrig.material import mean_emission
     >>> mean_emission(0.5, 0.02, 1.5, [0.0, 1.0, 50.0]).value.round(4).tolist()
-    [0.3536, 0.3498, 0.223]
+    [0.3536, 0.3498, 0.2271]
     """
     r, k, b, exposure = np.broadcast_arrays(
         *(np.asarray(each, dtype=np.float64) for each in (start, k_r_per_s, order, exposure_s))
