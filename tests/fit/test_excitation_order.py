@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from labrig.analyse import Overrides
 from labrig.analyse.excitation.orders import OrderFits, refit
+from labrig.errors import UsageError
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.material import becquerel_of, read_material
@@ -123,6 +125,12 @@ def test_the_order_is_chosen_by_the_data_or_told() -> None:
     assert told.chi2 == pytest.approx(fit.chi2, abs=12)
     again = refit(fit, UNCERTAIN)(series)
     assert again.chi2 == pytest.approx(fit.chi2, abs=0.01)
+
+
+@pytest.mark.parametrize("text", ["second", "0.5", "5", "nan"])
+def test_what_is_no_order_is_one_line(text: str) -> None:
+    with pytest.raises(UsageError, match=f"--order: expected auto, free or .* got '{text}'"):
+        Overrides.parse([], [], order=text)
 
 
 def test_closure_predicts_the_bent_charge() -> None:

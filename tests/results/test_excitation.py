@@ -4,14 +4,18 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
+from labrig.analyse.excitation.material import excited_material
 from labrig.errors import DiskError
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation
 from labrig.material import read_material
-from labrig.results import Series
+from labrig.report import Source
+from labrig.report.excitation import render
+from labrig.results import ExcitationModel, Series
 from labrig.results.excitation import ExcitationResult, PatchCharging, PatchExcitation
 from tests.analyse.excitation.test_excitation_run import true_irradiance
 from tests.fit.charged_samples import Bench, lvf_windows
@@ -82,3 +86,33 @@ def test_places_go_along_the_filter(result: ExcitationResult) -> None:
     position_nm = result.position_nm
     assert len(position_nm) == len(result.irradiance.position)
     assert position_nm[0] < 460 < 600 < position_nm[-1]
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_of_a_kinetic_order_only_what_is_known_is_shown(
+    result: ExcitationResult, is_known: bool
+) -> None:
+    patch = result.patches["left"]
+    fit = patch.fit
+    (state,) = fit.states
+    bent = replace(
+        state, k_r_sigma_per_s=0.001, kinetic_order=1.5, kinetic_order_sigma=0.01,
+        is_level_known=is_known,
+    )  # fmt: skip
+    covariance = np.diag([*np.diag(fit.covariance), 1e-4])
+    models = tuple(ExcitationModel(1, order, 12, 1.0, 7.0) for order in (1.0, None))
+    fit = replace(fit, states=(bent,), covariance=covariance, models=models)
+    again = replace(result, patches={"": replace(patch, fit=fit)})
+    assert_read_back(again)
+    assert fit.covariance_parameters[-1] == "kinetic_order 1"
+    shown = render(again, cast(Source, None))
+    assert "b 1.500 ± 0.010" in shown.lines[0]
+    assert ("k_r 0.0" in shown.lines[0]) == is_known
+    assert ("τ" in shown.lines[0] and "p 3.000 ± 0.040" in shown.lines[0]) != is_known
+    assert any("1 state of general order" in line for line in shown.lines)
+    (levels, _) = shown.sections[0].tables
+    assert (levels.rows[0][1:4] == ("–",) * 3) != is_known
+    assert levels.rows[0][-3:-2] == ("1.500 ± 0.010",)
+    material = excited_material(fit, result.irradiance, None, "mine", "run", ())
+    assert material.states[0].kinetic_order == 1.5
+    assert material.states[0].kinetic_order_sigma == 0.01

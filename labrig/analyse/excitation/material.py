@@ -34,15 +34,15 @@ def excited_material(
         states=tuple(
             State(
                 k_r_per_s=state.k_r_per_s,
-                k_r_per_s_sigma=state.k_r_sigma_per_s,
+                k_r_per_s_sigma=_known(state.k_r_sigma_per_s),
                 kinetic_order=state.kinetic_order,
-                kinetic_order_sigma=state.kinetic_order_sigma or None,
+                kinetic_order_sigma=_known(state.kinetic_order_sigma) or None,
                 amplitude=float(max(at_off.amplitude[number], 0.0)),
-                amplitude_sigma=float(at_off.amplitude_sigma[number]),
+                amplitude_sigma=_known(at_off.amplitude_sigma[number]),
                 r0=float(np.clip(at_off.r0[number], 0.0, 1.0)),
-                r0_sigma=float(at_off.r0_sigma[number]),
+                r0_sigma=_known(at_off.r0_sigma[number]),
                 k_e_per_s=tuple(state.k_e_per_s.tolist()),
-                k_e_per_s_sigma=tuple(state.k_e_sigma_per_s.tolist()),
+                k_e_per_s_sigma=_all_known(state.k_e_sigma_per_s),
                 **_reradiation(fit, number, state, spectrum, bands),
             )
             for number, state in enumerate(fit.states)
@@ -58,7 +58,7 @@ def _reradiation(
     state: ExcitedState,
     spectrum: EmissionSpectrum | None,
     bands_nm: FloatArray,
-) -> dict[str, tuple[float, ...]]:
+) -> dict[str, tuple[float, ...] | None]:
     """Return Λ and its σ by band: A_i / k_r,i times the spectrum's mean, with all their errors.
 
     Of an order other than 1 Λ is only known where the charge is.
@@ -76,5 +76,15 @@ def _reradiation(
     sigma = level * np.hypot(shape_sigma, shape * np.sqrt(relative))
     return {
         "reradiation": tuple(np.maximum(value, 0.0).tolist()),
-        "reradiation_sigma": tuple(sigma.tolist()),
+        "reradiation_sigma": _all_known(sigma),
     }
+
+
+def _known(sigma: float) -> float | None:
+    """Return a σ; None where the data leave its quantity open, which a file cannot say by inf."""
+    return float(sigma) if np.isfinite(sigma) else None
+
+
+def _all_known(sigma: FloatArray) -> tuple[float, ...] | None:
+    """Return the σ of all bands; None if some are not known."""
+    return tuple(sigma.tolist()) if np.isfinite(sigma).all() else None
