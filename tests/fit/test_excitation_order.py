@@ -96,6 +96,19 @@ def test_order_rates_and_level_of_a_sample() -> None:
     assert off.decay_time_s[0] == pytest.approx(1 / (law.shape * law.rate_per_s))
 
 
+@pytest.mark.campaign
+def test_the_sigma_of_an_order_is_its_scatter() -> None:
+    """With a lamp as steady as the simulated one; 120 pulls have an rms of 1 ± 0.065."""
+    pulls = []
+    for seed in range(200, 320):
+        series = measured(bench(B, seed=seed))
+        near = fit_excitation(series, [0.03], [1.0], RelativeSigmas(0.005))
+        found = fit_excitation(series, [0.03], [1.0], RelativeSigmas(0.005), near, None)
+        (state,) = found.states
+        pulls.append((state.kinetic_order - B) / state.kinetic_order_sigma)
+    assert np.sqrt(np.mean(np.square(pulls))) == pytest.approx(1.0, abs=0.165)
+
+
 def test_what_a_weak_charge_does_not_tell_is_not_known() -> None:
     """κ, k_r and r(0) scale each other; the decay of the charge is known for all that."""
     sample = bench(B, irradiance=0.05)
