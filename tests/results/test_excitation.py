@@ -40,8 +40,8 @@ def result() -> ExcitationResult:
     unknown = replace(fit.states[0], k_r_sigma_per_s=math.inf)
     fit = replace(fit, states=(unknown,))
     whole = Series(
-        t_s=np.array([1.0, 5.0]), exposure_s=np.ones(2), values=np.ones((2, 1)),
-        sigma=np.full((2, 1), math.nan), dark_sigma=np.zeros(1), channels=("G",),
+        t_s=np.array([1.0, 5.0]), exposure_s=np.ones(2), values=np.ones((2, 3)),
+        sigma=np.full((2, 3), math.nan), dark_sigma=np.zeros(3), channels=("R", "G", "B"),
         iso=np.full(2, 400.0), f_number=np.full(2, 4.0), frame=("a", "b"), unit=("u", "u"),
         flag=("", "late"),
     )  # fmt: skip

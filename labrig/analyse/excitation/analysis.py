@@ -30,6 +30,7 @@ from labrig.results import (
     Closure,
     ExcitationResult,
     FittedDecay,
+    FittedExcitation,
     PatchCharging,
     PatchExcitation,
 )

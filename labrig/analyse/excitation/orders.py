@@ -52,12 +52,23 @@ class OrderFits:
     states_given: bool
 
     def chosen(self, order: str) -> FittedExcitation:
-        """Return the fit with the kinetic orders asked for: `auto`, `free` or a number."""
+        """Return the fit with the kinetic orders asked for: `auto`, `free` or a number.
+
+        Models are compared with errors of the light of the sizes given: those that suit a model may
+        have grown to make good for its law.
+        """
+        doubt: Sequence[str] = ()
         if order in (AUTO, FREE):
-            return self._best(order)
-        fit = self._fit(self._start(), float(order))
+            best = self._best(order)
+        else:
+            held = self._fit(self._start(), float(order))
+            best, doubt = replace(held, models=(_model(held, float(order)),)), tuple(_doubt(held))
+        fit = refit(best, self.relative_sigmas)(self.series)
         return replace(
-            fit, models=(_model(fit, float(order)),), warnings=(*fit.warnings, *_doubt(fit))
+            fit,
+            models=best.models,
+            order_gain=best.order_gain,
+            warnings=(*fit.warnings, *doubt),
         )
 
     def _best(self, order: str) -> FittedExcitation:
@@ -107,7 +118,8 @@ class OrderFits:
         order: float | None,
         near: FittedExcitation | None = None,
     ) -> FittedExcitation:
-        return fit_excitation(self.series, *start, self.relative_sigmas, near, order)
+        as_given = replace(self.relative_sigmas, largest_factor=0.0)
+        return fit_excitation(self.series, *start, as_given, near, order)
 
 
 def refit(
