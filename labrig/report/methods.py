@@ -299,7 +299,8 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     if scatter is not None:
         noise = f"the standard uncertainty of the values, taken {scatter}"
     elif not report.frames:
-        noise = "the standard uncertainties in the table"
+        origins = dict.fromkeys(fit.sigma_origin or "the table" for fit in fits)
+        noise = f"the standard uncertainties of {'; '.join(origins)}"
     yield f"The weights follow {noise}{_flicker(fits)}."
     states = [str(number) for number in sorted({fit.n_states for fit in fits})]
     number = f"n = {states[0]}" if len(states) == 1 else f"n = {' or '.join(states)} by patch"
