@@ -122,7 +122,7 @@ def test_light_in_the_dark_is_becquerel_s_law(b: float) -> None:
 
 @given(st.floats(1e-3, 1.0), rates, st.floats(1.01, 3.9), durations)
 def test_derivatives_in_the_dark(start: float, k: float, b: float, t_s: float) -> None:
-    step = 1e-5
+    step = 3e-6
     for function in (dark_step, mean_emission):
         found = function(start, k, b, t_s)
         for slope, up, down in (

@@ -12,7 +12,10 @@ from labrig.predict.patch import chance_of_all_states
 from labrig.predict.series import DARK, FLICKER, PHOTONS, READING, ExpectedSeries
 from tests.fit import truths
 
-MANY, SOME = range(30), range(12)
+MANY = range(30)
+#: From this signal-to-noise ratio on, and below this rate of the fastest state, the data exclude a
+#: faster one that is not there.
+TELLING_SNR, TELLING_RATE_PER_S = 200.0, 0.2
 
 
 def series(
@@ -95,8 +98,9 @@ def test_they_are_what_the_fit_gives_for_data_without_noise(
     fit = fitted(expected, without_noise(expected), flicker)
     found = information(expected)
     sigma = np.sqrt(np.diag(fit.covariance))[: 2 * states]
-    if flicker:
-        # Values without noise look like flicker that drifts, which the fit's σ then allows for.
+    if flicker or snr < TELLING_SNR or truth[0][0] > TELLING_RATE_PER_S:
+        # The fit's σ allows for what the data do not exclude: flicker that drifts, as values
+        # without noise look, or a fast state.
         assert (found.sigma < 1.001 * sigma).all()
     else:
         np.testing.assert_allclose(found.sigma, sigma, rtol=1e-3)
@@ -140,9 +144,9 @@ def test_fits_that_have_to_measure_their_flicker_report_them(k_r_per_s: float) -
     own = [
         fitted(expected, truths.observe(truths.exponentials(*truth), seed).values, None)
         .states[0].k_r_sigma_per_s
-        for seed in SOME
+        for seed in MANY
     ]  # fmt: skip
-    assert np.mean(own) == pytest.approx(information(expected).sigma[0], rel=0.2)
+    assert np.median(own) == pytest.approx(information(expected).sigma[0], rel=0.12)
 
 
 def test_what_the_frames_do_not_show_is_not_known() -> None:
