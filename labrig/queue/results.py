@@ -17,20 +17,7 @@ from labrig.catalogue import RunSummary, summarise
 from labrig.errors import LabrigError
 from labrig.process import describe_without_run, write_with_report
 from labrig.queue.queue_file import Queue, QueuedRun
-from labrig.report import Report, Section, Table
-from labrig.report.chart import (
-    Axis,
-    Chart,
-    ErrorBars,
-    Margins,
-    Mark,
-    Panel,
-    Points,
-    linear_axis,
-    logarithmic_axis,
-)
-from labrig.report.figure_style import CHANNEL, INK, MARKERS, OTHER_CHANNELS
-from labrig.report.sections import Picture
+from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
 from labrig.results import Measured, read_fitted_decay, read_result
 
 #: Name of the figure, what it shows, label of its axis, and the quantity.
@@ -40,10 +27,6 @@ SWEPT: tuple[tuple[str, str, str, Callable[["FoundState"], Measured]], ...] = (
 )
 #: Status before the run, beside those of runs.
 WAITING = "waiting"
-#: Ratio of the largest to the least value from which an axis of a swept key is logarithmic.
-MANY_TIMES = 8.0
-HEIGHT_PT = 300.0
-COLOURS = (INK, OTHER_CHANNELS[1], OTHER_CHANNELS[0], OTHER_CHANNELS[2], *CHANNEL.values())
 
 
 @dataclass(frozen=True)
@@ -193,7 +176,7 @@ def write_results(folder: Path, name: str, listed: Sequence[QueueEntry]) -> Path
     >>> write_results(Path("queue-results"), "queue", listed).name
     'report.html'
     >>> print(Path("queue-results/results.csv").read_text().splitlines()[1])
-    1,decay,processed,decay,sample,1,0.20476...
+    1,decay,processed,decay,,1,0.20476...
     """
     report = queue_report(name, listed, folder)
     return write_with_report(folder, "results.csv", _csv(listed), report)
@@ -248,7 +231,7 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
     >>> listed = entries(Queue(runs=(QueuedRun(protocol="decay", run="decay"),)), Path("runs"))
     >>> report = queue_report("queue", listed)
     >>> report.sections[0].tables[0].rows[0][-1]
-    '0.2048(29), 0.01012(11)'
+    '0.2048(28), 0.01009(10)'
     """
     keys = _keys(listed)
     rows = [
@@ -271,7 +254,8 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
         Picture(name.format(n), chart, f"{what} over {key}. Bars are ± 1 σ.")
         for n, key in enumerate(keys, 1)
         for name, what, label, quantity in SWEPT
-        if (chart := _chart(listed, key, label, quantity)) is not None
+        for texts, points in [_swept(listed, key, quantity)]
+        if (chart := sweep_chart(key, texts, label, points)) is not None
     )
     swept = (Section("Over what was changed", figures=figures),) if figures else ()
     about = describe_without_run(name, "queue", "", ())
@@ -294,55 +278,16 @@ def _rates(entry: QueueEntry) -> list[str]:
     ]
 
 
-def _chart(
-    listed: Sequence[QueueEntry], key: str, label: str, quantity: Callable[[FoundState], Measured]
-) -> Chart | None:
-    """Return a quantity of states over a key that has two values or more in numbers; else None."""
-    points: dict[tuple[str, int], list[tuple[float, Measured]]] = {}
-    texts: dict[float, str] = {}
-    for entry in listed:
-        x = entry.value(key)
-        if key not in entry.queued.changes or np.isnan(x):
-            continue
-        texts[x] = str(entry.queued.changes[key])
-        for state in entry.states:
-            points.setdefault((state.patch, state.number), []).append((x, quantity(state)))
-    if len(texts) < 2 or not points:
-        return None
-    marks: list[Mark] = []
-    legend: list[tuple[str, Mark]] = []
-    patches = list(dict.fromkeys(patch for patch, _ in points))
-    every = []
-    for (patch, number), found in points.items():
-        at = np.array([value for value, _ in found])
-        y = np.array([measured.value for _, measured in found])
-        sigma = np.array([measured.sigma for _, measured in found])
-        colour = COLOURS[(number - 1) % len(COLOURS)]
-        marker = MARKERS[patches.index(patch) % len(MARKERS)]
-        dots = Points(colour, at, y, marker=marker, size_pt=5.0)
-        marks += [ErrorBars(colour, at, y, np.where(np.isfinite(sigma), sigma, 0.0)), dots]
-        legend.append((f"state {number}{f', {patch}' if len(patches) > 1 else ''}", dots))
-        every += y.tolist()
-    panel = Panel(_axis(key, texts), _range(label, every), tuple(marks), Margins(top=30.0))
-    return Chart((panel,), HEIGHT_PT, legend=tuple(legend), columns=min(len(legend), 4))
-
-
-def _range(label: str, values: Sequence[float]) -> Axis:
-    """Return an axis for values > 0, logarithmic if they differ much."""
-    low, high = min(values), max(values)
-    if low > 0 and high > MANY_TIMES * low:
-        return logarithmic_axis(label, low / 1.5, high * 1.5)
-    return linear_axis(label, 0.0, 1.15 * high)
-
-
-def _axis(key: str, texts: dict[float, str]) -> Axis:
-    """Return an axis with the values as they were typed; without them where there are many."""
-    low, high = min(texts), max(texts)
-    is_logarithmic = low > 0 and high > MANY_TIMES * low
-    if is_logarithmic:
-        axis = logarithmic_axis(key, low / 1.5, high * 1.5)
-    else:
-        axis = linear_axis(key, low - 0.08 * (high - low), high + 0.08 * (high - low))
-    if len(texts) > 8:
-        return axis
-    return Axis(key, axis.low, axis.high, tuple(sorted(texts.items())), (), is_logarithmic)
+def _swept(
+    listed: Sequence[QueueEntry], key: str, quantity: Callable[[FoundState], Measured]
+) -> tuple[dict[float, str], list[SweptPoint]]:
+    """Return the values of a key, as typed by their numbers, and a quantity of all runs."""
+    of_key = [entry for entry in listed if key in entry.queued.changes]
+    values = {entry.number: entry.value(key) for entry in of_key}
+    known = [entry for entry in of_key if not np.isnan(values[entry.number])]
+    texts = {values[entry.number]: str(entry.queued.changes[key]) for entry in known}
+    return texts, [
+        SweptPoint(values[entry.number], state.patch, state.number, quantity(state))
+        for entry in known
+        for state in entry.states
+    ]

@@ -64,6 +64,15 @@ def run_queue(path: Path, runs: Path, attendant: Attendant) -> Path:
         Some runs could not be reduced or fitted; all others are complete.
     Interrupted, LabrigError
         A run ended early, in the safe state; to run the queue again goes on with it.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.queue import Queue, QueuedRun, change_queue, run_queue
+    >>> queue = Queue(runs=(QueuedRun(protocol="decay", run="decay"),))
+    >>> _ = change_queue(Path("done.yaml"), lambda before: queue)
+    >>> run_queue(Path("done.yaml"), Path("runs"), attendant=None).as_posix()
+    'done-results/report.html'
     """
     with _alone(path):
         for entry in entries(read_queue(path), runs):

@@ -80,3 +80,7 @@ from .sections import (
     Source as Source,
     Table as Table,
 )
+from .sweep import (
+    SweptPoint as SweptPoint,
+    sweep_chart as sweep_chart,
+)
