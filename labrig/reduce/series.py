@@ -95,6 +95,8 @@ def apply_calibration(
 #: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
 TWO_DEGREES = 2 ** (2 / 6) - 1
+#: Multiple of the smallest patch's pixels up to which patches are taken together for their noise.
+ALIKE = 4.0
 #: Largest correlation of the errors of different channels.
 MAX_COMMON = 0.99
 
@@ -363,7 +365,13 @@ def _patch_levels(
 def _noise_together(
     patches: Sequence[_PatchLevels], measured: Sequence[MeasuredFrame]
 ) -> dict[str, SensorNoise | None]:
-    """Return the noise of the pixels in all patches for each unit, by units of one ISO."""
+    """Return the noise of the pixels for each unit, by units of one ISO.
+
+    It is that of the smallest patches: larger ones, such as the whole frame, may have structure
+    that changes from frame to frame.
+    """
+    size = [patch.frames.pixels.sum() for patch in patches]
+    small = [patch for patch, each in zip(patches, size, strict=True) if each <= ALIKE * min(size)]
     t_s = np.array([entry.frame.t_s for entry in measured])
     rows = rows_of_units([entry.frame.unit for entry in measured])
     units_of: dict[float, list[str]] = defaultdict(list)
@@ -375,12 +383,12 @@ def _noise_together(
             PatchPairs.of_unit(
                 patch.frames.take(rows[unit]), t_s[rows[unit]], patch.usable[rows[unit]]
             )
-            for patch in patches
+            for patch in small
             for unit in units
         ]
         pairs += [
             PatchPairs.of_like_exposure(patch.darks[units[0]])
-            for patch in patches
+            for patch in small
             if units[0] in patch.darks
         ]
         together |= dict.fromkeys(units, SensorNoise.of_patches(pairs))

@@ -32,6 +32,9 @@ from labrig.results import (
 
 #: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"
+#: Name of the frame among the regions.
+FRAME = "(whole frame)"
+WHOLE_FRAME: Region = (0.0, 0.0, 1.0, 1.0)
 #: Placeholder for the values of a series.
 NOTHING: FloatArray = np.empty((0, 0, 0))
 
@@ -72,7 +75,8 @@ def patch_chargings(
             _place_name(patch, name): region
             for patch, slices in sites.items()
             for name, region in {**slices, WHOLE: _bounding_region(slices)}.items()
-        },
+        }
+        | {FRAME: WHOLE_FRAME},
         [
             untimed(frame)
             for frame in part.run.frames(FrameRole.DARK)
@@ -121,7 +125,9 @@ def patch_chargings(
         weights = site_weights(slices, irradiance, layout)
         values, sigma = site_means(values, sigma, usable, weights)
         strip_series = series[_place_name(patch, WHOLE)]
-        chargings[patch] = _divide_by_evenness(values, sigma, through, direct, strip_series, frames)
+        chargings[patch] = _divide_by_evenness(
+            values, sigma, through, direct, strip_series, series[FRAME].values, frames
+        )
     return chargings, (*frames.left_out, *reasons)
 
 
@@ -131,6 +137,7 @@ def _divide_by_evenness(
     through: ChargingSeries,
     direct: ChargingSeries,
     strip_series: Series,
+    frame_light: FloatArray,
     frames: ChargeFrames,
 ) -> PatchCharging:
     """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
@@ -139,8 +146,18 @@ def _divide_by_evenness(
     values, sigma = values / evenness[:, None], sigma / evenness[:, None]
     is_last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
-        replace(through, values=values[~is_direct], sigma=sigma[~is_direct]),
-        replace(direct, values=values[is_direct], sigma=sigma[is_direct]),
+        replace(
+            through,
+            values=values[~is_direct],
+            sigma=sigma[~is_direct],
+            frame_light=frame_light[~is_direct],
+        ),
+        replace(
+            direct,
+            values=values[is_direct],
+            sigma=sigma[is_direct],
+            frame_light=frame_light[is_direct],
+        ),
         evenness,
         _final_decay(strip_series, is_last, frames),
     )

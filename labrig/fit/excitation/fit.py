@@ -29,6 +29,7 @@ from labrig.results import (
     ConcentrationAtOff,
     ExcitedState,
     FittedExcitation,
+    Measured,
 )
 
 #: Tolerance of the relative step, for the starting points and for the result.
@@ -135,6 +136,7 @@ def _roughly(
                 sigma=np.hypot(charging.sigma, LIGHT_SIGMA * charging.values)[..., [reference]],
                 site_modes=None,
                 across=None,
+                frame_light=None,
             )
             for charging in problem.series
         ],
@@ -264,9 +266,19 @@ def _result(
         residuals=problem.plain_residuals(theta),
         order_gain=order_gain(problem, theta, reference, uncertain),
         by_band=by_band,
+        veil=_veil(problem, solution),
         lamp_sigma=uncertain.lamp,
         site_sizes=site_sizes,
     )
+
+
+def _veil(problem: ExcitationProblem, solution: LeastSquaresFit) -> Measured | None:
+    """Return the fraction of the frame's light over every site; None if it was not fitted."""
+    place = problem.parameters.columns.veil
+    if not is_fitted(place):
+        return None
+    sigma = np.sqrt(solution.covariance[place.start, place.start])
+    return Measured(float(solution.parameters[place.start]), float(sigma))
 
 
 def _at_off(

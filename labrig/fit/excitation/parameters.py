@@ -37,6 +37,9 @@ class Rates(NamedTuple):
         Amplitudes z of `ChargingSeries.site_modes`, series by series, shape (M,).
     offset
         Dark level that was not subtracted, shape (C,), or (0,) if it is not fitted.
+    veil
+        Fraction of the frame's light that lies over every site, shape (1,), or (0,) if it is not
+        fitted.
     order
         Kinetic orders b, shape (N,).
     gain
@@ -52,6 +55,7 @@ class Rates(NamedTuple):
     lacking: FloatArray
     off: FloatArray
     offset: FloatArray
+    veil: FloatArray
     order: FloatArray
     gain: FloatArray
 
@@ -75,6 +79,10 @@ class RelativeSigmas:
     common_mode
         Scatter of the dark level from exposure to exposure in the values' unit, shape (C,): an
         exposing sensor warms.
+    veil
+        σ of the fraction of the frame's light that lies over every site, by glare of the lens and
+        by surfaces that light one another; 0 is expected. Fitted where the light of the frames is
+        known.
     irradiance
         Relative σ of E in every band, a scalar or (B,), common to all series: the fit cannot
         constrain it.
@@ -89,6 +97,7 @@ class RelativeSigmas:
     scale: float = 0.0
     offset: tuple[float, ...] = ()
     common_mode: tuple[float, ...] = ()
+    veil: float = 0.0
     irradiance: float | tuple[float, ...] = 0.0
     largest_factor: float = 0.0
 
@@ -117,6 +126,7 @@ class ParameterLayout(NamedTuple):
     lacking: slice
     off: slice
     offset: slice
+    veil: slice
 
 
 def is_fitted(place: slice) -> bool:
@@ -181,7 +191,11 @@ class Parameters:
             self._first_mode[-1],
         ]
         sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold_deficit, 1.0]
-        self.prior_sigma: FloatArray = np.concatenate([np.repeat(sigmas, counts), uncertain.offset])
+        is_veiled = all(charging.frame_light is not None for charging in series)
+        veils = [uncertain.veil] if uncertain.veil > 0 and is_veiled else []
+        self.prior_sigma: FloatArray = np.concatenate(
+            [np.repeat(sigmas, counts), uncertain.offset, veils]
+        )
         free_counts = [
             states,
             states,
@@ -189,7 +203,7 @@ class Parameters:
             len(self.others),
             states if order is None else 0,
         ]
-        ends = _begins([*free_counts, *counts, len(uncertain.offset)])
+        ends = _begins([*free_counts, *counts, len(uncertain.offset), len(veils)])
         self.columns = ParameterLayout(*(slice(*limits) for limits in pairwise(ends)))
         self.count = ends[-1]
 
@@ -259,6 +273,7 @@ class Parameters:
             theta[columns.lacking],
             theta[columns.off],
             theta[columns.offset],
+            theta[columns.veil],
             order,
             gain,
         )

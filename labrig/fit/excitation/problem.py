@@ -69,7 +69,7 @@ class ExcitationProblem:
         """Return the model of every series, shape (n, P, C) each."""
         rates = self.parameters.unpack(theta)
         return [
-            _signal(self.levels(charging, rates).value @ rates.amplitude, rates)
+            _signal(self.levels(charging, rates).value @ rates.amplitude, rates, charging)
             for charging in self.illuminated_series(rates)
         ]
 
@@ -159,7 +159,9 @@ class ExcitationProblem:
             jacobian[:, :, channel, place] = glow * inverse[..., channel]
         for channel in range(len(rates.offset)):
             jacobian[:, :, channel, columns.offset.start + channel] = inverse[..., channel]
-        misfit = (_signal(glow, rates) - self._values[number]) * inverse
+        if is_fitted(columns.veil):
+            jacobian[..., columns.veil.start] = _frame_light(charging) * inverse
+        misfit = (_signal(glow, rates, charging) - self._values[number]) * inverse
         return self._whitened(number, misfit.reshape(shots, -1), jacobian)
 
     def _set_light_derivatives(
@@ -244,7 +246,15 @@ def _flat(values: FloatArray) -> FloatArray:
     return values.reshape(len(values), -1)
 
 
-def _signal(glow: FloatArray, rates: Rates) -> FloatArray:
+def _signal(glow: FloatArray, rates: Rates, charging: ChargingSeries) -> FloatArray:
     """Return the signal (n, P, C) of a glow (n, P) in the brightest channel."""
     signal: FloatArray = np.multiply.outer(glow, rates.weights)
+    if len(rates.veil):
+        signal += rates.veil * _frame_light(charging)
     return signal + rates.offset if len(rates.offset) else signal
+
+
+def _frame_light(charging: ChargingSeries) -> FloatArray:
+    """Return the light of each frame, for all sites, shape (n, 1, C)."""
+    assert charging.frame_light is not None
+    return charging.frame_light[:, None, :]
