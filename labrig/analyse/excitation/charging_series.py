@@ -144,19 +144,22 @@ def _divide_by_evenness(
     is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
     evenness = _evenness(values[is_direct], sigma[is_direct])
     values, sigma = values / evenness[:, None], sigma / evenness[:, None]
+    # Direct charges define what even light is, with the veil that lies over it.
+    even = np.where(is_direct[:, None], 1.0, evenness)
+    veils = frame_light[:, None, :] / even[..., None]
     is_last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
         replace(
             through,
             values=values[~is_direct],
             sigma=sigma[~is_direct],
-            frame_light=frame_light[~is_direct],
+            frame_light=veils[~is_direct],
         ),
         replace(
             direct,
             values=values[is_direct],
             sigma=sigma[is_direct],
-            frame_light=frame_light[is_direct],
+            frame_light=veils[is_direct],
         ),
         evenness,
         _final_decay(strip_series, is_last, frames),

@@ -159,8 +159,8 @@ class ExcitationProblem:
             jacobian[:, :, channel, place] = glow * inverse[..., channel]
         for channel in range(len(rates.offset)):
             jacobian[:, :, channel, columns.offset.start + channel] = inverse[..., channel]
-        if is_fitted(columns.veil):
-            jacobian[..., columns.veil.start] = _frame_light(charging) * inverse
+        if charging.frame_light is not None and is_fitted(columns.veil):
+            jacobian[..., columns.veil.start] = charging.frame_light * inverse
         misfit = (_signal(glow, rates, charging) - self._values[number]) * inverse
         return self._whitened(number, misfit.reshape(shots, -1), jacobian)
 
@@ -249,12 +249,6 @@ def _flat(values: FloatArray) -> FloatArray:
 def _signal(glow: FloatArray, rates: Rates, charging: ChargingSeries) -> FloatArray:
     """Return the signal (n, P, C) of a glow (n, P) in the brightest channel."""
     signal: FloatArray = np.multiply.outer(glow, rates.weights)
-    if len(rates.veil):
-        signal += rates.veil * _frame_light(charging)
+    if charging.frame_light is not None and len(rates.veil):
+        signal += rates.veil * charging.frame_light
     return signal + rates.offset if len(rates.offset) else signal
-
-
-def _frame_light(charging: ChargingSeries) -> FloatArray:
-    """Return the light of each frame, for all sites, shape (n, 1, C)."""
-    assert charging.frame_light is not None
-    return charging.frame_light[:, None, :]
