@@ -148,6 +148,9 @@ class ChargingSeries:
     frame_light
         Mean light of the whole frame of each photograph, a fraction of which may veil every site,
         in the unit of the site's values, shape (n, P, C). None: nothing does.
+    veil_shapes
+        Courses along the sites by which the veil may differ from an even one, shape (K, P). None:
+        it is even.
     earlier
         Last charge before the first one of the series, which states of a kinetic order above 1
         remember for long; None: there was none.
@@ -164,6 +167,7 @@ class ChargingSeries:
     mode_kind: IntArray | None = None
     across: FloatArray | None = None
     frame_light: FloatArray | None = None
+    veil_shapes: FloatArray | None = None
     earlier: EarlierCharge | None = None
 
     def spread(self) -> Self:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
 from labrig.analyse.excitation.lamp_light import (
@@ -35,6 +36,8 @@ WHOLE = "whole strip"
 #: Name of the frame among the regions.
 FRAME = "(whole frame)"
 WHOLE_FRAME: Region = (0.0, 0.0, 1.0, 1.0)
+#: Degree of the veil's course along the sites.
+VEIL_DEGREE = 3
 #: Placeholder for the values of a series.
 NOTHING: FloatArray = np.empty((0, 0, 0))
 
@@ -154,6 +157,7 @@ def _divide_by_evenness(
             values=values[~is_direct],
             sigma=sigma[~is_direct],
             frame_light=veils[~is_direct],
+            veil_shapes=_veil_shapes(values.shape[1]),
         ),
         replace(
             direct,
@@ -164,6 +168,12 @@ def _divide_by_evenness(
         evenness,
         _final_decay(strip_series, is_last, frames),
     )
+
+
+def _veil_shapes(sites: int) -> FloatArray:
+    """Return smooth courses along the sites, Legendre's polynomials of low degree, shape (K, P)."""
+    along = np.linspace(-1.0, 1.0, sites)
+    return np.asarray(legvander(along, VEIL_DEGREE)[:, 1:].T)
 
 
 def _charge(

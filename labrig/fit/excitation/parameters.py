@@ -38,8 +38,8 @@ class Rates(NamedTuple):
     offset
         Dark level that was not subtracted, shape (C,), or (0,) if it is not fitted.
     veil
-        Fraction of the frame's light that lies over every site, shape (1,), or (0,) if it is not
-        fitted.
+        Fraction of the frame's light that lies over every site, followed by amplitudes of
+        `ChargingSeries.veil_shapes`, shape (1 + K,), or (0,) if it is not fitted.
     order
         Kinetic orders b, shape (N,).
     gain
@@ -83,6 +83,9 @@ class RelativeSigmas:
         σ of the fraction of the frame's light that lies over every site, by glare of the lens and
         by surfaces that light one another; 0 is expected. Fitted where the light of the frames is
         known.
+    veil_shape
+        σ of the amplitude of each of the shapes by which that differs from site to site; with 0 it
+        does not.
     irradiance
         Relative σ of E in every band, a scalar or (B,), common to all series: the fit cannot
         constrain it.
@@ -98,6 +101,7 @@ class RelativeSigmas:
     offset: tuple[float, ...] = ()
     common_mode: tuple[float, ...] = ()
     veil: float = 0.0
+    veil_shape: float = 0.0
     irradiance: float | tuple[float, ...] = 0.0
     largest_factor: float = 0.0
 
@@ -193,6 +197,9 @@ class Parameters:
         sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold_deficit, 1.0]
         is_veiled = all(charging.frame_light is not None for charging in series)
         veils = [uncertain.veil] if uncertain.veil > 0 and is_veiled else []
+        if veils and uncertain.veil_shape > 0:
+            shapes = max(0 if one.veil_shapes is None else len(one.veil_shapes) for one in series)
+            veils += shapes * [uncertain.veil_shape]
         self.prior_sigma: FloatArray = np.concatenate(
             [np.repeat(sigmas, counts), uncertain.offset, veils]
         )

@@ -160,7 +160,8 @@ class ExcitationProblem:
         for channel in range(len(rates.offset)):
             jacobian[:, :, channel, columns.offset.start + channel] = inverse[..., channel]
         if charging.frame_light is not None and is_fitted(columns.veil):
-            jacobian[..., columns.veil.start] = charging.frame_light * inverse
+            veils = _veils(charging, len(rates.veil))
+            jacobian[..., columns.veil] = (charging.frame_light * inverse)[..., None] * veils
         misfit = (_signal(glow, rates, charging) - self._values[number]) * inverse
         return self._whitened(number, misfit.reshape(shots, -1), jacobian)
 
@@ -250,5 +251,14 @@ def _signal(glow: FloatArray, rates: Rates, charging: ChargingSeries) -> FloatAr
     """Return the signal (n, P, C) of a glow (n, P) in the brightest channel."""
     signal: FloatArray = np.multiply.outer(glow, rates.weights)
     if charging.frame_light is not None and len(rates.veil):
-        signal += rates.veil * charging.frame_light
+        signal += charging.frame_light * (_veils(charging, len(rates.veil)) @ rates.veil)
     return signal + rates.offset if len(rates.offset) else signal
+
+
+def _veils(charging: ChargingSeries, count: int) -> FloatArray:
+    """Return the even veil and its shapes along the sites, shape (P, 1, count)."""
+    veils = np.zeros((charging.values.shape[1], 1, count))
+    veils[..., 0] = 1.0
+    if charging.veil_shapes is not None and count > 1:
+        veils[:, 0, 1:] = charging.veil_shapes.T
+    return veils
