@@ -228,12 +228,14 @@ class Parameters:
         return slice(*self._first_mode[number : number + 2])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of θ: excitation rates and weights ≥ 0, amplitudes in their range."""
+        """Return bounds of θ: excitation rates, weights and veil ≥ 0, amplitudes in their range."""
         lower, upper = np.full(self.count, -np.inf), np.full(self.count, np.inf)
         lower[self.columns.growth.start : self.columns.weights.stop] = 0.0
         lower[self.columns.inverse_gain] = 1 / self._largest_gain
         upper[self.columns.inverse_gain] = 1 / self._least_gain
         lower[self.columns.order], upper[self.columns.order] = 1.0, MAX_ORDER
+        if is_fitted(self.columns.veil):
+            lower[self.columns.veil.start] = 0.0
         return lower, upper
 
     def as_stated(
