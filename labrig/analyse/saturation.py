@@ -355,3 +355,16 @@ def _warnings(patch: PatchSaturation) -> Iterator[str]:
             "slowly the less it was charged: rates of exponentials hold for one charge only; "
             "excitation finds the order, too"
         )
+    if patch.is_of_no_law:
+        assert patch.order is not None
+        yield (
+            "neither first order nor a kinetic order describes how the glow falls after different "
+            f"charges (exponents {_known(patch.order.shift)} by the charge, "
+            f"{_known(patch.order.shape)} by the shape of the decays): rates hold for the charge "
+            "they were measured at; measure the decay after the charge that matters, and give "
+            "excitation two states of free order (--states 2 --order free)"
+        )
+
+
+def _known(found: Measured) -> str:
+    return plus_minus(found.value, found.sigma)

@@ -208,6 +208,11 @@ def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:
     return mean, sigma
 
 
+def pixels(views: Sequence[RegionMeasurement]) -> Floats:
+    """Return the number of pixels of each channel, shape (C,)."""
+    return np.array([stats.n for stats in views[0].measured.channels.values()], dtype=np.float64)
+
+
 def strips(views: Sequence[RegionMeasurement]) -> Floats:
     """Return the deviations of the strips in DN, shape (n, C, strips)."""
     return np.stack([view.strips for view in views])

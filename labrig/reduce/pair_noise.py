@@ -8,20 +8,23 @@ pairs of Janesick (2007) and EMVA 1288, on strips as wide as the patch instead o
 scatter of a strip contains the correlation of all pixels in it. Dark frames of similar exposure are
 pairs, too: they determine the read noise, which of a decay only the faintest frames do.
 
+Patches of too few pairs are taken together: the noise of a pixel at some level is that of the
+sensor, whatever patch it lies in. So narrow places side by side have the right noise, where a
+single frame would mix it with that of their surroundings.
+
 Deviations of the strips may be correlated between channels: rows that are read together, charge
 that strays into the neighbour of another colour. The same differences determine that correlation.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from labrig.reduce.channels import PixelMask
 from labrig.reduce.dark import same_exposure
-from labrig.reduce.photon_transfer import NoiseModel, variance_terms
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel, variance_terms
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.region import Region, region_pixels
@@ -73,36 +76,35 @@ class PatchFrames:
         Means in DN above those of zero exposure, dark current included, shape (n, C).
     sigma
         Standard uncertainty of the means by each frame alone in DN, shape (n, C).
+    pixels
+        Number of pixels of each channel, shape (C,).
     """
 
     exposure_s: Floats
     deviations: Floats
     light: Floats
     sigma: Floats
+    pixels: Floats
 
     def take(self, rows: npt.NDArray[np.intp]) -> "PatchFrames":
         """Return the given frames."""
-        return PatchFrames(
-            self.exposure_s[rows], self.deviations[rows], self.light[rows], self.sigma[rows]
+        return replace(
+            self,
+            exposure_s=self.exposure_s[rows],
+            deviations=self.deviations[rows],
+            light=self.light[rows],
+            sigma=self.sigma[rows],
         )
 
     def concatenate(self, others: "PatchFrames") -> "PatchFrames":
         """Return these frames followed by `others`."""
-        return PatchFrames(
-            np.append(self.exposure_s, others.exposure_s),
-            np.concatenate([self.deviations, others.deviations]),
-            np.concatenate([self.light, others.light]),
-            np.concatenate([self.sigma, others.sigma]),
+        return replace(
+            self,
+            exposure_s=np.append(self.exposure_s, others.exposure_s),
+            deviations=np.concatenate([self.deviations, others.deviations]),
+            light=np.concatenate([self.light, others.light]),
+            sigma=np.concatenate([self.sigma, others.sigma]),
         )
-
-    def pairs_of_like_exposure(self) -> list[tuple[int, int]]:
-        """Return pairs of frames that differ by noise only, whatever the dark current's pattern."""
-        rising = np.argsort(self.exposure_s, kind="stable").tolist()
-        return [
-            (first, second)
-            for first, second in pairwise(rising)
-            if same_exposure(self.exposure_s[first], self.exposure_s[second])
-        ]
 
 
 def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Floats:
@@ -141,16 +143,123 @@ def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Fl
     return np.asarray(means - means.mean(axis=1, keepdims=True))
 
 
+@dataclass(frozen=True, eq=False)
+class PatchPairs:
+    """Frames of a patch that differ by noise only.
+
+    Attributes
+    ----------
+    frames
+        The patch in frames of light, followed by dark ones.
+    first, second
+        Frames of each pair, shape (p,).
+    """
+
+    frames: PatchFrames
+    first: npt.NDArray[np.intp]
+    second: npt.NDArray[np.intp]
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom of the differences in one channel."""
+        return int(len(self.first) * (self.frames.deviations.shape[2] - 1))
+
+    @classmethod
+    def of_unit(
+        cls,
+        frames: PatchFrames,
+        t_s: Floats,
+        usable: npt.NDArray[np.bool_],
+        darks: PatchFrames | None = None,
+    ) -> "PatchPairs":
+        """Return successive usable frames of a unit as pairs, and like dark frames.
+
+        Parameters
+        ----------
+        frames
+            The patch in the n frames of a unit.
+        t_s
+            Begin of each exposure in seconds, shape (n,).
+        usable
+            Whether the frame can be in a pair, shape (n,).
+        darks
+            Dark frames at the ISO of the unit.
+        """
+        rows = np.flatnonzero(usable)
+        rows = rows[np.argsort(t_s[rows], kind="stable")]
+        light = cls(frames, rows[:-1], rows[1:])
+        if darks is None:
+            return light
+        dark = cls.of_like_exposure(darks)
+        return cls(
+            frames.concatenate(darks),
+            np.append(light.first, len(t_s) + dark.first),
+            np.append(light.second, len(t_s) + dark.second),
+        )
+
+    @classmethod
+    def of_like_exposure(cls, frames: PatchFrames) -> "PatchPairs":
+        """Return pairs of dark frames that differ by noise only, whatever the current's pattern."""
+        rising = np.argsort(frames.exposure_s, kind="stable")
+        first, second = rising[:-1], rising[1:]
+        like = [
+            same_exposure(*frames.exposure_s[[one, two]])
+            for one, two in zip(first, second, strict=True)
+        ]
+        return cls(frames, first[like], second[like])
+
+
+@dataclass(frozen=True, eq=False)
+class SensorNoise:
+    """Noise of single pixels, from pairs of frames in many patches.
+
+    Attributes
+    ----------
+    models
+        Variance of a pixel of each channel.
+    brightest
+        Brightness of the brightest pair of each channel in DN, shape (C,).
+    """
+
+    models: Sequence[NoiseModel]
+    brightest: Floats
+
+    @classmethod
+    def of_patches(cls, patches: Sequence[PatchPairs]) -> "SensorNoise | None":
+        """Return the noise that all pairs have in common; None if they are too few."""
+        if sum(pairs.dof for pairs in patches) < FEWEST_DOF:
+            return None
+        channels = range(patches[0].frames.light.shape[1])
+        return cls(
+            [_pixel_noise(patches, channel) for channel in channels],
+            np.max([_pair_light(pairs).max(axis=0) for pairs in patches if pairs.dof], axis=0),
+        )
+
+    def sigma(self, frames: PatchFrames) -> Floats:
+        """Return σ of the means of a patch in DN, shape (n, C); that of each frame if brighter."""
+        variance = np.column_stack(
+            [
+                model.variance_dn2(light)
+                for model, light in zip(self.models, frames.light.T, strict=True)
+            ]
+        )
+        is_beyond = _is_bright(frames) & (frames.light > MAX_EXTRAPOLATION * self.brightest)
+        sigma = np.maximum(np.sqrt(variance / frames.pixels), MIN_FRACTION * frames.sigma)
+        return np.where(is_beyond, frames.sigma, sigma)
+
+
 def paired_noise(
     frames: PatchFrames,
     t_s: Floats,
     unit: Sequence[str],
     usable: npt.NDArray[np.bool_],
     darks: Mapping[str, PatchFrames],
+    together: Mapping[str, SensorNoise | None],
 ) -> PatchNoise:
     """Estimate the noise of the means of a patch, σ unit by unit.
 
-    Where there are too few pairs, σ of each frame alone is kept, the channels then independent.
+    Where a unit has too few pairs, σ is that of all patches together; if these have too few, that
+    of each frame alone. The channels are then independent.
 
     Parameters
     ----------
@@ -164,29 +273,34 @@ def paired_noise(
         Whether the frame can be in a pair, shape (n,).
     darks
         Dark frames at the ISO of each unit, where there are any.
+    together
+        Noise of the pixels of all patches, for each unit.
     """
     sigma = frames.sigma.copy()
     channels = sigma.shape[1]
     products = MIN_PRODUCT * np.eye(channels)
-    for name in dict.fromkeys(unit):
-        rows = np.array([row for row, row_unit in enumerate(unit) if row_unit == name])
-        paired = np.flatnonzero(usable[rows])
-        paired = paired[np.argsort(t_s[rows[paired]], kind="stable")]
-        pairs = list(pairwise(paired.tolist()))
-        if len(pairs) * (frames.deviations.shape[2] - 1) < FEWEST_DOF:
-            continue
+    for name, rows in rows_of_units(unit).items():
         part = frames.take(rows)
-        if name in darks:
-            dark_pairs = darks[name].pairs_of_like_exposure()
-            pairs += [(len(rows) + first, len(rows) + second) for first, second in dark_pairs]
-            part = part.concatenate(darks[name])
-        first, second = np.array(pairs).T
+        light = PatchPairs.of_unit(part, t_s[rows], usable[rows])
+        shared = together.get(name)
+        if light.dof < FEWEST_DOF:
+            if shared is not None:
+                sigma[rows] = shared.sigma(part)
+            continue
+        pairs = PatchPairs.of_unit(part, t_s[rows], usable[rows], darks.get(name))
         for channel in range(channels):
-            sigma[rows, channel] = _sigma_of_means(part, channel, first, second)[: len(rows)]
-        light = second < len(rows)
-        products += _cross_products(frames.take(rows), sigma[rows], first[light], second[light])
+            sigma[rows, channel] = _sigma_of_means(pairs, channel)[: len(rows)]
+        products += _cross_products(light, sigma[rows])
     length = np.sqrt(np.diag(products))
     return PatchNoise(sigma, products / np.outer(length, length))
+
+
+def rows_of_units(unit: Sequence[str]) -> dict[str, npt.NDArray[np.intp]]:
+    """Return the rows of the frames of each unit, by its name."""
+    return {
+        name: np.flatnonzero([row_unit == name for row_unit in unit])
+        for name in dict.fromkeys(unit)
+    }
 
 
 def paired_dark_sigma(darks: PatchFrames) -> Floats:
@@ -195,62 +309,96 @@ def paired_dark_sigma(darks: PatchFrames) -> Floats:
     It is estimated from pairs of similar exposure, or from each frame alone where these are too
     few.
     """
-    pairs = darks.pairs_of_like_exposure()
-    if len(pairs) * (darks.deviations.shape[2] - 1) < FEWEST_DOF:
+    pairs = PatchPairs.of_like_exposure(darks)
+    if pairs.dof < FEWEST_DOF:
         return darks.sigma
-    first, second = np.array(pairs).T
     channels = range(darks.sigma.shape[1])
-    return np.stack([_sigma_of_means(darks, c, first, second) for c in channels], axis=1)
+    return np.stack([_sigma_of_means(pairs, channel) for channel in channels], axis=1)
 
 
-def _cross_products(
-    frames: PatchFrames, sigma: Floats, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
-) -> Floats:
+def _cross_products(pairs: PatchPairs, sigma: Floats) -> Floats:
     """Sum products of the channels' normalised differences over paired frames, shape (C, C)."""
-    scales, differences = _differences(frames, sigma, first, second)
-    expected = np.square(sigma[second]) + np.square(scales * sigma[first])
+    scales, differences = _differences(pairs, sigma)
+    expected = np.square(sigma[pairs.second]) + np.square(scales * sigma[pairs.first])
     normal = differences / np.sqrt(expected)[..., np.newaxis]
     products: Floats = np.einsum("pcs,pds->cd", normal, normal)
     return products
 
 
-def _differences(
-    frames: PatchFrames, sigma: Floats, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
-) -> tuple[Floats, Floats]:
+def _differences(pairs: PatchPairs, sigma: Floats) -> tuple[Floats, Floats]:
     """Return scales and differences of p pairs of frames.
 
     The scale of the first frame to the second has shape (p, C), the difference of their s strips
     (p, C, s). A frame that is nothing but noise is not scaled.
     """
+    frames, first, second = pairs.frames, pairs.first, pairs.second
     light = np.maximum(frames.light, 0)
     is_bright = light[first] > SCALED_SIGMAS * sigma[first]
     scales = np.where(is_bright, light[second] / np.where(is_bright, light[first], 1.0), 1.0)
     return scales, frames.deviations[second] - scales[..., np.newaxis] * frames.deviations[first]
 
 
-def _sigma_of_means(
-    frames: PatchFrames, channel: int, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
-) -> Floats:
+def _sigma_of_means(pairs: PatchPairs, channel: int) -> Floats:
     """Return σ of the means of one channel in DN, shape (n,), from pairs of frames.
 
     The uneven part is proportional to the light but not common to the patch. A frame much brighter
     than all pairs keeps the σ by itself alone: scaled to a dark frame, it leaves none of its noise
     in the difference.
     """
-    scales, differences = _differences(frames, frames.sigma, first, second)
-    scale, difference, sigma = scales[:, channel], differences[:, channel], frames.sigma[:, channel]
-    strips = difference.shape[1]
-    light = frames.light[:, channel]
-    scatter = np.square(difference).sum(axis=1) / (strips - 1) / strips
-    terms = variance_terms(light)
-    pair_terms = terms[second] + np.square(scale)[:, np.newaxis] * terms[first]
+    frames, first, second = pairs.frames, pairs.first, pairs.second
+    sigma, light = frames.sigma[:, channel], frames.light[:, channel]
+    scatter, pair_terms, scale = _scatter(pairs, channel)
     variance = np.square(sigma)
     least = MIN_FRACTION**2 * variance
     for _ in range(REWEIGHTINGS):
         expected = variance[second] + np.square(scale) * variance[first]
         noise = NoiseModel.fit(pair_terms, scatter, sigma_dn2=expected)
         variance = np.maximum(noise.variance_dn2(light), least)
-    pair_light = (light[second] + np.square(scale) * light[first]) / (1 + np.square(scale))
-    is_bright = light > SCALED_SIGMAS * sigma
-    is_beyond = is_bright & (light > MAX_EXTRAPOLATION * pair_light.max())
+    is_beyond = _is_bright(frames)[:, channel] & (
+        light > MAX_EXTRAPOLATION * _pair_light(pairs)[:, channel].max()
+    )
     return np.where(is_beyond, sigma, np.sqrt(variance))
+
+
+def _pixel_noise(patches: Sequence[PatchPairs], channel: int) -> NoiseModel:
+    """Return the noise of a pixel of one channel from the pairs of all patches."""
+    parts = [(pairs, *_scatter(pairs, channel)) for pairs in patches if pairs.dof]
+    pixels = np.concatenate(
+        [np.full(len(scatter), pairs.frames.pixels[channel]) for pairs, scatter, _, _ in parts]
+    )
+    scatter = pixels * np.concatenate([scatter for _, scatter, _, _ in parts])
+    terms = np.concatenate([terms for _, _, terms, _ in parts])
+    dof = np.concatenate(
+        [np.full(len(scatter), pairs.dof / len(scatter)) for pairs, scatter, _, _ in parts]
+    )
+    expected = np.maximum(scatter, max(float(scatter.mean()), ROUNDING_VARIANCE))
+    for _ in range(REWEIGHTINGS):
+        noise = NoiseModel.fit(terms, scatter, sigma_dn2=expected / np.sqrt(dof))
+        parts_dn2 = terms @ [noise.read_dn2, noise.photon_dn, noise.uneven]
+        expected = np.maximum(parts_dn2, ROUNDING_VARIANCE)
+    return noise
+
+
+def _scatter(pairs: PatchPairs, channel: int) -> tuple[Floats, Floats, Floats]:
+    """Return the variance of each pair's difference of means, its terms (p, 3), and its scale."""
+    scales, differences = _differences(pairs, pairs.frames.sigma)
+    scale, difference = scales[:, channel], differences[:, channel]
+    strips = difference.shape[1]
+    scatter = np.square(difference).sum(axis=1) / max(strips - 1, 1) / strips
+    terms = variance_terms(pairs.frames.light[:, channel])
+    return (
+        scatter,
+        terms[pairs.second] + np.square(scale)[:, np.newaxis] * terms[pairs.first],
+        scale,
+    )
+
+
+def _pair_light(pairs: PatchPairs) -> Floats:
+    """Return the brightness of each pair in DN, shape (p, C)."""
+    light = pairs.frames.light
+    square = np.square(_differences(pairs, pairs.frames.sigma)[0])
+    return np.asarray((light[pairs.second] + square * light[pairs.first]) / (1 + square))
+
+
+def _is_bright(frames: PatchFrames) -> npt.NDArray[np.bool_]:
+    return np.asarray(frames.light > SCALED_SIGMAS * frames.sigma)

@@ -40,13 +40,21 @@ class SensorLayout:
 
     def middle_columns(self, region: Region) -> Floats:
         """Return the mean column of each channel's pixels, shape (C,); pixel centres are at .5."""
+        first, weights = self.column_weights(region)
+        return np.asarray(weights @ (first + np.arange(weights.shape[1]) + 0.5))
+
+    def column_weights(self, region: Region) -> tuple[int, Floats]:
+        """Return the first column of a region, and the weight of each in a channel's mean, (C, w).
+
+        Some of a cell's colours lie in some columns only.
+        """
         x, y, width, height = region_pixels(region, self.width, self.height)
         side, channels = self.cfa_side, self.channels
         pixels = np.zeros((len(channels), width))
         for row, column in np.ndindex(side, side):
             letter = self.cfa[side * ((y + row) % side) + (x + column) % side]
             pixels[channels.index(letter), column::side] += len(range(row, height, side))
-        return np.asarray(pixels @ (np.arange(x, x + width) + 0.5) / pixels.sum(axis=1))
+        return x, pixels / pixels.sum(axis=1, keepdims=True)
 
 
 @dataclass(frozen=True)

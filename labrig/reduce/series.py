@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from labrig.errors import DataError
 from labrig.optics import CameraModel
@@ -17,9 +18,18 @@ from labrig.reduce.measured_frames import (
     SeriesFrame,
     levels,
     measure_frames,
+    pixels,
     strips,
 )
-from labrig.reduce.pair_noise import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
+from labrig.reduce.pair_noise import (
+    PatchFrames,
+    PatchNoise,
+    PatchPairs,
+    SensorNoise,
+    paired_dark_sigma,
+    paired_noise,
+    rows_of_units,
+)
 from labrig.reduce.plane_noise import Floats
 from labrig.region import Region
 from labrig.results import Series, add_flag, is_usable
@@ -85,6 +95,8 @@ def apply_calibration(
 #: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
 TWO_DEGREES = 2 ** (2 / 6) - 1
+#: Multiple of the smallest patch's pixels up to which patches are taken together for their noise.
+ALIKE = 4.0
 #: Largest correlation of the errors of different channels.
 MAX_COMMON = 0.99
 
@@ -173,7 +185,8 @@ def reduce_patches(
 
     Frames in which a patch is clipped (`is_clipped`) are flagged, not dropped. The standard
     uncertainty comes from pairs of successive frames of a unit, and of dark frames of one exposure
-    time; where there are too few pairs, from each frame alone.
+    time; where a patch has too few pairs, from those of all patches together, or from each frame
+    alone.
 
     Parameters
     ----------
@@ -228,7 +241,9 @@ def reduce_patches(
     dark = {} if background else _patch_darks(darks, patches, hot)
     measured = measure_frames(frames, patches, background, hot)
     _check_settings(measured)
-    series = {name: _patch_series(name, measured, dark) for name in patches}
+    found = {name: _patch_levels(name, measured, dark) for name in patches}
+    together = _noise_together(list(found.values()), measured)
+    series = {name: _patch_series(patch, measured, together) for name, patch in found.items()}
     if camera is None:
         return series
     calibrated = {
@@ -266,34 +281,61 @@ def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]
     exposure_s = np.array(exposures_s)
     level, sigma = levels(views)
     light = level - fit_dark(exposure_s, level, sigma).base
-    frames = PatchFrames(exposure_s, strips(views), light, sigma)
+    frames = PatchFrames(exposure_s, strips(views), light, sigma, pixels(views))
     frames = replace(frames, sigma=paired_dark_sigma(frames))
     return _PatchDark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
 
 
-def _patch_series(
+@dataclass(frozen=True, eq=False)
+class _PatchLevels:
+    """Levels of a patch in n frames, before their noise is known.
+
+    Attributes
+    ----------
+    name
+        Name of the patch.
+    views
+        The patch in each frame.
+    flags
+        Flags of each frame.
+    frames
+        The patch above zero exposure, or above its background.
+    dark, dark_sigma
+        Level to subtract and its standard uncertainty in DN, shape (n, C).
+    drift
+        Part of `dark_sigma` by a sensor that warms, shape (n, C).
+    darks
+        The patch in the dark frames at the ISO of each unit, where there are any.
+    """
+
+    name: str
+    views: Sequence[RegionMeasurement]
+    flags: tuple[str, ...]
+    frames: PatchFrames
+    dark: Floats
+    dark_sigma: Floats
+    drift: Floats
+    darks: Mapping[str, PatchFrames]
+
+    @property
+    def usable(self) -> npt.NDArray[np.bool_]:
+        """Whether each frame can be in a pair."""
+        return np.array([is_usable(flag) for flag in self.flags])
+
+
+def _patch_levels(
     name: str, measured: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _PatchDark]
-) -> Series:
+) -> _PatchLevels:
     exposure_s = np.array([entry.frame.exposure_s for entry in measured])
-    t_s = np.array([entry.frame.t_s for entry in measured])
-    unit = tuple(entry.frame.unit for entry in measured)
-    flags = tuple(_flag(entry, name) for entry in measured)
-    dark_of_unit: dict[str, PatchFrames] = {}
-
-    def noise(views: Sequence[RegionMeasurement], light: Floats, sigma: Floats) -> PatchNoise:
-        frames = PatchFrames(exposure_s, strips(views), light, sigma)
-        usable = np.array([is_usable(flag) for flag in flags])
-        return paired_noise(frames, t_s, unit, usable, dark_of_unit)
-
     views = _views(name, measured)
     level, sigma = levels(views)
     dark, dark_sigma = np.zeros_like(level), np.full_like(level, np.nan)
     drift = np.zeros_like(level)
     unexposed = np.zeros_like(level)
-    backgrounds = [entry.background for entry in measured if entry.background is not None]
+    dark_of_unit: dict[str, PatchFrames] = {}
+    backgrounds = _backgrounds(measured)
     if backgrounds:
-        dark, dark_noise = levels(backgrounds)
-        dark_noise = noise(backgrounds, np.zeros_like(dark), dark_noise).sigma
+        dark = unexposed = levels(backgrounds)[0]
         dark_sigma = np.zeros_like(level)
     elif darks:
         for row, (entry, view) in enumerate(zip(measured, views, strict=True)):
@@ -308,30 +350,101 @@ def _patch_series(
             drift[row] = TWO_DEGREES * np.abs(patch_dark.model.current(entry.frame.exposure_s))
             dark_sigma[row] = np.hypot(model_sigma, drift[row])
             dark_of_unit[entry.frame.unit] = patch_dark.frames
-    patch_noise = noise(views, level - (dark if backgrounds else unexposed), sigma)
-    sigma = np.hypot(patch_noise.sigma, dark_noise) if backgrounds else patch_noise.sigma
+    return _PatchLevels(
+        name,
+        views,
+        tuple(_flag(entry, name) for entry in measured),
+        PatchFrames(exposure_s, strips(views), level - unexposed, sigma, pixels(views)),
+        dark,
+        dark_sigma,
+        drift,
+        dark_of_unit,
+    )
+
+
+def _noise_together(
+    patches: Sequence[_PatchLevels], measured: Sequence[MeasuredFrame]
+) -> dict[str, SensorNoise | None]:
+    """Return the noise of the pixels for each unit, by units of one ISO.
+
+    It is that of the smallest patches: larger ones, such as the whole frame, may have structure
+    that changes from frame to frame.
+    """
+    size = [patch.frames.pixels.sum() for patch in patches]
+    small = [patch for patch, each in zip(patches, size, strict=True) if each <= ALIKE * min(size)]
+    t_s = np.array([entry.frame.t_s for entry in measured])
+    rows = rows_of_units([entry.frame.unit for entry in measured])
+    units_of: dict[float, list[str]] = defaultdict(list)
+    for unit, (first, *_) in rows.items():
+        units_of[_setting_key(measured[first].iso)].append(unit)
+    together: dict[str, SensorNoise | None] = {}
+    for units in units_of.values():
+        pairs = [
+            PatchPairs.of_unit(
+                patch.frames.take(rows[unit]), t_s[rows[unit]], patch.usable[rows[unit]]
+            )
+            for patch in small
+            for unit in units
+        ]
+        pairs += [
+            PatchPairs.of_like_exposure(patch.darks[units[0]])
+            for patch in small
+            if units[0] in patch.darks
+        ]
+        together |= dict.fromkeys(units, SensorNoise.of_patches(pairs))
+    return together
+
+
+def _patch_series(
+    patch: _PatchLevels,
+    measured: Sequence[MeasuredFrame],
+    together: Mapping[str, SensorNoise | None],
+) -> Series:
+    exposure_s = patch.frames.exposure_s
+    t_s = np.array([entry.frame.t_s for entry in measured])
+    unit = tuple(entry.frame.unit for entry in measured)
+
+    def noise(frames: PatchFrames) -> PatchNoise:
+        return paired_noise(frames, t_s, unit, patch.usable, patch.darks, together)
+
+    patch_noise = noise(patch.frames)
+    sigma = patch_noise.sigma
+    if backgrounds := _backgrounds(measured):
+        _, alone = levels(backgrounds)
+        beside = replace(
+            patch.frames,
+            deviations=strips(backgrounds),
+            light=np.zeros_like(alone),
+            sigma=alone,
+            pixels=pixels(backgrounds),
+        )
+        sigma = np.hypot(sigma, noise(beside).sigma)
     per_second = exposure_s[:, np.newaxis]
     sigma = sigma / per_second
     # As the offset acts on a fit, most where weights are highest.
     weights = 1 / np.square(sigma)
-    dark_sigma = np.average(dark_sigma / per_second, axis=0, weights=weights)
-    drift_sigma = np.average(drift / per_second, axis=0, weights=weights)
+    dark_sigma = np.average(patch.dark_sigma / per_second, axis=0, weights=weights)
+    drift_sigma = np.average(patch.drift / per_second, axis=0, weights=weights)
     return Series(
         t_s=t_s,
         exposure_s=exposure_s,
-        values=(level - dark) / per_second,
+        values=(levels(patch.views)[0] - patch.dark) / per_second,
         sigma=sigma,
         dark_sigma=dark_sigma,
-        channels=tuple(views[0].measured.channels),
+        channels=tuple(patch.views[0].measured.channels),
         iso=np.array([entry.iso for entry in measured], dtype=np.float64),
         f_number=np.array([entry.f_number for entry in measured], dtype=np.float64),
         frame=tuple(entry.frame.path.name for entry in measured),
         unit=unit,
-        flag=flags,
-        region=name,
+        flag=patch.flags,
+        region=patch.name,
         correlation=patch_noise.correlation,
         dark_correlation=_dark_correlation(dark_sigma, drift_sigma, patch_noise.correlation),
     )
+
+
+def _backgrounds(measured: Sequence[MeasuredFrame]) -> list[RegionMeasurement]:
+    return [entry.background for entry in measured if entry.background is not None]
 
 
 def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | None:

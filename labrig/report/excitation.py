@@ -33,6 +33,7 @@ from labrig.results import (
     FittedExcitation,
     FloatArray,
     LightScatter,
+    Measured,
     PatchExcitation,
     spans_decades,
 )
@@ -165,6 +166,7 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             "equation in exact steps. k_e belongs to an irradiance of vector length "
             f"{rounded(irradiance.vector_length)}.",
             _light_line(patch.light),
+            *([] if fit.veil is None else [_veil_line(fit.veil)]),
             *(f"{line[0].upper()}{line[1:]}." for line in band_lines(fit.by_band)),
             f"Closure: {_closure_line(patch.closure)}.",
             *([f"Models: {_models_line(fit)}."] if len(fit.models) > 1 else []),
@@ -185,6 +187,12 @@ def _light_line(light: LightScatter) -> str:
         f"{rounded(100 * light.sites, 2)} %, and the filter's wavelengths are off by "
         f"{rounded(light.wavelength_nm, 2)} nm beyond what the calibrations state."
     )
+
+
+def _veil_line(veil: Measured) -> str:
+    """Return the sentence on the light of the frame that lies over all places."""
+    fraction = plus_minus(100 * veil.value, 100 * veil.sigma)
+    return f"Over every place lies {fraction} % of the frame's mean light, which is reckoned with."
 
 
 def _levels_table(fit: FittedExcitation, caption: str) -> Table:

@@ -145,6 +145,12 @@ class ChargingSeries:
     across
         Irradiance at Q places within every site relative to the site's, shape (Q, P, B): in uneven
         light, the mean level is not the level of the mean light. None: the light is even.
+    frame_light
+        Mean light of the whole frame of each photograph, a fraction of which may veil every site,
+        in the unit of the site's values, shape (n, P, C). None: nothing does.
+    veil_shapes
+        Courses along the sites by which the veil may differ from an even one, shape (K, P). None:
+        it is even.
     earlier
         Last charge before the first one of the series, which states of a kinetic order above 1
         remember for long; None: there was none.
@@ -160,6 +166,8 @@ class ChargingSeries:
     site_modes: FloatArray | None = None
     mode_kind: IntArray | None = None
     across: FloatArray | None = None
+    frame_light: FloatArray | None = None
+    veil_shapes: FloatArray | None = None
     earlier: EarlierCharge | None = None
 
     def spread(self) -> Self:
@@ -221,6 +229,14 @@ class ChargingSeries:
             modes.shape[1:] == (sites, bands) and np.isfinite(modes).all()
         ):
             raise FitError(f"{self.name}: expected finite 'site_modes' of {sites} x {bands}")
+        light = self.frame_light
+        if light is not None and not (
+            light.shape == self.values.shape and np.isfinite(light).all()
+        ):
+            raise FitError(
+                f"{self.name}: expected a finite 'frame_light' of {shots} photographs of {sites} "
+                "sites"
+            )
         if self.mode_kind is not None and (modes is None or len(self.mode_kind) != len(modes)):
             raise FitError(f"{self.name}: expected a kind of each of the 'site_modes'")
         if not (self.irradiance >= 0).all():

@@ -235,6 +235,8 @@ class ExcitationResult(RunResult):
                 "wavelength_error_nm": light.wavelength_nm,
                 "site_scatter": light.sites,
             },
+            "veil": None if fit.veil is None else fit.veil.value,
+            "veil_sigma": None if fit.veil is None else fit.veil.sigma,
             "by_band": None if fit.by_band is None else _by_band(fit.by_band),
             "channel_weights": fit.channel_weights.tolist(),
             "reduced_chi2": fit.reduced_chi2,

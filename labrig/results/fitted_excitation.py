@@ -223,6 +223,8 @@ class FittedExcitation:
         Models that were tried, of which this is one.
     by_band
         Tests whether all bands excite the same glow; None if the sites are excited by one band.
+    veil
+        Fraction of the frame's light that lies over every site; None if it was not fitted.
     lamp_sigma
         Relative scatter of the lamp's brightness from charge to charge, found or as given.
     site_sizes
@@ -239,6 +241,7 @@ class FittedExcitation:
     warnings: tuple[str, ...]
     residuals: tuple[FloatArray, ...]
     by_band: BandTests | None
+    veil: Measured | None
     lamp_sigma: float
     site_sizes: tuple[float, ...] = ()
     order_gain: float = 0.0

@@ -214,6 +214,17 @@ class PatchSaturation:
             return "saturated in time"
         return "not decided"
 
+    @property
+    def is_of_no_law(self) -> bool:
+        """Whether neither states of first order nor one of another order describe all decays.
+
+        Several states of first order that are filled unequally look like no order either; they
+        describe the decays with the same rates after every charge.
+        """
+        if self.order is None or self.order.verdict != "neither":
+            return False
+        return self.fit.n_states == 1 or self.rates.differ or self.rates.misfit
+
     def rows(self, light: str) -> list[int]:
         """Return the numbers of the decays under a light, in the order of `curves`."""
         return [row for row, decay_light in enumerate(self.light) if decay_light == light]

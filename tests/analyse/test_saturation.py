@@ -9,10 +9,13 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import read_rig_file
+from labrig.analyse.kinetic_order import compare_levels
 from labrig.analyse.saturation import analyse, charge_level, charged, compare_rates
+from labrig.analyse.series_fit import fit_series
 from labrig.bench import open_bench
 from labrig.errors import DataError
 from labrig.process import process_and_report
+from labrig.results import Measured, PatchSaturation, Series
 from labrig.results.saturation import Curve, SaturationResult
 from tests.analyse.recorded import part_of
 from tests.analyse.spectral_bench import record
@@ -22,6 +25,7 @@ QUICK: dict[str, Any] = {
     "protocol": "saturation", "charges": ["30 s", "10 min", "20 min"], "first": "800 ms",
     "for": "60 s",
 }  # fmt: skip
+T_S = np.arange(1.0, 120.0, 4.0)
 HALF = {"weaker": {"filter": "neutral-50", "fraction": "50 %"}}
 
 
@@ -149,6 +153,47 @@ def test_rates_that_differ_by_a_few_per_cent_are_distinguished() -> None:
     test = compare_rates(curves, [0.04])
     assert test.differ
     assert test.own_per_s[:, 0] == pytest.approx([0.05, 0.053], rel=0.02)
+
+
+def judged(curves: list[Curve], rates: list[float]) -> PatchSaturation:
+    """Compare decays as an analysis does, the last one fitted with as many states as rates."""
+    t_s, one, text = curves[-1].t_s, np.ones(len(T_S)), ("",) * len(T_S)
+    value, sigma = curves[-1].value[:, None], curves[-1].sigma[:, None]
+    series = Series(t_s, one, value, sigma, np.zeros(1), ("G",), one, one, text, text, text)
+    growth = Measured(0.0, 0.01)
+    return PatchSaturation(
+        fit_series(series, len(rates)), ("full",) * len(curves), np.ones(len(curves)),
+        {str(number): curve for number, curve in enumerate(curves)},
+        compare_rates(curves, rates), growth, growth, (), compare_levels(curves),
+    )  # fmt: skip
+
+
+def test_a_fall_that_no_law_describes_is_told() -> None:
+    """A shape that lasts the longer the less it was charged, but bent otherwise than an order's."""
+    curves = []
+    for seed, (light, rate) in enumerate(((1.0, 0.08), (0.3, 0.05), (0.1, 0.03))):
+        true = light * np.exp(-((rate * T_S) ** 1.3))
+        sigma = 0.005 * true + 1e-4
+        noise = sigma * np.random.default_rng(seed).standard_normal(len(T_S))
+        curves.append(Curve(T_S, np.zeros_like(T_S), true + noise, sigma, 0.0))
+    found = judged(curves, [0.05])
+    assert found.order is not None
+    assert found.order.verdict == "neither"
+    assert found.is_of_no_law
+
+
+def test_two_states_that_are_filled_unequally_are_a_law() -> None:
+    curves = [
+        decay([0.1, 0.01], amplitudes, seed)
+        for seed, amplitudes in enumerate(([1.0, 0.2], [0.5, 0.19], [0.2, 0.15]))
+    ]
+    found = judged(curves, [0.08, 0.02])
+    assert found.order is not None
+    order = replace(found.order, shift=Measured(-0.3, 0.01), difference_sigma=0.02)
+    assert order.verdict == "neither"
+    assert not replace(found, order=order).is_of_no_law
+    one = replace(found.fit, states=found.fit.states[:1])
+    assert replace(found, order=order, fit=one).is_of_no_law
 
 
 def test_amplitudes_of_two_states_change_without_their_rates() -> None:

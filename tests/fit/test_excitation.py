@@ -179,6 +179,57 @@ def test_charging_by_another_law_is_told_from_the_lamps_scatter(convex: bool) ->
     assert said.startswith(f"long charges glow {'more' if convex else 'less'} and short ones ")
 
 
+def measured_in_frames(bench: Bench) -> list[ChargingSeries]:
+    """Photographs of 2 s after charges through the filter, of 0.2 s by the bare lamp.
+
+    The filter takes a tenth of the frame, the whole sample two thirds.
+    """
+    through = bench.series("through LVF", LVF, CHARGES_S, exposure_s=2.0)
+    bare = bench.series("bare lamp", np.tile(BARE, (len(LVF), 1)), [20.0, 1800.0], exposure_s=0.2)
+    return [
+        replace(one, frame_light=np.broadcast_to(light[:, None], one.values.shape).copy())
+        for one, part in ((through, 0.1), (bare, 0.66))
+        for light in [part * one.values.mean(axis=1)]
+    ]
+
+
+def test_light_of_the_frame_over_all_sites_excites_nothing() -> None:
+    """Without it weakly exciting bands have rates that are the frame's light."""
+    bench = Bench(read_material("blue-paint"))
+    series = [
+        replace(one, values=one.values + 0.03 * one.frame_light)
+        for one in measured_in_frames(bench)
+        if one.frame_light is not None
+    ]
+    sigmas = RelativeSigmas(bench.flicker, LAMP, scale=0.005)
+    ignored = fit(series, [0.03], [1.0], sigmas)
+    found = fit(series, [0.03], [1.0], replace(sigmas, veil=0.02))
+    k_e = np.array(bench.material.states[0].k_e_per_s)
+    state, other = found.states[0], ignored.states[0]
+    assert (np.abs(state.k_e_per_s - k_e) < 3 * state.k_e_sigma_per_s).all()
+    assert (np.abs(other.k_e_per_s - k_e) > 4 * other.k_e_sigma_per_s).any()
+    assert ignored.veil is None
+    assert found.veil is not None
+    assert abs(found.veil.value - 0.03) < 3 * found.veil.sigma < 0.06
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.02])
+def test_a_camera_whose_large_signals_fall_short_is_told(missing: float) -> None:
+    bench = Bench(read_material("blue-paint"))
+    series = measured_in_frames(bench)
+    collected = [
+        one.values * np.concatenate([charge.exposure_s for charge in one.charges])[:, None, None]
+        for one in series
+    ]
+    largest = max(float(each.max()) for each in collected)
+    series = [
+        replace(one, values=one.values * (1 - missing * each / largest))
+        for one, each in zip(series, collected, strict=True)
+    ]
+    found = fit(series, [0.03], [1.0], RelativeSigmas(bench.flicker, LAMP, scale=0.005))
+    assert any("fall short of proportion" in said for said in found.warnings) == (missing > 0)
+
+
 def test_irradiance_known_badly_goes_into_every_rate() -> None:
     bench = Bench(read_material("blue-paint"))
     series = measured(bench)
@@ -228,7 +279,12 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
     series = measured(bench)
     charges = tuple(replace(one, cold_deficit=0.3) for one in series[0].charges)
     modes = np.random.default_rng(4).normal(0, 0.05, (3, *series[0].irradiance.shape))
-    series = [replace(series[0], charges=charges, site_modes=modes), *series[1:]]
+    veiled = [replace(one, frame_light=0.4 * one.values) for one in series]
+    shapes = np.linspace(-1.0, 1.0, len(LVF))[None]
+    series = [
+        replace(veiled[0], charges=charges, site_modes=modes),
+        replace(veiled[1], veil_shapes=shapes),
+    ]
     problem = ExcitationProblem(
         series,
         2,
@@ -240,6 +296,8 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
             scale=0.02,
             offset=(0.1, 0.2, 0.3),
             common_mode=(0.2, 0.1, 0.3),
+            veil=0.02,
+            veil_shape=0.01,
         ),
     )
     random = np.random.default_rng(3)
@@ -254,11 +312,12 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
     theta[columns.scale], theta[columns.brightness], theta[columns.lacking] = 0.01, 0.005, 0.02
     theta[columns.off] = random.normal(0, 1.0, 3)
     theta[columns.offset] = 0.3, -0.2, 0.1
+    theta[columns.veil] = 0.01, -0.005
     problem.rewhiten(theta)
     _, jacobian = problem.residuals(theta)
     # Of a charge that leaves something to the next one, the derivative is not quite exact.
-    left = len(theta) - 6 - 7
-    for column in [*range(left), *range(len(theta) - 6, len(theta))]:
+    left = columns.off.start - 7
+    for column in [*range(left), *range(columns.off.start, len(theta))]:
         h = 1e-6 * max(abs(theta[column]), 1e-3)
         up, down = theta.copy(), theta.copy()
         up[column] += h

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from labrig.reduce import SeriesFrame, measure, read_raw, reduce_series
+from labrig.reduce import SeriesFrame, measure, read_raw, reduce_patches, reduce_series
 from labrig.results import Series
 
 WriteDng = Callable[..., bytes]
@@ -184,6 +184,33 @@ def test_neighbours_and_structure_of_the_sample_do_not_matter(
     assert ratio.mean() == pytest.approx(1, abs=0.08)
     alone = measure(read_raw(frames[0].path), PATCH).channels["G"].sigma
     assert alone > 1.5 * series.sigma[0, 1]
+
+
+def test_narrow_patches_of_few_frames_have_the_noise_of_all_together(
+    tmp_path: Path, write_dng: WriteDng
+) -> None:
+    """A bright stripe along the patches, dark beside: a single frame mixes its noise with the dark.
+
+    Brightness falls by half from patch to patch, so that each has its own.
+    """
+    wide, high, top = 6, 12, 30
+    patches = {f"{x}": (x, top, wide, high) for x in range(12, 84, wide)}
+    scene = np.zeros((HEIGHT, WIDTH))
+    scene[top : top + high] = 0.5 ** (np.arange(WIDTH) / wide / 2)
+    frames = recorded(tmp_path, write_dng, 3, scene=scene, times_s=TIMES_S[:5])
+    found = reduce_patches(frames, patches)
+    ratio = []
+    for x, y, w, h in patches.values():
+        series = found[f"{x}"]
+        here = (scene * COLOURS)[y : y + h, x : x + w]
+        for channel, level in enumerate(WEIGHTS):
+            of_channel = COLOURS[y : y + h, x : x + w] == level
+            light = BRIGHT_DN * np.exp(-RATE_PER_S * series.t_s) * here[of_channel].mean()
+            expected = np.sqrt((light + READ_DN**2 + 1 / 12) / of_channel.sum())
+            ratio.append(series.sigma[:, channel] / expected)
+    # 12 patches of 4 pairs and 5 degrees of freedom: σ to 5 % of each channel.
+    assert np.abs(np.mean(np.reshape(ratio, (-1, 3, 5)), axis=(0, 2)) - 1).max() < 0.12
+    assert np.mean(ratio) == pytest.approx(1, abs=0.08)
 
 
 def test_clipped_frames_are_in_no_pair(tmp_path: Path, write_dng: WriteDng) -> None:

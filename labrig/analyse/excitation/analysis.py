@@ -41,6 +41,9 @@ USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
 AT_END = 0.9
 #: Deviation of the closure in σ that causes a warning.
 CLOSURE_SIGMAS = 3.0
+#: σ of the fraction of the frame's light that lies over every site: glare of a photographic lens is
+#: 0.3 to 3 %, and surfaces light one another.
+VEIL_SIGMA = 0.02
 #: Least standard uncertainty of a dark level in DN/s.
 MIN_DARK = 1e-3
 
@@ -94,6 +97,7 @@ def _patch_excitation(
         offset=dark,
         # The sensor warms and cools over hours of long exposures, more than dark frames show.
         common_mode=dark,
+        veil=VEIL_SIGMA,
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
         largest_factor=LARGEST_FACTOR,

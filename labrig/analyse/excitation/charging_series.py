@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
 from labrig.analyse.excitation.lamp_light import (
@@ -11,14 +12,14 @@ from labrig.analyse.excitation.lamp_light import (
     mode_kinds,
     site_modes,
 )
+from labrig.analyse.excitation.site_means import site_means, site_weights
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
-from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
+from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
-from labrig.optics import Strip
 from labrig.record import FrameRole
-from labrig.reduce import SensorLayout, reduce_patches, sensor_layout
+from labrig.reduce import reduce_patches, sensor_layout
 from labrig.region import Region
 from labrig.results import (
     BoolArray,
@@ -32,6 +33,11 @@ from labrig.results import (
 
 #: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"
+#: Name of the frame among the regions.
+FRAME = "(whole frame)"
+WHOLE_FRAME: Region = (0.0, 0.0, 1.0, 1.0)
+#: Degree of the veil's course along the sites.
+VEIL_DEGREE = 3
 #: Placeholder for the values of a series.
 NOTHING: FloatArray = np.empty((0, 0, 0))
 
@@ -72,7 +78,8 @@ def patch_chargings(
             _place_name(patch, name): region
             for patch, slices in sites.items()
             for name, region in {**slices, WHOLE: _bounding_region(slices)}.items()
-        },
+        }
+        | {FRAME: WHOLE_FRAME},
         [
             untimed(frame)
             for frame in part.run.frames(FrameRole.DARK)
@@ -113,57 +120,18 @@ def patch_chargings(
     chargings = {}
     for patch, slices in sites.items():
         patch_series = [series[_place_name(patch, name)] for name in slices]
-        values = np.stack(
-            [_with_unusable_nan(site_series, site_series.values) for site_series in patch_series],
-            axis=1,
+        values, sigma = (
+            np.stack([getattr(each, name) for each in patch_series], axis=1)
+            for name in ("values", "sigma")
         )
-        sigma = np.stack(
-            [_with_unusable_nan(site_series, site_series.sigma) for site_series in patch_series],
-            axis=1,
-        )
-        values = _interpolate_to_positions(
-            values, slices, np.array(irradiance.position), irradiance.strip, layout
-        )
+        usable = np.stack([each.usable for each in patch_series], axis=1)
+        weights = site_weights(slices, irradiance, layout)
+        values, sigma = site_means(values, sigma, usable, weights)
         strip_series = series[_place_name(patch, WHOLE)]
-        chargings[patch] = _divide_by_evenness(values, sigma, through, direct, strip_series, frames)
+        chargings[patch] = _divide_by_evenness(
+            values, sigma, through, direct, strip_series, series[FRAME].values, frames
+        )
     return chargings, (*frames.left_out, *reasons)
-
-
-def _interpolate_to_positions(
-    values: FloatArray,
-    slices: Slices,
-    position: FloatArray,
-    strip: Strip,
-    layout: SensorLayout,
-) -> FloatArray:
-    """Interpolate values (n, P, C) to the positions (P,) along the strip, by the neighbours' slope.
-
-    A slice consists of whole pixels, and some of a Bayer cell's colours lie left of others: a
-    channel's value of a slice belongs to a place up to a pixel away from the slice's middle. Along
-    the filter the glow is steep, so that a pixel matters where slices are a few pixels wide.
-
-    Parameters
-    ----------
-    values
-        Values of the slices.
-    slices
-        Regions in which the values were measured.
-    position
-        Positions along the strip, 0 at the blue end to 1 at the red end.
-    strip
-        Place of the strip.
-    layout
-        Size and colours of the sensor.
-    """
-    along = position if strip.rising else 1 - position
-    left, right = strip.left[0] * layout.width, strip.right[0] * layout.width
-    centre_column = left + (along - tilt_offset(strip, slices, layout)) * (right - left)
-    interpolated = values.copy()
-    middles = np.array([layout.middle_columns(region) for region in slices.values()])
-    for number, x in enumerate(middles.T):
-        slope = np.nan_to_num(np.gradient(values[..., number], x, axis=1))
-        interpolated[..., number] += slope * (centre_column - x)
-    return interpolated
 
 
 def _divide_by_evenness(
@@ -172,19 +140,40 @@ def _divide_by_evenness(
     through: ChargingSeries,
     direct: ChargingSeries,
     strip_series: Series,
+    frame_light: FloatArray,
     frames: ChargeFrames,
 ) -> PatchCharging:
     """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
     is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
     evenness = _evenness(values[is_direct], sigma[is_direct])
     values, sigma = values / evenness[:, None], sigma / evenness[:, None]
+    # Direct charges define what even light is, with the veil that lies over it.
+    even = np.where(is_direct[:, None], 1.0, evenness)
+    veils = frame_light[:, None, :] / even[..., None]
     is_last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
-        replace(through, values=values[~is_direct], sigma=sigma[~is_direct]),
-        replace(direct, values=values[is_direct], sigma=sigma[is_direct]),
+        replace(
+            through,
+            values=values[~is_direct],
+            sigma=sigma[~is_direct],
+            frame_light=veils[~is_direct],
+            veil_shapes=_veil_shapes(values.shape[1]),
+        ),
+        replace(
+            direct,
+            values=values[is_direct],
+            sigma=sigma[is_direct],
+            frame_light=veils[is_direct],
+        ),
         evenness,
         _final_decay(strip_series, is_last, frames),
     )
+
+
+def _veil_shapes(sites: int) -> FloatArray:
+    """Return smooth courses along the sites, Legendre's polynomials of low degree, shape (K, P)."""
+    along = np.linspace(-1.0, 1.0, sites)
+    return np.asarray(legvander(along, VEIL_DEGREE)[:, 1:].T)
 
 
 def _charge(
@@ -206,11 +195,6 @@ def _charge(
 def _place_name(patch: StripPatch, name: str) -> str:
     """Return the name of a place among those of all patches."""
     return f"{patch.folder} {name}".strip()
-
-
-def _with_unusable_nan(series: Series, numbers: FloatArray) -> FloatArray:
-    """Replace numbers by NaN in rows that must not be used."""
-    return np.where(series.usable[:, None], numbers, np.nan)
 
 
 def _bounding_region(sites: Slices) -> Region:

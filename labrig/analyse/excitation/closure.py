@@ -60,6 +60,10 @@ def predicted_charging(
     noise = np.hypot(
         np.sqrt((sigma**2).sum(axis=1)) / sigma.shape[1], relative_sigmas.flicker * level
     )
+    if fit.veil is not None and direct.frame_light is not None:
+        frame_light = direct.frame_light[rows, :, channel].mean(axis=1)
+        level = level - fit.veil.value * frame_light
+        noise = np.hypot(noise, fit.veil.sigma * frame_light)
     charge_s = _equivalent_charge_s(direct, fit, np.array(irradiance.direct))[list(first)]
     starts, exposures = (
         np.concatenate([getattr(charge, name) for charge in direct.charges])[rows]

@@ -92,7 +92,7 @@ def across_sites(irradiance: IrradianceFile) -> FloatArray:
     """
     position, through = np.array(irradiance.position), _positive_light(np.array(irradiance.through))
     course = PchipInterpolator(position, np.log(through), axis=0)
-    offset = np.gradient(position)[:, None] / 2 / np.sqrt(3)
+    offset = 1 / len(position) / 2 / np.sqrt(3)
     log_light, slope = course(position), course(position, 1)
     # At the ends there is nothing to look up beyond the last place's middle.
     pair: FloatArray = np.exp(np.stack([log_light - slope * offset, log_light + slope * offset]))

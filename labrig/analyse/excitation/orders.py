@@ -24,6 +24,8 @@ from labrig.results import (
 
 #: Difference in BIC from which a model with more parameters is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
+#: Part of the veil by which it may differ along the filter, in each of some smooth courses.
+VEIL_SHAPE = 0.3
 #: Largest number of states that are fitted with orders.
 MAX_STATES = 2
 #: Least part of the glow of a state at the start.
@@ -125,12 +127,17 @@ class OrderFits:
 def refit(
     fit: FittedExcitation, relative_sigmas: RelativeSigmas
 ) -> Callable[[Sequence[ChargingSeries]], FittedExcitation]:
-    """Return the function that fits other series by the model of a fit, from its solution."""
+    """Return the function that fits other series by the model of a fit, from its solution.
+
+    How far the veil differs from site to site is taken in proportion to the veil that was found.
+    """
     order = None if fit.are_orders_fitted else fit.states[0].kinetic_order
     k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in fit.states]).T
+    veil = 0.0 if fit.veil is None else abs(fit.veil.value)
+    sigmas = replace(relative_sigmas, veil_shape=VEIL_SHAPE * veil)
 
     def again(series: Sequence[ChargingSeries]) -> FittedExcitation:
-        return fit_excitation(series, k_r, amplitude, relative_sigmas, fit, order)
+        return fit_excitation(series, k_r, amplitude, sigmas, fit, order)
 
     return again
 

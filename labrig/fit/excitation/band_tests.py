@@ -47,7 +47,7 @@ def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTes
     if len(bands) < 2:
         return None
     residual, jacobian = problem.residuals(theta)
-    basis = _column_space(jacobian)
+    basis = column_space(jacobian)
     reduced = max(solution.chi2 / max(problem.n_values - solution.rank, 1), 1.0)
     masks = (band_of_site == bands[:, None]).astype(np.float64)
 
@@ -56,7 +56,9 @@ def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTes
         whitened = np.zeros((len(residual), columns.shape[-1]))
         of_series = problem.whitened(0, columns)
         whitened[: len(of_series)] = of_series
-        return _tested(residual, whitened, basis, reduced, (len(changes), len(bands)), tolerance)
+        return change_along(
+            residual, whitened, basis, reduced, (len(changes), len(bands)), tolerance
+        )
 
     columns, signal = problem.parameters.columns, problem.signal(theta)[0]
     by_amplitude = np.zeros(len(theta))
@@ -78,7 +80,7 @@ def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTes
     )
     whitened = np.zeros((len(residual), 1))
     whitened[: len(depth)] = depth
-    of_depth = _tested(residual, whitened, basis, reduced, (1, 1), 0.0, UNKNOWN_VARIANCE)
+    of_depth = change_along(residual, whitened, basis, reduced, (1, 1), 0.0, UNKNOWN_VARIANCE)
     return BandTests(
         bands=bands,
         light_variance=Measured(float(of_depth.deviation[0, 0]), float(of_depth.sigma[0, 0])),
@@ -112,14 +114,14 @@ def _by_depth(problem: ExcitationProblem, rates: Rates) -> list[FloatArray]:
     return changes
 
 
-def _column_space(jacobian: FloatArray) -> FloatArray:
+def column_space(jacobian: FloatArray) -> FloatArray:
     """Return an orthonormal basis (m, rank) of the changes that the fit's own parameters make."""
     norm = np.linalg.norm(jacobian, axis=0)
     left, values, _ = np.linalg.svd(jacobian[:, norm > 0] / norm[norm > 0], full_matrices=False)
     return np.asarray(left[:, values > EPSILON * len(jacobian) * values[0]])
 
 
-def _tested(
+def change_along(
     residual: FloatArray,
     columns: FloatArray,
     basis: FloatArray,

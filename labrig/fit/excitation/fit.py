@@ -16,6 +16,7 @@ from labrig.fit.excitation.band_tests import band_tests
 from labrig.fit.excitation.lamp_pulls import law_test
 from labrig.fit.excitation.levels import levels_at_off
 from labrig.fit.excitation.light_errors import found_errors
+from labrig.fit.excitation.linearity import missing_signal
 from labrig.fit.excitation.order_gain import order_gain
 from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
@@ -29,6 +30,7 @@ from labrig.results import (
     ConcentrationAtOff,
     ExcitedState,
     FittedExcitation,
+    Measured,
 )
 
 #: Tolerance of the relative step, for the starting points and for the result.
@@ -47,6 +49,8 @@ ROUGH_K_R_FACTOR = 2.0
 ROUGH_GAIN = 0.1
 #: Relative σ of an amplitude above which a warning is given.
 LEVEL_KNOWN = 0.3
+#: Missing signal in σ from which a warning is given.
+CLEARLY_MISSING = 3.5
 #: Reduced χ² above which a warning is given.
 LARGE_CHI2 = 1.5
 
@@ -135,6 +139,7 @@ def _roughly(
                 sigma=np.hypot(charging.sigma, LIGHT_SIGMA * charging.values)[..., [reference]],
                 site_modes=None,
                 across=None,
+                frame_light=None,
             )
             for charging in problem.series
         ],
@@ -248,6 +253,7 @@ def _result(
     # By way of θ: A and k_e may trade off so far that their covariance has no digits left of this.
     at_off = _at_off(problem, rates, stated[own], solution.covariance, falling)
     by_band = band_tests(problem, solution)
+    missing = missing_signal(problem, solution)
     return FittedExcitation(
         states=states,
         channel_weights=rates.weights,
@@ -260,13 +266,24 @@ def _result(
             *_warnings(problem, solution, states),
             *law_warnings,
             *(() if by_band is None else _band_warnings(by_band)),
+            *_linearity_warnings(missing),
         ),
         residuals=problem.plain_residuals(theta),
         order_gain=order_gain(problem, theta, reference, uncertain),
         by_band=by_band,
+        veil=_veil(problem, solution),
         lamp_sigma=uncertain.lamp,
         site_sizes=site_sizes,
     )
+
+
+def _veil(problem: ExcitationProblem, solution: LeastSquaresFit) -> Measured | None:
+    """Return the fraction of the frame's light over every site; None if it was not fitted."""
+    place = problem.parameters.columns.veil
+    if not is_fitted(place):
+        return None
+    sigma = np.sqrt(solution.covariance[place.start, place.start])
+    return Measured(float(solution.parameters[place.start]), float(sigma))
 
 
 def _at_off(
@@ -385,6 +402,17 @@ def _band_warnings(tests: BandTests) -> list[str]:
             "in the photographs; look at the channels by band"
         )
     return messages
+
+
+def _linearity_warnings(missing: Measured) -> list[str]:
+    """Return one line if large signals fall short of proportion."""
+    if missing.value < CLEARLY_MISSING * missing.sigma:
+        return []
+    return [
+        f"large signals fall short of proportion, the largest by {100 * missing.value:.1f} % "
+        f"({missing.value / missing.sigma:.1f} σ): the camera is not linear, and k_r and k_e may "
+        "be off by as much; leave out the brightest photographs (labrig process --exclude)"
+    ]
 
 
 def _law_warnings(problem: ExcitationProblem, theta: FloatArray) -> list[str]:

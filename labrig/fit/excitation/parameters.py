@@ -37,6 +37,9 @@ class Rates(NamedTuple):
         Amplitudes z of `ChargingSeries.site_modes`, series by series, shape (M,).
     offset
         Dark level that was not subtracted, shape (C,), or (0,) if it is not fitted.
+    veil
+        Fraction of the frame's light that lies over every site, followed by amplitudes of
+        `ChargingSeries.veil_shapes`, shape (1 + K,), or (0,) if it is not fitted.
     order
         Kinetic orders b, shape (N,).
     gain
@@ -52,6 +55,7 @@ class Rates(NamedTuple):
     lacking: FloatArray
     off: FloatArray
     offset: FloatArray
+    veil: FloatArray
     order: FloatArray
     gain: FloatArray
 
@@ -75,6 +79,13 @@ class RelativeSigmas:
     common_mode
         Scatter of the dark level from exposure to exposure in the values' unit, shape (C,): an
         exposing sensor warms.
+    veil
+        σ of the fraction of the frame's light that lies over every site, by glare of the lens and
+        by surfaces that light one another; 0 is expected. Fitted where the light of the frames is
+        known.
+    veil_shape
+        σ of the amplitude of each of the shapes by which that differs from site to site; with 0 it
+        does not.
     irradiance
         Relative σ of E in every band, a scalar or (B,), common to all series: the fit cannot
         constrain it.
@@ -89,6 +100,8 @@ class RelativeSigmas:
     scale: float = 0.0
     offset: tuple[float, ...] = ()
     common_mode: tuple[float, ...] = ()
+    veil: float = 0.0
+    veil_shape: float = 0.0
     irradiance: float | tuple[float, ...] = 0.0
     largest_factor: float = 0.0
 
@@ -117,6 +130,7 @@ class ParameterLayout(NamedTuple):
     lacking: slice
     off: slice
     offset: slice
+    veil: slice
 
 
 def is_fitted(place: slice) -> bool:
@@ -181,7 +195,14 @@ class Parameters:
             self._first_mode[-1],
         ]
         sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold_deficit, 1.0]
-        self.prior_sigma: FloatArray = np.concatenate([np.repeat(sigmas, counts), uncertain.offset])
+        is_veiled = all(charging.frame_light is not None for charging in series)
+        veils = [uncertain.veil] if uncertain.veil > 0 and is_veiled else []
+        if veils and uncertain.veil_shape > 0:
+            shapes = max(0 if one.veil_shapes is None else len(one.veil_shapes) for one in series)
+            veils += shapes * [uncertain.veil_shape]
+        self.prior_sigma: FloatArray = np.concatenate(
+            [np.repeat(sigmas, counts), uncertain.offset, veils]
+        )
         free_counts = [
             states,
             states,
@@ -189,7 +210,7 @@ class Parameters:
             len(self.others),
             states if order is None else 0,
         ]
-        ends = _begins([*free_counts, *counts, len(uncertain.offset)])
+        ends = _begins([*free_counts, *counts, len(uncertain.offset), len(veils)])
         self.columns = ParameterLayout(*(slice(*limits) for limits in pairwise(ends)))
         self.count = ends[-1]
 
@@ -207,12 +228,14 @@ class Parameters:
         return slice(*self._first_mode[number : number + 2])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of θ: excitation rates and weights ≥ 0, amplitudes in their range."""
+        """Return bounds of θ: excitation rates, weights and veil ≥ 0, amplitudes in their range."""
         lower, upper = np.full(self.count, -np.inf), np.full(self.count, np.inf)
         lower[self.columns.growth.start : self.columns.weights.stop] = 0.0
         lower[self.columns.inverse_gain] = 1 / self._largest_gain
         upper[self.columns.inverse_gain] = 1 / self._least_gain
         lower[self.columns.order], upper[self.columns.order] = 1.0, MAX_ORDER
+        if is_fitted(self.columns.veil):
+            lower[self.columns.veil.start] = 0.0
         return lower, upper
 
     def as_stated(
@@ -259,6 +282,7 @@ class Parameters:
             theta[columns.lacking],
             theta[columns.off],
             theta[columns.offset],
+            theta[columns.veil],
             order,
             gain,
         )

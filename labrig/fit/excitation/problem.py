@@ -69,7 +69,7 @@ class ExcitationProblem:
         """Return the model of every series, shape (n, P, C) each."""
         rates = self.parameters.unpack(theta)
         return [
-            _signal(self.levels(charging, rates).value @ rates.amplitude, rates)
+            _signal(self.levels(charging, rates).value @ rates.amplitude, rates, charging)
             for charging in self.illuminated_series(rates)
         ]
 
@@ -159,7 +159,10 @@ class ExcitationProblem:
             jacobian[:, :, channel, place] = glow * inverse[..., channel]
         for channel in range(len(rates.offset)):
             jacobian[:, :, channel, columns.offset.start + channel] = inverse[..., channel]
-        misfit = (_signal(glow, rates) - self._values[number]) * inverse
+        if charging.frame_light is not None and is_fitted(columns.veil):
+            veils = _veils(charging, len(rates.veil))
+            jacobian[..., columns.veil] = (charging.frame_light * inverse)[..., None] * veils
+        misfit = (_signal(glow, rates, charging) - self._values[number]) * inverse
         return self._whitened(number, misfit.reshape(shots, -1), jacobian)
 
     def _set_light_derivatives(
@@ -244,7 +247,18 @@ def _flat(values: FloatArray) -> FloatArray:
     return values.reshape(len(values), -1)
 
 
-def _signal(glow: FloatArray, rates: Rates) -> FloatArray:
+def _signal(glow: FloatArray, rates: Rates, charging: ChargingSeries) -> FloatArray:
     """Return the signal (n, P, C) of a glow (n, P) in the brightest channel."""
     signal: FloatArray = np.multiply.outer(glow, rates.weights)
+    if charging.frame_light is not None and len(rates.veil):
+        signal += charging.frame_light * (_veils(charging, len(rates.veil)) @ rates.veil)
     return signal + rates.offset if len(rates.offset) else signal
+
+
+def _veils(charging: ChargingSeries, count: int) -> FloatArray:
+    """Return the even veil and its shapes along the sites, shape (P, 1, count)."""
+    veils = np.zeros((charging.values.shape[1], 1, count))
+    veils[..., 0] = 1.0
+    if charging.veil_shapes is not None and count > 1:
+        veils[:, 0, 1:] = charging.veil_shapes.T
+    return veils
