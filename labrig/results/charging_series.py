@@ -146,8 +146,8 @@ class ChargingSeries:
         Irradiance at Q places within every site relative to the site's, shape (Q, P, B): in uneven
         light, the mean level is not the level of the mean light. None: the light is even.
     earlier
-        Last charge before the first one of the series, which states of a kinetic order above 1
-        remember for long; None: there was none.
+        Last charge before the first one of the series, which slow states and those of a kinetic
+        order above 1 remember for long; None: there was none.
     """
 
     name: str
@@ -172,6 +172,20 @@ class ChargingSeries:
             everywhere = np.tile(earlier.irradiance, (len(self.across), 1))
             earlier = replace(earlier, irradiance=everywhere)
         return replace(self, irradiance=irradiance, across=None, earlier=earlier)
+
+    def before(self) -> Self | None:
+        """Return the series of the last charge before, without photographs; None if none was."""
+        if self.earlier is None:
+            return None
+        nothing: FloatArray = np.empty((0, *self.values.shape[1:]))
+        return replace(
+            self,
+            charges=(replace(self.earlier.charge, start_s=np.empty(0), exposure_s=np.empty(0)),),
+            irradiance=self.earlier.irradiance,
+            values=nothing,
+            sigma=nothing,
+            earlier=None,
+        )
 
     def first_frames(self, usable: BoolArray) -> dict[int, int]:
         """Return the row of its first usable photograph for each charge.

@@ -7,6 +7,7 @@ import numpy as np
 from labrig.analyse.excitation.charge_intervals import GLOWING
 from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
+from labrig.analyse.excitation.evenness import evened
 from labrig.analyse.excitation.lamp_light import (
     LAMP_SIGMA,
     LARGEST_FACTOR,
@@ -15,7 +16,7 @@ from labrig.analyse.excitation.lamp_light import (
     scale_sigma,
 )
 from labrig.analyse.excitation.material import excited_material
-from labrig.analyse.excitation.orders import OrderFits, refit
+from labrig.analyse.excitation.orders import OrderFits
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
@@ -99,10 +100,11 @@ def _patch_excitation(
         largest_factor=LARGEST_FACTOR,
     )
     fits = OrderFits(_series(charging), decay, relative_sigmas, _states(part, patch) is not None)
-    fit = fits.chosen(part.overrides.order)
-    refitted = refit(fit, relative_sigmas)
+    choice = fits.chosen(part.overrides.order)
+    charging = evened(charging, choice.best)
+    fit = choice.fitted(_series(charging))
     closure = predicted_charging(
-        charging, irradiance, relative_sigmas, lambda reduced: refitted(_series(reduced))
+        charging, irradiance, relative_sigmas, lambda reduced: choice.fitted(_series(reduced))
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
+from labrig.analyse.excitation.evenness import evenness
 from labrig.analyse.excitation.lamp_light import (
     across_sites,
     lamp_transients,
@@ -15,7 +16,6 @@ from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.calibration import IrradianceFile, Warming
-from labrig.errors import DataError
 from labrig.optics import Strip
 from labrig.record import FrameRole
 from labrig.reduce import SensorLayout, reduce_patches, sensor_layout
@@ -176,13 +176,14 @@ def _divide_by_evenness(
 ) -> PatchCharging:
     """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
     is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
-    evenness = _evenness(values[is_direct], sigma[is_direct])
-    values, sigma = values / evenness[:, None], sigma / evenness[:, None]
+    # What earlier charges have left is not known yet: `evened` takes it into account.
+    even = evenness(values[is_direct], sigma[is_direct], np.ones(1))
+    values, sigma = values / even[:, None], sigma / even[:, None]
     is_last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
         replace(through, values=values[~is_direct], sigma=sigma[~is_direct]),
         replace(direct, values=values[is_direct], sigma=sigma[is_direct]),
-        evenness,
+        even,
         _final_decay(strip_series, is_last, frames),
     )
 
@@ -219,24 +220,6 @@ def _bounding_region(sites: Slices) -> Region:
     right = max(region[0] + region[2] for region in sites.values())
     bottom = max(region[1] + region[3] for region in sites.values())
     return left, top, right - left, bottom - top
-
-
-def _evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
-    """Return the brightness of every place after the same light, 1 on average, shape (P,)."""
-    weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
-    is_known = weight.min(axis=1, keepdims=True) > 0
-    frame_mean = np.where(
-        is_known, np.nanmean(np.where(is_known, values, 0.0), axis=1, keepdims=True), 0.0
-    )
-    weight = np.where(is_known, weight, 0.0)
-    total = (weight * frame_mean**2).sum(axis=(0, 2))
-    if not (total > 0).all():
-        raise DataError(
-            "expected a glow all along the filter's place after charges by the lamp itself, got "
-            "none somewhere, or it is clipped; check where the sample and the filter lie"
-        )
-    signal = (weight * frame_mean * np.nan_to_num(values)).sum(axis=(0, 2)) / total
-    return np.asarray(signal / signal.mean())
 
 
 def _final_decay(strip_series: Series, rows: BoolArray, frames: ChargeFrames) -> Series:

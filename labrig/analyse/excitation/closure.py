@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def predicted_charging(
         for name in ("start_s", "exposure_s")
     )
     dark_s = starts - np.array([charge.off_s for charge in charges])
-    initial = _initial_concentrations(direct, fit)[list(first)]
+    initial = _initial_concentrations(direct, fit)[:, list(first)]
     order = np.array([state.kinetic_order for state in fit.states])
 
     def predicted(theta: FloatArray) -> FloatArray:
@@ -132,18 +133,21 @@ def _equivalent_charge_s(
 
 
 def _initial_concentrations(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
-    """Return the concentrations left of the previous charge at the begin of each charge, (K, N)."""
+    """Return what the charge before has left at every site at the begin of each, (P, K, N)."""
     k_r = np.array([state.k_r_per_s for state in fit.states])
     order = np.array([state.kinetic_order for state in fit.states])
-    ended = levels_at_off(direct, k_r, fit.k_e(), fit.orders()).value.mean(axis=1)
-    on_s, off_s = (
-        np.array([getattr(charge, name) for charge in direct.charges]) for name in ("on_s", "off_s")
-    )
-    waited_s = on_s[1:] - off_s[:-1]
-    fresh = np.array([charge.fresh for charge in direct.charges[1:]])
-    waited = dark_concentration(ended[:-1], k_r, order, waited_s[:, None])
-    remaining = np.where(fresh[:, None], 0.0, waited)
-    return np.vstack([np.zeros_like(k_r), remaining])
+    charges = direct.charges
+    level = levels_at_off(direct, k_r, fit.k_e(), fit.orders()).value
+    initial = np.zeros_like(level)
+    if (before := direct.before()) is not None:
+        (charge,) = before.charges
+        charges = (charge, *charges)
+        level = np.concatenate([levels_at_off(before, k_r, fit.k_e(), fit.orders()).value, level])
+    waited_s = [after.on_s - charge.off_s for charge, after in pairwise(charges)]
+    is_fresh = [charge.fresh for charge in charges[1:]]
+    left = dark_concentration(level[:-1], k_r, order, np.array(waited_s)[:, None, None])
+    initial[len(initial) - len(left) :] = np.where(np.array(is_fresh)[:, None, None], 0.0, left)
+    return initial.swapaxes(0, 1)
 
 
 def _slopes(

@@ -109,10 +109,10 @@ def levels_after_charges(
     empty = _State.of(np.zeros(shape), bands)
     transients = _parts(series.rise), _parts(series.fade)
     state, dark_s, ends = empty, -np.inf, []
-    if series.earlier is not None:
-        elsewhere = sample._replace(irradiance=series.earlier.irradiance)
-        state = _charged(elsewhere, empty, transients, series.earlier.charge)
-        dark_s = series.earlier.charge.off_s + series.fade.total_s
+    if (earlier := series.earlier) is not None:
+        elsewhere = sample._replace(irradiance=earlier.irradiance)
+        state = _charged(elsewhere, empty, transients, earlier.charge)
+        dark_s = earlier.charge.off_s + series.fade.total_s
     for charge in series.charges:
         if charge.saturated:
             full = _State.of(np.ones(shape), bands)
