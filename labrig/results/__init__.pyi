@@ -21,7 +21,7 @@ from .camera_calibration import (
 from .charging_series import (
     Charge as Charge,
     ChargingSeries as ChargingSeries,
-    EarlierCharge as EarlierCharge,
+    EarlierCharges as EarlierCharges,
     Transient as Transient,
 )
 from .decay import (

@@ -102,18 +102,18 @@ class Charge:
 
 
 @dataclass(frozen=True, eq=False)
-class EarlierCharge:
-    """Last charge of the same sites before a series began, of which something may be left.
+class EarlierCharges:
+    """Charges of the same sites before a series began, of which something may be left.
 
     Attributes
     ----------
-    charge
-        The charge, by the same lamp and on the same clock.
+    charges
+        The charges by rising time, by the same lamp and on the same clock.
     irradiance
         Irradiance of every site in every band, shape (P, B).
     """
 
-    charge: Charge
+    charges: tuple[Charge, ...]
     irradiance: FloatArray
 
 
@@ -146,8 +146,8 @@ class ChargingSeries:
         Irradiance at Q places within every site relative to the site's, shape (Q, P, B): in uneven
         light, the mean level is not the level of the mean light. None: the light is even.
     earlier
-        Last charge before the first one of the series, which slow states and those of a kinetic
-        order above 1 remember for long; None: there was none.
+        Charges before the first one of the series, which slow states and those of a kinetic order
+        above 1 remember for long; None: there were none.
     """
 
     name: str
@@ -160,7 +160,7 @@ class ChargingSeries:
     site_modes: FloatArray | None = None
     mode_kind: IntArray | None = None
     across: FloatArray | None = None
-    earlier: EarlierCharge | None = None
+    earlier: EarlierCharges | None = None
 
     def spread(self) -> Self:
         """Return the series with every place within the sites as a site, place by place."""
@@ -174,13 +174,16 @@ class ChargingSeries:
         return replace(self, irradiance=irradiance, across=None, earlier=earlier)
 
     def before(self) -> Self | None:
-        """Return the series of the last charge before, without photographs; None if none was."""
+        """Return the series of earlier charges, without photographs; None if there were none."""
         if self.earlier is None:
             return None
         nothing: FloatArray = np.empty((0, *self.values.shape[1:]))
+        never: FloatArray = np.empty(0)
         return replace(
             self,
-            charges=(replace(self.earlier.charge, start_s=np.empty(0), exposure_s=np.empty(0)),),
+            charges=tuple(
+                replace(charge, start_s=never, exposure_s=never) for charge in self.earlier.charges
+            ),
             irradiance=self.earlier.irradiance,
             values=nothing,
             sigma=nothing,

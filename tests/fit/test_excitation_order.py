@@ -11,7 +11,7 @@ from labrig.errors import UsageError
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.material import becquerel_of, read_material
-from labrig.results import ChargingSeries, EarlierCharge, FittedExcitation
+from labrig.results import ChargingSeries, EarlierCharges, FittedExcitation
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
@@ -172,7 +172,7 @@ def test_a_charge_of_the_series_before_is_not_forgotten() -> None:
     first, second = whole.charges
     later = replace(
         whole, charges=(second,), values=whole.values[3:], sigma=whole.sigma[3:],
-        earlier=EarlierCharge(first, whole.irradiance),
+        earlier=EarlierCharges((first,), whole.irradiance),
     )  # fmt: skip
     (truth,) = sample.material.states
     rates = np.array([truth.k_r_per_s]), np.array([truth.k_e_per_s]), np.array([B])

@@ -1,6 +1,7 @@
 """Analysis of an excitation run, from its frames to rates and a material of every patch."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from labrig.analyse.excitation.charge_intervals import GLOWING
 from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
 from labrig.analyse.excitation.evenness import evened
+from labrig.analyse.excitation.flicker import common_flicker
 from labrig.analyse.excitation.lamp_light import (
     LAMP_SIGMA,
     LARGEST_FACTOR,
@@ -101,6 +103,10 @@ def _patch_excitation(
     )
     fits = OrderFits(_series(charging), decay, relative_sigmas, _states(part, patch) is not None)
     choice = fits.chosen(part.overrides.order)
+    if part.inputs.camera is None:
+        flicker = common_flicker(choice.best, _series(charging), dark)
+        relative_sigmas = replace(relative_sigmas, flicker=flicker)
+        choice = replace(choice, relative_sigmas=relative_sigmas)
     charging = evened(charging, choice.best)
     fit = choice.fitted(_series(charging))
     closure = predicted_charging(

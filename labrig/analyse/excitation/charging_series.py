@@ -24,7 +24,7 @@ from labrig.results import (
     BoolArray,
     Charge,
     ChargingSeries,
-    EarlierCharge,
+    EarlierCharges,
     FloatArray,
     PatchCharging,
     Series,
@@ -104,11 +104,11 @@ def patch_chargings(
         NOTHING, NOTHING, site_modes(irradiance), mode_kinds(irradiance), across_sites(irradiance),
     )  # fmt: skip
     everywhere = np.tile(irradiance.direct, (len(irradiance.position), 1))
-    direct_charges, last = charges(True), through.charges[-1]
-    is_earlier = last.off_s < direct_charges[0].on_s
+    direct_charges = charges(True)
+    is_earlier = through.charges[-1].off_s < direct_charges[0].on_s
     direct = ChargingSeries(
         "by the lamp itself", direct_charges, rise, fade, everywhere, NOTHING, NOTHING,
-        earlier=EarlierCharge(last, through.irradiance) if is_earlier else None,
+        earlier=EarlierCharges(through.charges, through.irradiance) if is_earlier else None,
     )  # fmt: skip
     chargings = {}
     for patch, slices in sites.items():

@@ -140,9 +140,9 @@ def _initial_concentrations(direct: ChargingSeries, fit: FittedExcitation) -> Fl
     level = levels_at_off(direct, k_r, fit.k_e(), fit.orders()).value
     initial = np.zeros_like(level)
     if (before := direct.before()) is not None:
-        (charge,) = before.charges
-        charges = (charge, *charges)
-        level = np.concatenate([levels_at_off(before, k_r, fit.k_e(), fit.orders()).value, level])
+        charges = (before.charges[-1], *charges)
+        last = levels_at_off(before, k_r, fit.k_e(), fit.orders()).value[-1:]
+        level = np.concatenate([last, level])
     waited_s = [after.on_s - charge.off_s for charge, after in pairwise(charges)]
     is_fresh = [charge.fresh for charge in charges[1:]]
     left = dark_concentration(level[:-1], k_r, order, np.array(waited_s)[:, None, None])

@@ -133,7 +133,7 @@ class ChosenOrders:
     doubt: tuple[str, ...] = ()
 
     def fitted(self, series: Sequence[ChargingSeries]) -> FittedExcitation:
-        """Fit series of the sample by the model, from its solution; the light's errors are found."""
+        """Fit series of the sample by the model, from its solution, and find the light's errors."""
         best = self.best
         order = None if best.are_orders_fitted else best.states[0].kinetic_order
         k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in best.states]).T

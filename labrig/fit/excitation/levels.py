@@ -133,11 +133,11 @@ def _level_before(
     series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
 ) -> _Before | None:
     """Return the level after the last charge before the series; None if there was none."""
-    alone = series.before()
-    if alone is None:
+    earlier = series.before()
+    if earlier is None:
         return None
-    value, by_k_r, by_k_e, _ = _independent_charges(alone, k_r_per_s, k_e_per_s).gained
-    return _Before(float(_dark_s(alone)[0]), value[0], by_k_r[0], by_k_e[0])
+    value, by_k_r, by_k_e, _ = _levels_after_charges(earlier, k_r_per_s, k_e_per_s)
+    return _Before(float(_dark_s(earlier)[-1]), value[-1], by_k_r[-1], by_k_e[-1])
 
 
 def _independent_charges(
