@@ -101,7 +101,7 @@ def _patch_excitation(
         irradiance=band_sigma(irradiance),
         largest_factor=LARGEST_FACTOR,
     )
-    fits = OrderFits(_series(charging), decay, relative_sigmas, _states(part, patch) is not None)
+    fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(part) is not None)
     choice = fits.chosen(part.overrides.order)
     if part.inputs.camera is None:
         flicker = common_flicker(choice.best, _series(charging), dark)
@@ -157,10 +157,15 @@ def _closure_warnings(closure: Closure | None) -> Iterator[str]:
         )
 
 
-def _states(part: Part, patch: StripPatch) -> int | None:
-    """Return the requested number of states, or that of an earlier decay of this patch; or None."""
+def _asked_states(part: Part) -> int | None:
+    """Return the number of states that is asked for; None if the data choose it."""
     protocol_states = part.protocol.states
-    states = part.overrides.states or (None if protocol_states == "auto" else protocol_states)
+    return part.overrides.states or (None if protocol_states == "auto" else protocol_states)
+
+
+def _states(part: Part, patch: StripPatch) -> int | None:
+    """Return the number of states of an earlier decay of this patch, if none is asked for."""
+    states = _asked_states(part)
     if states is None and (decay := patch.own(part.inputs.decays)) is not None:
         return decay.n_states
     return states

@@ -11,7 +11,7 @@ from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_o
 from labrig.material import dark_concentration
 from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
 
-#: Step of the derivatives as a fraction of σ.
+#: Step of the derivatives as a fraction of σ, or of the parameter where σ is larger than it.
 STEP = 0.01
 
 
@@ -24,7 +24,8 @@ def predicted_charging(
     """Predict charging by the lamp itself from charges through the filter.
 
     The longest charge by the lamp itself stays in the fit, since it determines the level of charge;
-    the shorter ones are predicted. With fewer than two of those there is no test.
+    the shorter ones are predicted. With fewer than two of those there is no test, nor where the
+    other charges do not determine every rate.
 
     Parameters
     ----------
@@ -54,6 +55,8 @@ def predicted_charging(
     if len(first) < 3:
         return None
     fit = fit_of(longest_only)
+    if not np.isfinite(fit.covariance).all():
+        return None
     rows = np.array(list(first.values()))
     charges = [direct.charges[number] for number in first]
     values, sigma = direct.values[rows, :, channel], direct.sigma[rows, :, channel]
@@ -70,9 +73,10 @@ def predicted_charging(
     initial = _initial_concentrations(direct, fit)[:, list(first)]
     order = np.array([state.kinetic_order for state in fit.states])
 
+    n, end = len(fit.states), 2 * len(fit.states) + fit.k_e().size
+
     def predicted(theta: FloatArray) -> FloatArray:
         """Return the levels by k_r, amplitudes, k_e, fitted orders and ln of the light."""
-        n, end = len(fit.states), 2 * len(fit.states) + fit.k_e().size
         light = np.array(irradiance.direct) * np.exp(theta[-1])
         sample = Charging(
             theta[2 * n : end].reshape(n, -1),
@@ -93,7 +97,11 @@ def predicted_charging(
         ]
     )
     theta_sigma = np.sqrt(np.append(np.diag(fit.covariance), max(relative_sigmas.scale, 1e-6) ** 2))
-    slopes = _slopes(predicted, theta, theta_sigma)
+    # Rates without a level have a σ larger than themselves, and must stay above 0.
+    size = np.ones(len(theta))
+    size[: 2 * n] = theta[: 2 * n]
+    size[2 * n : end] = np.repeat(fit.k_e().max(axis=1), fit.k_e().shape[1])
+    slopes = _slopes(predicted, theta, np.minimum(theta_sigma, size))
     cold_deficit = np.array([charge.cold_deficit for charge in charges])
     charge_variance = slopes[-1] ** 2 * (
         relative_sigmas.scale**2
@@ -151,10 +159,10 @@ def _initial_concentrations(direct: ChargingSeries, fit: FittedExcitation) -> Fl
 
 
 def _slopes(
-    function: Callable[[FloatArray], FloatArray], theta: FloatArray, sigma: FloatArray
+    function: Callable[[FloatArray], FloatArray], theta: FloatArray, largest: FloatArray
 ) -> FloatArray:
-    """Return the slopes (θ, n), by differences of a fraction of each parameter's σ."""
-    steps = np.diag(STEP * np.maximum(sigma, 1e-12))
+    """Return the slopes (θ, n), by differences of a fraction of each parameter's largest change."""
+    steps = np.diag(STEP * np.maximum(largest, 1e-12))
     return np.array(
         [(function(theta + step) - function(theta - step)) / (2 * step.sum()) for step in steps]
     )
