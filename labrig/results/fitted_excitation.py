@@ -303,8 +303,11 @@ class FittedExcitation:
         relative = k_e / k_e[largest]
         slopes = np.eye(bands)
         slopes[:, largest] -= relative
-        covariance = slopes @ self.covariance[np.ix_(rows, rows)] @ slopes.T / k_e[largest] ** 2
-        return relative, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        of_state = self.covariance[np.ix_(rows, rows)]
+        if not np.isfinite(of_state).all():
+            return relative, np.where(np.arange(bands) == largest, 0.0, np.inf)
+        variance = np.diag(slopes @ of_state @ slopes.T) / k_e[largest] ** 2
+        return relative, np.sqrt(np.maximum(variance, 0.0))
 
     def k_e(self) -> FloatArray:
         """Return the excitation rates of all states in 1/s, shape (N, B)."""
