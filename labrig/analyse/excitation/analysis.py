@@ -127,7 +127,8 @@ def _patch_excitation(
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
         (
-            *decay.warnings,
+            # Exponentials are a start only where another law was chosen for all charges.
+            *(decay.warnings if fit.is_first_order else ()),
             *fit.warnings,
             *_light_warnings(fit),
             *_closure_warnings(closure),
