@@ -6,16 +6,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy.special import chdtrc
 
 from labrig.catalogue.reference import gain
 from labrig.errors import DataError
-from labrig.results import FittedDecay, Measured, read_fitted_decays
+from labrig.results import (
+    EXPONENTIALS,
+    LAW_LABELS,
+    FittedDecay,
+    FittedLaw,
+    Measured,
+    read_fitted_decays,
+)
 from labrig.yaml_file import read_yaml
 
 #: Significance level below which rates differ.
 DIFFERENT_P = 0.01
 NO_GAIN = Measured(1.0, 0.0)
+#: Symbols and units of the parameters of laws; τ belongs to the charge.
+LAW_SYMBOLS = {
+    "decay_time_s": ("τ", "s"),
+    "exponent": ("exponent", ""),
+    "kinetic_order": ("b", ""),
+    "retrapping": ("retrapping", ""),
+}
 #: Smallest p-value that is reported as a number.
 MIN_P = 1e-9
 
@@ -53,17 +68,22 @@ class PatchComparison:
     ----------
     patch
         Name of the patch.
+    laws
+        Laws of decay that were chosen in runs A and B.
     states
-        Numbers of states in runs A and B.
+        Numbers of states in runs A and B, of exponentials.
     differences
-        Differences of the parameters state by state; empty if the numbers of states differ.
+        Differences of the parameters, of exponentials state by state; empty if laws or numbers of
+        states differ.
     p_value
-        Probability that equal rates differ at least as much as these; NaN if it is not known.
+        Probability that equal rates, or laws, differ at least as much as these; NaN if it is not
+        known.
     gain
         Factor by which the amplitudes of run B were multiplied; 1 without a reference.
     """
 
     patch: str
+    laws: tuple[str, str]
     states: tuple[int, int]
     differences: tuple[Difference, ...]
     p_value: float
@@ -72,13 +92,19 @@ class PatchComparison:
     @property
     def assessment(self) -> str:
         """Assessment of the differences as text."""
-        if self.states[0] != self.states[1]:
+        if self.laws[0] != self.laws[1]:
+            labels = " and ".join(LAW_LABELS[law] for law in self.laws)
+            return f"{labels}: process both with the same --law"
+        is_sum = self.laws[0] == EXPONENTIALS
+        if is_sum and self.states[0] != self.states[1]:
             return f"{self.states[0]} and {self.states[1]} states: fit both with the same --states"
         if math.isnan(self.p_value):
             return "not decided: the uncertainties are not known"
         agree = "differ" if self.p_value < DIFFERENT_P else "agree"
         p = f"p = {self.p_value:.2g}" if self.p_value >= MIN_P else f"p < {MIN_P:g}"
-        return f"the rates {agree} ({p})"
+        if is_sum:
+            return f"the rates {agree} ({p})"
+        return f"the decays by {LAW_LABELS[self.laws[0]]} {agree} ({p})"
 
 
 @dataclass(frozen=True)
@@ -163,9 +189,15 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
 
 
 def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> PatchComparison:
-    counts = len(a.rates), len(b.rates)
+    laws, counts = (a.law, b.law), (len(a.rates), len(b.rates))
+    if a.law != b.law:
+        return PatchComparison(name, laws, counts, (), math.nan, gain_b)
+    law_a, law_b = _chosen_law(a), _chosen_law(b)
+    if law_a is not None and law_b is not None:
+        differences, p_value = _differences_of_laws(law_a, law_b, a.brightest_channel, gain_b)
+        return PatchComparison(name, laws, counts, differences, p_value, gain_b)
     if counts[0] != counts[1]:
-        return PatchComparison(name, counts, (), math.nan, gain_b)
+        return PatchComparison(name, laws, counts, (), math.nan, gain_b)
     rates = [
         Difference(f"k_r {number}", "1/s", value_a, value_b)
         for number, (value_a, value_b) in enumerate(zip(a.rates, b.rates, strict=True), start=1)
@@ -178,7 +210,37 @@ def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> Pat
     ]
     chi2 = sum(difference.pull**2 for difference in rates)
     p_value = float(chdtrc(len(rates), chi2))
-    return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_b)
+    return PatchComparison(name, laws, counts, (*rates, *amplitudes), p_value, gain_b)
+
+
+def _chosen_law(fit: FittedDecay) -> FittedLaw | None:
+    """Return the law that describes the decay; None if it is a sum of exponentials."""
+    return next((law for law in fit.laws if law.name == fit.law), None)
+
+
+def _differences_of_laws(
+    a: FittedLaw, b: FittedLaw, channel: str, gain_b: Measured
+) -> tuple[tuple[Difference, ...], float]:
+    """Return the differences of a law's parameters, and the probability of such in rate and shape.
+
+    Rate and shape determine the course of the decay, and depend on each other.
+    """
+    shared = [name for name in a.parameters if name in b.parameters]
+    own = [
+        Difference(*LAW_SYMBOLS[name], a.parameters[name], b.parameters[name]) for name in shared
+    ]
+    amplitude_a, amplitude_b = (
+        Measured(law.amplitude, math.sqrt(law.covariance[0, 0])) for law in (a, b)
+    )
+    amplitude = Difference(
+        "a", f"DN/s of channel {channel}", amplitude_a, amplitude_b.times(gain_b)
+    )
+    apart = np.array([b.rate_per_s - a.rate_per_s, b.shape - a.shape])
+    covariance = (a.covariance + b.covariance)[1:3, 1:3]
+    if not np.isfinite(covariance).all():
+        return (*own, amplitude), math.nan
+    chi2 = float(apart @ np.linalg.pinv(covariance) @ apart)
+    return (*own, amplitude), float(chdtrc(len(apart), chi2))
 
 
 def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:

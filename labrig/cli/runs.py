@@ -211,7 +211,7 @@ def _print_comparison(comparison: "Comparison") -> None:
             table.add_column(title)
         for difference in patch.differences:
             table.add_row(
-                f"{difference.quantity} in {difference.unit}",
+                " in ".join(filter(None, (difference.quantity, difference.unit))),
                 plus_minus(difference.a.value, difference.a.sigma),
                 plus_minus(difference.b.value, difference.b.sigma),
                 "–" if math.isnan(difference.pull) else f"{difference.pull:+.1f}".replace("-", "−"),

@@ -104,6 +104,14 @@ def compare_materials(measured: Material, reference: Material) -> MaterialCompar
             "Their kinetic orders differ, so their k_r and Λ do not mean the same: k_r is the rate "
             "of a full state only."
         )
+    if not all(state.is_level_known for state in (*measured_states, *reference_states)):
+        notes.append(
+            "The charge of one of them was too far from saturation to tell k_r, r(0), k_e and Λ "
+            "apart; those are left out."
+        )
+    has_order = not (measured.is_first_order and reference.is_first_order)
+    if has_order:
+        notes.append("τ belongs to each one's own charge: after more of it the glow fades sooner.")
     same_bands = measured.bands_nm == reference.bands_nm
     if not same_bands and measured.bands_nm is not None and reference.bands_nm is not None:
         notes.append("Their bands differ, so k_e and Λ are left out.")
@@ -122,8 +130,9 @@ def compare_materials(measured: Material, reference: Material) -> MaterialCompar
         reference_state = reference_states[number] if number < len(reference_states) else None
         label = f" {number + 1}" if max(len(measured_states), len(reference_states)) > 1 else ""
         pairs += _pairs(state, reference_state, label, "k_r", "s⁻¹", "k_r_per_s")
-        if not (measured.is_first_order and reference.is_first_order):
+        if has_order:
             pairs += _pairs(state, reference_state, label, "b", "", "kinetic_order")
+            pairs += _pairs(state, reference_state, label, "τ", "s", "decay_time_s")
         pairs += _pairs(state, reference_state, label, "r(0)", "", "r0")
         if same_bands and measured.bands_nm is not None:
             bands = measured.bands_nm
@@ -151,9 +160,9 @@ def _closest(
 ) -> float:
     """Return the c that minimises Σ (c x − x')² over states and bands of `name`; 1 without any."""
     values = [
-        (np.array(getattr(state, name)), np.array(getattr(reference_state, name)))
+        (np.array(state.known(name)), np.array(reference_state.known(name)))
         for state, reference_state in zip(measured_states, reference_states, strict=False)
-        if getattr(state, name) is not None and getattr(reference_state, name) is not None
+        if state.known(name) is not None and reference_state.known(name) is not None
     ]
     square = sum(float(value @ value) for value, _ in values)
     product = sum(float(value @ reference) for value, reference in values)
@@ -195,9 +204,13 @@ def _pairs(
 
 def _values(state: State | None, name: str) -> tuple[FloatArray | None, FloatArray | None]:
     """Return value and σ of a quantity of `state`, shape (1,) or (bands,), None where not known."""
-    quantity = (getattr(state, name, None), getattr(state, f"{name}_sigma", None))
+    known = None if state is None else state.known(name)
+    if name == "decay_time_s" and known is None and state is not None:
+        known = state.decay_time_of_rate_s
+    sigma_known = None if known is None else getattr(state, f"{name}_sigma")
     value, sigma = (
-        None if column is None else np.atleast_1d(np.array(column, float)) for column in quantity
+        None if column is None else np.atleast_1d(np.array(column, float))
+        for column in (known, sigma_known)
     )
     return value, sigma
 

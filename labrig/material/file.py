@@ -30,9 +30,23 @@ Concentration = Annotated[float, Field(ge=0, le=1)]
 Series = tuple[NotNegative, ...]
 
 #: Fields of a state that may have an uncertainty.
-MEASURED = ("k_r_per_s", "kinetic_order", "amplitude", "r0", "k_e_per_s", "reradiation")
+MEASURED = (
+    "k_r_per_s",
+    "kinetic_order",
+    "amplitude",
+    "r0",
+    "decay_time_s",
+    "k_e_per_s",
+    "reradiation",
+)
 #: Fields that are written where the kinetic order is not 1.
-OF_ORDER = ("kinetic_order", "kinetic_order_sigma")
+OF_ORDER = ("kinetic_order", "kinetic_order_sigma", "decay_time_s", "decay_time_s_sigma")
+#: What only the level of charge tells of a state of an order other than 1.
+OF_LEVEL = ("k_r_per_s", "r0", "k_e_per_s", "reradiation")
+#: Relative σ of r(0) from which a state of an order other than 1 was not seen to saturate.
+LEVEL_KNOWN = 0.3
+#: Relative difference of `decay_time_s` to that of rate and concentration, by rounding.
+SAME_TIME = 1e-3
 
 
 class _Part(BaseModel):
@@ -72,6 +86,10 @@ class State(_Part):
         Λ k_r r(0)ᵇ with a kinetic order.
     r0
         Concentration r(0) of the state at lamp off to which `amplitude` belongs, 0 to 1.
+    decay_time_s
+        Time τ of the decay of a kinetic order after that lamp off, in s, which is known better than
+        `k_r_per_s` and `r0` where the charge does not tell them apart. Default: that of their
+        values.
     k_e_per_s
         Excitation rate k_e of the state in every band, in 1/s per unit of the normalised
         irradiance; as many numbers as there are bands.
@@ -86,6 +104,8 @@ class State(_Part):
         Standard deviation of `amplitude`, in its unit.
     r0_sigma
         Standard deviation of `r0`.
+    decay_time_s_sigma
+        Standard deviation of `decay_time_s`, in s.
     k_e_per_s_sigma
         Standard deviation of each number of `k_e_per_s`, in the same unit.
     reradiation_sigma
@@ -96,12 +116,14 @@ class State(_Part):
     kinetic_order: Order = 1.0
     amplitude: NotNegative | None = None
     r0: Concentration | None = None
+    decay_time_s: Rate | None = None
     k_e_per_s: Series | None = None
     reradiation: Series | None = None
     k_r_per_s_sigma: NotNegative | None = None
     kinetic_order_sigma: NotNegative | None = None
     amplitude_sigma: NotNegative | None = None
     r0_sigma: NotNegative | None = None
+    decay_time_s_sigma: NotNegative | None = None
     k_e_per_s_sigma: Series | None = None
     reradiation_sigma: Series | None = None
 
@@ -128,6 +150,42 @@ class State(_Part):
                 f"its decay depends on the charge, got {'nothing' if self.r0 is None else self.r0}"
             )
         return self
+
+    @model_validator(mode="after")
+    def _decay_time_is_that_of_the_rate(self) -> Self:
+        if self.decay_time_s is None:
+            return self
+        time_s = self.decay_time_of_rate_s
+        if time_s is None or abs(self.decay_time_s / time_s - 1) > SAME_TIME:
+            raise ValueError(
+                "expected 'decay_time_s' with a 'kinetic_order' above 1 and 'r0', equal to "
+                f"1/((b − 1) k_r r(0)^(b − 1)), got {self.decay_time_s:g} instead of "
+                f"{'nothing' if time_s is None else format(time_s, 'g')}"
+            )
+        return self
+
+    @property
+    def decay_time_of_rate_s(self) -> float | None:
+        """Time τ = 1/((b − 1) k_r r(0)^(b − 1)) in s; None of the first order or without r(0)."""
+        beyond = self.kinetic_order - 1
+        return 1 / (beyond * self.k_r_per_s * self.r0**beyond) if beyond and self.r0 else None
+
+    @property
+    def is_level_known(self) -> bool:
+        """Whether k_r, k_e, r(0) and Λ are known apart, as always of the first order.
+
+        Of another order a charge far from saturation tells only what their common scale leaves
+        alone: amplitude, τ and the order.
+        """
+        if self.kinetic_order == 1 or self.r0 is None or self.r0_sigma is None:
+            return True
+        return self.r0_sigma < LEVEL_KNOWN * self.r0
+
+    def known(self, name: str) -> Any:
+        """Return a value by its name; None where the charge does not tell it."""
+        if name in OF_LEVEL and not self.is_level_known:
+            return None
+        return getattr(self, name)
 
     @model_serializer(mode="wrap")
     def _without_the_first_order(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

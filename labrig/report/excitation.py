@@ -27,6 +27,8 @@ from labrig.report.figure_style import (
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
+    SEEN_SIGMAS,
+    UPPER_SIGMAS,
     ChargingSeries,
     Closure,
     ExcitationResult,
@@ -40,6 +42,8 @@ from labrig.results import (
 
 HEIGHT_PT = 270.0
 UNKNOWN = "–"
+#: What is given of excitation rates where the charge does not tell their scale.
+RELATIVE = "k_e over its largest"
 #: Number of positions along the filter whose charging is drawn.
 SHOWN = 5
 MEASURED = (
@@ -63,9 +67,10 @@ def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
     fit = patch.fit
     for number in range(len(fit.states)):
         yield f"state {number + 1}: {_state_line(fit, number)}"
+        quantity, unit = ("k_e", " /s") if fit.states[number].is_apart else (RELATIVE, "")
         bands = zip(pairwise(result.irradiance.bands_nm), _rates(fit, number), strict=True)
         for (low, high), text in bands:
-            yield f"  {low:.0f}-{high:.0f} nm: k_e {text} /s"
+            yield f"  {low:.0f}-{high:.0f} nm: {quantity} {text}{unit}"
     yield f"reduced χ² {rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"
     if len(fit.models) > 1:
         yield f"models: {_models_line(fit)}"
@@ -112,14 +117,24 @@ def _closure_line(closure: Closure | None) -> str:
 
 
 def _rates(fit: FittedExcitation, number: int) -> list[str]:
-    """Return k_e of a state in each band in 1/s as text, or its upper limit."""
+    """Return k_e of a state in each band as text, or its upper limit.
+
+    It is in 1/s, or over the largest band's where only that is known.
+    """
     state = fit.states[number]
+    columns = (state.k_e_per_s, state.k_e_sigma_per_s, state.seen, state.k_e_upper_per_s)
+    if not state.is_apart:
+        value, sigma = fit.relative_k_e(number)
+        columns = value, sigma, value > SEEN_SIGMAS * sigma, value + UPPER_SIGMAS * sigma
     return [
-        plus_minus(float(value), float(sigma)) if detected else f"< {rounded(float(upper), 2)}"
-        for value, sigma, detected, upper in zip(
-            state.k_e_per_s, state.k_e_sigma_per_s, state.seen, state.k_e_upper_per_s, strict=True
-        )
+        _rate_text(float(value), float(sigma)) if detected else f"< {rounded(float(upper), 2)}"
+        for value, sigma, detected, upper in zip(*columns, strict=True)
     ]
+
+
+def _rate_text(value: float, sigma: float) -> str:
+    """Return a rate with its σ; the largest of relative rates, to which others refer, is exact."""
+    return plus_minus(value, sigma) if sigma > 0 else rounded(value)
 
 
 def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Section:
@@ -200,6 +215,7 @@ def _levels_table(fit: FittedExcitation, caption: str) -> Table:
     head = ["State", "k_r / s⁻¹", "Amplitude at r = 1 / (DN/s)", "r(0)", "Amplitude a / (DN/s)"]
     if not fit.is_first_order:
         head += ["b", "τ / s", "p"]
+        caption = caption.replace("k_r r(0) after", "k_r r(0)ᵇ after")
         caption += (
             " b is the kinetic order; the glow after that charge decays as a (1 + t/τ)^(−p). k_r "
             "and the amplitude belong to r = 1, and are left out where the charge does not tell "
@@ -211,7 +227,7 @@ def _levels_table(fit: FittedExcitation, caption: str) -> Table:
 
 def _levels_row(fit: FittedExcitation, number: int) -> tuple[str, ...]:
     state, off = fit.states[number], fit.at_off[-1]
-    is_known = state.is_first_order or state.is_level_known
+    is_known = state.is_apart
     cells = [
         str(number + 1),
         plus_minus(state.k_r_per_s, state.k_r_sigma_per_s) if is_known else UNKNOWN,
@@ -235,7 +251,15 @@ def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
     states = range(len(fit.states))
     columns = [_rates(fit, number) for number in states]
     return Table(
-        ("Band / nm", *(f"k_e of state {number + 1} / s⁻¹" for number in states)),
+        (
+            "Band / nm",
+            *(
+                f"k_e of state {number + 1} / s⁻¹"
+                if fit.states[number].is_apart
+                else f"{RELATIVE} of state {number + 1}"
+                for number in states
+            ),
+        ),
         tuple(
             (f"{low:.0f}–{high:.0f}", *(column[band] for column in columns))
             for band, (low, high) in enumerate(pairwise(bands_nm))
@@ -264,13 +288,22 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
         for at_nm, limit in zip(x[~detected], limits, strict=True):
             axes.plot([at_nm, at_nm], [0, limit], color=colour, linewidth=0.9, alpha=0.5)
         entries.append(
-            marker_entry(f"state {number + 1}, k_r {state.k_r_per_s:.3g} s⁻¹", marker, colour)
+            marker_entry(f"state {number + 1}, {_state_label(fit, number)}", marker, colour)
         )
     axes.set_ylim(0, None)
     axes.set_xlabel("Excitation wavelength / nm")
     axes.set_ylabel("k_e / 10⁻³ s⁻¹")
     legend_above(figure, entries, columns=3)
     return figure
+
+
+def _state_label(fit: FittedExcitation, number: int) -> str:
+    """Return k_r of a state; where that is not known, order and τ after the brightest charge."""
+    state = fit.states[number]
+    if state.is_apart:
+        return f"k_r {state.k_r_per_s:.3g} s⁻¹"
+    time_s = float(fit.at_off[-1].decay_time_s[number])
+    return f"b {state.kinetic_order:.3g}, τ {time_s:.3g} s; scale not known"
 
 
 def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: FloatArray) -> Figure:

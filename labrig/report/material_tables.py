@@ -23,6 +23,16 @@ def measured_table(material: Material) -> Table:
             " k_e is per unit of the lamp's irradiance, whose values in the bands are scaled so "
             f"that the root of the sum of their squares is {length:g}; Λ is relative radiance."
         )
+    if any(state.decay_time_of_rate_s is not None for state in states):
+        caption += (
+            " The glow of a kinetic order b decays as a (1 + t/τ)^(−p), after the charge to which "
+            "r(0) belongs; k_r is the rate of a full state."
+        )
+    if not all(state.is_level_known for state in states):
+        caption += (
+            " The charge was too far from saturation to tell k_r, r(0), k_e and Λ apart: those are "
+            "left out, though the file has values for predictions, good for charges like this one."
+        )
     return Table(head if len(states) > 1 else ("", "measured"), rows, caption)
 
 
@@ -128,6 +138,10 @@ def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[
     for quantity, name in own:
         if any(getattr(state, name) is not None for state in states):
             yield (quantity, *(_quantity_text(state, name) for state in states))
+    if any(state.decay_time_of_rate_s is not None for state in states):
+        for quantity, name in (("a", "amplitude"), ("τ / s", "decay_time_s")):
+            yield (quantity, *(_quantity_text(state, name) for state in states))
+        yield ("p", *map(_exponent_text, states))
     for symbol, unit, name in (("k_e", " / s⁻¹", "k_e_per_s"), ("Λ", "", "reradiation")):
         if any(getattr(state, name) is not None for state in states):
             for band, (low, high) in enumerate(pairwise(bands_nm)):
@@ -137,12 +151,24 @@ def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[
 
 def _quantity_text(state: State, name: str, band: int | None = None) -> str:
     """Return a quantity of a state, in a band if there are bands, with its σ as text."""
-    value, sigma = getattr(state, name), getattr(state, f"{name}_sigma")
+    value, sigma = state.known(name), getattr(state, f"{name}_sigma")
+    if name == "decay_time_s" and value is None:
+        value = state.decay_time_of_rate_s
     if value is None:
         return UNKNOWN
     if band is not None:
         value, sigma = value[band], None if sigma is None else sigma[band]
     return _value_text(value, math.nan if sigma is None else sigma)
+
+
+def _exponent_text(state: State) -> str:
+    """Return p = b/(b − 1) with its σ as text."""
+    beyond, sigma = state.kinetic_order - 1, state.kinetic_order_sigma
+    if beyond == 0:
+        return UNKNOWN
+    return _value_text(
+        state.kinetic_order / beyond, math.nan if sigma is None else sigma / beyond**2
+    )
 
 
 def _value_text(value: float, sigma: float) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.material import Material
+from labrig.material import Material, State
 from labrig.number_format import rounded
 from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
 from labrig.report.picture_file import require_picture, save_picture
@@ -68,6 +68,15 @@ def draw_phosphor(material: Material, path: Path) -> None:
         save_picture(figure, path)
 
 
+def _label(state: State) -> str:
+    """Return what tells a state from others: its lifetime, or order and τ after its charge."""
+    if state.kinetic_order == 1:
+        return f"1/k_r = {rounded(1 / state.k_r_per_s, 3)} s"
+    order = f"b = {rounded(state.kinetic_order, 3)}"
+    time_s = state.decay_time_of_rate_s
+    return order if time_s is None else f"{order}, τ = {rounded(time_s, 3)} s"
+
+
 def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
     """Draw one quantity of every state as steps with ± 1 σ."""
     edges_nm = np.array(material.bands_nm)
@@ -78,8 +87,7 @@ def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
             continue
         axes.stairs(
             values, edges_nm, color=colour, linewidth=1.4,
-            label=f"1/k_r = {rounded(1 / state.k_r_per_s, 3)} s"
-            + ("" if state.kinetic_order == 1 else f", b = {rounded(state.kinetic_order, 3)}"),
+            label=_label(state),
         )  # fmt: skip
         if sigmas is not None:
             middles_nm = (edges_nm[1:] + edges_nm[:-1]) / 2

@@ -21,7 +21,7 @@ from .camera_calibration import (
 from .charging_series import (
     Charge as Charge,
     ChargingSeries as ChargingSeries,
-    EarlierCharge as EarlierCharge,
+    EarlierCharges as EarlierCharges,
     Transient as Transient,
 )
 from .decay import (
@@ -70,6 +70,8 @@ from .fitted_decay import (
     write_fitted_decay as write_fitted_decay,
 )
 from .fitted_excitation import (
+    SEEN_SIGMAS as SEEN_SIGMAS,
+    UPPER_SIGMAS as UPPER_SIGMAS,
     BandQuantity as BandQuantity,
     BandTests as BandTests,
     ConcentrationAtOff as ConcentrationAtOff,

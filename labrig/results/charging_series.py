@@ -102,18 +102,18 @@ class Charge:
 
 
 @dataclass(frozen=True, eq=False)
-class EarlierCharge:
-    """Last charge of the same sites before a series began, of which something may be left.
+class EarlierCharges:
+    """Charges of the same sites before a series began, of which something may be left.
 
     Attributes
     ----------
-    charge
-        The charge, by the same lamp and on the same clock.
+    charges
+        The charges by rising time, by the same lamp and on the same clock.
     irradiance
         Irradiance of every site in every band, shape (P, B).
     """
 
-    charge: Charge
+    charges: tuple[Charge, ...]
     irradiance: FloatArray
 
 
@@ -152,8 +152,8 @@ class ChargingSeries:
         Courses along the sites by which the veil may differ from an even one, shape (K, P). None:
         it is even.
     earlier
-        Last charge before the first one of the series, which states of a kinetic order above 1
-        remember for long; None: there was none.
+        Charges before the first one of the series, which slow states and those of a kinetic order
+        above 1 remember for long; None: there were none.
     """
 
     name: str
@@ -168,7 +168,7 @@ class ChargingSeries:
     across: FloatArray | None = None
     frame_light: FloatArray | None = None
     veil_shapes: FloatArray | None = None
-    earlier: EarlierCharge | None = None
+    earlier: EarlierCharges | None = None
 
     def spread(self) -> Self:
         """Return the series with every place within the sites as a site, place by place."""
@@ -180,6 +180,23 @@ class ChargingSeries:
             everywhere = np.tile(earlier.irradiance, (len(self.across), 1))
             earlier = replace(earlier, irradiance=everywhere)
         return replace(self, irradiance=irradiance, across=None, earlier=earlier)
+
+    def before(self) -> Self | None:
+        """Return the series of earlier charges, without photographs; None if there were none."""
+        if self.earlier is None:
+            return None
+        nothing: FloatArray = np.empty((0, *self.values.shape[1:]))
+        never: FloatArray = np.empty(0)
+        return replace(
+            self,
+            charges=tuple(
+                replace(charge, start_s=never, exposure_s=never) for charge in self.earlier.charges
+            ),
+            irradiance=self.earlier.irradiance,
+            values=nothing,
+            sigma=nothing,
+            earlier=None,
+        )
 
     def first_frames(self, usable: BoolArray) -> dict[int, int]:
         """Return the row of its first usable photograph for each charge.

@@ -51,6 +51,11 @@ class ExcitedState:
         return self.kinetic_order == 1
 
     @property
+    def is_apart(self) -> bool:
+        """Whether k_r, k_e, r(0) and Λ are known apart, as always of the first order."""
+        return self.is_first_order or self.is_level_known
+
+    @property
     def exponent(self) -> Measured | None:
         """Exponent p = b/(b − 1) of the decay; None of the first order, an exponential."""
         beyond = self.kinetic_order - 1
@@ -285,6 +290,27 @@ class FittedExcitation:
         if self.is_first_order:
             return None
         return np.array([state.kinetic_order for state in self.states])
+
+    def relative_k_e(self, number: int) -> tuple[FloatArray, FloatArray]:
+        """Return k_e of a state over its largest, and σ, which level and light do not enter, (B,).
+
+        Parameters
+        ----------
+        number
+            Number of the state, from 0.
+        """
+        states, bands = self.k_e().shape
+        rows = 2 * states + number * bands + np.arange(bands)
+        k_e = self.states[number].k_e_per_s
+        largest = int(np.argmax(k_e))
+        relative = k_e / k_e[largest]
+        slopes = np.eye(bands)
+        slopes[:, largest] -= relative
+        of_state = self.covariance[np.ix_(rows, rows)]
+        if not np.isfinite(of_state).all():
+            return relative, np.where(np.arange(bands) == largest, 0.0, np.inf)
+        variance = np.diag(slopes @ of_state @ slopes.T) / k_e[largest] ** 2
+        return relative, np.sqrt(np.maximum(variance, 0.0))
 
     def k_e(self) -> FloatArray:
         """Return the excitation rates of all states in 1/s, shape (N, B)."""

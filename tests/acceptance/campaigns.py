@@ -117,6 +117,7 @@ CAMPAIGNS = {
         _module("veiling_glare"),
         _module("law_confusion", "--seeds", "100"),
         _module("sao_charge_and_decay"),
+        _module("trap_models"),
         _module("lightlogger"),
         _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),
         _module(

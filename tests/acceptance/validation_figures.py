@@ -175,6 +175,18 @@ def _real_charge_of_general_order(printed: str) -> str:
     return f"{charge:.1f}, {decay:.1f}"
 
 
+def _trap_models(order: str) -> Extract:
+    """Return the extract of how many materials were predicted how, processed with an order."""
+
+    def extract(printed: str) -> str:
+        row = re.compile(rf"^[\w.-]+ +{order} +b .* (\w+) +\d+ s$", re.MULTILINE)
+        verdicts = row.findall(printed)
+        kinds = ("good", "doubted", "told", "WRONG")
+        return ", ".join(f"{verdicts.count(kind)} {kind}" for kind in kinds)
+
+    return extract
+
+
 def _narrow_lights(printed: str) -> str:
     thirds = columns(r"^every third.* ([\d.]+) +([\d.]+) +([\d.]+) +[\d.]+ +([\d.]+)$", printed)
     (low,), (median,), (high,), (worst,) = thirds
@@ -478,6 +490,19 @@ FIGURES = (
         "charge, in the decay",
         "sao_charge_and_decay",
         _real_charge_of_general_order,
+    ),
+    Figure(
+        "Charging by the white lamp and decay predicted from an excitation of traps of first and "
+        "general order, with retrapping, and with depths that scatter, the order chosen by the "
+        "data: within 2 % or 3 σ (good; doubted: and warned), worse and warned (told), not warned "
+        "(WRONG)",
+        "trap_models",
+        _trap_models("auto"),
+    ),
+    Figure(
+        "The same with the first order held",
+        "trap_models",
+        _trap_models("1"),
     ),
     Figure(
         "Faults of 15 kinds at random moments of a run, signals and kill -9 in addition; "

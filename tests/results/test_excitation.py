@@ -106,7 +106,11 @@ def test_of_a_kinetic_order_only_what_is_known_is_shown(
     )  # fmt: skip
     covariance = np.diag([*np.diag(fit.covariance), 1e-4])
     models = tuple(ExcitationModel(1, order, 12, 1.0, 7.0) for order in (1.0, None))
-    fit = replace(fit, states=(bent,), covariance=covariance, models=models)
+    last = fit.at_off[-1]
+    last = replace(last, decay_time_s=1 / (0.5 * state.k_r_per_s * last.r0**0.5))
+    fit = replace(
+        fit, states=(bent,), covariance=covariance, models=models, at_off=(*fit.at_off[:-1], last)
+    )
     again = replace(result, patches={"": replace(patch, fit=fit)})
     assert_read_back(again)
     assert fit.covariance_parameters[-1] == "kinetic_order 1"

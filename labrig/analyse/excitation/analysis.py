@@ -1,12 +1,15 @@
 """Analysis of an excitation run, from its frames to rates and a material of every patch."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from labrig.analyse.excitation.charge_intervals import GLOWING
 from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
+from labrig.analyse.excitation.evenness import evened
+from labrig.analyse.excitation.flicker import common_flicker
 from labrig.analyse.excitation.lamp_light import (
     LAMP_SIGMA,
     LARGEST_FACTOR,
@@ -15,7 +18,7 @@ from labrig.analyse.excitation.lamp_light import (
     scale_sigma,
 )
 from labrig.analyse.excitation.material import excited_material
-from labrig.analyse.excitation.orders import OrderFits, refit
+from labrig.analyse.excitation.orders import OrderFits
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
@@ -102,11 +105,16 @@ def _patch_excitation(
         irradiance=band_sigma(irradiance),
         largest_factor=LARGEST_FACTOR,
     )
-    fits = OrderFits(_series(charging), decay, relative_sigmas, _states(part, patch) is not None)
-    fit = fits.chosen(part.overrides.order)
-    refitted = refit(fit, relative_sigmas)
+    fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(part) is not None)
+    choice = fits.chosen(part.overrides.order)
+    if part.inputs.camera is None:
+        flicker = common_flicker(choice.best, _series(charging), dark)
+        relative_sigmas = replace(relative_sigmas, flicker=flicker)
+        choice = replace(choice, relative_sigmas=relative_sigmas)
+    charging = evened(charging, choice.best)
+    fit = choice.fitted(_series(charging))
     closure = predicted_charging(
-        charging, irradiance, relative_sigmas, lambda reduced: refitted(_series(reduced))
+        charging, irradiance, relative_sigmas, lambda reduced: choice.fitted(_series(reduced))
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
@@ -123,7 +131,8 @@ def _patch_excitation(
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
         (
-            *decay.warnings,
+            # Exponentials are a start only where another law was chosen for all charges.
+            *(decay.warnings if fit.is_first_order else ()),
             *fit.warnings,
             *_light_warnings(fit),
             *_closure_warnings(closure),
@@ -153,10 +162,15 @@ def _closure_warnings(closure: Closure | None) -> Iterator[str]:
         )
 
 
-def _states(part: Part, patch: StripPatch) -> int | None:
-    """Return the requested number of states, or that of an earlier decay of this patch; or None."""
+def _asked_states(part: Part) -> int | None:
+    """Return the number of states that is asked for; None if the data choose it."""
     protocol_states = part.protocol.states
-    states = part.overrides.states or (None if protocol_states == "auto" else protocol_states)
+    return part.overrides.states or (None if protocol_states == "auto" else protocol_states)
+
+
+def _states(part: Part, patch: StripPatch) -> int | None:
+    """Return the number of states of an earlier decay of this patch, if none is asked for."""
+    states = _asked_states(part)
     if states is None and (decay := patch.own(part.inputs.decays)) is not None:
         return decay.n_states
     return states

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
+from labrig.analyse.excitation.evenness import evenness
 from labrig.analyse.excitation.lamp_light import (
     across_sites,
     lamp_transients,
@@ -17,7 +18,6 @@ from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions
 from labrig.calibration import IrradianceFile, Warming
-from labrig.errors import DataError
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches, sensor_layout
 from labrig.region import Region
@@ -25,7 +25,7 @@ from labrig.results import (
     BoolArray,
     Charge,
     ChargingSeries,
-    EarlierCharge,
+    EarlierCharges,
     FloatArray,
     PatchCharging,
     Series,
@@ -111,11 +111,11 @@ def patch_chargings(
         NOTHING, NOTHING, site_modes(irradiance), mode_kinds(irradiance), across_sites(irradiance),
     )  # fmt: skip
     everywhere = np.tile(irradiance.direct, (len(irradiance.position), 1))
-    direct_charges, last = charges(True), through.charges[-1]
-    is_earlier = last.off_s < direct_charges[0].on_s
+    direct_charges = charges(True)
+    is_earlier = through.charges[-1].off_s < direct_charges[0].on_s
     direct = ChargingSeries(
         "by the lamp itself", direct_charges, rise, fade, everywhere, NOTHING, NOTHING,
-        earlier=EarlierCharge(last, through.irradiance) if is_earlier else None,
+        earlier=EarlierCharges(through.charges, through.irradiance) if is_earlier else None,
     )  # fmt: skip
     chargings = {}
     for patch, slices in sites.items():
@@ -145,11 +145,11 @@ def _divide_by_evenness(
 ) -> PatchCharging:
     """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
     is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
-    evenness = _evenness(values[is_direct], sigma[is_direct])
-    values, sigma = values / evenness[:, None], sigma / evenness[:, None]
+    # What earlier charges have left is not known yet: `evened` takes it into account.
+    even = evenness(values[is_direct], sigma[is_direct], np.ones(1))
+    values, sigma = values / even[:, None], sigma / even[:, None]
     # Direct charges define what even light is, with the veil that lies over it.
-    even = np.where(is_direct[:, None], 1.0, evenness)
-    veils = frame_light[:, None, :] / even[..., None]
+    veils = frame_light[:, None, :] / np.where(is_direct[:, None], 1.0, even)[..., None]
     is_last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
         replace(
@@ -165,7 +165,7 @@ def _divide_by_evenness(
             sigma=sigma[is_direct],
             frame_light=veils[is_direct],
         ),
-        evenness,
+        even,
         _final_decay(strip_series, is_last, frames),
     )
 
@@ -203,24 +203,6 @@ def _bounding_region(sites: Slices) -> Region:
     right = max(region[0] + region[2] for region in sites.values())
     bottom = max(region[1] + region[3] for region in sites.values())
     return left, top, right - left, bottom - top
-
-
-def _evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
-    """Return the brightness of every place after the same light, 1 on average, shape (P,)."""
-    weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
-    is_known = weight.min(axis=1, keepdims=True) > 0
-    frame_mean = np.where(
-        is_known, np.nanmean(np.where(is_known, values, 0.0), axis=1, keepdims=True), 0.0
-    )
-    weight = np.where(is_known, weight, 0.0)
-    total = (weight * frame_mean**2).sum(axis=(0, 2))
-    if not (total > 0).all():
-        raise DataError(
-            "expected a glow all along the filter's place after charges by the lamp itself, got "
-            "none somewhere, or it is clipped; check where the sample and the filter lie"
-        )
-    signal = (weight * frame_mean * np.nan_to_num(values)).sum(axis=(0, 2)) / total
-    return np.asarray(signal / signal.mean())
 
 
 def _final_decay(strip_series: Series, rows: BoolArray, frames: ChargeFrames) -> Series:

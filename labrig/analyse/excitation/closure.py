@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_o
 from labrig.material import dark_concentration
 from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
 
-#: Step of the derivatives as a fraction of σ.
+#: Step of the derivatives as a fraction of σ, or of the parameter where σ is larger than it.
 STEP = 0.01
 
 
@@ -23,7 +24,8 @@ def predicted_charging(
     """Predict charging by the lamp itself from charges through the filter.
 
     The longest charge by the lamp itself stays in the fit, since it determines the level of charge;
-    the shorter ones are predicted. With fewer than two of those there is no test.
+    the shorter ones are predicted. With fewer than two of those there is no test, nor where the
+    other charges do not determine every rate.
 
     Parameters
     ----------
@@ -53,6 +55,8 @@ def predicted_charging(
     if len(first) < 3:
         return None
     fit = fit_of(longest_only)
+    if not np.isfinite(fit.covariance).all():
+        return None
     rows = np.array(list(first.values()))
     charges = [direct.charges[number] for number in first]
     values, sigma = direct.values[rows, :, channel], direct.sigma[rows, :, channel]
@@ -70,12 +74,13 @@ def predicted_charging(
         for name in ("start_s", "exposure_s")
     )
     dark_s = starts - np.array([charge.off_s for charge in charges])
-    initial = _initial_concentrations(direct, fit)[list(first)]
+    initial = _initial_concentrations(direct, fit)[:, list(first)]
     order = np.array([state.kinetic_order for state in fit.states])
+
+    n, end = len(fit.states), 2 * len(fit.states) + fit.k_e().size
 
     def predicted(theta: FloatArray) -> FloatArray:
         """Return the levels by k_r, amplitudes, k_e, fitted orders and ln of the light."""
-        n, end = len(fit.states), 2 * len(fit.states) + fit.k_e().size
         light = np.array(irradiance.direct) * np.exp(theta[-1])
         sample = Charging(
             theta[2 * n : end].reshape(n, -1),
@@ -96,7 +101,11 @@ def predicted_charging(
         ]
     )
     theta_sigma = np.sqrt(np.append(np.diag(fit.covariance), max(relative_sigmas.scale, 1e-6) ** 2))
-    slopes = _slopes(predicted, theta, theta_sigma)
+    # Rates without a level have a σ larger than themselves, and must stay above 0.
+    size = np.ones(len(theta))
+    size[: 2 * n] = theta[: 2 * n]
+    size[2 * n : end] = np.repeat(fit.k_e().max(axis=1), fit.k_e().shape[1])
+    slopes = _slopes(predicted, theta, np.minimum(theta_sigma, size))
     cold_deficit = np.array([charge.cold_deficit for charge in charges])
     charge_variance = slopes[-1] ** 2 * (
         relative_sigmas.scale**2
@@ -136,25 +145,28 @@ def _equivalent_charge_s(
 
 
 def _initial_concentrations(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
-    """Return the concentrations left of the previous charge at the begin of each charge, (K, N)."""
+    """Return what the charge before has left at every site at the begin of each, (P, K, N)."""
     k_r = np.array([state.k_r_per_s for state in fit.states])
     order = np.array([state.kinetic_order for state in fit.states])
-    ended = levels_at_off(direct, k_r, fit.k_e(), fit.orders()).value.mean(axis=1)
-    on_s, off_s = (
-        np.array([getattr(charge, name) for charge in direct.charges]) for name in ("on_s", "off_s")
-    )
-    waited_s = on_s[1:] - off_s[:-1]
-    fresh = np.array([charge.fresh for charge in direct.charges[1:]])
-    waited = dark_concentration(ended[:-1], k_r, order, waited_s[:, None])
-    remaining = np.where(fresh[:, None], 0.0, waited)
-    return np.vstack([np.zeros_like(k_r), remaining])
+    charges = direct.charges
+    level = levels_at_off(direct, k_r, fit.k_e(), fit.orders()).value
+    initial = np.zeros_like(level)
+    if (before := direct.before()) is not None:
+        charges = (before.charges[-1], *charges)
+        last = levels_at_off(before, k_r, fit.k_e(), fit.orders()).value[-1:]
+        level = np.concatenate([last, level])
+    waited_s = [after.on_s - charge.off_s for charge, after in pairwise(charges)]
+    is_fresh = [charge.fresh for charge in charges[1:]]
+    left = dark_concentration(level[:-1], k_r, order, np.array(waited_s)[:, None, None])
+    initial[len(initial) - len(left) :] = np.where(np.array(is_fresh)[:, None, None], 0.0, left)
+    return initial.swapaxes(0, 1)
 
 
 def _slopes(
-    function: Callable[[FloatArray], FloatArray], theta: FloatArray, sigma: FloatArray
+    function: Callable[[FloatArray], FloatArray], theta: FloatArray, largest: FloatArray
 ) -> FloatArray:
-    """Return the slopes (θ, n), by differences of a fraction of each parameter's σ."""
-    steps = np.diag(STEP * np.maximum(sigma, 1e-12))
+    """Return the slopes (θ, n), by differences of a fraction of each parameter's largest change."""
+    steps = np.diag(STEP * np.maximum(largest, 1e-12))
     return np.array(
         [(function(theta + step) - function(theta - step)) / (2 * step.sum()) for step in steps]
     )

@@ -41,6 +41,7 @@ def excited_material(
                 amplitude_sigma=_known(at_off.amplitude_sigma[number]),
                 r0=float(np.clip(at_off.r0[number], 0.0, 1.0)),
                 r0_sigma=_known(at_off.r0_sigma[number]),
+                **_decay_time(fit, number),
                 k_e_per_s=tuple(state.k_e_per_s.tolist()),
                 k_e_per_s_sigma=_all_known(state.k_e_sigma_per_s),
                 **_reradiation(fit, number, state, spectrum, bands),
@@ -50,6 +51,17 @@ def excited_material(
         spectrum=None if spectrum is None else spectrum.for_material(),
         provenance=Provenance(source=SOURCE, run=run, frames=frames, version=version("labrig")),
     )
+
+
+def _decay_time(fit: FittedExcitation, number: int) -> dict[str, float | None]:
+    """Return τ after that charge and its σ; nothing of the first order, an exponential."""
+    if fit.states[number].is_first_order:
+        return {}
+    at_off = fit.at_off[-1]
+    return {
+        "decay_time_s": float(at_off.decay_time_s[number]),
+        "decay_time_s_sigma": _known(at_off.decay_time_sigma_s[number]),
+    }
 
 
 def _reradiation(
@@ -63,7 +75,7 @@ def _reradiation(
 
     Of an order other than 1 Λ is only known where the charge is.
     """
-    if spectrum is None or not (state.is_first_order or state.is_level_known):
+    if spectrum is None or not state.is_apart:
         return {}
     states = len(fit.states)
     level = state.amplitude / state.k_r_per_s

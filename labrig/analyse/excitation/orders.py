@@ -6,7 +6,7 @@ Bayesian information criterion with the noise enlarged to the misfit of the best
 of all of them adds no orders.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,25 +53,17 @@ class OrderFits:
     relative_sigmas: RelativeSigmas
     states_given: bool
 
-    def chosen(self, order: str) -> FittedExcitation:
-        """Return the fit with the kinetic orders asked for: `auto`, `free` or a number.
+    def chosen(self, order: str) -> "ChosenOrders":
+        """Choose the kinetic orders asked for: `auto`, `free` or a number.
 
         Models are compared with errors of the light of the sizes given: those that suit a model may
         have grown to make good for its law.
         """
-        doubt: Sequence[str] = ()
         if order in (AUTO, FREE):
-            best = self._best(order)
-        else:
-            held = self._fit(self._start(), float(order))
-            best, doubt = replace(held, models=(_model(held, float(order)),)), tuple(_doubt(held))
-        fit = refit(best, self.relative_sigmas)(self.series)
-        return replace(
-            fit,
-            models=best.models,
-            order_gain=best.order_gain,
-            warnings=(*fit.warnings, *doubt),
-        )
+            return ChosenOrders(self._best(order), self.relative_sigmas)
+        held = self._fit(self._start(), float(order))
+        named = replace(held, models=(_model(held, float(order)),))
+        return ChosenOrders(named, self.relative_sigmas, tuple(_doubt(held)))
 
     def _best(self, order: str) -> FittedExcitation:
         first = self._fit(self._start(), 1.0)
@@ -124,22 +116,41 @@ class OrderFits:
         return fit_excitation(self.series, *start, as_given, near, order)
 
 
-def refit(
-    fit: FittedExcitation, relative_sigmas: RelativeSigmas
-) -> Callable[[Sequence[ChargingSeries]], FittedExcitation]:
-    """Return the function that fits other series by the model of a fit, from its solution.
+@dataclass(frozen=True)
+class ChosenOrders:
+    """Model that was chosen for the charges of one sample.
 
-    How far the veil differs from site to site is taken in proportion to the veil that was found.
+    Attributes
+    ----------
+    best
+        Its fit with errors of the light of the sizes given.
+    relative_sigmas
+        Relative uncertainties of the measurement.
+    doubt
+        Warnings that the data contradict orders that were asked for.
     """
-    order = None if fit.are_orders_fitted else fit.states[0].kinetic_order
-    k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in fit.states]).T
-    veil = 0.0 if fit.veil is None else abs(fit.veil.value)
-    sigmas = replace(relative_sigmas, veil_shape=VEIL_SHAPE * veil)
 
-    def again(series: Sequence[ChargingSeries]) -> FittedExcitation:
-        return fit_excitation(series, k_r, amplitude, sigmas, fit, order)
+    best: FittedExcitation
+    relative_sigmas: RelativeSigmas
+    doubt: tuple[str, ...] = ()
 
-    return again
+    def fitted(self, series: Sequence[ChargingSeries]) -> FittedExcitation:
+        """Fit series of the sample by the model, from its solution, and find the light's errors.
+
+        How far the veil differs from site to site is taken in proportion to the veil found.
+        """
+        best = self.best
+        veil = 0.0 if best.veil is None else abs(best.veil.value)
+        sigmas = replace(self.relative_sigmas, veil_shape=VEIL_SHAPE * veil)
+        order = None if best.are_orders_fitted else best.states[0].kinetic_order
+        k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in best.states]).T
+        fit = fit_excitation(series, k_r, amplitude, sigmas, best, order)
+        return replace(
+            fit,
+            models=best.models,
+            order_gain=best.order_gain,
+            warnings=(*fit.warnings, *self.doubt),
+        )
 
 
 def _model(fit: FittedExcitation, order: float | None, enlarged: float = 1.0) -> ExcitationModel:

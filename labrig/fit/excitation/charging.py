@@ -49,13 +49,16 @@ class Charging:
     def level(
         self, charge_s: FloatArray, r0: FloatArray, dark_s: FloatArray, exposure_s: FloatArray
     ) -> FloatArray:
-        """Return levels after charges from `r0` (n, m); all other arguments are (n,)."""
+        """Return levels after charges from `r0` (n, m); all other arguments are (n,).
+
+        Of P sites with `r0` (P, n, m) the levels are averaged.
+        """
         kappa = np.maximum(self.k_e_per_s @ self.irradiance, LEAST_KAPPA)
         k_r, order = self.k_r_per_s, self.kinetic_order
         charged = lit_concentration(r0, kappa, k_r, order, charge_s[:, np.newaxis]).value
         begins = dark_concentration(charged, k_r, order, dark_s[:, np.newaxis])
         emitted = mean_emission(begins, k_r, order, exposure_s[:, np.newaxis]).value
-        return np.asarray(emitted @ self.full_level)
+        return np.asarray((emitted @ self.full_level).reshape(-1, len(charge_s)).mean(axis=0))
 
 
 def closure(
@@ -90,7 +93,8 @@ def closure(
     full_level
         Level of each state at r = 1, given by Λ_i k_r,i, shape (m,).
     r0
-        Concentrations before each charge: a scalar, (m,) or (n, m).
+        Concentrations before each charge: a scalar, (m,) or (n, m), or (P, n, m) of P sites whose
+        levels are averaged.
     dark_s, exposure_s
         Time from lamp off to the begin of the exposure, and its length, in s: a scalar or (n,).
     kinetic_order
@@ -108,22 +112,23 @@ def closure(
     if not (charge.ndim == 1 and charge.shape == measured.shape == noise.shape and charge.size):
         raise DataError("closure: expected as many levels and σ as charges, at least one")
     n, m = len(charge), len(sample.k_r_per_s)
-    start = np.broadcast_to(_floats(r0), (n, m))
+    starts = _floats(r0)
+    starts = np.broadcast_to(starts, (*starts.shape[:-2], n, m))
     dark, exposure = (np.broadcast_to(_floats(column), n) for column in (dark_s, exposure_s))
     if not all(
-        np.isfinite(column).all() for column in (charge, measured, noise, start, dark, exposure)
+        np.isfinite(column).all() for column in (charge, measured, noise, starts, dark, exposure)
     ):
         raise DataError("closure: expected finite numbers, got NaN or infinity")
     if not (noise > 0).all():
         raise DataError("closure: expected σ above 0")
-    predicted = sample.level(charge, start, dark, exposure)
+    predicted = sample.level(charge, starts, dark, exposure)
     by_length, line_s = np.argsort(charge, kind="stable"), _line(charge)
 
     def along(column: FloatArray) -> FloatArray:
         return np.interp(line_s, charge[by_length], column[by_length])
 
-    starts = np.stack([along(column) for column in start.T], axis=1)
-    line = sample.level(line_s, starts, along(dark), along(exposure))
+    along_starts = np.apply_along_axis(along, -2, starts)
+    line = sample.level(line_s, along_starts, along(dark), along(exposure))
     return Closure(charge, measured, noise, predicted, line_s, line)
 
 

@@ -35,6 +35,15 @@ class _Charges(NamedTuple):
     gained: Levels
 
 
+class _Before(NamedTuple):
+    """Concentrations (P, N) after a charge, when the lamp is dark at `dark_s`, and derivatives."""
+
+    dark_s: float
+    value: FloatArray
+    by_k_r: FloatArray
+    by_k_e: FloatArray
+
+
 def levels(
     series: ChargingSeries,
     k_r_per_s: FloatArray,
@@ -100,24 +109,35 @@ def _levels_after_charges(
 ) -> Levels:
     """Return the levels after every charge, when the lamp is dark, n = K."""
     charges = _independent_charges(series, k_r_per_s, k_e_per_s)
-    on_s = np.array([charge.on_s for charge in series.charges])
-    dark_s = on_s[1:] - _dark_s(series)[:-1]
     value, by_k_r, by_k_e, _ = charges.gained
+    before, dark_s = _level_before(series, k_r_per_s, k_e_per_s), _dark_s(series)
     for number, charge in enumerate(series.charges):
         if charge.saturated:
             value[number] = np.exp(-k_r_per_s * series.fade.total_s)
             by_k_r[number] = -series.fade.total_s * value[number]
             by_k_e[number] = 0.0
-        elif number and not charge.fresh:
-            previous, wait_s = number - 1, float(dark_s[number - 1])
+        elif before is not None and not charge.fresh:
+            wait_s = charge.on_s - before.dark_s
             decay = charges.kept[number] * np.exp(-k_r_per_s * wait_s)
             elapsed_s = charges.elapsed_s[number] + wait_s
-            value[number] += decay * value[previous]
-            by_k_r[number] += decay * (by_k_r[previous] - elapsed_s * value[previous])
+            value[number] += decay * before.value
+            by_k_r[number] += decay * (before.by_k_r - elapsed_s * before.value)
             by_k_e[number] += decay[..., None] * (
-                by_k_e[previous] - value[previous, ..., None] * charges.dose[number, :, None]
+                before.by_k_e - before.value[..., None] * charges.dose[number, :, None]
             )
+        before = _Before(float(dark_s[number]), value[number], by_k_r[number], by_k_e[number])
     return charges.gained
+
+
+def _level_before(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+) -> _Before | None:
+    """Return the level after the last charge before the series; None if there was none."""
+    earlier = series.before()
+    if earlier is None:
+        return None
+    value, by_k_r, by_k_e, _ = _levels_after_charges(earlier, k_r_per_s, k_e_per_s)
+    return _Before(float(_dark_s(earlier)[-1]), value[-1], by_k_r[-1], by_k_e[-1])
 
 
 def _independent_charges(

@@ -104,15 +104,19 @@ def levels_after_charges(
 ) -> Levels:
     """Return the concentrations after every charge, when the lamp is dark, n = K."""
     sample = _Sample(k_r_per_s, k_e_per_s, order, series.irradiance)
-    shape = len(series.irradiance), len(k_r_per_s)
+    return Levels(*(np.stack(parts) for parts in _columns(_after_charges(series, sample))))
+
+
+def _after_charges(series: ChargingSeries, sample: _Sample) -> list[_State]:
+    """Return the states after every charge, when the lamp is dark."""
+    shape = len(series.irradiance), len(sample.k_r_per_s)
     bands = series.irradiance.shape[1]
     empty = _State.of(np.zeros(shape), bands)
     transients = _parts(series.rise), _parts(series.fade)
     state, dark_s, ends = empty, -np.inf, []
-    if series.earlier is not None:
-        elsewhere = sample._replace(irradiance=series.earlier.irradiance)
-        state = _charged(elsewhere, empty, transients, series.earlier.charge)
-        dark_s = series.earlier.charge.off_s + series.fade.total_s
+    if (earlier := series.before()) is not None:
+        state = _after_charges(earlier, sample._replace(irradiance=earlier.irradiance))[-1]
+        dark_s = earlier.charges[-1].off_s + series.fade.total_s
     for charge in series.charges:
         if charge.saturated:
             full = _State.of(np.ones(shape), bands)
@@ -123,7 +127,7 @@ def levels_after_charges(
             state = _charged(sample, state, transients, charge)
         dark_s = charge.off_s + series.fade.total_s
         ends.append(state)
-    return Levels(*(np.stack(parts) for parts in _columns(ends)))
+    return ends
 
 
 def decayed(levels: Levels, k_r_per_s: FloatArray, order: FloatArray, t_s: FloatArray) -> Levels:

@@ -1,0 +1,38 @@
+"""What all places of a photograph have in common, and what each place has in all photographs."""
+
+import numpy as np
+import pytest
+
+from labrig.analyse.excitation.evenness import evenness
+from labrig.analyse.excitation.flicker import common_flicker
+from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.material import read_material
+from tests.fit.charged_samples import Bench
+from tests.fit.test_excitation_order import BARE, LVF
+
+
+@pytest.mark.parametrize("flicker", [0.004, 0.012])
+def test_flicker_is_that_of_all_photographs(flicker: float) -> None:
+    """Of 3 × 175 photographs; those of a dozen would scatter by a fifth."""
+    found = []
+    for seed in (5, 6, 7):
+        sample = Bench(read_material("blue-paint"), flicker=flicker, photons=2000.0, seed=seed)
+        through = sample.series("LVF", LVF, (8.0, 16.0, 64.0, 128.0, 256.0), shots=30, every_s=3.0)
+        bare = sample.series("bare lamp", BARE, (900.0,), shots=25, every_s=4.0)
+        fit = fit_excitation([bare, through], [0.03], [1.0], RelativeSigmas(0.007, 0.01))
+        found.append(common_flicker(fit, [bare, through], (1e-3, 1e-3, 1e-3)))
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(flicker, rel=0.12)
+
+
+def test_evenness_is_not_that_of_earlier_charges() -> None:
+    """Places that were charged through the filter, before all are charged by the lamp itself."""
+    rng = np.random.default_rng(6)
+    even = 1 + 0.03 * np.cos(np.linspace(0.0, 3.0, 6))
+    course = 1 + np.outer([0.2, 0.05, 0.0], np.linspace(0.5, -0.5, 6))
+    glow = np.array([100.0, 400.0, 2000.0])[:, None] * course
+    values = (glow * even)[..., None] * [0.3, 1.0, 0.7]
+    sigma = 1e-3 * values
+    values = values + sigma * rng.normal(size=values.shape)
+    found = evenness(values, sigma, course[..., None])
+    assert found == pytest.approx(even / even.mean(), rel=3e-3)
+    assert np.abs(evenness(values, sigma, np.ones(1)) / found - 1).max() > 0.02
