@@ -138,18 +138,21 @@ def noise_correlation(
     ):
         return None
     direction = along[used] / brightness[used, None]
-    deviation, design = _against_curve(data, noise, used, direction)
+    deviation, jacobian = _along(direction, used, data, fit)
+    kept = [*range(len(fit.joint.shape)), *range(-len(series.fitted_offsets), 0)]
+    design = jacobian[:, kept]
+    n_values = data.values.size
+    known = np.column_stack([solution.jacobian[n_values:, kept], -solution.residuals[n_values:]])
     # The scatter of a σ that is too large is smaller, which is no correlation.
     scatter = float(np.linalg.norm(deviation)) / max(len(deviation) - design.shape[1], 1) ** 0.5
     parts = _parts(data, noise, brightness[used], scatter)
-    curve = np.einsum("fc,fcd,fd->f", direction, data.matrices[used], noise.signal[used])
-    if not parts or _ends_below_zero(deviation + curve):
+    if not parts or _ends_below_zero(deviation + brightness[used]):
         return None
     told = slice(0, MOST_VALUES)
     n_told = len(deviation[told])
     log_posteriors = [
         _log_restricted_likelihoods(
-            deviation[told], design[told], _offset_rows(series, noise), part.covariances(n_told)
+            deviation[told], design[told], known, part.covariances(n_told)
         )
         + part.log_prior
         for part in parts
@@ -160,9 +163,7 @@ def noise_correlation(
     total = sum(float(each.sum()) for each in posteriors)
     none = sum(float(each[0].sum()) for each in posteriors) / total
     correlated = [each[1:] / total for each in posteriors]
-    n_values = data.values.size
-    jacobian = solution.jacobian[:n_values].reshape(*data.values.shape, -1)[used]
-    effect = solution.covariance @ np.einsum("fcp,fc->pf", jacobian, direction)
+    effect = solution.covariance @ jacobian.T
     added = -(1 - none) * (effect @ effect.T)
     for weights, part in zip(correlated, parts, strict=True):
         added += part.effect_of(effect, weights)
@@ -209,33 +210,17 @@ def _parts(
     return parts
 
 
-def _against_curve(
-    data: WhitenedSeries, noise: Envelope, used: FloatArray, direction: FloatArray
+def _along(
+    direction: FloatArray, used: FloatArray, data: WhitenedSeries, fit: StatesFit
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the deviations (n,) of the used values from the curve, and what it is made of (n, q).
-
-    Both are along the signal, in units of the noise.
-    """
-    series, matrices = data.series, data.matrices[used]
-    deviations = np.einsum(
-        "fcd,fd->fc", matrices, (series.values - noise.signal - noise.offsets)[used]
+    """Return deviations from the fit (n,) and its Jacobian (n, p) along the signal (n, C)."""
+    solution, shape = fit.joint.least_squares, data.values.shape
+    residuals = solution.residuals[: data.values.size].reshape(shape)[used]
+    jacobian = solution.jacobian[: data.values.size].reshape(*shape, -1)[used]
+    return (
+        -np.einsum("fc,fc->f", direction, residuals),
+        np.einsum("fc,fcp->fp", direction, jacobian),
     )
-    weighted = np.einsum("fc,fcd,d->f", direction, matrices, noise.weights)
-    design = weighted[:, None] * noise.shapes[used]
-    if series.fitted_offsets.size:
-        offsets = np.einsum("fc,fcd->fd", direction, matrices)[:, series.fitted_offsets]
-        design = np.column_stack([design, offsets])
-    return np.einsum("fc,fc->f", direction, deviations), design
-
-
-def _offset_rows(series: DecaySeries, noise: Envelope) -> FloatArray:
-    """Return what the priors of the offsets say, as rows of design and deviation (p, q + 1).
-
-    Without it the curve could bend with offsets that nobody believes in, and after the noise.
-    """
-    prior = series.offset_prior
-    left = -prior @ noise.offsets[series.fitted_offsets]
-    return np.column_stack([np.zeros((len(prior), noise.shapes.shape[1])), prior, left])
 
 
 def _log_restricted_likelihoods(
