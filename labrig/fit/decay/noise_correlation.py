@@ -34,7 +34,8 @@ PRIOR_OF_NONE = 0.85
 #: noise it is told of 0.3 %.
 TOLD = 10.0
 #: Factors c that are weighed: noise that correlates is larger than its scatter about a curve that
-#: follows it.
+#: follows it. The flicker that they make has Student's t with 3 degrees of freedom before the data:
+#: half a Cauchy distribution, as for independent flicker, has no mean square.
 FACTORS = np.geomspace(0.5, 4.0, 7)
 #: Values below which no correlation is told, and number of first values that tell it.
 FEWEST_VALUES, MOST_VALUES = 12, 100
@@ -195,14 +196,14 @@ def _parts(
     another instrument's table consists of is not known.
     """
     parts = []
-    is_estimated = len(noise.likely_flickers) > 1
-    if is_estimated or noise.flicker > 0:
-        size = (max(noise.flicker, LEAST_FLICKER) if is_estimated else noise.flicker) * brightness
-        factors = FACTORS if is_estimated else np.ones(1)
-        log_prior = -np.log1p((noise.flicker * factors / USUAL_FLICKER) ** 2)
+    if len(noise.likely_flickers) > 1 or noise.flicker > 0:
+        # A flicker that was given may be wrong, too: a small scatter is no long memory.
+        flicker = max(noise.flicker, LEAST_FLICKER)
+        size = flicker * brightness
+        log_prior = -2 * np.log1p((flicker * FACTORS / USUAL_FLICKER) ** 2)
         if (size**2).mean() > LEAST_FRACTION:
             rest = np.maximum(1 - (noise.flicker * brightness) ** 2, 0.0)
-            parts.append(_Part(size, rest, factors, log_prior - np.log(len(factors))))
+            parts.append(_Part(size, rest, FACTORS, log_prior - np.log(len(FACTORS))))
     if len(data.series.channels) == 1:
         ones = np.ones_like(brightness)
         log_prior = np.full_like(FACTORS, -np.log(len(FACTORS)))
