@@ -27,8 +27,7 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
     ties = [
         law
         for law in compared.values()
-        # A spectrum of rates is what any exponentials are, blurred: no other law.
-        if law.name != RATE_SPECTRUM and _is_close(fit, taken, law) and _differs(fit, law.name)
+        if _is_close(fit, taken, law) and _differs(fit, law.name)
     ]
     if not ties:
         return []
@@ -58,6 +57,9 @@ def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:
 def _differs(fit: FittedDecay, law: str) -> bool:
     own, own_variance = _signal(fit, fit.law)
     other, variance = _signal(fit, law)
+    if law == RATE_SPECTRUM:
+        # What it has beyond the record hardly constrains: the law taken would have to hold it.
+        variance = 0.0
     return bool(abs(own - other) > MATTERS_SIGMAS * np.sqrt(own_variance + variance))
 
 
