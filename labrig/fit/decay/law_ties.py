@@ -25,9 +25,7 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
     compared = {law.name: law for law in fit.compared_laws}
     taken = compared.pop(fit.law)
     ties = [
-        law
-        for law in compared.values()
-        if _is_close(fit, taken, law) and _differs(fit, law.name)
+        law for law in compared.values() if _is_close(fit, taken, law) and _differs(fit, law.name)
     ]
     if not ties:
         return []

@@ -1,17 +1,16 @@
 """Noise that correlates from value to value, as that of a lamp or a room that drifts does.
 
 Neighbouring values then err together, and what a sum of exponentials averages over is less than it
-seems. In units of their σ, the values deviate from the best monotone curve with the covariance
+seems. In units of their σ, the values deviate from the fit with the covariance
 V = D + c² S φ^|f − g| S: S is the part of σ that is flicker, or all of it, and D the independent
-rest. The restricted likelihood (D. Harville, J. Am. Stat. Assoc. 72, 1977) allows for what the
-curve took of the deviations, and weighs all φ and c. That there is no correlation is six times as
-probable before the data as all φ together, which have the reference prior (1 − φ²)^(−1/2) (J. O.
-Berger, R.-Y. Yang, Econometric Theory 10, 1994): the flicker of shutter and aperture has none. The
-fit, whose weights are those of independent values, has the covariance A V Aᵀ with
+rest. The restricted likelihood (D. Harville, J. Am. Stat. Assoc. 72, 1977) allows for what the fit
+took of the deviations, and weighs all φ and c. That there is no correlation is six times as
+probable before the data as all φ > 0 together, since the flicker of shutter and aperture has none;
+these have the reference prior (1 − φ²)^(−1/2) (J. O. Berger, R.-Y. Yang, Econometric Theory 10,
+1994). The fit, whose weights are those of independent values, has the covariance A V Aᵀ with
 A = (JᵀJ)⁻¹Jᵀ, and V is the mean over all φ and c, none included (model averaging; J. Hoeting et
-al., Statistical Science 14, 1999): some dozens of values hardly tell a memory of one or two steps,
-which makes σ too small by a third, and a σ that jumped where they begin to tell it would be too
-small just before and too large just after.
+al., Statistical Science 14, 1999). A threshold would do worse: some dozens of values hardly tell a
+memory of one or two frames, which makes σ too small by a third, and σ would jump at it.
 """
 
 from dataclasses import dataclass
@@ -21,7 +20,6 @@ from scipy.linalg import solveh_banded
 
 from labrig.fit.decay.diagnostics import BELOW_ZERO_SIGMAS
 from labrig.fit.decay.envelope import USUAL_FLICKER, Envelope
-from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
@@ -30,12 +28,12 @@ from labrig.fit.least_squares import FloatArray
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92, 0.97])
 PRIOR_OF_NONE = 0.85
 #: Factor by which the data raise the odds of a correlation from which a warning says so: strong
-#: evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of series with independent
-#: noise it is told of 0.3 %.
+#: evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of 720 series with independent
+#: noise one has it.
 TOLD = 10.0
 #: Factors c that are weighed: noise that correlates is larger than its scatter about a curve that
-#: follows it. The flicker that they make has Student's t with 3 degrees of freedom before the data:
-#: half a Cauchy distribution, as for independent flicker, has no mean square.
+#: follows it. The flicker c ρ has half a Student's t distribution with 3 degrees of freedom before
+#: the data; half a Cauchy distribution, as for the independent flicker, has no mean square.
 FACTORS = np.geomspace(0.5, 4.0, 7)
 #: Values below which no correlation is told, and number of first values that tell it.
 FEWEST_VALUES, MOST_VALUES = 12, 100
@@ -125,7 +123,7 @@ def noise_correlation(
     fit
         The fit at its minimum.
     noise
-        The curve that the noise is measured against, and the flicker.
+        The flicker.
     """
     series, solution = data.series, fit.joint.least_squares
     along = np.einsum("fcd,fd->fc", data.matrices, fit.signal(series))
@@ -152,9 +150,7 @@ def noise_correlation(
     told = slice(0, MOST_VALUES)
     n_told = len(deviation[told])
     log_posteriors = [
-        _log_restricted_likelihoods(
-            deviation[told], design[told], known, part.covariances(n_told)
-        )
+        _log_restricted_likelihoods(deviation[told], design[told], known, part.covariances(n_told))
         + part.log_prior
         for part in parts
     ]
@@ -197,7 +193,7 @@ def _parts(
     """
     parts = []
     if len(noise.likely_flickers) > 1 or noise.flicker > 0:
-        # A flicker that was given may be wrong, too: a small scatter is no long memory.
+        # A flicker that was given may be wrong, too: a scatter that is small is no long memory.
         flicker = max(noise.flicker, LEAST_FLICKER)
         size = flicker * brightness
         log_prior = -2 * np.log1p((flicker * FACTORS / USUAL_FLICKER) ** 2)
