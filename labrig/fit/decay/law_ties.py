@@ -18,6 +18,8 @@ from labrig.results import (
 #: Difference of two laws at the end of a forecast, in their σ, from which it matters which holds.
 #: A law that contains the other one, as one trap does the exponential, differs by less.
 MATTERS_SIGMAS = 3.0
+#: Part of the signal at lamp off below which it does not matter whether rates are spread.
+DARKNESS = 1e-4
 
 
 def tie_warnings(fit: FittedDecay) -> list[str]:
@@ -47,8 +49,11 @@ def _is_close(fit: FittedDecay, taken: ComparedLaw, other: ComparedLaw) -> bool:
 
 
 def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:
-    at_s = np.array([FORECAST_SPANS * fit.measured_until_s])
-    value, variance = fit.signal(at_s, np.zeros(1), law)
+    return _signal_at(FORECAST_SPANS * fit.measured_until_s, fit, law)
+
+
+def _signal_at(t_s: float, fit: FittedDecay, law: str) -> tuple[float, float]:
+    value, variance = fit.signal(np.array([t_s]), np.zeros(1), law)
     return float(value[0]), float(variance[0])
 
 
@@ -57,7 +62,7 @@ def _differs(fit: FittedDecay, law: str) -> bool:
     other, variance = _signal(fit, law)
     if law == RATE_SPECTRUM:
         # What it has beyond the record hardly constrains: the law taken would have to hold it.
-        variance = 0.0
+        variance = (DARKNESS * _signal_at(0.0, fit, fit.law)[0]) ** 2
     return bool(abs(own - other) > MATTERS_SIGMAS * np.sqrt(own_variance + variance))
 
 
