@@ -20,6 +20,9 @@ from labrig.results import (
 MATTERS_SIGMAS = 3.0
 #: Part of the signal at lamp off below which it does not matter whether rates are spread.
 DARKNESS = 1e-4
+#: Relative difference of a spectrum's forecast from which it matters: two states that are close
+#: together differ from it by less.
+SPREAD_MATTERS = 1 / 3
 
 
 def tie_warnings(fit: FittedDecay) -> list[str]:
@@ -63,6 +66,8 @@ def _differs(fit: FittedDecay, law: str) -> bool:
     if law == RATE_SPECTRUM:
         # What it has beyond the record hardly constrains: the law taken would have to hold it.
         variance = (DARKNESS * _signal_at(0.0, fit, fit.law)[0]) ** 2
+        if abs(own - other) < SPREAD_MATTERS * min(own, other):
+            return False
     return bool(abs(own - other) > MATTERS_SIGMAS * np.sqrt(own_variance + variance))
 
 
