@@ -168,6 +168,61 @@ def test_the_drift_of_a_lamp_is_in_sigma() -> None:
     assert told > 50
 
 
+def _with_memory(seed: int, memory: float, dark_sigma: float) -> DecayFit:
+    """Fit two states whose flicker of 0.7 % correlates by so much from frame to frame."""
+    seen = truths.observe(
+        truths.exponentials(*DOUBLE), seed, snr=3000, flicker=0.0, dark_sigma=dark_sigma
+    )
+    steps = np.random.default_rng(seed + 1000).normal(size=len(seen.t_s))
+    steps[1:] *= np.sqrt(1 - memory**2)
+    for row in range(1, len(steps)):
+        steps[row] += memory * steps[row - 1]
+    return fit_decay(
+        seen.t_s,
+        seen.values * (1 + 0.007 * steps)[:, None],
+        seen.sigma,
+        exposure_s=1.5,
+        channels="RGB",
+        flicker=None,
+        offset_sigma=dark_sigma,
+        n_states=2,
+    )
+
+
+def test_a_drift_is_told_beside_dark_levels_that_are_known() -> None:
+    """Dark levels that were free to follow the drift hid it in most of these."""
+    fits = [_with_memory(seed, 0.85, 2e-5) for seed in range(2000, 2020)]
+    told = sum(_says(each, "noise of neighbouring values correlates") for each in fits)
+    assert told >= 13
+
+
+def test_a_flicker_that_is_given_too_large_is_no_drift() -> None:
+    told = 0
+    for seed in range(2100, 2120):
+        seen = truths.observe(
+            truths.exponentials((0.02, 1.0)), seed, flicker=0.003, t_s=truths.TIMES_S[:24]
+        )
+        each = fit_decay(
+            seen.t_s, seen.values, seen.sigma, exposure_s=1.5, channels="RGB", flicker=0.007
+        )
+        told += _says(each, "noise of neighbouring values correlates")
+    assert told <= 2
+
+
+def test_a_spectrum_of_rates_that_two_states_describe_is_told() -> None:
+    """Rates spread by a factor of 2.2; three of these eight were taken for two states silently."""
+    spread = np.linspace(-4, 4, 201)
+    fractions = np.exp(-(spread**2) / 2)
+    states = zip(0.02 * np.exp(0.8 * spread), fractions / fractions.sum(), strict=True)
+    truth = truths.exponentials(*states)
+    for seed in range(2200, 2208):
+        seen = truths.observe(truth, seed, snr=1000)
+        each = fit_decay(
+            seen.t_s, seen.values, seen.sigma, exposure_s=1.5, channels="RGB", flicker=None
+        )
+        assert each.warnings
+
+
 def test_few_counts_are_not_biased(tmp_path: Path) -> None:
     """Weights from the counts themselves prefer the low ones: the mean pull was 1."""
     table, pulls = tmp_path / "counts.csv", []

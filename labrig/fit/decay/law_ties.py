@@ -18,6 +18,11 @@ from labrig.results import (
 #: Difference of two laws at the end of a forecast, in their σ, from which it matters which holds.
 #: A law that contains the other one, as one trap does the exponential, differs by less.
 MATTERS_SIGMAS = 3.0
+#: Part of the signal at lamp off below which it does not matter whether rates are spread.
+DARKNESS = 1e-4
+#: Relative difference of a spectrum's forecast from which it matters: two states that are close
+#: together differ from it by less.
+SPREAD_MATTERS = 1 / 3
 
 
 def tie_warnings(fit: FittedDecay) -> list[str]:
@@ -25,10 +30,7 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
     compared = {law.name: law for law in fit.compared_laws}
     taken = compared.pop(fit.law)
     ties = [
-        law
-        for law in compared.values()
-        # A spectrum of rates is what any exponentials are, blurred: no other law.
-        if law.name != RATE_SPECTRUM and _is_close(fit, taken, law) and _differs(fit, law.name)
+        law for law in compared.values() if _is_close(fit, taken, law) and _differs(fit, law.name)
     ]
     if not ties:
         return []
@@ -50,14 +52,22 @@ def _is_close(fit: FittedDecay, taken: ComparedLaw, other: ComparedLaw) -> bool:
 
 
 def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:
-    at_s = np.array([FORECAST_SPANS * fit.measured_until_s])
-    value, variance = fit.signal(at_s, np.zeros(1), law)
+    return _signal_at(FORECAST_SPANS * fit.measured_until_s, fit, law)
+
+
+def _signal_at(t_s: float, fit: FittedDecay, law: str) -> tuple[float, float]:
+    value, variance = fit.signal(np.array([t_s]), np.zeros(1), law)
     return float(value[0]), float(variance[0])
 
 
 def _differs(fit: FittedDecay, law: str) -> bool:
     own, own_variance = _signal(fit, fit.law)
     other, variance = _signal(fit, law)
+    if law == RATE_SPECTRUM:
+        # What it has beyond the record hardly constrains: the law taken would have to hold it.
+        variance = (DARKNESS * _signal_at(0.0, fit, fit.law)[0]) ** 2
+        if abs(own - other) < SPREAD_MATTERS * min(own, other):
+            return False
     return bool(abs(own - other) > MATTERS_SIGMAS * np.sqrt(own_variance + variance))
 
 
