@@ -1,26 +1,10 @@
 """What pages of the manual say of a campaign's output: sentences and rows of tables."""
 
 import re
-from dataclasses import dataclass
 
+from tests.acceptance import quoted_decay_fit, quoted_examples
 from tests.acceptance.printed import Extract, columns, match, part, span
-
-
-@dataclass(frozen=True)
-class Quote:
-    """Text that a page has to contain, but for its line breaks.
-
-    Attributes
-    ----------
-    page
-        File, from the root of the repository.
-    text
-        Function that makes the text of the campaign's output.
-    """
-
-    page: str
-    campaign: str
-    text: Extract
+from tests.acceptance.quote import DECISIONS, EXPLANATION, HOW_TO, Quote
 
 
 def _charging(printed: str) -> str:
@@ -98,21 +82,6 @@ def _glare(printed: str) -> str:
         f"were wrong by more than $2\\sigma$ and {other:.0f} had a wrong number of states, against "
         f"{clean_far:.0f} and {clean_other:.0f} without glare"
     )
-
-
-def _tutorial_rate(printed: str) -> str:
-    shown = match(r"^1 +([\d.]+\(\d+\)) ", printed)
-    value = match(r"k_r 1 (\S+ ± \S+) →", printed)
-    return f"`{shown}` is {value} per second"
-
-
-def _refitted(printed: str) -> str:
-    again = printed[printed.index("$ labrig process") :]
-    return "\n".join(match(row, again) for row in (r"^(state  k .*)$", r"^(1  .*)$"))
-
-
-def _changed(printed: str) -> str:
-    return match(r"^  (k_r 1 .*? σ\); a 1 .*? σ\));", printed)
 
 
 def _charge_console(printed: str) -> str:
@@ -236,9 +205,10 @@ def _emissions(library: str) -> Extract:
     return extract
 
 
-EXPLANATION, HOW_TO, DECISIONS = "docs/explanation", "docs/how-to", "docs/decisions"
 FLUORESCENT = f"{HOW_TO}/fluorescent.md"
 QUOTES = (
+    *quoted_examples.QUOTES,
+    *quoted_decay_fit.QUOTES,
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _charging),
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _two_rates),
     Quote(f"{EXPLANATION}/identifiability.md", "coverage_pipeline", _of_bound),
@@ -252,9 +222,6 @@ QUOTES = (
     Quote(f"{DECISIONS}/0011-least-squares.md", "least_squares_starts", _starts),
     Quote(f"{DECISIONS}/0006-own-ptp.md", "gphoto2_latency", _release),
     Quote(f"{DECISIONS}/0010-guard.md", "lamp_off_however_it_ends", _lamp_off),
-    Quote("docs/tutorial.md", "manual_examples", _tutorial_rate),
-    Quote(f"{HOW_TO}/refit.md", "manual_examples", _refitted),
-    Quote(f"{HOW_TO}/refit.md", "manual_examples", _changed),
     Quote(f"{HOW_TO}/fit_a_table.md", "sao_charge_and_decay", _charge_console),
     Quote(FLUORESCENT, "led_matrices", _leds_exact),
     Quote(FLUORESCENT, "led_matrices", _leds_calibrated),

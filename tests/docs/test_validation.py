@@ -5,7 +5,8 @@ import re
 import pytest
 
 from tests.acceptance.campaigns import CAMPAIGNS, OUTPUTS, ROOT
-from tests.acceptance.quoted_figures import QUOTES, Quote
+from tests.acceptance.quote import Quote
+from tests.acceptance.quoted_figures import QUOTES
 from tests.acceptance.validation import PAGE, page, says
 from tests.acceptance.validation_figures import FIGURES, Figure
 
