@@ -157,6 +157,7 @@ CAMPAIGNS = {
         ),
         _module("led_fluorescence_bench", "--calibrated", called="led_bench_calibrated"),
         _module("led_fluorescence_bench", called="led_bench"),
+        _module("tile_noise"),
         *(
             _module("mixture_colours", *arguments, called="_".join(("mixture_colours", *words)))
             for words, arguments in MIXTURE_SCALES.items()

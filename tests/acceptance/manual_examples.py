@@ -106,7 +106,10 @@ def _bench(shipped: str, **changed: object) -> dict[str, Any]:
 
 
 def two_days(folder: Path) -> None:
-    """Write a decay of two patches, and rig files of the same samples on two days."""
+    """Write a decay of two patches, and rig files of the same samples and camera on two days.
+
+    Without `curves` another seed would be another camera.
+    """
     protocol = _shipped("protocols", "decay")
     protocol["patches"] = {"sample": [0.05, 0.3, 0.4, 0.4], "reference": [0.55, 0.3, 0.4, 0.4]}
     _write(folder / "my-decay.yaml", protocol)
@@ -114,9 +117,11 @@ def two_days(folder: Path) -> None:
         {"material": "blue-paint", "region": [0.03, 0.25, 0.45, 0.5]},
         {"material": "green-paint", "region": [0.52, 0.25, 0.45, 0.5]},
     ]
-    for day, seed in ((1, 1), (2, 3)):
+    curves = resources.folder("config") / "optics/canon_eos_5d_mark_ii.json"
+    sensor = {**SMALL_SENSOR, "curves": str(curves)}
+    for day in (1, 2):
         epoch = f"2026-01-0{day}T00:00:00Z"
-        rig = _bench("sim", sample=samples, sensor=SMALL_SENSOR, seed=seed, epoch=epoch)
+        rig = _bench("sim", sample=samples, sensor=sensor, seed=day, epoch=epoch)
         _write(folder / f"day-{day}.yaml", rig)
 
 
@@ -167,6 +172,7 @@ EXAMPLES = {
             "runs list",
             "runs compare 2026-01-01 2026-01-02",
             "runs compare 2026-01-01 2026-01-02 --reference reference",
+            "compare last",
             "compare last --material sample=blue-paint",
             "process last --states 2",
             "runs show last",
@@ -219,7 +225,7 @@ EXAMPLES = {
             f"process last --optics leds={_FLUORESCENT_RUN.format('led_brightness')} "
             f"--optics direct={_FLUORESCENT_RUN.format('direct_bispectral')}",
         ),
-        reported=r"all LEDs together – spectrometer [^a-z]* one LED by itself – spectrometer [^a-z]*",
+        reported=r"all LEDs together – spectrometer [^a-z]*one LED by itself – spectrometer[^a-z]*",
     ),
 }
 

@@ -49,7 +49,7 @@ def _wrong_sigma(printed: str) -> str:
 def _hidden(printed: str) -> str:
     def silent(rates: str) -> str:
         row = rf"^3 states 0\.5/{rates} +share +8 %.* without a word +([\d.]+) %"
-        return f"{float(match(row, printed)):.0f} %"
+        return f"{float(match(row, printed)):g} %"
 
     return (
         f"beside 0.08 and 0.015 s⁻¹, {silent('0.08/0.015')} are off by more than 3 σ without a "
@@ -83,7 +83,7 @@ def _example(printed: str) -> str:
 
 
 def _example_rates(printed: str) -> str:
-    fast, slow = (match(rf"^{state}  ([\d.]+\(\d+\))", printed) for state in (1, 2))
+    fast, slow = (match(rf"^{state} +([\d.]+\(\d+\))", printed) for state in (1, 2))
     return f"The fit finds two states, {fast} and {slow} per second"
 
 

@@ -205,6 +205,23 @@ def _emissions(library: str) -> Extract:
     return extract
 
 
+def _tiles(printed: str) -> str:
+    (count,) = columns(r"^(\d+) measurements of tiles", printed)
+    rms = map(float, re.findall(r" ([\d.]+);", printed))
+    ((as_measured, corrected),) = columns(r"^sums over columns, .*: rms ([\d.]+)", printed)
+    return (
+        f"On {count[0]:.0f} measurements of ceramic tiles, which do not re-radiate, the rms of "
+        f"errors over σ is {span(rms, 2)}, by region, with and without these corrections; sums "
+        f"over columns between 430 nm and 600 nm are off by {corrected:.3f} instead of "
+        f"{as_measured:.3f}"
+    )
+
+
+def _most_that_returns(printed: str) -> str:
+    ((count,), (most,)) = columns(r"^(\d+) other surfaces: up to ([\d.]+)", printed)
+    return f"may do so (up to {most:.2f} of {count:.0f} measured surfaces)"
+
+
 FLUORESCENT = f"{HOW_TO}/fluorescent.md"
 QUOTES = (
     *quoted_examples.QUOTES,
@@ -229,6 +246,8 @@ QUOTES = (
     Quote(FLUORESCENT, "led_matrices", _emissions("none")),
     Quote(FLUORESCENT, "led_bench_calibrated", _led_bench),
     Quote(FLUORESCENT, "led_bench", _led_bench),
+    Quote(FLUORESCENT, "tile_noise", _tiles),
+    Quote(FLUORESCENT, "tile_noise", _most_that_returns),
     Quote(FLUORESCENT, "led_matrices_library_others", _emissions("the other 43")),
     Quote(FLUORESCENT, "led_matrices_library_own", _emissions("all 44")),
     Quote(
