@@ -2,7 +2,7 @@
 
 import re
 
-from tests.acceptance.printed import Extract, columns, match, part
+from tests.acceptance.printed import Extract, columns, match, part, span
 from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
 
 
@@ -60,6 +60,11 @@ def _transient(which: str) -> Extract:
 def _afterglow(printed: str) -> str:
     chi2 = match(r"χ² ([\d.]+) a degree", _console("run fade --rig ./afterglow.yaml")(printed))
     return f"With an afterglow of 0.01 % that fades within a minute it is {chi2}"
+
+
+def _direct_sigma(printed: str) -> str:
+    (sigma,) = columns(r"σ of a band ([\d.e-]+)\)", printed)
+    return f"On the simulated bench it is {span(sigma, 5)} per band of 10 nm"
 
 
 def _direct(printed: str) -> str:
@@ -137,6 +142,7 @@ QUOTES = (
             _line("daylight: .*", "run validate_illuminants"),
             _line("angular fluorescence: .*", "run angular_fluorescence"),
             _direct,
+            _direct_sigma,
         )
     ),
 )

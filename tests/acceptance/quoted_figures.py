@@ -189,6 +189,11 @@ def _led_bench(printed: str) -> str:
     return f"{d65:.2f} and {a:.2f} (90 %: {high_d65:.2f} and {high_a:.2f}; errors over σ {rms} rms)"
 
 
+def _time_of_a_sample(printed: str) -> str:
+    ((count,), (cpu_s,)) = columns(r"^(\d+) patches: .* each ([\d.]+) s,", printed)
+    return f"The {count:.0f} samples of one capture take {cpu_s:.2f} s of one core each"
+
+
 def _emissions(library: str) -> Extract:
     """Return the row of a library of emissions."""
 
@@ -246,6 +251,7 @@ QUOTES = (
     Quote(FLUORESCENT, "led_matrices", _emissions("none")),
     Quote(FLUORESCENT, "led_bench_calibrated", _led_bench),
     Quote(FLUORESCENT, "led_bench", _led_bench),
+    Quote(FLUORESCENT, "led_bench_calibrated", _time_of_a_sample),
     Quote(FLUORESCENT, "tile_noise", _tiles),
     Quote(FLUORESCENT, "tile_noise", _most_that_returns),
     Quote(FLUORESCENT, "led_matrices_library_others", _emissions("the other 43")),
