@@ -296,7 +296,7 @@ def test_an_unfinished_run_keeps_what_is_measured(tmp_path: Path) -> None:
 
 def changed_curves(folder: Path, change: Callable[[list[float]], None]) -> str:
     """Path of the shipped camera's curves, each row R, G, B changed."""
-    path = resources.folder("config/optics") / "canon_eos_5d_mark_ii.json"
+    path = resources.folder("config/optics/cameras") / "canon_eos_5d_mark_ii.json"
     curves = json.loads(path.read_text(encoding="utf-8"))
     for row in curves["spectral_data"]["data"]["main"].values():
         change(row)
