@@ -117,7 +117,7 @@ def two_days(folder: Path) -> None:
         {"material": "blue-paint", "region": [0.03, 0.25, 0.45, 0.5]},
         {"material": "green-paint", "region": [0.52, 0.25, 0.45, 0.5]},
     ]
-    curves = resources.folder("config") / "optics/canon_eos_5d_mark_ii.json"
+    curves = resources.folder("config") / "optics/cameras/canon_eos_5d_mark_ii.json"
     sensor = {**SMALL_SENSOR, "curves": str(curves)}
     for day in (1, 2):
         epoch = f"2026-01-0{day}T00:00:00Z"

@@ -62,6 +62,11 @@ def _afterglow(printed: str) -> str:
     return f"With an afterglow of 0.01 % that fades within a minute it is {chi2}"
 
 
+def _curves_of(printed: str) -> str:
+    file = match(r"3 curves \(.*?(/config/.*)\)", printed)
+    return f"Canon EOS 5D Mark II: 3 curves (…{file})"
+
+
 def _direct_sigma(printed: str) -> str:
     (sigma,) = columns(r"σ of a band ([\d.e-]+)\)", printed)
     return f"On the simulated bench it is {span(sigma, 5)} per band of 10 nm"
@@ -114,7 +119,7 @@ QUOTES = (
             _lines("│ camera ", "│ +│ +│ the dark", "rig check ./my-rig.yaml"),
             _lines("│ +│ +│ release asked", "│ +│ +│ the next", "rig check sim"),
             _lines("│ +│ +│ for the rig file", "│.*│ frame_size.*(?:\n.*)?", "rig check sim"),
-            _line("Canon EOS 5D Mark II: 3 curves", "optics show"),
+            _curves_of,
             _line("R  380.*", "optics show"),
             _line("G  380.*", "optics show"),
             _line("B  380.*", "optics show"),
