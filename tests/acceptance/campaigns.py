@@ -157,6 +157,11 @@ CAMPAIGNS = {
         ),
         _module("led_fluorescence_bench", "--calibrated", called="led_bench_calibrated"),
         _module("led_fluorescence_bench", called="led_bench"),
+        _module(
+            "led_fluorescence_bench",
+            *("--width", "480", "--lamps", "daylight", "halogen"),
+            called="led_bench_lamps",
+        ),
         _module("tile_noise"),
         *(
             _module("mixture_colours", *arguments, called="_".join(("mixture_colours", *words)))

@@ -252,6 +252,7 @@ QUOTES = (
     Quote(FLUORESCENT, "led_bench_calibrated", _led_bench),
     Quote(FLUORESCENT, "led_bench", _led_bench),
     Quote(FLUORESCENT, "led_bench_calibrated", _time_of_a_sample),
+    Quote(FLUORESCENT, "led_bench_lamps", _led_bench),
     Quote(FLUORESCENT, "tile_noise", _tiles),
     Quote(FLUORESCENT, "tile_noise", _most_that_returns),
     Quote(FLUORESCENT, "led_matrices_library_others", _emissions("the other 43")),
