@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from tests.acceptance.manual_examples import EXAMPLES
+
 ROOT = Path(__file__).parents[2]
 OUTPUTS = Path(__file__).with_name("outputs")
 
@@ -113,9 +115,24 @@ CAMPAIGNS = {
         _module("emission_spectra", "3"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
         _module("rate_information"),
-        _module("manual_examples"),
+        *(_module("manual_examples", page, called=f"manual_{page}") for page in EXAMPLES),
+        _module("decay_fit_example"),
         _module("veiling_glare"),
         _module("law_confusion", "--seeds", "100"),
+        *(
+            _module(
+                "coverage_table_sigma", "--broken", "--seeds", "60", "--only", only, called=name
+            )
+            for name, only in {
+                "tables_of_wrong_sigma": "σ times",
+                "tables_that_drift": "flicker, ρ",
+            }.items()
+        ),
+        _module(
+            "decay_coverage",
+            *("--seeds", "200", "--jobs", "1", "--table", "hidden"),
+            called="decay_states_that_hide",
+        ),
         _module("sao_charge_and_decay"),
         _module("trap_models"),
         _module("lightlogger"),
@@ -141,6 +158,12 @@ CAMPAIGNS = {
         ),
         _module("led_fluorescence_bench", "--calibrated", called="led_bench_calibrated"),
         _module("led_fluorescence_bench", called="led_bench"),
+        _module(
+            "led_fluorescence_bench",
+            *("--width", "480", "--lamps", "daylight", "halogen"),
+            called="led_bench_lamps",
+        ),
+        _module("tile_noise"),
         *(
             _module("mixture_colours", *arguments, called="_".join(("mixture_colours", *words)))
             for words, arguments in MIXTURE_SCALES.items()

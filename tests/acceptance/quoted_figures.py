@@ -1,26 +1,10 @@
 """What pages of the manual say of a campaign's output: sentences and rows of tables."""
 
 import re
-from dataclasses import dataclass
 
+from tests.acceptance import quoted_decay_fit, quoted_examples
 from tests.acceptance.printed import Extract, columns, match, part, span
-
-
-@dataclass(frozen=True)
-class Quote:
-    """Text that a page has to contain, but for its line breaks.
-
-    Attributes
-    ----------
-    page
-        File, from the root of the repository.
-    text
-        Function that makes the text of the campaign's output.
-    """
-
-    page: str
-    campaign: str
-    text: Extract
+from tests.acceptance.quote import DECISIONS, EXPLANATION, HOW_TO, Quote
 
 
 def _charging(printed: str) -> str:
@@ -98,21 +82,6 @@ def _glare(printed: str) -> str:
         f"were wrong by more than $2\\sigma$ and {other:.0f} had a wrong number of states, against "
         f"{clean_far:.0f} and {clean_other:.0f} without glare"
     )
-
-
-def _tutorial_rate(printed: str) -> str:
-    shown = match(r"^1 +([\d.]+\(\d+\)) ", printed)
-    value = match(r"k_r 1 (\S+ ± \S+) →", printed)
-    return f"`{shown}` is {value} per second"
-
-
-def _refitted(printed: str) -> str:
-    again = printed[printed.index("$ labrig process") :]
-    return "\n".join(match(row, again) for row in (r"^(state  k .*)$", r"^(1  .*)$"))
-
-
-def _changed(printed: str) -> str:
-    return match(r"^  (k_r 1 .*? σ\); a 1 .*? σ\));", printed)
 
 
 def _charge_console(printed: str) -> str:
@@ -220,6 +189,11 @@ def _led_bench(printed: str) -> str:
     return f"{d65:.2f} and {a:.2f} (90 %: {high_d65:.2f} and {high_a:.2f}; errors over σ {rms} rms)"
 
 
+def _time_of_a_sample(printed: str) -> str:
+    ((count,), (cpu_s,)) = columns(r"^(\d+) patches: .* each ([\d.]+) s,", printed)
+    return f"The {count:.0f} samples of one capture take {cpu_s:.2f} s of one core each"
+
+
 def _emissions(library: str) -> Extract:
     """Return the row of a library of emissions."""
 
@@ -236,9 +210,27 @@ def _emissions(library: str) -> Extract:
     return extract
 
 
-EXPLANATION, HOW_TO, DECISIONS = "docs/explanation", "docs/how-to", "docs/decisions"
+def _tiles(printed: str) -> str:
+    (count,) = columns(r"^(\d+) measurements of tiles", printed)
+    rms = map(float, re.findall(r" ([\d.]+);", printed))
+    ((as_measured, corrected),) = columns(r"^sums over columns, .*: rms ([\d.]+)", printed)
+    return (
+        f"On {count[0]:.0f} measurements of ceramic tiles, which do not re-radiate, the rms of "
+        f"errors over σ is {span(rms, 2)}, by region, with and without these corrections; sums "
+        f"over columns between 430 nm and 600 nm are off by {corrected:.3f} instead of "
+        f"{as_measured:.3f}"
+    )
+
+
+def _most_that_returns(printed: str) -> str:
+    ((count,), (most,)) = columns(r"^(\d+) other surfaces: up to ([\d.]+)", printed)
+    return f"may do so (up to {most:.2f} of {count:.0f} measured surfaces)"
+
+
 FLUORESCENT = f"{HOW_TO}/fluorescent.md"
 QUOTES = (
+    *quoted_examples.QUOTES,
+    *quoted_decay_fit.QUOTES,
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _charging),
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _two_rates),
     Quote(f"{EXPLANATION}/identifiability.md", "coverage_pipeline", _of_bound),
@@ -252,9 +244,6 @@ QUOTES = (
     Quote(f"{DECISIONS}/0011-least-squares.md", "least_squares_starts", _starts),
     Quote(f"{DECISIONS}/0006-own-ptp.md", "gphoto2_latency", _release),
     Quote(f"{DECISIONS}/0010-guard.md", "lamp_off_however_it_ends", _lamp_off),
-    Quote("docs/tutorial.md", "manual_examples", _tutorial_rate),
-    Quote(f"{HOW_TO}/refit.md", "manual_examples", _refitted),
-    Quote(f"{HOW_TO}/refit.md", "manual_examples", _changed),
     Quote(f"{HOW_TO}/fit_a_table.md", "sao_charge_and_decay", _charge_console),
     Quote(FLUORESCENT, "led_matrices", _leds_exact),
     Quote(FLUORESCENT, "led_matrices", _leds_calibrated),
@@ -262,6 +251,10 @@ QUOTES = (
     Quote(FLUORESCENT, "led_matrices", _emissions("none")),
     Quote(FLUORESCENT, "led_bench_calibrated", _led_bench),
     Quote(FLUORESCENT, "led_bench", _led_bench),
+    Quote(FLUORESCENT, "led_bench_calibrated", _time_of_a_sample),
+    Quote(FLUORESCENT, "led_bench_lamps", _led_bench),
+    Quote(FLUORESCENT, "tile_noise", _tiles),
+    Quote(FLUORESCENT, "tile_noise", _most_that_returns),
     Quote(FLUORESCENT, "led_matrices_library_others", _emissions("the other 43")),
     Quote(FLUORESCENT, "led_matrices_library_own", _emissions("all 44")),
     Quote(

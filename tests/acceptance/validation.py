@@ -13,7 +13,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from tests.acceptance.campaigns import CAMPAIGNS, ROOT, Campaign, Output
-from tests.acceptance.quoted_figures import QUOTES, Quote
+from tests.acceptance.quote import Quote
+from tests.acceptance.quoted_figures import QUOTES
 from tests.acceptance.validation_figures import FIGURES
 
 TEMPLATE = Path(__file__).with_name("validation.md")

@@ -1,0 +1,73 @@
+"""Pages of the manual state the constants that the code has."""
+
+import math
+
+import pytest
+
+from labrig import execution, guard
+from labrig.acquire.roles import camera
+from labrig.analyse.excitation import lamp_light
+from labrig.fit import luminance
+from labrig.fit.decay import (
+    bend,
+    envelope,
+    further_state,
+    rate_spectrum,
+    scatter,
+    search,
+    selection,
+    series,
+    states,
+)
+from labrig.material.reradiation import evidence
+from labrig.setup import check
+from tests.acceptance.campaigns import ROOT
+
+BLUE_MS, RED_MS = (1000 * tau_s for tau_s in lamp_light.USUAL_1_E_S)
+BLUE_NM, RED_NM = lamp_light.USUAL_NM
+STATED = {
+    "explanation/calibrations.md": [
+        f"1/e after {BLUE_MS:.0f} ms at {BLUE_NM:.0f} nm and {RED_MS:.0f} ms at {RED_NM:.0f} nm, "
+        f"dark after {1000 * lamp_light.DARK_S:.0f} ms",
+    ],
+    "explanation/decay_fit.md": [
+        f"It is bounded by {100 * envelope.MAX_FLICKER:.0f} %; larger",
+        f"probability of {100 * scatter.PRIOR_OF_CONSTANT:.0f} % that the noise is constant",
+        f"a grid of rates, at most {search.COMBINATIONS},",
+        f"searched from 1/{series.SLOWEST_SPANS:.0f} of the inverse length",
+        f"improbable at the level {selection.F_TEST_LEVEL:g}",
+        f"known to {100 * states.ILL_DETERMINED:.0f} % or better, or BIC falls by more than "
+        f"{selection.REFUTING_BIC:.0f} (odds of "
+        f"{round(math.exp(selection.REFUTING_BIC / 2), -1):.0f} : 1)",
+        f"when a step gains less than {states.CANDIDATE_GAIN:g} in",
+        f"odds of 1 : {1 / further_state.PRIOR_ODDS:.0f} that there is one, and a half-normal "
+        f"prior of $a$ whose scale is {100 * further_state.USUAL_SHARE:.0f} % of all",
+        f"where $P > 1/{1 / further_state.POSSIBLE:.0f}$. Where "
+        f"$P > 1/{1 / further_state.LIKELY:.0f}$ a",
+        f"$\\beta$ is more than {bend.BEND_SIGMAS:.0f} σ from zero",
+        f"on a grid of {rate_spectrum.RATES} rates",
+        f"more than {selection.PREFERRED_BIC:.0f} in BIC; by more than {selection.CLEAR_BIC:.0f} "
+        f"(odds of {round(math.exp(selection.CLEAR_BIC / 2), -1):.0f} to 1)",
+    ],
+    "how-to/dark_room.md": [
+        f"Its limit is {100 * check.LIGHT:g} % of the range in {camera.LONG_S:.0f} s",
+        f"goes on trying for {guard.TRIES_FOR_S / 60:.0f} min. If labrig hangs or is stopped for "
+        f"{guard.HANG_TIMEOUT_S} s",
+        f"is waited for, for up to {execution.COMES_BACK_S / 60:.0f} min",
+    ],
+    "how-to/fluorescent.md": [
+        f"some number is {evidence.CLEAR_SIGMAS:.0f} σ above zero and those of both neighbouring "
+        f"columns are {evidence.BESIDE_SIGMAS:.0f} σ",
+    ],
+    "how-to/luminance.md": [
+        f"within a factor of {math.exp(luminance.NEAR):.1f} in time",
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("page", "text"), [(page, text) for page, texts in STATED.items() for text in texts]
+)
+def test_a_page_states_it(page: str, text: str) -> None:
+    words = (ROOT / "docs" / page).read_text(encoding="utf-8").split()
+    assert text in " ".join(words)
