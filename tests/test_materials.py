@@ -61,6 +61,7 @@ def test_a_power_law_is_flagged(labrig: Labrig, make_rig: Make, tmp_path: Path) 
     assert any("descriptive only" in warning for warning in fit["warnings"])
 
 
+@pytest.mark.campaign
 def test_eleven_patches_in_one_charge_give_the_rates_of_one_by_one(
     labrig: Labrig, make_rig: Make, tmp_path: Path
 ) -> None:

@@ -52,6 +52,7 @@ def fitted(values: FloatArray, sigma: FloatArray | float | None, **options: obje
     )  # fmt: skip
 
 
+@pytest.mark.campaign
 def test_a_state_that_saturates_is_known_with_its_sigma() -> None:
     kappa, k, b, noise = 0.012, 0.03, 1.6, 0.3
     t_s = np.concatenate(

@@ -223,6 +223,7 @@ def test_a_spectrum_of_rates_that_two_states_describe_is_told() -> None:
         assert each.warnings
 
 
+@pytest.mark.campaign
 def test_few_counts_are_not_biased(tmp_path: Path) -> None:
     """Weights from the counts themselves prefer the low ones: the mean pull was 1."""
     table, pulls = tmp_path / "counts.csv", []

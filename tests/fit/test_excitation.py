@@ -57,6 +57,7 @@ def test_rates_and_levels_of_a_material(material: Material) -> None:
         assert (k_e[~strong] < state.k_e_upper_per_s[~strong] + 1e-5).all()
 
 
+@pytest.mark.campaign
 def test_errors_are_as_large_as_their_sigma() -> None:
     material = read_material("blue-paint")
     (true,) = material.states

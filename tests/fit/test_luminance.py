@@ -45,7 +45,13 @@ def end_s(law: Law) -> float:
     return float(t_s[np.argmax(law(t_s) < 0.3)])
 
 
-@pytest.mark.parametrize("known", [True, False], ids=["given σ", "scatter"])
+@pytest.mark.parametrize(
+    "known",
+    [
+        pytest.param(True, id="given σ", marks=pytest.mark.campaign),
+        pytest.param(False, id="scatter"),
+    ],
+)
 def test_errors_are_as_large_as_their_sigma(known: bool) -> None:
     pulls = []
     for number, law in enumerate([becquerel, one_trap, states] * 6):

@@ -193,6 +193,7 @@ def test_two_normal_densities_under_noise_are_two_components() -> None:
     assert fit_mixture(matrix, threshold=0.004).components == 2
 
 
+@pytest.mark.campaign
 def test_cross_validation_takes_the_least_number_within_a_standard_error() -> None:
     matrix = measured(two_dyes(), 27)
     fit = fit_mixture(matrix, selection="cross-validation")

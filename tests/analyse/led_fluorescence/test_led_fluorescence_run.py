@@ -311,6 +311,7 @@ def test_a_method_is_refused_where_there_is_none_to_choose() -> None:
         Overrides.parse([], [], method="thesis")
 
 
+@pytest.mark.campaign
 def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Path) -> None:
     patches = {name: QUICK["patches"][name] for name in ("yellow", "felt")}
     asked = FEW | {"lamps": ["halogen"], "patches": patches}
