@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +13,10 @@ from labrig.number_format import plus_minus, rounded
 from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
 from labrig.yaml_file import read_yaml
 
+#: Largest number of changed files that are named.
+MOST_FILES = 6
+#: Relative difference of two numbers that are the same but for rounding.
+ROUNDING = 1e-9
 #: Fraction of σ below which the change of a parameter, or of its σ, is not reported.
 REPORTED_SIGMAS = 0.01
 
@@ -60,7 +64,9 @@ def changes(before: Path, after: Path) -> tuple[str, ...]:
     settings = other_settings(before, after)
     numbers = list(_parameter_changes(_fits(before), _fits(after)))
     if not numbers:
-        numbers = [f"the numbers are the same; other in {', '.join(map(str, changed_files))}"]
+        numbers = list(_other_changes(before, after))
+    if not numbers:
+        numbers = [f"the numbers are the same; other in {_listed(changed_files)}"]
     elif not settings:
         numbers.append("nothing that is recorded explains it: labrig's code, or the computer?")
     return (*settings, *numbers)
@@ -93,6 +99,51 @@ def other_settings(before: Path, after: Path) -> tuple[str, ...]:
     ('states: auto → 1',)
     """
     return tuple(_other_settings(_settings(before), _settings(after)))
+
+
+def _listed(files: Sequence[Path]) -> str:
+    named = ", ".join(map(str, files[:MOST_FILES]))
+    more = len(files) - MOST_FILES
+    return f"{named} and {more} more" if more > 0 else named
+
+
+def _other_changes(before: Path, after: Path) -> Iterator[str]:
+    """Yield how many numbers of the results differ, and which one most, in proportion."""
+    old, new = (dict(_numbers(_result(folder), "")) for folder in (before, after))
+    if not old or not new:
+        return
+    if len(old) != len(new):
+        yield f"{len(old)} numbers → {len(new)} numbers"
+    ratios = {
+        name: abs(new[name] - value) / max(abs(new[name]), abs(value))
+        for name, value in old.items()
+        if name in new and not math.isclose(new[name], value, rel_tol=ROUNDING)
+    }
+    if ratios:
+        most = max(ratios, key=lambda name: ratios[name])
+        yield (
+            f"{len(ratios)} of {len(old)} numbers differ, most{most}: {rounded(old[most], 5)} → "
+            f"{rounded(new[most], 5)}"
+        )
+
+
+def _result(folder: Path) -> Any:
+    try:
+        return json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _numbers(content: Any, place: str) -> Iterator[tuple[str, float]]:
+    """Yield all finite numbers of a result by their places, as words."""
+    if isinstance(content, dict):
+        for key, value in content.items():
+            yield from _numbers(value, f"{place} {key}")
+    elif isinstance(content, list):
+        for number, value in enumerate(content, start=1):
+            yield from _numbers(value, f"{place} {number}")
+    elif isinstance(content, float) and math.isfinite(content):
+        yield place, content
 
 
 def _same_content(first: Path, second: Path) -> bool:

@@ -1,5 +1,6 @@
 """What is said of two results, and where the older one goes."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -79,6 +80,16 @@ def test_a_result_that_says_nothing_of_itself(put: Put) -> None:
     assert changes(old, new) == (
         "what the earlier one was made with is not recorded",
         "the numbers are the same; other in provenance.yaml",
+    )
+
+
+def test_numbers_that_are_no_decay_are_compared_too(put: Put) -> None:
+    old, new = put("old", fit((0.03, 800.0))), put("new", fit((0.03, 800.0)))
+    for folder, lightness in ((old, 91.5), (new, 96.1)):
+        content = {"patches": {"paper": {"lab": [lightness, 1.0, 2.0], "leds": ["430 nm"]}}}
+        (folder / "result.json").write_text(json.dumps(content))
+    assert changes(old, new)[0] == (
+        "1 of 3 numbers differ, most patches paper lab 1: 91.500 → 96.100"
     )
 
 
