@@ -89,7 +89,7 @@ def test_numbers_that_are_no_decay_are_compared_too(put: Put) -> None:
         content = {"patches": {"paper": {"lab": [lightness, 1.0, 2.0], "leds": ["430 nm"]}}}
         (folder / "result.json").write_text(json.dumps(content))
     assert changes(old, new)[0] == (
-        "1 of 3 numbers differ, most patches paper lab 1: 91.500 → 96.100"
+        "1 of 3 numbers differ, most patches paper lab 1: 91.5 → 96.1"
     )
 
 
