@@ -30,8 +30,10 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "sensor": {"width": 96, "height": 64},
         "epoch": "2026-01-01T00:00:00Z",
         "initial": {"lamp": "off"},
+        # Frames of one seed in six look by chance as if they drifted, which is in the fit's σ.
+        "seed": 3,
     }
-    protocol = {"protocol": "decay", "charge": "10 min", "for": "100 s", "every": "4 s"}
+    protocol = {"protocol": "decay", "charge": "15 min", "for": "100 s", "every": "4 s"}
     (folder / "rig.yaml").write_text(write_quickly(rig))
     (folder / "protocol.yaml").write_text(write_quickly(protocol))
     quiet = io.StringIO()
@@ -75,9 +77,8 @@ def test_the_run_that_follows_finds_what_was_predicted(labrig: Labrig, measured:
     assert said["exposures_s"] == pytest.approx(taken, rel=0.27), "within a third of a stop"
     (found,) = json.loads((run / "result" / "fit.json").read_text())["states"]
     (state,) = said["patches"]["sample"]["states"]
-    # σ of the run has beside it what its frames say of a correlation, which is by chance.
-    assert 1 / 1.25 < found["k_r_sigma_per_s"] / state["rate_sigma_per_s"] < 2.5
-    assert 1 / 1.25 < found["amplitude_sigma"] / state["amplitude_sigma_dn_per_s"] < 2.5
+    assert 1 / 1.2 < found["k_r_sigma_per_s"] / state["rate_sigma_per_s"] < 1.2
+    assert 1 / 1.2 < found["amplitude_sigma"] / state["amplitude_sigma_dn_per_s"] < 1.2
     assert said["patches"]["sample"]["brightness_known"]
     assert sum(state["noise"].values()) == pytest.approx(1)
 
