@@ -32,6 +32,8 @@ FloatArray = NDArray[np.float64]
 
 #: X, Y, Z of a screen's white, D65.
 SCREEN_WHITE = np.array([0.95047, 1.0, 1.08883])
+#: σ above zero from which a number is named as the largest one.
+KNOWN_SIGMAS = 3.0
 
 
 def describe_reradiation(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) -> str:
@@ -140,6 +142,8 @@ def reradiation_text(matrix: ReradiationMatrix) -> str:
     'none'
     """
     stokes = np.where(matrix.is_stokes, np.nan_to_num(matrix.reradiation), 0.0)
+    if matrix.reradiation_sigma is not None and reradiates(matrix):
+        stokes = np.where(stokes > KNOWN_SIGMAS * matrix.reradiation_sigma, stokes, 0.0)
     out, into = np.unravel_index(stokes.argmax(), stokes.shape)
     if not stokes[out, into] > 0:
         return "none"
@@ -150,11 +154,10 @@ def reradiation_text(matrix: ReradiationMatrix) -> str:
         return f"strongest {where}{rest}"
     fraction, sigma = matrix.reradiated_fraction, matrix.reradiated_fraction_sigma
     if sigma is not None and not reradiates(matrix):
-        return (
-            f"none above the noise of {rounded(100 * float(np.median(sigma)), 2)} % of a wavelength"
-            f"{rest}"
-        )
-    most = int(fraction.argmax())
+        noise = rounded(100 * float(np.median(sigma[sigma > 0])), 2)
+        return f"none above the noise of {noise} % of a wavelength{rest}"
+    known = fraction if sigma is None else np.where(fraction > KNOWN_SIGMAS * sigma, fraction, 0.0)
+    most = int(known.argmax())
     share = (
         rounded(100 * float(fraction[most]), 3)
         if sigma is None

@@ -88,9 +88,7 @@ def test_numbers_that_are_no_decay_are_compared_too(put: Put) -> None:
     for folder, lightness in ((old, 91.5), (new, 96.1)):
         content = {"patches": {"paper": {"lab": [lightness, 1.0, 2.0], "leds": ["430 nm"]}}}
         (folder / "result.json").write_text(json.dumps(content))
-    assert changes(old, new)[0] == (
-        "1 of 3 numbers differ, most patches paper lab 1: 91.5 → 96.1"
-    )
+    assert changes(old, new)[0] == ("1 of 3 numbers differ, most patches paper lab 1: 91.5 → 96.1")
 
 
 def test_earlier_results_are_numbered_from_old_to_new(tmp_path: Path) -> None:

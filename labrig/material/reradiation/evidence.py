@@ -22,7 +22,8 @@ def reradiates(matrix: ReradiationMatrix) -> bool:
     -------
     bool
         Whether some entry is 5 σ above zero, and both entries beside it, of the neighbouring input
-        bands, are 3 σ above zero.
+        bands, are 3 σ above zero. Where one of these was not measured, as beside the only light
+        that excites a sample, the neighbouring output bands stand for it.
 
     Raises
     ------
@@ -42,8 +43,16 @@ def reradiates(matrix: ReradiationMatrix) -> bool:
     """
     sigma = required_sigma(matrix)
     used = matrix.is_stokes & ~near_diagonal(matrix)
-    used &= (sigma > 0) & np.isfinite(matrix.reradiation)
+    is_measured = np.isfinite(matrix.reradiation)
+    used &= (sigma > 0) & is_measured
     pulls = np.divide(matrix.reradiation, sigma, out=np.zeros_like(sigma), where=used)
-    middle, left, right = pulls[:, 1:-1], pulls[:, :-2], pulls[:, 2:]
-    clear = (middle > CLEAR_SIGMAS) & (np.minimum(left, right) > BESIDE_SIGMAS)
+    # An entry on the edge has no neighbour that could agree.
+    ends = np.pad(pulls, ((1, 1), (0, 0)))
+    same_light = np.minimum(ends[:-2], ends[2:])
+    beside = np.where(is_measured, pulls, np.nan)
+    left, right = (
+        np.where(np.isnan(near), same_light[:, 1:-1], near)
+        for near in (beside[:, :-2], beside[:, 2:])
+    )
+    clear = (pulls[:, 1:-1] > CLEAR_SIGMAS) & (np.minimum(left, right) > BESIDE_SIGMAS)
     return bool(clear.any())

@@ -19,6 +19,7 @@ from labrig.material import (
     with_sigma,
     without_spill,
 )
+from labrig.report import reradiation_text
 from tests.material.reradiation import bfc450
 from tests.material.reradiation.synthetic import (
     BRIGHTENER,
@@ -165,6 +166,25 @@ def test_what_gives_no_sigma_is_refused_in_one_line() -> None:
 
 @pytest.mark.shared_data
 @pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
+@pytest.mark.parametrize("emits", [True, False])
+def test_one_light_suffices_to_tell_re_radiation(emits: bool) -> None:
+    """LEDs measure single columns; what one of them excites has no neighbour that agrees."""
+    nm = np.arange(400.0, 701.0, 10.0)
+    noise = 1e-4 * np.random.default_rng(3).standard_normal((31, 31))
+    values = np.full((31, 31), np.nan)
+    values[:, [2, 12, 22]] = noise[:, [2, 12, 22]]
+    if emits:
+        values[6:10, 2] += 1e-3 * np.array([1.0, 2.0, 2.0, 1.0])
+    matrix = replace(
+        ReradiationMatrix.from_bands("", nm, nm, values),
+        reradiation_sigma=np.full((31, 31), 1e-5),
+    )
+    assert reradiates(matrix) == emits
+    told = reradiation_text(matrix)
+    assert ("420 nm to" in told) == emits
+    assert ("none above the noise" in told) != emits
+
+
 class TestRealTiles:
     """Tiles do not re-radiate: what is there off the diagonal is the error."""
 
