@@ -21,36 +21,12 @@ from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import EPSILON, FloatArray
+from labrig.fit.spectrum.values import measured
+from labrig.fit.spectrum.hypotheses import Chain, Feature, evidence_of, finer_design, finer_knots
 from labrig.fit.spectrum.system import SpectralSystem
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import band_means
 
-FEWEST_VALUES = 3
-
-
-def measured(
-    value: ArrayLike, sigma: ArrayLike, system: SpectralSystem
-) -> tuple[NDArray[np.bool_], SpectralSystem, FloatArray, FloatArray]:
-    """Return which values are usable, the system of those, their values and σ.
-
-    Raises
-    ------
-    FitError
-        There are too few values, none above its noise, or a σ of 0.
-    """
-    values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
-    used = np.isfinite(values) & np.isfinite(sigmas) & system.design.any(axis=1)
-    if (sigmas[used] <= 0).any():
-        raise FitError("expected every σ above 0, got some of 0; give the noise of every value")
-    if used.sum() < FEWEST_VALUES:
-        raise FitError(
-            f"expected {FEWEST_VALUES} or more values that are neither clipped nor missing, got "
-            f"{used.sum()}; expose shorter or light more of the filter"
-        )
-    part = system.of(used)
-    if not values[used] @ part.design.sum(axis=1) > 0:
-        raise FitError("expected values above 0, got none above their noise; expose longer")
-    return used, part, values[used], sigmas[used]
 
 
 #: Number of exchanges after which block pivoting counts as cycling.
@@ -114,6 +90,7 @@ ROUNDS = 3
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
 #: Added to the curvature of the fit, for a spectrum of about 1.
 MIN_CURVATURE = 1e-6
+COARSER = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +118,7 @@ class SpectrumFit:
     weight: float
     misfit: float
     used: NDArray[np.bool_]
+    features: tuple[tuple[Feature, ...], ...] = ()
 
     def in_bands(self, edges_nm: ArrayLike, level: float = 0.6827) -> "BandedSpectrum":
         """Average over neighbouring bands, with their credible interval.
@@ -201,27 +179,70 @@ def fit_spectrum(
     white_response = part.design.sum(axis=1)
     scale = float(y @ white_response) / float(white_response @ white_response)
     roughness = _second_differences(part.knots_nm)
-    x, misfit = np.full(len(part.knots_nm), scale), 1.0
-    for _ in range(ROUNDS):
-        whitened, target = _whitened(part, y, misfit * s, x / scale, scale)
-        x, ratio = _likeliest(whitened, target, roughness)
-        x, misfit = x * scale, max(1.0, misfit * ratio)
     rng = np.random.default_rng(seed)
-    draws, weights = _draw(whitened, target, roughness, samples, rng)
+    x, misfit, features = np.full(len(part.knots_nm), scale), 1.0, ()
+    for _ in range(ROUNDS):
+        values = _whitened(part, y, misfit * s, x / scale, scale)
+        chain = _chain_of(values, roughness, features, np.random.default_rng(seed))
+        features = tuple(chain.features) if chain else ()
+        x, ratio = _likeliest(values, roughness, chain)
+        x, misfit = x * scale, max(1.0, misfit * ratio)
+    if chain is None:
+        drawn = _smooth_hypotheses(values, roughness, samples, rng)
+    else:
+        drawn = [_Drawn(float(WEIGHTS[::COARSER][h.weight]), h.features)
+                 for h in sorted(chain.draw(samples), key=lambda h: h.weight)]
+    draws = _draw(values, roughness, drawn, rng)
+    knots_nm = values.fine_nm if draws.shape[1] > len(part.knots_nm) else part.knots_nm
     return SpectrumFit(
-        part.knots_nm, draws.mean(axis=0) * scale, draws * scale,
-        float(np.median(weights)), misfit, used,
+        knots_nm, draws.mean(axis=0) * scale, draws * scale,
+        float(np.median([one.weight for one in drawn])), misfit, used,
+        tuple(one.features for one in drawn),
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Whitened:
+    """Values (m,) and their designs, in units of their total error, for a spectrum of about 1."""
+
+    target: FloatArray
+    design: FloatArray
+    fine_design: FloatArray
+    knots_nm: FloatArray
+    fine_nm: FloatArray
 
 
 def _whitened(
     system: SpectralSystem, y: FloatArray, s: FloatArray, spectrum: FloatArray, scale: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return design and values in units of their total error, for a spectrum of about 1."""
+) -> _Whitened:
     covariance = np.diag((s / scale) ** 2) + system.covariance(spectrum)
     lower = np.linalg.cholesky(covariance)
-    solution = np.linalg.solve(lower, np.column_stack([system.design, y / scale]))
-    return solution[:, :-1], solution[:, -1]
+    fine = finer_design(system.design, system.knots_nm)
+    solution = np.linalg.solve(lower, np.column_stack([y / scale, system.design, fine]))
+    n = len(system.knots_nm)
+    return _Whitened(
+        solution[:, 0], solution[:, 1 : n + 1], solution[:, n + 1 :],
+        system.knots_nm, finer_knots(system.knots_nm),
+    )  # fmt: skip
+
+
+def _chain_of(
+    values: _Whitened,
+    roughness: FloatArray,
+    features: tuple[Feature, ...],
+    rng: np.random.Generator,
+) -> Chain | None:
+    """Return a chain of hypotheses with lines, settled; None if lines are out of the question."""
+    prior = roughness.T @ roughness
+    evidence = evidence_of(
+        values.design, values.target, values.fine_design, values.fine_nm,
+        prior, _ridge(prior), WEIGHTS[::COARSER],
+    )  # fmt: skip
+    if not features and not evidence.lines_are_possible():
+        return None
+    chain = Chain(evidence, rng, features=list(features))
+    chain.settle()
+    return chain
 
 
 def _second_differences(knots_nm: FloatArray) -> FloatArray:
@@ -246,43 +267,84 @@ def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> Float
 
 
 def _likeliest(
-    design: FloatArray, target: FloatArray, roughness: FloatArray
+    values: _Whitened, roughness: FloatArray, chain: Chain | None
 ) -> tuple[FloatArray, float]:
-    """Return the spectrum at the most probable weight, and the root of χ² per degree of freedom."""
-    prior = roughness.T @ roughness
-    weight = float(WEIGHTS[np.argmax(_weights(design, target, prior))])
-    curvature = design.T @ design + weight * prior + _ridge(prior)
-    all_free = np.ones(len(prior), dtype=np.bool_)
-    x = nonnegative_minimum(curvature, design.T @ target, all_free)
+    """Return the spectrum at the most probable weight, and the root of χ² per degree of freedom.
+
+    Lines are taken as the chain has them.
+    """
+    features = tuple(chain.features) if chain else ()
+    if chain is None:
+        weight = float(WEIGHTS[np.argmax(_weights(values.design, values.target, roughness.T @ roughness))])
+    else:
+        weight = float(WEIGHTS[::COARSER][chain.weight])
+    design, curvature = _with_features(values, roughness, weight, features)
+    free = np.ones(len(curvature), dtype=np.bool_)
+    x = nonnegative_minimum(curvature, design.T @ values.target, free)
     free = x > 0
     leverage = np.linalg.solve(
         curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)]
     )
-    residual = target - design @ x
-    dof = max(len(target) - float(np.trace(leverage)), 1.0)
-    return x, float(np.sqrt(residual @ residual / dof))
+    residual = values.target - design @ x
+    dof = max(len(values.target) - float(np.trace(leverage)) - 2 * len(features), 1.0)
+    n = len(values.knots_nm)
+    lines = np.zeros(n)
+    for power, one in zip(x[n:], features, strict=True):
+        lines += power * one.at_knots(values.knots_nm)
+    return x[:n] + lines, float(np.sqrt(residual @ residual / dof))
+
+
+def _with_features(
+    values: _Whitened, roughness: FloatArray, weight: float, features: tuple[Feature, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the design of the smooth spectrum and the features' powers, and the curvature."""
+    shapes = [values.fine_design @ one.at_knots(values.fine_nm) for one in features]
+    design = np.column_stack([values.design, *shapes])
+    n = len(values.knots_nm)
+    curvature = design.T @ design
+    curvature[:n, :n] += weight * roughness.T @ roughness + _ridge(roughness.T)
+    power = float(values.knots_nm[-1] - values.knots_nm[0])
+    curvature[range(n, len(curvature)), range(n, len(curvature))] += power**-2
+    return design, curvature
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """A weight of the smoothness prior and features."""
+
+    weight: float
+    features: tuple[Feature, ...]
+
+
+def _smooth_hypotheses(
+    values: _Whitened, roughness: FloatArray, samples: int, rng: np.random.Generator
+) -> list[_Drawn]:
+    probability = _weights(values.design, values.target, roughness.T @ roughness)
+    return [_Drawn(float(one), ()) for one in np.sort(rng.choice(WEIGHTS, samples, p=probability))]
 
 
 def _draw(
-    design: FloatArray,
-    target: FloatArray,
-    roughness: FloatArray,
-    samples: int,
-    rng: np.random.Generator,
-) -> tuple[FloatArray, FloatArray]:
-    """Return (s, n) spectra and the (s,) weights with which they were drawn."""
-    information, prior = design.T @ design, roughness.T @ roughness
-    probability = _weights(design, target, prior)
-    weights = np.sort(rng.choice(WEIGHTS, samples, p=probability))
-    draws = np.empty((samples, len(prior)))
-    free = np.ones(len(prior), dtype=np.bool_)
-    for number, weight in enumerate(weights):
-        measured = design.T @ (target + rng.standard_normal(len(target)))
-        expected = np.sqrt(weight) * roughness.T @ rng.standard_normal(len(roughness))
-        curvature = information + weight * prior + _ridge(prior)
-        draws[number] = nonnegative_minimum(curvature, measured + expected, free)
-        free = draws[number] > 0
-    return draws, weights
+    values: _Whitened, roughness: FloatArray, drawn: list[_Drawn], rng: np.random.Generator
+) -> FloatArray:
+    """Return (s, q) spectra, one for each hypothesis; on the knots of lines if there are any."""
+    n = len(values.knots_nm)
+    any_lines = any(one.features for one in drawn)
+    draws = np.empty((len(drawn), len(values.fine_nm) if any_lines else n))
+    free = np.ones(n, dtype=np.bool_)
+    for number, one in enumerate(drawn):
+        design, curvature = _with_features(values, roughness, one.weight, one.features)
+        linear = design.T @ (values.target + rng.standard_normal(len(values.target)))
+        linear[:n] += np.sqrt(one.weight) * roughness.T @ rng.standard_normal(len(roughness))
+        start = np.concatenate([free[:n], np.ones(len(one.features), dtype=np.bool_)])
+        x = nonnegative_minimum(curvature, linear, start)
+        free = x > 0
+        if not any_lines:
+            draws[number] = x
+            continue
+        draws[number] = np.interp(values.fine_nm, values.knots_nm, x[:n])
+        for power, feature in zip(x[n:], one.features, strict=True):
+            draws[number] += power * feature.at_knots(values.fine_nm)
+    return draws
 
 
 def _ridge(prior: FloatArray) -> FloatArray:
