@@ -18,11 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
+from scipy.special import logsumexp
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import EPSILON, FloatArray
 from labrig.fit.spectrum.values import measured
-from labrig.fit.spectrum.hypotheses import Chain, Feature, evidence_of, finer_design, finer_knots
+from labrig.fit.spectrum.hypotheses import (
+    FWHM_NM, Chain, Feature, evidence_of, features_of, finer_design, finer_knots,
+)
 from labrig.fit.spectrum.system import SpectralSystem
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import band_means
@@ -90,7 +93,7 @@ ROUNDS = 3
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
 #: Added to the curvature of the fit, for a spectrum of about 1.
 MIN_CURVATURE = 1e-6
-COARSER = 3
+SMOOTH_WEIGHTS = WEIGHTS[26::3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +193,7 @@ def fit_spectrum(
     if chain is None:
         drawn = _smooth_hypotheses(values, roughness, samples, rng)
     else:
-        drawn = [_Drawn(float(WEIGHTS[::COARSER][h.weight]), h.features)
+        drawn = [_Drawn(float(SMOOTH_WEIGHTS[h.weight]), h.features)
                  for h in sorted(chain.draw(samples), key=lambda h: h.weight)]
     draws = _draw(values, roughness, drawn, rng)
     knots_nm = values.fine_nm if draws.shape[1] > len(part.knots_nm) else part.knots_nm
@@ -236,13 +239,24 @@ def _chain_of(
     prior = roughness.T @ roughness
     evidence = evidence_of(
         values.design, values.target, values.fine_design, values.fine_nm,
-        prior, _ridge(prior), WEIGHTS[::COARSER],
+        prior, _ridge(prior), SMOOTH_WEIGHTS,
     )  # fmt: skip
-    if not features and not evidence.lines_are_possible():
+    log_of_none = _log_evidence(values.design, values.target, prior)
+    if not features and not evidence.lines_are_possible(float(logsumexp(log_of_none)) - np.log(len(WEIGHTS) / len(SMOOTH_WEIGHTS))):
         return None
-    chain = Chain(evidence, rng, features=list(features))
+    chain = Chain(evidence, rng, features=list(features) or _sparse_features(values, evidence, roughness))
     chain.settle()
     return chain
+
+
+def _sparse_features(values, evidence, roughness) -> list[Feature]:
+    low, high = evidence.range_nm
+    grid_nm = np.arange(low, high, 2.5)
+    lines = tuple(Feature(float(nm), FWHM_NM[0] / 2.355) for nm in grid_nm)
+    design, curvature = _with_features(values, roughness, 100.0, lines)
+    x = nonnegative_minimum(curvature, design.T @ values.target, np.ones(len(curvature), dtype=np.bool_))
+    n = len(values.knots_nm)
+    return features_of(x[n:], grid_nm)
 
 
 def _second_differences(knots_nm: FloatArray) -> FloatArray:
@@ -251,8 +265,8 @@ def _second_differences(knots_nm: FloatArray) -> FloatArray:
     return np.diff(np.eye(n), n=2, axis=0)
 
 
-def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
-    """Return the probability of each of `WEIGHTS` under a flat prior, ignoring x ≥ 0."""
+def _log_evidence(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
+    """Return the log evidence of each of `WEIGHTS`, ignoring x ≥ 0."""
     information, linear = design.T @ design, design.T @ target
     log_evidence = np.empty(len(WEIGHTS))
     for number, weight in enumerate(WEIGHTS):
@@ -261,6 +275,12 @@ def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> Float
         log_determinant = 2 * float(np.log(np.diag(lower)).sum())
         rank = len(prior) - 2
         log_evidence[number] = (rank * np.log(weight) - log_determinant + along @ along) / 2
+    return log_evidence
+
+
+def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
+    """Return the probability of each of `WEIGHTS` under a flat prior."""
+    log_evidence = _log_evidence(design, target, prior)
     probability = np.exp(log_evidence - log_evidence.max())
     normalised: FloatArray = probability / probability.sum()
     return normalised
@@ -277,7 +297,7 @@ def _likeliest(
     if chain is None:
         weight = float(WEIGHTS[np.argmax(_weights(values.design, values.target, roughness.T @ roughness))])
     else:
-        weight = float(WEIGHTS[::COARSER][chain.weight])
+        weight = float(SMOOTH_WEIGHTS[chain.weight])
     design, curvature = _with_features(values, roughness, weight, features)
     free = np.ones(len(curvature), dtype=np.bool_)
     x = nonnegative_minimum(curvature, design.T @ values.target, free)

@@ -16,30 +16,36 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import LinAlgError, lapack, solve_triangular
+from scipy.optimize import minimize
 from scipy.special import log_ndtr, logsumexp
 
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.spectrum.line import FWHM_OVER_SIGMA, line_at_knots
+from labrig.fit.spectrum.line import FWHM_OVER_SIGMA, line_at_knots, wings_at_knots
 
 #: Prior of a feature's full width at half maximum in nm: even in its logarithm. Wider ones are left
 #: to the smooth spectrum, which resolves them.
-FWHM_NM = (2.0, 25.0)
-#: Prior probability that a feature is one line, not two.
-SINGLE = 0.5
+FWHM_NM = (2.0, 40.0)
+#: Prior probability that a feature is a Gaussian line, and that it is two; else it has wings.
+GAUSSIAN, PAIR = 0.35, 0.45
 #: Least share of the weaker of two lines.
 WEAKEST = 0.05
-#: Prior expectation of the number of features.
-EXPECTED = 0.1
+#: Prior probability of a first feature relative to none, and of each further one to as many less.
+FIRST, FURTHER = 0.1, 0.5
 MAX_FEATURES = 16
+#: Least significance, in σ of the values, of a line with all the light.
+SEEN_SIGMA = 30.0
+#: Distance in knots of the places at which the smooth spectrum must not be negative, and how much
+#: it may be for a spectrum of about 1.
+PLACES, TOLERATED = 4, 0.01
 #: Probability of any line at all below which there are none.
 NEGLIGIBLE = 0.01
 #: Distance of the tried wavelengths and of the knots of lines, per distance of the knots.
 TRIED, FINER = 0.5, 0.25
 TRIED_FWHM_NM = (3.0, 8.0, 14.0, 22.0)
 #: Steps of the chain for each step that is kept, and those between two features of the start.
-THINNING, SETTLING = 20, 120
+THINNING, SETTLING = 20, 200
 #: Steps after which another weight is drawn.
-WEIGHING = 10
+WEIGHING = 20
 #: Largest steps of a feature's wavelength in nm and of the logarithm of its width; most are smaller.
 STEP_NM, STEP_LOG = 5.0, 1.0
 SMALLER = 2.5
@@ -63,12 +69,17 @@ class Feature:
     width_nm: float
     apart: float = 0.0
     share: float = 0.5
+    wings: float = 0.0
 
     def at_knots(self, knots_nm: FloatArray) -> FloatArray:
         """Return the values (n,) of the feature of integral 1 at evenly spaced knots."""
         fwhm_nm = FWHM_OVER_SIGMA * self.width_nm * np.sqrt(1 - self.apart)
         if self.apart == 0:
-            return line_at_knots(knots_nm, self.wavelength_nm, fwhm_nm)
+            core = line_at_knots(knots_nm, self.wavelength_nm, fwhm_nm)
+            if self.wings == 0:
+                return core
+            wings = wings_at_knots(knots_nm, self.wavelength_nm, fwhm_nm)
+            return (1 - self.wings) * core + self.wings * wings
         distance_nm = self.width_nm * np.sqrt(self.apart / (self.share * (1 - self.share)))
         upper = line_at_knots(knots_nm, self.wavelength_nm + (1 - self.share) * distance_nm, fwhm_nm)
         lower = line_at_knots(knots_nm, self.wavelength_nm - self.share * distance_nm, fwhm_nm)
@@ -129,6 +140,9 @@ class Evidence:
     smooth: FloatArray
     along: FloatArray
     log_smooth: FloatArray
+    at_places: FloatArray
+    mean_at_places: FloatArray
+    variance_at_places: FloatArray
     power: float
 
     def columns(self, features: Sequence[Feature]) -> FloatArray:
@@ -136,14 +150,10 @@ class Evidence:
         rows = [self.fine_design @ one.at_knots(self.fine_nm) for one in features]
         return np.array(rows).reshape(-1, len(self.target))
 
-    def log_evidence(self, columns: FloatArray, weight: int) -> float:
-        """Return the log evidence of a weight with features of the given values."""
-        return float(self.log_smooth[weight] + self._gain(columns, weight))
-
     def log_evidence_of_weights(self, columns: FloatArray) -> FloatArray:
         """Return the log evidence of all weights with features of the given values."""
         if not len(columns):
-            return self.log_smooth
+            return self.log_none
         outside = columns @ self.smooth.swapaxes(1, 2)
         information = columns @ columns.T - outside @ outside.swapaxes(1, 2)
         information += np.eye(len(columns)) / self.power**2
@@ -154,11 +164,15 @@ class Evidence:
         sigma = np.sqrt((inverse**2).sum(axis=1))
         occam = np.log(np.einsum("wii->wi", inverse) / self.power) + np.log(2)
         gain = (whitened**2 / 2 + occam + log_ndtr(mean / sigma)).sum(axis=1)
-        return self.log_smooth + gain
+        lever = self.at_places @ columns.T
+        smooth = self.mean_at_places - np.einsum("wpk,wk->wp", lever, mean)
+        variance = self.variance_at_places + ((lever @ inverse.swapaxes(1, 2)) ** 2).sum(axis=2)
+        return self.log_smooth + gain + log_ndtr(smooth / np.sqrt(variance)).sum(axis=1)
 
-    def _gain(self, columns: FloatArray, weight: int) -> float:
+    def log_evidence(self, columns: FloatArray, weight: int) -> float:
+        """Return the log evidence of a weight with features of the given values."""
         if not len(columns):
-            return 0.0
+            return float(self.log_none[weight])
         outside = columns @ self.smooth[weight].T
         information = columns @ columns.T - outside @ outside.T
         information.flat[:: len(columns) + 1] += self.power**-2
@@ -169,58 +183,66 @@ class Evidence:
             raise LinAlgError("expected a positive definite matrix")
         inverse, _ = lapack.dtrtri(lower, lower=1)
         whitened = inverse @ linear
-        z = (whitened @ inverse) / np.sqrt((inverse**2).sum(axis=0))
+        mean = whitened @ inverse
+        z = mean / np.sqrt((inverse**2).sum(axis=0))
         occam = np.log(inverse.diagonal() / self.power * 2).sum()
-        return float(whitened @ whitened / 2 + occam + log_ndtr(z).sum())
+        lever = self.at_places[weight] @ columns.T
+        smooth = self.mean_at_places[weight] - lever @ mean
+        variance = self.variance_at_places[weight] + ((lever @ inverse.T) ** 2).sum(axis=1)
+        positive = log_ndtr(z).sum() + log_ndtr(smooth / np.sqrt(variance)).sum()
+        return float(self.log_smooth[weight] + whitened @ whitened / 2 + occam + positive)
+
+    @cached_property
+    def log_none(self) -> FloatArray:
+        """Log evidence of all weights without features."""
+        z = self.mean_at_places / np.sqrt(self.variance_at_places)
+        result: FloatArray = self.log_smooth + log_ndtr(z).sum(axis=1)
+        return result
 
     @cached_property
     def tried(self) -> tuple[list[Feature], FloatArray]:
         """Features on a grid, and their whitened values."""
         low, high = self.range_nm
-        step = TRIED * (self.fine_nm[1] - self.fine_nm[0]) / FINER
-        grid_nm = np.arange(low, high, step)
+        grid_nm = np.arange(low, high, TRIED * self.margin_nm)
         features = [
             Feature(float(nm), fwhm / FWHM_OVER_SIGMA) for fwhm in TRIED_FWHM_NM for nm in grid_nm
         ]
         return features, self.columns(features)
 
     @property
-    def range_nm(self) -> tuple[float, float]:
-        """Least and largest wavelength of a feature."""
-        margin = (self.fine_nm[1] - self.fine_nm[0]) / FINER
-        return float(self.fine_nm[0] + margin), float(self.fine_nm[-1] - margin)
+    def margin_nm(self) -> float:
+        """Distance of the knots of the smooth spectrum."""
+        return float(self.fine_nm[1] - self.fine_nm[0]) / FINER
 
-    def gains(self, columns: FloatArray) -> FloatArray:
-        """Return the log evidence of each weight with each tried feature besides given ones."""
+    @cached_property
+    def range_nm(self) -> tuple[float, float]:
+        """Least and largest wavelength of a feature: a knot within what the values see."""
+        step = float(self.fine_nm[1] - self.fine_nm[0])
+        seen = np.linalg.norm(self.fine_design, axis=0)
+        inside = self.fine_nm[seen * self.power > SEEN_SIGMA * step]
+        low, high = self.fine_nm[0] + self.margin_nm, self.fine_nm[-1] - self.margin_nm
+        return float(max(low, inside[0])), float(min(high, inside[-1]))
+
+    def gains(self) -> FloatArray:
+        """Return the log evidence of each weight with each tried feature."""
         tried = self.tried[1]
         result = np.empty((len(self.smooth), len(tried)))
-        direct, known, mixed = tried @ self.target, columns @ self.target, tried @ columns.T
+        direct = tried @ self.target
         for number, smooth in enumerate(self.smooth):
-            seen, along = tried @ smooth.T, self.along[number]
+            seen = tried @ smooth.T
             norm2 = np.einsum("ij,ij->i", tried, tried) - np.einsum("ij,ij->i", seen, seen)
-            norm2 += self.power**-2
-            linear = direct - seen @ along
-            if len(columns):
-                outside = columns @ smooth.T
-                information = columns @ columns.T - outside @ outside.T
-                information[np.diag_indices_from(information)] += self.power**-2
-                lower = np.linalg.cholesky(information)
-                cross = np.linalg.solve(lower, (mixed - seen @ outside.T).T)
-                norm2 = norm2 - np.einsum("ij,ij->j", cross, cross)
-                linear = linear - cross.T @ np.linalg.solve(lower, known - outside @ along)
-            norm2 = np.maximum(norm2, self.power**-2)
-            sigmas = linear / np.sqrt(norm2)
-            result[number] = (
-                sigmas**2 / 2 - np.log(norm2 * self.power**2) / 2 + np.log(2) + log_ndtr(sigmas)
-            )
-        return result + self.log_evidence_of_weights(columns)[:, np.newaxis]
+            norm2 = np.maximum(norm2, 0.0) + self.power**-2
+            sigmas = (direct - seen @ self.along[number]) / np.sqrt(norm2)
+            occam = np.log(2) - np.log(norm2 * self.power**2) / 2
+            result[number] = sigmas**2 / 2 + occam + log_ndtr(sigmas) + self.log_smooth[number]
+        return result
 
-    def lines_are_possible(self) -> bool:
+    def lines_are_possible(self, log_of_none: float) -> bool:
         """Return whether one feature is as probable as `NEGLIGIBLE` or more."""
-        with_one = self.gains(self.columns(()))
+        with_one = self.gains()
         log_odds = (
-            logsumexp(with_one) - np.log(with_one.shape[1]) + np.log(EXPECTED)
-            - logsumexp(self.log_smooth)
+            logsumexp(with_one) - np.log(with_one.shape[1]) + np.log(FIRST)
+            - log_of_none
         )  # fmt: skip
         return bool(log_odds > np.log(NEGLIGIBLE))
 
@@ -250,45 +272,61 @@ class Chain:
         self._log = float(log[self.weight])
 
     def settle(self) -> None:
-        """Add features one by one as long as the next makes the values more probable."""
-        self._walk(SETTLING if self.features else 0)
-        while len(self.features) < MAX_FEATURES:
-            gains = self.evidence.gains(self._columns)
-            best = np.unravel_index(int(np.argmax(gains)), gains.shape)
-            added = gains.max() + np.log(EXPECTED) + logsumexp(gains - gains.max()) - np.log(gains.shape[1])
-            if added < self._log_all():
-                break
-            self.weight = int(best[0])
-            self._see([*self.features, self.evidence.tried[0][best[1]]])
-            self._walk(SETTLING)
+        """Go to where the evidence is high."""
+        self._climb()
+        self._walk(SETTLING)
+        self._climb()
 
-    def _log_all(self) -> float:
-        return float(logsumexp(self.evidence.log_evidence_of_weights(self._columns)))
+    def _climb(self) -> None:
+        """Take the wavelengths and widths to a maximum of the evidence."""
+        if not self.features:
+            return
+        margin = self.evidence.margin_nm
+        low, high = self.evidence.range_nm
+        narrow, wide = np.log(np.array(FWHM_NM) / FWHM_OVER_SIGMA)
+
+        def at(x: FloatArray) -> list[Feature]:
+            return [
+                replace(one, wavelength_nm=margin * float(place), width_nm=float(np.exp(width)))
+                for one, place, width in zip(self.features, x[::2], x[1::2], strict=True)
+            ]
+
+        def cost(x: FloatArray) -> float:
+            return -self.evidence.log_evidence(self.evidence.columns(at(x)), self.weight)
+
+        start = [(one.wavelength_nm / margin, np.log(one.width_nm)) for one in self.features]
+        bounds = [(low / margin, high / margin), (narrow, wide)] * len(self.features)
+        found = minimize(cost, np.ravel(start), bounds=bounds, options={"maxiter": 50})
+        self._see(at(found.x))
+        self.weight = int(np.argmax(self.evidence.log_evidence_of_weights(self._columns)))
+        self._see(self.features)
+
+    def _log_prior(self, more: int) -> float:
+        """Return the logarithm of the prior of one feature more, or less, relative to now."""
+        return float(more * np.log(FIRST if len(self.features) + min(more, 0) == 0 else FURTHER))
 
     def _walk(self, steps: int) -> None:
-        for number in range(steps):
-            self._move()
-            if number % WEIGHING == 0:
-                self._weigh()
+        for _ in range(steps // WEIGHING):
+            for _ in range(WEIGHING):
+                self._step()
+            self._weigh()
 
     def draw(self, count: int) -> list[Hypothesis]:
         """Return hypotheses of the chain."""
         drawn = []
         for _ in range(count):
-            for _ in range(THINNING):
-                self._step()
-            self._weigh()
+            self._walk(THINNING)
             drawn.append(Hypothesis(self.weight, tuple(self.features)))
         return drawn
 
     def _step(self) -> None:
         kind = self.rng.random()
-        if kind < 0.1:
+        if kind < 0.08:
             self._birth()
-        elif kind < 0.2:
+        elif kind < 0.16:
             self._death()
-        elif kind < 0.35:
-            self._pair()
+        elif kind < 0.4:
+            self._reshape()
         else:
             self._move()
 
@@ -304,7 +342,7 @@ class Chain:
             return
         new = self._any_feature()
         columns = np.vstack([self._columns, self.evidence.columns([new])])
-        if self._accept(columns, np.log(EXPECTED / (len(self.features) + 1))):
+        if self._accept(columns, self._log_prior(1)):
             self.features.append(new)
 
     def _death(self) -> None:
@@ -312,28 +350,42 @@ class Chain:
             return
         chosen = int(self.rng.integers(len(self.features)))
         columns = np.delete(self._columns, chosen, axis=0)
-        if self._accept(columns, np.log(len(self.features) / EXPECTED)):
+        if self._accept(columns, self._log_prior(-1)):
             del self.features[chosen]
 
     def _any_feature(self) -> Feature:
         low, high = np.log(np.array(FWHM_NM) / FWHM_OVER_SIGMA)
-        return self._any_pair(
+        return self._any_shape(
             Feature(
                 float(self.rng.uniform(*self.evidence.range_nm)),
                 float(np.exp(self.rng.uniform(low, high))),
             )
         )
 
-    def _any_pair(self, one: Feature) -> Feature:
-        if self.rng.random() < SINGLE:
-            return replace(one, apart=0.0, share=0.5)
-        apart, share = float(self.rng.random()), float(self.rng.uniform(WEAKEST, 1 - WEAKEST))
-        return replace(one, apart=apart, share=share)
+    def _any_shape(self, one: Feature) -> Feature:
+        kind = self.rng.random()
+        plain = Feature(one.wavelength_nm, one.width_nm)
+        if kind < GAUSSIAN:
+            return plain
+        if kind < GAUSSIAN + PAIR:
+            share = float(self.rng.uniform(WEAKEST, 1 - WEAKEST))
+            return replace(plain, apart=float(self.rng.random()), share=share)
+        return replace(plain, wings=float(self.rng.random()))
 
-    def _pair(self) -> None:
+    def _reshape(self) -> None:
         if self.features:
             chosen = int(self.rng.integers(len(self.features)))
-            self._replace(chosen, self._any_pair(self.features[chosen]))
+            new = self._any_shape(self.features[chosen])
+            size = 10 ** -self.rng.uniform(0, SMALLER) * (self.rng.random() < 0.5)
+            step = size * self.rng.standard_normal(2)
+            self._replace(
+                chosen,
+                replace(
+                    new,
+                    wavelength_nm=new.wavelength_nm + float(STEP_NM * step[0]),
+                    width_nm=new.width_nm * float(np.exp(STEP_LOG * step[1])),
+                ),
+            )
 
     def _move(self) -> None:
         if not self.features:
@@ -341,12 +393,13 @@ class Chain:
         chosen = int(self.rng.integers(len(self.features)))
         one = self.features[chosen]
         size = 10 ** -self.rng.uniform(0, SMALLER)
-        step = size * self.rng.standard_normal(4)
+        step = (size * self.rng.standard_normal(5)).tolist()
         moved = Feature(
             one.wavelength_nm + STEP_NM * step[0],
-            one.width_nm * np.exp(STEP_LOG * step[1]),
+            one.width_nm * float(np.exp(STEP_LOG * step[1])),
             one.apart + step[2] if one.apart else 0.0,
             one.share + step[3] if one.apart else 0.5,
+            one.wings + step[4] if one.wings else 0.0,
         )
         self._replace(chosen, moved)
 
@@ -357,6 +410,7 @@ class Chain:
             low < new.wavelength_nm < high
             and narrow < new.width_nm < wide
             and 0 <= new.apart < 1
+            and 0 <= new.wings < 1
             and WEAKEST < new.share < 1 - WEAKEST
         ):
             return
@@ -379,12 +433,41 @@ def evidence_of(
     information, linear = design.T @ design, design.T @ target
     smooth = np.empty((len(weights), *design.T.shape))
     log_smooth = np.empty(len(weights))
+    places = np.arange(PLACES // 2, len(prior), PLACES)
+    at_places, variance = np.empty((len(weights), len(places), len(target))), np.empty((len(weights), len(places)))
     for number, weight in enumerate(weights):
         lower = np.linalg.cholesky(information + weight * prior + ridge)
         smooth[number] = solve_triangular(lower, design.T, lower=True)
         along = smooth[number] @ target
+        root = solve_triangular(lower, np.eye(len(prior))[:, places], lower=True)
+        at_places[number] = root.T @ smooth[number]
+        variance[number] = (root**2).sum(axis=0) + TOLERATED**2
         log_determinant = 2 * float(np.log(np.diag(lower)).sum())
         log_smooth[number] = ((len(prior) - 2) * np.log(weight) - log_determinant + along @ along) / 2
     span_nm = float(fine_nm[-1] - fine_nm[0])
     along = smooth @ target
-    return Evidence(target, fine_design, fine_nm, smooth, along, log_smooth, span_nm)
+    return Evidence(
+        target, fine_design, fine_nm, smooth, along, log_smooth,
+        at_places, at_places @ target, variance, span_nm,
+    )  # fmt: skip
+
+
+#: Distance in nm up to which neighbouring lines of the first solution make one feature.
+TOGETHER_NM = 6.0
+SMALLEST_POWER = 1e-3
+
+
+def features_of(power: FloatArray, grid_nm: FloatArray) -> list[Feature]:
+    """Return features for the powers (n,) of lines at evenly spaced wavelengths."""
+    seen = np.flatnonzero(power > SMALLEST_POWER * power.sum())
+    if not len(seen):
+        return []
+    groups = np.split(seen, np.flatnonzero(np.diff(grid_nm[seen]) > TOGETHER_NM) + 1)
+    features = []
+    for group in groups:
+        share = power[group] / power[group].sum()
+        mean_nm = float(share @ grid_nm[group])
+        variance = float(share @ (grid_nm[group] - mean_nm) ** 2)
+        width_nm = max(np.sqrt(variance), 1.5 * FWHM_NM[0] / FWHM_OVER_SIGMA)
+        features.append(Feature(mean_nm, float(width_nm)))
+    return features
