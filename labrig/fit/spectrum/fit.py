@@ -24,7 +24,7 @@ from labrig.errors import FitError
 from labrig.fit.least_squares import EPSILON, FloatArray
 from labrig.fit.spectrum.values import measured
 from labrig.fit.spectrum.hypotheses import (
-    FWHM_NM, Chain, Feature, evidence_of, features_of, finer_design, finer_knots,
+    FWHM_NM, NEGLIGIBLE, Chain, Feature, evidence_of, features_of, finer_design, finer_knots,
 )
 from labrig.fit.spectrum.system import SpectralSystem
 from labrig.nonnegative import nonnegative_least_squares
@@ -241,8 +241,10 @@ def _chain_of(
         values.design, values.target, values.fine_design, values.fine_nm,
         prior, _ridge(prior), SMOOTH_WEIGHTS,
     )  # fmt: skip
-    log_of_none = _log_evidence(values.design, values.target, prior)
-    if not features and not evidence.lines_are_possible(float(logsumexp(log_of_none)) - np.log(len(WEIGHTS) / len(SMOOTH_WEIGHTS))):
+    log_none = _log_evidence(values.design, values.target, prior)
+    rough = logsumexp(log_none[: WEIGHTS.searchsorted(SMOOTH_WEIGHTS[0])])
+    one = evidence.log_odds_of_one() + np.log(len(WEIGHTS))
+    if not features and max(rough, one) < logsumexp(log_none) + np.log(NEGLIGIBLE):
         return None
     chain = Chain(evidence, rng, features=list(features) or _sparse_features(values, evidence, roughness))
     chain.settle()

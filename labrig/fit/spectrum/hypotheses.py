@@ -9,7 +9,7 @@ and death of a Poisson process: C. J. Geyer, J. Møller, *Simulation procedures 
 inference for spatial point processes*, Scand. J. Stat. 21, 1994).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -44,6 +44,8 @@ TRIED, FINER = 0.5, 0.25
 TRIED_FWHM_NM = (3.0, 8.0, 14.0, 22.0)
 #: Steps of the chain for each step that is kept, and those between two features of the start.
 THINNING, SETTLING = 20, 200
+#: Largest loss of log evidence for one feature less: what its place and width cost by their prior.
+WORTH, SIMPLIFYING = 10.0, 4
 #: Steps after which another weight is drawn.
 WEIGHING = 20
 #: Largest steps of a feature's wavelength in nm and of the logarithm of its width; most are smaller.
@@ -192,6 +194,14 @@ class Evidence:
         positive = log_ndtr(z).sum() + log_ndtr(smooth / np.sqrt(variance)).sum()
         return float(self.log_smooth[weight] + whitened @ whitened / 2 + occam + positive)
 
+    def powers(self, columns: FloatArray, weight: int) -> FloatArray:
+        """Return the mean powers of features of the given values."""
+        outside = columns @ self.smooth[weight].T
+        information = columns @ columns.T - outside @ outside.T
+        information.flat[:: len(columns) + 1] += self.power**-2
+        linear = columns @ self.target - outside @ self.along[weight]
+        return np.asarray(np.linalg.solve(information, linear))
+
     @cached_property
     def log_none(self) -> FloatArray:
         """Log evidence of all weights without features."""
@@ -237,14 +247,10 @@ class Evidence:
             result[number] = sigmas**2 / 2 + occam + log_ndtr(sigmas) + self.log_smooth[number]
         return result
 
-    def lines_are_possible(self, log_of_none: float) -> bool:
-        """Return whether one feature is as probable as `NEGLIGIBLE` or more."""
+    def log_odds_of_one(self) -> float:
+        """Return the log of the evidence of one feature, its prior included."""
         with_one = self.gains()
-        log_odds = (
-            logsumexp(with_one) - np.log(with_one.shape[1]) + np.log(FIRST)
-            - log_of_none
-        )  # fmt: skip
-        return bool(log_odds > np.log(NEGLIGIBLE))
+        return float(logsumexp(with_one) - np.log(with_one.size) + np.log(FIRST))
 
 
 @dataclass(eq=False)
@@ -272,10 +278,56 @@ class Chain:
         self._log = float(log[self.weight])
 
     def settle(self) -> None:
-        """Go to where the evidence is high."""
+        """Go to where the evidence is high, with as few features as explain the values."""
         self._climb()
+        for _ in range(SIMPLIFYING):
+            before = len(self.features)
+            self._simplify()
+            self._climb()
+            if len(self.features) == before:
+                break
         self._walk(SETTLING)
+        self._simplify()
         self._climb()
+
+    def _simplify(self) -> None:
+        """Leave out features, and unite neighbours, as long as that costs no evidence to speak of."""
+        while self.features:
+            options = list(self._simpler())
+            logs = [
+                self.evidence.log_evidence(self.evidence.columns(one), self.weight)
+                for one in options
+            ]
+            best = int(np.argmax(logs))
+            if logs[best] + WORTH < self._log:
+                break
+            self._see(options[best])
+            if not self.features:
+                break
+
+    def _simpler(self) -> Iterator[list[Feature]]:
+        """Yield the features without one of them, and with two neighbours made one."""
+        order = sorted(range(len(self.features)), key=lambda k: self.features[k].wavelength_nm)
+        features = [self.features[k] for k in order]
+        power = np.maximum(self.evidence.powers(self._columns, self.weight)[order], 0.0)
+        for k in range(len(features)):
+            yield features[:k] + features[k + 1 :]
+        for k in range(len(features) - 1):
+            pair, total = features[k : k + 2], float(power[k : k + 2].sum())
+            if total > 0:
+                share = (power[k : k + 2] / total).tolist()
+                mean_nm = sum(p * one.wavelength_nm for p, one in zip(share, pair, strict=True))
+                variance = sum(
+                    p * (one.width_nm**2 + (one.wavelength_nm - mean_nm) ** 2)
+                    for p, one in zip(share, pair, strict=True)
+                )
+                width_nm = min(float(np.sqrt(variance)), 0.999 * FWHM_NM[1] / FWHM_OVER_SIGMA)
+                yield [*features[:k], Feature(mean_nm, width_nm), *features[k + 2 :]]
+                between = (share[0] * share[1] * (pair[1].wavelength_nm - pair[0].wavelength_nm) ** 2)
+                apart = between / variance
+                if WEAKEST < share[1] < 1 - WEAKEST and 0.01 < apart < 0.99:
+                    double = Feature(mean_nm, width_nm, apart, share[1])
+                    yield [*features[:k], double, *features[k + 2 :]]
 
     def _climb(self) -> None:
         """Take the wavelengths and widths to a maximum of the evidence."""
@@ -453,7 +505,7 @@ def evidence_of(
 
 
 #: Distance in nm up to which neighbouring lines of the first solution make one feature.
-TOGETHER_NM = 6.0
+TOGETHER_NM = 3.0
 SMALLEST_POWER = 1e-3
 
 
