@@ -13,6 +13,7 @@ Lines, such as a mercury lamp's through a filter of 25 nm, come out too broad, b
 band; `fit_line` finds the wavelength of a single one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,17 +21,21 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
 from scipy.special import logsumexp
 
-from labrig.errors import FitError
 from labrig.fit.least_squares import EPSILON, FloatArray
-from labrig.fit.spectrum.values import measured
-from labrig.fit.spectrum.hypotheses import (
-    FWHM_NM, NEGLIGIBLE, Chain, Feature, evidence_of, features_of, finer_design, finer_knots,
+from labrig.fit.spectrum.evidence import evidence_of
+from labrig.fit.spectrum.feature import (
+    FWHM_NM,
+    Feature,
+    features_of,
+    finer_design,
+    finer_knots,
 )
+from labrig.fit.spectrum.hypotheses import FIRST, Chain, Hypothesis
+from labrig.fit.spectrum.line import FWHM_OVER_SIGMA
 from labrig.fit.spectrum.system import SpectralSystem
+from labrig.fit.spectrum.values import measured
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import band_means
-
-
 
 #: Number of exchanges after which block pivoting counts as cycling.
 MAX_EXCHANGES = 25
@@ -93,7 +98,32 @@ ROUNDS = 3
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
 #: Added to the curvature of the fit, for a spectrum of about 1.
 MIN_CURVATURE = 1e-6
-SMOOTH_WEIGHTS = WEIGHTS[26::3]
+#: Weights besides lines. At the least of them, knots 5 nm apart, the smooth spectrum may bend as
+#: much as a band of 40 nm with all the light: what is narrower is a matter of lines.
+WEIGHTS_WITH_LINES = WEIGHTS[26::3]
+#: Probability of lines below which there are none.
+NEGLIGIBLE = 0.01
+#: Lines with which a first solution is found: their distance in knots, and the weight besides.
+FIRST_LINES, FIRST_WEIGHT = 0.5, 100.0
+#: Parameters of a feature besides its power.
+PARAMETERS = 2
+#: Largest full width at half maximum of a line that is reported, in nm; how far its wavelength may
+#: differ from draw to draw; and the least fraction of the draws that have it.
+NARROW_FWHM_NM, SAME_LINE_NM, CERTAIN = 20.0, 2.0, 0.9
+
+
+@dataclass(frozen=True)
+class NarrowLine:
+    """A line, or lines too close to be told apart.
+
+    Attributes
+    ----------
+    wavelength_nm, fwhm_nm
+        Mean wavelength and full width at half maximum in nm, medians of the draws.
+    """
+
+    wavelength_nm: float
+    fwhm_nm: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +151,7 @@ class SpectrumFit:
     weight: float
     misfit: float
     used: NDArray[np.bool_]
-    features: tuple[tuple[Feature, ...], ...] = ()
+    lines: tuple[NarrowLine, ...] = ()
 
     def in_bands(self, edges_nm: ArrayLike, level: float = 0.6827) -> "BandedSpectrum":
         """Average over neighbouring bands, with their credible interval.
@@ -181,37 +211,44 @@ def fit_spectrum(
     used, part, y, s = measured(value, sigma, system)
     white_response = part.design.sum(axis=1)
     scale = float(y @ white_response) / float(white_response @ white_response)
-    roughness = _second_differences(part.knots_nm)
-    rng = np.random.default_rng(seed)
-    x, misfit, features = np.full(len(part.knots_nm), scale), 1.0, ()
+    prior = _Prior.on(len(part.knots_nm))
+    x, misfit = np.full(len(part.knots_nm), scale), 1.0
+    features: tuple[Feature, ...] = ()
     for _ in range(ROUNDS):
         values = _whitened(part, y, misfit * s, x / scale, scale)
-        chain = _chain_of(values, roughness, features, np.random.default_rng(seed))
-        features = tuple(chain.features) if chain else ()
-        x, ratio = _likeliest(values, roughness, chain)
+        log_evidence = prior.log_evidence(values)
+        chain = _chain_of(values, prior, log_evidence, features, seed)
+        likeliest = (
+            _Drawn(float(WEIGHTS[np.argmax(log_evidence)]), ())
+            if chain is None
+            else _Drawn.by(chain.hypothesis)
+        )
+        features = likeliest.features
+        x, ratio = _likeliest(values, prior, likeliest)
         x, misfit = x * scale, max(1.0, misfit * ratio)
+    rng = np.random.default_rng(seed)
     if chain is None:
-        drawn = _smooth_hypotheses(values, roughness, samples, rng)
+        weights = np.sort(rng.choice(WEIGHTS, samples, p=_normalised(log_evidence)))
+        drawn = [_Drawn(weight, ()) for weight in weights.tolist()]
     else:
-        drawn = [_Drawn(float(SMOOTH_WEIGHTS[h.weight]), h.features)
-                 for h in sorted(chain.draw(samples), key=lambda h: h.weight)]
-    draws = _draw(values, roughness, drawn, rng)
-    knots_nm = values.fine_nm if draws.shape[1] > len(part.knots_nm) else part.knots_nm
+        drawn = [_Drawn.by(one) for one in chain.draw(samples)]
+    draws = _draw(values, prior, drawn, rng) * scale
+    knots_nm = part.knots_nm if draws.shape[1] == len(part.knots_nm) else values.fine_nm
+    weight = float(np.median([one.weight for one in drawn]))
+    every = [feature for one in drawn for feature in one.features]
     return SpectrumFit(
-        knots_nm, draws.mean(axis=0) * scale, draws * scale,
-        float(np.median([one.weight for one in drawn])), misfit, used,
-        tuple(one.features for one in drawn),
-    )  # fmt: skip
+        knots_nm, draws.mean(axis=0), draws, weight, misfit, used, _lines(every, samples)
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Whitened:
-    """Values (m,) and their designs, in units of their total error, for a spectrum of about 1."""
+    """Values (m,) and their designs in units of their total error, for a spectrum of about 1."""
 
     target: FloatArray
     design: FloatArray
-    fine_design: FloatArray
     knots_nm: FloatArray
+    fine_design: FloatArray
     fine_nm: FloatArray
 
 
@@ -220,87 +257,138 @@ def _whitened(
 ) -> _Whitened:
     covariance = np.diag((s / scale) ** 2) + system.covariance(spectrum)
     lower = np.linalg.cholesky(covariance)
-    fine = finer_design(system.design, system.knots_nm)
-    solution = np.linalg.solve(lower, np.column_stack([y / scale, system.design, fine]))
-    n = len(system.knots_nm)
+    fine_design = finer_design(system.design, system.knots_nm)
+    columns = np.column_stack([y / scale, system.design, fine_design])
+    solution = np.linalg.solve(lower, columns)
+    last = len(system.knots_nm) + 1
     return _Whitened(
-        solution[:, 0], solution[:, 1 : n + 1], solution[:, n + 1 :],
-        system.knots_nm, finer_knots(system.knots_nm),
+        solution[:, 0], solution[:, 1:last], system.knots_nm,
+        solution[:, last:], finer_knots(system.knots_nm),
     )  # fmt: skip
 
 
-def _chain_of(
-    values: _Whitened,
-    roughness: FloatArray,
-    features: tuple[Feature, ...],
-    rng: np.random.Generator,
-) -> Chain | None:
-    """Return a chain of hypotheses with lines, settled; None if lines are out of the question."""
-    prior = roughness.T @ roughness
-    evidence = evidence_of(
-        values.design, values.target, values.fine_design, values.fine_nm,
-        prior, _ridge(prior), SMOOTH_WEIGHTS,
-    )  # fmt: skip
-    log_none = _log_evidence(values.design, values.target, prior)
-    rough = logsumexp(log_none[: WEIGHTS.searchsorted(SMOOTH_WEIGHTS[0])])
-    one = evidence.log_odds_of_one() + np.log(len(WEIGHTS))
-    if not features and max(rough, one) < logsumexp(log_none) + np.log(NEGLIGIBLE):
-        return None
-    chain = Chain(evidence, rng, features=list(features) or _sparse_features(values, evidence, roughness))
-    chain.settle()
-    return chain
+@dataclass(frozen=True, eq=False)
+class _Prior:
+    """Smoothness prior: its roughness matrix (n − 2, n)."""
+
+    roughness: FloatArray
+
+    @classmethod
+    def on(cls, knots: int) -> "_Prior":
+        return cls(np.diff(np.eye(knots), n=2, axis=0))
+
+    def precision(self, weight: float) -> FloatArray:
+        """Return the precision (n, n), with a ridge for what nothing else constrains."""
+        matrix = weight * self.roughness.T @ self.roughness
+        matrix.flat[:: len(matrix) + 1] += MIN_CURVATURE
+        return matrix
+
+    def log_determinant(self, weight: ArrayLike) -> FloatArray:
+        """Return the logarithm of the precision's determinant, up to a constant."""
+        result: FloatArray = len(self.roughness) * np.log(np.asarray(weight, dtype=np.float64))
+        return result
+
+    def log_evidence(self, values: _Whitened) -> FloatArray:
+        """Return the log evidence of each of `WEIGHTS` without lines, ignoring x ≥ 0."""
+        information, linear = values.design.T @ values.design, values.design.T @ values.target
+        log_evidence = np.empty(len(WEIGHTS))
+        for number, weight in enumerate(WEIGHTS):
+            lower = np.linalg.cholesky(information + self.precision(weight))
+            along = solve_triangular(lower, linear, lower=True)
+            log_determinant = 2 * float(np.log(np.diag(lower)).sum())
+            log_evidence[number] = (along @ along - log_determinant) / 2
+        return log_evidence + self.log_determinant(WEIGHTS) / 2
 
 
-def _sparse_features(values, evidence, roughness) -> list[Feature]:
-    low, high = evidence.range_nm
-    grid_nm = np.arange(low, high, 2.5)
-    lines = tuple(Feature(float(nm), FWHM_NM[0] / 2.355) for nm in grid_nm)
-    design, curvature = _with_features(values, roughness, 100.0, lines)
-    x = nonnegative_minimum(curvature, design.T @ values.target, np.ones(len(curvature), dtype=np.bool_))
-    n = len(values.knots_nm)
-    return features_of(x[n:], grid_nm)
-
-
-def _second_differences(knots_nm: FloatArray) -> FloatArray:
-    """Return the second differences of values on an even grid as a matrix (n − 2, n)."""
-    n = len(knots_nm)
-    return np.diff(np.eye(n), n=2, axis=0)
-
-
-def _log_evidence(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
-    """Return the log evidence of each of `WEIGHTS`, ignoring x ≥ 0."""
-    information, linear = design.T @ design, design.T @ target
-    log_evidence = np.empty(len(WEIGHTS))
-    for number, weight in enumerate(WEIGHTS):
-        lower = np.linalg.cholesky(information + weight * prior + _ridge(prior))
-        along = solve_triangular(lower, linear, lower=True)
-        log_determinant = 2 * float(np.log(np.diag(lower)).sum())
-        rank = len(prior) - 2
-        log_evidence[number] = (rank * np.log(weight) - log_determinant + along @ along) / 2
-    return log_evidence
-
-
-def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
-    """Return the probability of each of `WEIGHTS` under a flat prior."""
-    log_evidence = _log_evidence(design, target, prior)
-    probability = np.exp(log_evidence - log_evidence.max())
+def _normalised(log_probability: FloatArray) -> FloatArray:
+    probability = np.exp(log_probability - log_probability.max())
     normalised: FloatArray = probability / probability.sum()
     return normalised
 
 
-def _likeliest(
-    values: _Whitened, roughness: FloatArray, chain: Chain | None
-) -> tuple[FloatArray, float]:
-    """Return the spectrum at the most probable weight, and the root of χ² per degree of freedom.
+@dataclass(frozen=True)
+class _Drawn:
+    """A weight of the smoothness prior, and features."""
 
-    Lines are taken as the chain has them.
+    weight: float
+    features: tuple[Feature, ...]
+
+    @classmethod
+    def by(cls, hypothesis: Hypothesis) -> "_Drawn":
+        return cls(float(WEIGHTS_WITH_LINES[hypothesis.weight]), hypothesis.features)
+
+
+def _chain_of(
+    values: _Whitened,
+    prior: _Prior,
+    log_evidence: FloatArray,
+    features: tuple[Feature, ...],
+    seed: int,
+) -> Chain | None:
+    """Return a settled chain of hypotheses with lines; None if lines are out of the question."""
+    evidence = evidence_of(
+        values.target, values.design, values.fine_design, values.fine_nm,
+        [prior.precision(weight) for weight in WEIGHTS_WITH_LINES],
+        prior.log_determinant(WEIGHTS_WITH_LINES),
+    )  # fmt: skip
+    if not features:
+        # Rougher than anything without lines, or explained better by one.
+        rough = logsumexp(log_evidence[: WEIGHTS.searchsorted(WEIGHTS_WITH_LINES[0])])
+        of_one = evidence.of_one_feature()
+        one = logsumexp(of_one) + np.log(FIRST * len(WEIGHTS) / of_one.size)
+        if max(rough, one) < logsumexp(log_evidence) + np.log(NEGLIGIBLE):
+            return None
+        features = tuple(_first_features(values, prior, evidence.range_nm))
+    chain = Chain(evidence, features, np.random.default_rng(seed))
+    chain.settle()
+    return chain
+
+
+def _first_features(
+    values: _Whitened, prior: _Prior, range_nm: tuple[float, float]
+) -> list[Feature]:
+    """Return features with which to start: a smooth spectrum and lines everywhere, none negative.
+
+    Few of the lines are not zero, and those that are side by side belong together.
     """
-    features = tuple(chain.features) if chain else ()
-    if chain is None:
-        weight = float(WEIGHTS[np.argmax(_weights(values.design, values.target, roughness.T @ roughness))])
-    else:
-        weight = float(SMOOTH_WEIGHTS[chain.weight])
-    design, curvature = _with_features(values, roughness, weight, features)
+    grid_nm = np.arange(*range_nm, FIRST_LINES * float(np.diff(values.knots_nm)[0]))
+    width_nm = FWHM_NM[0] / FWHM_OVER_SIGMA
+    lines = _Drawn(FIRST_WEIGHT, tuple(Feature(nm, width_nm) for nm in grid_nm.tolist()))
+    design, curvature = _problem(values, prior, lines)
+    free = np.ones(len(curvature), dtype=np.bool_)
+    x = nonnegative_minimum(curvature, design.T @ values.target, free)
+    return features_of(x[len(values.knots_nm) :], grid_nm)
+
+
+def _lines(features: Sequence[Feature], samples: int) -> tuple[NarrowLine, ...]:
+    """Return the narrow lines that nearly all draws have, of the features of all draws."""
+    narrow = sorted(
+        (one for one in features if one.fwhm_nm < NARROW_FWHM_NM), key=lambda f: f.wavelength_nm
+    )
+    nm = np.array([one.wavelength_nm for one in narrow])
+    found = []
+    for group in np.split(np.arange(len(nm)), np.flatnonzero(np.diff(nm) > SAME_LINE_NM) + 1):
+        if len(group) > CERTAIN * samples:
+            fwhm_nm = float(np.median([narrow[k].fwhm_nm for k in group]))
+            found.append(NarrowLine(float(np.median(nm[group])), fwhm_nm))
+    return tuple(found)
+
+
+def _problem(values: _Whitened, prior: _Prior, drawn: _Drawn) -> tuple[FloatArray, FloatArray]:
+    """Return the design of the smooth spectrum and the features' powers, and the curvature."""
+    n = len(values.knots_nm)
+    shapes = [one.seen_by(values.fine_design, values.fine_nm) for one in drawn.features]
+    design = np.column_stack([values.design, *shapes])
+    curvature = design.T @ design
+    curvature[:n, :n] += prior.precision(drawn.weight)
+    powers = np.arange(n, len(curvature))
+    curvature[powers, powers] += float(values.knots_nm[-1] - values.knots_nm[0]) ** -2
+    return design, curvature
+
+
+def _likeliest(values: _Whitened, prior: _Prior, likeliest: _Drawn) -> tuple[FloatArray, float]:
+    """Return the spectrum on the knots, and the root of χ² per degree of freedom."""
+    design, curvature = _problem(values, prior, likeliest)
     free = np.ones(len(curvature), dtype=np.bool_)
     x = nonnegative_minimum(curvature, design.T @ values.target, free)
     free = x > 0
@@ -308,67 +396,35 @@ def _likeliest(
         curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)]
     )
     residual = values.target - design @ x
-    dof = max(len(values.target) - float(np.trace(leverage)) - 2 * len(features), 1.0)
+    taken = float(np.trace(leverage)) + PARAMETERS * len(likeliest.features)
+    dof = max(len(values.target) - taken, 1.0)
     n = len(values.knots_nm)
-    lines = np.zeros(n)
-    for power, one in zip(x[n:], features, strict=True):
-        lines += power * one.at_knots(values.knots_nm)
-    return x[:n] + lines, float(np.sqrt(residual @ residual / dof))
-
-
-def _with_features(
-    values: _Whitened, roughness: FloatArray, weight: float, features: tuple[Feature, ...]
-) -> tuple[FloatArray, FloatArray]:
-    """Return the design of the smooth spectrum and the features' powers, and the curvature."""
-    shapes = [values.fine_design @ one.at_knots(values.fine_nm) for one in features]
-    design = np.column_stack([values.design, *shapes])
-    n = len(values.knots_nm)
-    curvature = design.T @ design
-    curvature[:n, :n] += weight * roughness.T @ roughness + _ridge(roughness.T)
-    power = float(values.knots_nm[-1] - values.knots_nm[0])
-    curvature[range(n, len(curvature)), range(n, len(curvature))] += power**-2
-    return design, curvature
-
-
-@dataclass(frozen=True, eq=False)
-class _Drawn:
-    """A weight of the smoothness prior and features."""
-
-    weight: float
-    features: tuple[Feature, ...]
-
-
-def _smooth_hypotheses(
-    values: _Whitened, roughness: FloatArray, samples: int, rng: np.random.Generator
-) -> list[_Drawn]:
-    probability = _weights(values.design, values.target, roughness.T @ roughness)
-    return [_Drawn(float(one), ()) for one in np.sort(rng.choice(WEIGHTS, samples, p=probability))]
+    spectrum = x[:n].copy()
+    for power, one in zip(x[n:], likeliest.features, strict=True):
+        spectrum += power * one.at_knots(values.knots_nm)
+    return spectrum, float(np.sqrt(residual @ residual / dof))
 
 
 def _draw(
-    values: _Whitened, roughness: FloatArray, drawn: list[_Drawn], rng: np.random.Generator
+    values: _Whitened, prior: _Prior, drawn: Sequence[_Drawn], rng: np.random.Generator
 ) -> FloatArray:
-    """Return (s, q) spectra, one for each hypothesis; on the knots of lines if there are any."""
+    """Return a spectrum for each hypothesis, on the knots of lines if any has some."""
     n = len(values.knots_nm)
-    any_lines = any(one.features for one in drawn)
-    draws = np.empty((len(drawn), len(values.fine_nm) if any_lines else n))
+    with_lines = any(one.features for one in drawn)
+    draws = np.empty((len(drawn), len(values.fine_nm) if with_lines else n))
     free = np.ones(n, dtype=np.bool_)
     for number, one in enumerate(drawn):
-        design, curvature = _with_features(values, roughness, one.weight, one.features)
+        design, curvature = _problem(values, prior, one)
         linear = design.T @ (values.target + rng.standard_normal(len(values.target)))
-        linear[:n] += np.sqrt(one.weight) * roughness.T @ rng.standard_normal(len(roughness))
-        start = np.concatenate([free[:n], np.ones(len(one.features), dtype=np.bool_)])
-        x = nonnegative_minimum(curvature, linear, start)
+        expected = prior.roughness.T @ rng.standard_normal(len(prior.roughness))
+        linear[:n] += np.sqrt(one.weight) * expected
+        lines_free = np.ones(len(one.features), dtype=np.bool_)
+        x = nonnegative_minimum(curvature, linear, np.concatenate([free[:n], lines_free]))
         free = x > 0
-        if not any_lines:
+        if not with_lines:
             draws[number] = x
             continue
         draws[number] = np.interp(values.fine_nm, values.knots_nm, x[:n])
         for power, feature in zip(x[n:], one.features, strict=True):
             draws[number] += power * feature.at_knots(values.fine_nm)
     return draws
-
-
-def _ridge(prior: FloatArray) -> FloatArray:
-    """Return a ridge that fixes what neither the values nor the prior constrain."""
-    return MIN_CURVATURE * np.eye(len(prior))
