@@ -17,6 +17,8 @@ from labrig.fit.spectrum.line import FWHM_OVER_SIGMA, line_at_knots, wings_at_kn
 #: Prior of a feature's full width at half maximum in nm: even in its logarithm. Wider ones are left
 #: to the smooth spectrum, which resolves them.
 FWHM_NM = (0.7, 40.0)
+#: Largest distance of the two lines of a feature: half a pass band, farther ones are two features.
+PAIR_NM = 12.0
 #: Least share of the weaker of two lines.
 WEAKEST = 0.05
 #: Distance of the knots of lines, per distance of the knots.
@@ -57,6 +59,22 @@ class Feature:
         """Full width at half maximum in nm of a Gaussian of the same width."""
         return float(FWHM_OVER_SIGMA) * self.width_nm
 
+    @property
+    def distance_nm(self) -> float:
+        """Distance of its two lines in nm, 0 for one."""
+        return self.width_nm * float(np.sqrt(self.apart / self.share / (1 - self.share)))
+
+    @property
+    def is_allowed(self) -> bool:
+        """Whether the prior of its shape is not zero."""
+        return (
+            FWHM_NM[0] < self.fwhm_nm < FWHM_NM[1]
+            and 0 <= self.apart < 1
+            and WEAKEST < self.share < 1 - WEAKEST
+            and self.distance_nm < PAIR_NM
+            and 0 <= self.wings < 1
+        )
+
     def at_knots(self, knots_nm: FloatArray) -> FloatArray:
         """Return the values (n,) of the feature of integral 1 at evenly spaced knots."""
         values = np.zeros_like(knots_nm)
@@ -75,10 +93,9 @@ class Feature:
         """Yield where each line is not nil, and its values there."""
         width_nm = self.width_nm * float(np.sqrt(1 - self.apart))
         if self.apart > 0:
-            distance_nm = self.width_nm * float(np.sqrt(self.apart / self.share / (1 - self.share)))
             lines = [
-                (self.share, self.wavelength_nm + (1 - self.share) * distance_nm),
-                (1 - self.share, self.wavelength_nm - self.share * distance_nm),
+                (self.share, self.wavelength_nm + (1 - self.share) * self.distance_nm),
+                (1 - self.share, self.wavelength_nm - self.share * self.distance_nm),
             ]
         else:
             lines = [(1 - self.wings, self.wavelength_nm)]
@@ -130,10 +147,14 @@ def united(one: Feature, other: Feature, share: float) -> Iterator[Feature]:
     between = share * (1 - share) * distance_nm**2
     variance = between + (1 - share) * one.width_nm**2 + share * other.width_nm**2
     width_nm = float(np.sqrt(variance))
-    if FWHM_NM[0] < FWHM_OVER_SIGMA * width_nm < FWHM_NM[1]:
-        yield Feature(mean_nm, width_nm)
-        if WEAKEST < share < 1 - WEAKEST and 0 < between < variance:
-            yield Feature(mean_nm, width_nm, between / variance, share)
+    yield from (
+        one
+        for one in (
+            Feature(mean_nm, width_nm),
+            Feature(mean_nm, width_nm, between / variance, share),
+        )
+        if one.is_allowed
+    )
 
 
 def features_of(power: FloatArray, grid_nm: FloatArray) -> list[Feature]:

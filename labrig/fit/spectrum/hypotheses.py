@@ -184,6 +184,8 @@ class Chain:
             float(self._rng.uniform(*self._evidence.range_nm)),
             float(np.exp(self._rng.uniform(*self._log_width))),
         )
+        if not new.is_allowed:
+            return
         columns = np.vstack([self._columns, self._evidence.columns([new])])
         if self._accept(columns, float(np.log(FURTHER if count else FIRST))):
             self._features.append(new)
@@ -236,13 +238,7 @@ class Chain:
 
     def _replace(self, chosen: int, new: Feature) -> None:
         low_nm, high_nm = self._evidence.range_nm
-        if not (
-            low_nm < new.wavelength_nm < high_nm
-            and FWHM_NM[0] < new.fwhm_nm < FWHM_NM[1]
-            and 0 <= new.apart < 1
-            and 0 <= new.wings < 1
-            and WEAKEST < new.share < 1 - WEAKEST
-        ):
+        if not (low_nm < new.wavelength_nm < high_nm and new.is_allowed):
             return
         columns = self._columns.copy()
         columns[chosen] = self._evidence.columns([new])[0]
