@@ -19,7 +19,7 @@ from labrig.fit.spectrum.feature import FINER, Feature
 from labrig.fit.spectrum.line import FWHM_OVER_SIGMA
 
 #: Features with which the first is sought: their distance in knots, and their widths.
-TRIED, TRIED_FWHM_NM = 0.5, (3.0, 8.0, 14.0, 22.0)
+TRIED, TRIED_FWHM_NM = 0.5, (3.0, 8.0, 14.0, 22.0, 32.0)
 #: Least significance, in σ of the values, of a line with all the light.
 SEEN_SIGMA = 30.0
 #: Distance in knots of the places at which the smooth spectrum must not be negative, and how much
@@ -87,19 +87,18 @@ class Evidence:
         result: FloatArray = self.log_smooth + log_ndtr(z).sum(axis=1)
         return result
 
-    def of_one_feature(self) -> FloatArray:
-        """Return the log evidence (weights, f) with each of f features on a grid.
+    def of_one_feature(self) -> tuple[list[Feature], FloatArray]:
+        """Return f features on a grid, and the log evidence (weights, f) with each of them.
 
         That the smooth spectrum is not negative is ignored, as by `log_smooth`.
         """
         grid_nm = np.arange(*self.range_nm, TRIED * self.margin_nm)
-        tried = self.columns(
-            [
-                Feature(float(nm), float(fwhm_nm / FWHM_OVER_SIGMA))
-                for fwhm_nm in TRIED_FWHM_NM
-                for nm in grid_nm
-            ]
-        )
+        features = [
+            Feature(float(nm), float(fwhm_nm / FWHM_OVER_SIGMA))
+            for fwhm_nm in TRIED_FWHM_NM
+            for nm in grid_nm
+        ]
+        tried = self.columns(features)
         result = np.empty((len(self.smooth), len(tried)))
         direct, length2 = tried @ self.target, np.einsum("ij,ij->i", tried, tried)
         for number, smooth in enumerate(self.smooth):
@@ -109,7 +108,7 @@ class Evidence:
             z = (direct - explained @ self.along[number]) / np.sqrt(information)
             occam = np.log(2) - np.log(information * self.power**2) / 2
             result[number] = self.log_smooth[number] + z**2 / 2 + occam + log_ndtr(z)
-        return result
+        return features, result
 
     def of_weights(self, columns: FloatArray) -> FloatArray:
         """Return the log evidence of all weights with features of the given values (k, m)."""

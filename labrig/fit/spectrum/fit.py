@@ -331,17 +331,22 @@ def _chain_of(
         [prior.precision(weight) for weight in WEIGHTS_WITH_LINES],
         prior.log_determinant(WEIGHTS_WITH_LINES),
     )  # fmt: skip
+    starts = [list(features)]
     if not features:
         # Rougher than anything without lines, or explained better by one.
         rough = logsumexp(log_evidence[: WEIGHTS.searchsorted(WEIGHTS_WITH_LINES[0])])
-        of_one = evidence.of_one_feature()
+        tried, of_one = evidence.of_one_feature()
         one = logsumexp(of_one) + np.log(FIRST * len(WEIGHTS) / of_one.size)
         if max(rough, one) < logsumexp(log_evidence) + np.log(NEGLIGIBLE):
             return None
-        features = tuple(_first_features(values, prior, evidence.range_nm))
-    chain = Chain(evidence, features, np.random.default_rng(seed))
-    chain.settle()
-    return chain
+        best = tried[int(np.argmax(of_one.max(axis=0)))]
+        starts = [[best], _first_features(values, prior, evidence.range_nm)]
+    chains = [Chain(evidence, start, np.random.default_rng(seed)) for start in starts]
+    for chain in chains:
+        chain.climb()
+    best_chain = max(chains, key=lambda chain: chain.log_posterior)
+    best_chain.settle()
+    return best_chain
 
 
 def _first_features(

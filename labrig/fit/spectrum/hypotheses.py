@@ -72,11 +72,19 @@ class Chain:
         """Hypothesis at which the chain is."""
         return Hypothesis(self._weight, tuple(self._features))
 
-    def settle(self) -> None:
-        """Go to where the evidence is high, with as few features as explain the values."""
+    @property
+    def log_posterior(self) -> float:
+        """Log evidence, less what places and widths of the features cost by their prior."""
+        return self._log - WORTH * len(self._features)
+
+    def climb(self) -> None:
+        """Go to a maximum of the evidence with as few features as explain the values."""
         self._climb()
         while self._simplify():
             self._climb()
+
+    def settle(self) -> None:
+        """Walk for a while, and climb."""
         self._walk(SETTLING)
         self._simplify()
         self._climb()
