@@ -2,6 +2,7 @@
 
 from labrig.fit.spectrum.fit import (
     BandedSpectrum,
+    NarrowLine,
     SpectrumFit,
     fit_spectrum,
     nonnegative_minimum,
@@ -13,6 +14,7 @@ __all__ = [
     "BandedSpectrum",
     "CurveError",
     "LineFit",
+    "NarrowLine",
     "SpectralSystem",
     "SpectrumFit",
     "curve_modes",

@@ -8,9 +8,11 @@ non-negative spectrum nearest to them: its values may be exactly zero (Bardsley 
 algorithms for computational UQ of nonnegativity constrained linear inverse problems*, SIAM J. Sci.
 Comput. 42, 2020; Everink, Dong and Andersen, *Bayesian inference with projected densities*, 2023).
 
-The credible band holds for spectra that are not much narrower than the response of one value.
-Lines, such as a mercury lamp's through a filter of 25 nm, come out too broad, by more than their
-band; `fit_line` finds the wavelength of a single one.
+Where that is rougher than any broad band, or a line explains the values better, there are lines on
+the smooth spectrum (`hypotheses`): how many, where, and how broad is drawn anew for every draw,
+too, so that the band of a line is as wide as what the values leave open. Without lines nothing of
+this happens. Where several lines share a pass band, fewer are found than there are, and errors may
+exceed the band.
 """
 
 from collections.abc import Sequence
@@ -107,7 +109,7 @@ NEGLIGIBLE = 0.01
 FIRST_LINES, FIRST_WEIGHT = 0.5, 100.0
 #: Parameters of a feature besides its power.
 PARAMETERS = 2
-#: Largest full width at half maximum of a line that is reported, in nm; how far its wavelength may
+#: Full width at half maximum in nm below which a feature is a line; how far its wavelength may
 #: differ from draw to draw; and the least fraction of the draws that have it.
 NARROW_FWHM_NM, SAME_LINE_NM, CERTAIN = 20.0, 2.0, 0.9
 
@@ -133,7 +135,8 @@ class SpectrumFit:
     Attributes
     ----------
     knots_nm, value
-        Knots in nm and mean of the samples, shape (n,), piecewise linear in between.
+        Knots in nm and mean of the samples, shape (n,), piecewise linear in between; those of the
+        system, or finer ones where there are lines.
     samples
         Draws from the posterior, shape (s, n); all their spread is uncertainty.
     weight
@@ -143,6 +146,8 @@ class SpectrumFit:
         widens the samples' spread.
     used
         Whether a value was used, shape (m,), bool.
+    lines
+        Lines narrower than 20 nm that nearly all draws have, by wavelength.
     """
 
     knots_nm: FloatArray
@@ -214,10 +219,12 @@ def fit_spectrum(
     prior = _Prior.on(len(part.knots_nm))
     x, misfit = np.full(len(part.knots_nm), scale), 1.0
     features: tuple[Feature, ...] = ()
-    for _ in range(ROUNDS):
+    chain = None
+    for number in range(ROUNDS):
         values = _whitened(part, y, misfit * s, x / scale, scale)
         log_evidence = prior.log_evidence(values)
-        chain = _chain_of(values, prior, log_evidence, features, seed)
+        if number == 0 or chain is not None:
+            chain = _chain_of(values, prior, log_evidence, features, seed)
         likeliest = (
             _Drawn(float(WEIGHTS[np.argmax(log_evidence)]), ())
             if chain is None
@@ -325,7 +332,10 @@ def _chain_of(
     features: tuple[Feature, ...],
     seed: int,
 ) -> Chain | None:
-    """Return a settled chain of hypotheses with lines; None if lines are out of the question."""
+    """Return a settled chain of hypotheses with lines; None if there are hardly any.
+
+    Features as broad as the pass band serve to describe lights of many lines only.
+    """
     evidence = evidence_of(
         values.target, values.design, values.fine_design, values.fine_nm,
         [prior.precision(weight) for weight in WEIGHTS_WITH_LINES],
@@ -346,7 +356,8 @@ def _chain_of(
         chain.climb()
     best_chain = max(chains, key=lambda chain: chain.log_posterior)
     best_chain.settle()
-    return best_chain
+    narrow = any(one.fwhm_nm < NARROW_FWHM_NM for one in best_chain.hypothesis.features)
+    return best_chain if narrow else None
 
 
 def _first_features(
