@@ -87,6 +87,8 @@ def colour_errors(
 
 
 FINE_NM: FloatArray = np.arange(380.0, 720.1, 0.25)
+TB_NM = (487, 493, 542, 548, 583, 588, 619, 624)
+EU_NM = (591, 596, 611, 617, 624, 651, 656, 688, 698, 704)
 
 
 def _peak(centre_nm: float, fwhm_nm: float) -> FloatArray:
@@ -121,11 +123,9 @@ def narrow_light(kind: str, rng: np.random.Generator) -> Spectrum:
         case ["Lorentzian", fwhm]:
             value = 1 / (1 + ((FINE_NM - place_nm) / (float(fwhm) / 2)) ** 2)
         case ["Tb"]:
-            places = (487, 493, 542, 548, 583, 588, 619, 624)
-            value = _rare_earth(rng, places, (0.3, 0.25, 1, 0.8, 0.2, 0.2, 0.12, 0.08))
+            value = _rare_earth(rng, TB_NM, (0.3, 0.25, 1, 0.8, 0.2, 0.2, 0.12, 0.08))
         case _:
-            places = (591, 596, 611, 617, 624, 651, 656, 688, 698, 704)
-            value = _rare_earth(rng, places, (0.4, 0.3, 1, 0.6, 0.3, 0.1, 0.08, 0.2, 0.5, 0.5))
+            value = _rare_earth(rng, EU_NM, (0.4, 0.3, 1, 0.6, 0.3, 0.1, 0.08, 0.2, 0.5, 0.5))
     return Spectrum(kind, FINE_NM, value)
 
 
@@ -156,7 +156,7 @@ def narrow_lights(count: int, kinds: Sequence[str] = NARROW) -> None:
             draws = band_means(fit.knots_nm, fit.samples.T, made.EDGES_NM)
             difference, covariance = draws.mean(axis=1) - true, np.cov(draws)
             bright = true > BRIGHT * true.max()
-            bands.append((difference / np.sqrt(np.diag(covariance)))[bright])
+            bands.append(difference[bright] / np.sqrt(np.diag(covariance)[bright]))
             errors.append(difference[bright] / true.max())
             window = np.abs(made.GRID_NM - made.GRID_NM[np.argmax(true)]) <= 20
             sums.append(

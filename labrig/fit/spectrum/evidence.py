@@ -19,7 +19,7 @@ from labrig.fit.spectrum.feature import FINER, Feature
 from labrig.fit.spectrum.line import FWHM_OVER_SIGMA
 
 #: Features with which the first is sought: their distance in knots, and their widths.
-TRIED, TRIED_FWHM_NM = 0.5, (3.0, 8.0, 14.0)
+TRIED, TRIED_FWHM_NM = 0.5, (3.0, 8.0, 14.0, 22.0, 32.0)
 #: Least significance, in σ of the values, of a line with all the light.
 SEEN_SIGMA = 30.0
 #: Distance in knots of the places at which the smooth spectrum must not be negative, and how much

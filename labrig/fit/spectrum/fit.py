@@ -346,7 +346,8 @@ def _chain_of(
         # Rougher than anything without lines, or explained better by one.
         rough = logsumexp(log_evidence[: WEIGHTS.searchsorted(WEIGHTS_WITH_LINES[0])])
         tried, of_one = evidence.of_one_feature()
-        one = logsumexp(of_one) + np.log(FIRST * len(WEIGHTS) / of_one.size)
+        of_lines = of_one[:, [feature.fwhm_nm < NARROW_FWHM_NM for feature in tried]]
+        one = logsumexp(of_lines) + np.log(FIRST * len(WEIGHTS) / of_lines.size)
         if max(rough, one) < logsumexp(log_evidence) + np.log(NEGLIGIBLE):
             return None
         best = tried[int(np.argmax(of_one.max(axis=0)))]
