@@ -20,6 +20,7 @@ from labrig.optics import (
     read_camera,
     read_spectrum,
     read_transmittance,
+    shipped_camera,
 )
 from labrig.yaml_file import did_you_mean
 
@@ -92,6 +93,28 @@ def camera_curves(
             "sees nothing; check 'lens' and 'polariser' under 'optics:'"
         )
     return replace(camera, sensitivity=seen / seen.max())
+
+
+def with_shipped_camera(rig: RigFile, identity: str) -> RigFile:
+    """Return the rig with the shipped curves of its camera, where the rig file names none.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    identity
+        What the camera says of itself: maker and model, then serial number and firmware.
+
+    Returns
+    -------
+    RigFile
+        The rig itself if it names curves, none of that model are shipped, or the ratios between
+        the channels of those are unknown.
+    """
+    shipped = shipped_camera(identity.partition(",")[0])
+    if rig.optics.camera is not None or shipped is None or not read_camera(shipped.path).has_ratios:
+        return rig
+    return rig.model_copy(update={"optics": rig.optics.model_copy(update={"camera": shipped.name})})
 
 
 def lens_transmittance(rig: RigFile) -> Transmittance | None:

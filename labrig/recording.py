@@ -1,9 +1,11 @@
 """Runs: preparing, recording and resuming a protocol on a bench in a run folder."""
 
 import shutil
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from types import MappingProxyType
+from typing import Any, Self
 
 from labrig.acquire import (
     Plan,
@@ -34,8 +36,23 @@ class Recording:
     plan: Plan
 
     @classmethod
-    def prepare(cls, protocol_path: Path, rig_path: Path, runs: Path) -> Self:
+    def prepare(
+        cls,
+        protocol_path: Path,
+        rig_path: Path,
+        runs: Path,
+        changes: Mapping[str, Any] = MappingProxyType({}),
+    ) -> Self:
         """Read both files, lay out the plan, and refuse what cannot work.
+
+        Parameters
+        ----------
+        protocol_path, rig_path
+            Files of the protocol and of the rig.
+        runs
+            Folder for the run's folder.
+        changes
+            Values of the protocol's keys instead of those in its file, by dotted keys.
 
         Raises
         ------
@@ -44,7 +61,7 @@ class Recording:
         DiskError
             The disk has no room for frames and results.
         """
-        requested = read_protocol(protocol_path)
+        requested = read_protocol(protocol_path, changes)
         rig = with_frame_size(read_rig_file(rig_path), str(rig_path))
         planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
         protocol = requested.suited_to(rig)
@@ -55,15 +72,23 @@ class Recording:
 
     def notes(self) -> tuple[str, ...]:
         """Return notes for the user before the run, one line each."""
-        return tuple(
+        unmeasured = (
             f"what {self.protocol.protocol} finds rests on {name}, of which the rig file names no "
             "run ('optics:'); frames will be kept: measure it, too, and name it to labrig process "
             "--optics"
             for name in self.protocol.unmeasured(self.rig)
         )
+        return (*unmeasured, *self.protocol.notes(self.rig))
 
-    def record(self, watch: Watch) -> Path:
+    def record(self, watch: Watch, created: Callable[[Path], None] = lambda folder: None) -> Path:
         """Create a run folder, record into it and return its path.
+
+        Parameters
+        ----------
+        watch
+            Observer of the run.
+        created
+            Called with the path of the run folder before anything happens.
 
         Raises
         ------
@@ -85,6 +110,7 @@ class Recording:
                 bench.disk,
             )
             try:
+                created(folder.path)
                 with folder, run_log(folder.path, self.rig.name, bench.clock):
                     execute(folder, self.protocol, bench, self.plan, watch)
             except BaseException:

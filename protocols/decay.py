@@ -261,6 +261,17 @@ class DecaySettings(ProtocolModel):
         regions = list(self.patches.values())
         return SanityChecks(session, unit, regions, background, metering=metering)
 
+    def notes(self, rig: RigFile) -> Sequence[str]:
+        """Return that the lamp's warm-up, which is a part of the charge, is longer than asked."""
+        warm_up_s = rig.devices["lamp"].warm_up if "lamp" in rig.devices else 0.0
+        if not isinstance(self.charge, float) or self.charge >= warm_up_s:
+            return ()
+        return (
+            f"the sample is charged for {duration_text(warm_up_s)}, until the lamp is warm, not "
+            f"for the {duration_text(self.charge)} of 'charge'; for less, give the lamp of the rig "
+            "file a shorter 'warm_up'",
+        )
+
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Charge for that long, and at least for the lamp's warm-up time."""
         charge(session, max(duration_s, session.rig.warm_up_s("lamp")))

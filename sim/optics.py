@@ -86,7 +86,7 @@ def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
     UsageError
         There is no such file, or it has another format.
     """
-    path = resources.find("config/optics", "camera", name_or_path)
+    path = resources.find("config/optics/cameras", "camera", name_or_path)
     try:
         table = json.loads(path.read_text(encoding="utf-8"))["spectral_data"]["data"]["main"]
         wavelength_nm = np.array([float(key) for key in table])

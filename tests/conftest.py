@@ -188,7 +188,7 @@ def make_protocol(tmp_path: Path) -> Callable[..., Path]:
         content = {
             "protocol": "decay",
             "sample": {"name": "test"},
-            "charge": "10 min",
+            "charge": "15 min",
             "for": "60 s",
             "exposure": "1 s",
         } | keys

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from labrig.acquire import Optics, read_rig_file
-from labrig.bench_optics import camera_curves, led_exposures, require_optics
+from labrig.bench_optics import camera_curves, led_exposures, require_optics, with_shipped_camera
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 
@@ -130,3 +130,19 @@ def test_the_shipped_bench_tells_its_lens_and_geometry() -> None:
     require_optics(shipped)
     assert shipped.optics.geometry_text == "45°/0°"
     assert camera_curves(shipped).at([385.0]).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("named", "identity", "curves"),
+    [
+        (None, "Canon EOS 600D, serial 1, firmware 1.0.2", "canon_eos_600d"),
+        ("canon_eos_5d", "Canon EOS 600D, serial 1, firmware 1.0.2", "canon_eos_5d"),
+        (None, "Canon EOS 60D, serial 1, firmware 1.0.2", None),
+        (None, "NIKON D5100, serial 1", None),  # whose channels have no common scale
+        (None, "", None),
+    ],
+)
+def test_a_camera_without_curves_in_the_rig_file_has_the_shipped_ones(
+    rig: Callable[..., Path], named: str | None, identity: str, curves: str | None
+) -> None:
+    assert with_shipped_camera(read_rig_file(rig(camera=named)), identity).optics.camera == curves

@@ -24,7 +24,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "config/sim.yaml": read_rig_file,
     "config/materials/blue-paint.yaml": read_material,
     "config/optics/grey_card_18.csv": read_curve_file,
-    "config/optics/canon_eos_5d_mark_ii.json": read_curve_file,
+    "config/optics/cameras/canon_eos_5d_mark_ii.json": read_curve_file,
     "config/optics/halogen_3000k.csv": read_series,
 }
 

@@ -15,7 +15,13 @@ from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.rig import Rig, in_safe_order
-from labrig.acquire.rig_file import DeviceEntry, Optics, RigFile, read_rig_file
+from labrig.acquire.rig_file import (
+    DeviceEntry,
+    Optics,
+    RigFile,
+    read_rig_file,
+    with_absolute_paths,
+)
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
 from labrig.acquire.roles.role import Finding, Severity
 from labrig.acquire.runner import RunObserver, run_units
@@ -72,5 +78,6 @@ __all__ = [
     "read_rig_file",
     "run_units",
     "shutter_text",
+    "with_absolute_paths",
 ]
 __all__ += roles.__all__

@@ -1,6 +1,8 @@
 """Loading of drivers and protocols by the names under which they are registered."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from labrig.acquire.protocol import ProtocolModel
@@ -162,7 +164,9 @@ def illuminant_lights(rig: RigFile, source: str) -> dict[str, Illuminant]:
     return dict(driver.declared_lamps(settings))
 
 
-def read_protocol(path: str | Path) -> ProtocolModel:
+def read_protocol(
+    path: str | Path, changes: Mapping[str, Any] = MappingProxyType({})
+) -> ProtocolModel:
     """Read a protocol file and validate it with the model that its key `protocol` names.
 
     Files and folders that it names relative to its own folder have absolute paths in the result.
@@ -171,6 +175,8 @@ def read_protocol(path: str | Path) -> ProtocolModel:
     ----------
     path
         Protocol file in YAML.
+    changes
+        Values of keys instead of those in the file, by dotted keys such as `sample.name`.
 
     Returns
     -------
@@ -193,6 +199,8 @@ def read_protocol(path: str | Path) -> ProtocolModel:
     """
     path = Path(path)
     content = with_absolute_paths(read_yaml(path), path.resolve().parent)
+    for key, value in changes.items():
+        _change(content, key, value, str(path))
     kind = content.get("protocol")
     if not isinstance(kind, str):
         raise UsageError(
@@ -200,3 +208,13 @@ def read_protocol(path: str | Path) -> ProtocolModel:
         )
     model: type[ProtocolModel] = load(PROTOCOLS, kind, str(path))
     return validate(content, model, str(path))
+
+
+def _change(content: dict[str, Any], key: str, value: Any, source: str) -> None:
+    """Set a dotted key in the content of a file."""
+    *outer, last = key.split(".")
+    for name in outer:
+        content = content.setdefault(name, {})
+        if not isinstance(content, dict):
+            raise UsageError(f"{source}: expected keys below '{name}' to change '{key}', got none")
+    content[last] = value

@@ -105,6 +105,10 @@ class ProtocolModel(BaseModel):
         """
         return self
 
+    def notes(self, rig: RigFile) -> Sequence[str]:
+        """Return what a person should know of this protocol on a rig before a run, a line each."""
+        return ()
+
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols whose results this one needs and the rig file does not name."""
         return [kind.protocol for kind in self.rests_on if rig.optics.named(kind) is None]

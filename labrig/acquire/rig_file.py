@@ -87,7 +87,8 @@ class Optics(BaseModel):
     ----------
     camera
         Spectral sensitivities of the camera: name of a shipped file, such as
-        `canon_eos_5d_mark_ii`, or path of a file.
+        `canon_eos_5d_mark_ii`, or path of a file. Default: the shipped file of the model that the
+        camera says it is, if there is one.
     lamp
         Spectrum of the lamp: name of a shipped file, such as `halogen_3000k`, or path of a file.
     grey_card
@@ -284,7 +285,27 @@ def read_rig_file(path: str | Path) -> RigFile:
 
 
 def with_absolute_paths(value: Any, folder: Path) -> Any:
-    """Return the content of a YAML file in which paths of files beside it are absolute."""
+    """Return the content of a YAML file in which paths of files beside it are absolute.
+
+    Parameters
+    ----------
+    value
+        Content, or a part of it.
+    folder
+        Folder of the file.
+
+    Returns
+    -------
+    object
+        The same with absolute paths of what is there; a bare word is a shipped name and is left.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.acquire import with_absolute_paths
+    >>> with_absolute_paths({"camera": "sim"}, Path.cwd())
+    {'camera': 'sim'}
+    """
     if isinstance(value, dict):
         return {key: with_absolute_paths(inner, folder) for key, inner in value.items()}
     if isinstance(value, list):

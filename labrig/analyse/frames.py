@@ -14,14 +14,6 @@ from labrig.region import Region
 from labrig.results import add_flag
 
 
-def camera_identity(run: RunRecord) -> str:
-    """Return the camera's identification in the journal of a run; empty if there is none."""
-    for attempt in run.attempts:
-        if identity := dict(attempt.start.get("devices", {})).get("camera"):
-            return str(identity)
-    return ""
-
-
 def lens_of(frames: Sequence[FrameRecord]) -> str | None:
     """Return name and focal length of the lens by the first frame's EXIF; None if absent."""
     return read_exif(frames[0].path.read_bytes()).lens if frames else None
@@ -41,7 +33,7 @@ def require_calibrated_camera(
         return
     lens = lens_of(frames)
     for f_number in {frame.f_number for frame in frames}:
-        camera.require_match(camera_identity(run), lens, f_number)
+        camera.require_match(run.camera_identity, lens, f_number)
 
 
 FileRecordT = TypeVar("FileRecordT", bound=FileRecord)

@@ -16,6 +16,7 @@ from labrig.cli import (
     optics,
     process,
     protocol,
+    queue,
     rig,
     run,
     runs,
@@ -46,6 +47,7 @@ app.add_typer(leds.app, name="leds")
 app.add_typer(material.app, name="material")
 app.add_typer(optics.app, name="optics")
 app.add_typer(protocol.app, name="protocol")
+app.add_typer(queue.app, name="queue")
 app.add_typer(rig.app, name="rig")
 app.add_typer(runs.app, name="runs")
 app.add_typer(sim.app, name="sim")

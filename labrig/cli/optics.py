@@ -27,3 +27,11 @@ def show(
     if picture is not None:
         draw_curves(curves, picture)
         typer.echo(f"drawn into {picture}")
+
+
+@app.command("list")
+def list_() -> None:
+    """Cameras, colour filters and other curves that are shipped."""
+    from labrig.report import describe_shipped_curves
+
+    typer.echo(describe_shipped_curves())

@@ -1,11 +1,13 @@
 """`labrig run`, `labrig plan`, `labrig resume`: protocols on a rig."""
 
+import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
@@ -152,7 +154,8 @@ def _prepared(protocol: str, rig: str | None, runs: Path) -> "Recording":
 
     recording = Recording.prepare(protocol_path(protocol), rig_path(rig), runs)
     for note in recording.notes():
-        typer.echo(f"note: {note}", err=True)
+        # Nobody may read it: the run goes on.
+        print(f"note: {note}", file=DetachableStream(sys.stderr))
     return recording
 
 

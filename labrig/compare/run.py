@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.acquire import read_rig_file
-from labrig.bench_optics import calibration, camera_curves
+from labrig.bench_optics import calibration, camera_curves, with_shipped_camera
 from labrig.calibration import LVF_KIND
 from labrig.compare.glow import GlowComparison, compare_glow, glow_of, in_colour, predicted_by
 from labrig.compare.nalbach2017 import TABLE_1, emission, emission_grid
@@ -25,6 +25,7 @@ from labrig.errors import DataError, UsageError
 from labrig.fit import DecayFit
 from labrig.material import Material, MaterialComparison, compare_materials, read_material
 from labrig.optics import CameraResponse
+from labrig.record import read_run
 from labrig.results import (
     Series,
     find_fitted_decays,
@@ -267,7 +268,7 @@ def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Mat
 
 def _camera(folder: Path, replacement: str | None) -> tuple[CameraResponse | None, list[str]]:
     """Return the curves requested, else those of the processing, and why there are none."""
-    rig = read_rig_file(folder / "rig.yaml")
+    rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), read_run(folder).camera_identity)
     try:
         lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
         return camera_curves(rig, replacement, lvf), []

@@ -50,6 +50,7 @@ from labrig.optics.piecewise import (
     hat_functions,
     quadrature,
 )
+from labrig.optics.shipped_cameras import ShippedCamera, shipped_camera, shipped_cameras
 from labrig.optics.spectrometer import (
     MeasuredSpectrum,
     SpectrometerReading,
@@ -77,6 +78,7 @@ __all__ = [
     "Lvf",
     "MeasuredSpectrum",
     "Observer",
+    "ShippedCamera",
     "SpectrometerReading",
     "Spectrum",
     "Strip",
@@ -106,6 +108,8 @@ __all__ = [
     "read_spectrum",
     "read_transmittance",
     "rho_squared",
+    "shipped_camera",
+    "shipped_cameras",
     "signal_through",
     "white_xyz",
 ]

@@ -12,6 +12,7 @@ from labrig import resources
 from labrig.errors import UsageError
 from labrig.optics.curve_file import CurveFile, checked, read_curve_file
 from labrig.optics.piecewise import FloatArray, band_means
+from labrig.optics.shipped_cameras import FOLDER, shipped_camera
 from labrig.optics.spectrum import check_curve
 
 CHANNELS = ("R", "G", "B")
@@ -45,6 +46,11 @@ class CameraResponse:
     sensitivity: FloatArray
     channels: tuple[str, ...] = CHANNELS
 
+    @property
+    def has_ratios(self) -> bool:
+        """Whether the ratios between channels are known: not if each was scaled to 1."""
+        return len(self.channels) == 1 or bool((self.sensitivity.max(axis=0) < 1).any())
+
     def response(self, spectrum: FloatArray) -> FloatArray:
         """Return the relative signal of a spectrum given at `wavelength_nm`, shape (channels,)."""
         values: FloatArray = (spectrum * np.gradient(self.wavelength_nm)) @ self.sensitivity
@@ -72,8 +78,9 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
     Parameters
     ----------
     name_or_path
-        Name of a shipped camera such as `canon_eos_5d_mark_ii`, or the path of a file: JSON as
-        rawtoaces writes it, or a CSV table with the columns `wavelength_nm,R,G,B`, or those four
+        Name of a shipped camera such as `canon_eos_5d_mark_ii`, maker and model as the camera
+        states them, such as `Canon EOS 5D Mark II`, or the path of a file: JSON as rawtoaces writes
+        it, or a CSV table with the columns `wavelength_nm,R,G,B`, or those four
         columns without a header (Jiang et al. 2013).
 
     Returns
@@ -183,11 +190,13 @@ def read_checked_curves(
 
 
 def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a shipped camera, or the path as given."""
+    """Return the file of a shipped camera, by its name or its own, or the path as given."""
     path = Path(name_or_path)
     if path.suffix.lower() in _TABLES:
         return path
-    return resources.find("config/optics", "camera", name_or_path)
+    if len(path.parts) == 1 and (shipped := shipped_camera(str(path))):
+        return shipped.path
+    return resources.find(FOLDER, "camera", name_or_path)
 
 
 def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:

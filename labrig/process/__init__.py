@@ -6,10 +6,12 @@ from labrig.process.mixture import report_mixture
 from labrig.process.result_changes import other_settings
 from labrig.process.run import Processed, draw_figures, process_and_report, process_run
 from labrig.process.table import report_table
+from labrig.process.without_run import describe_without_run, write_with_report
 
 __all__ = [
     "Processed",
     "ReportedCharge",
+    "describe_without_run",
     "draw_figures",
     "other_settings",
     "process_and_report",
@@ -18,4 +20,5 @@ __all__ = [
     "report_led_study",
     "report_mixture",
     "report_table",
+    "write_with_report",
 ]

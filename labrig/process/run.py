@@ -7,7 +7,7 @@ from pathlib import Path
 from labrig import plugins
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, temperature_warnings
-from labrig.bench_optics import camera_curves
+from labrig.bench_optics import camera_curves, with_shipped_camera
 from labrig.calibration import LvfFile
 from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
@@ -175,7 +175,8 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Processed:
     """Process a run that no other process processes meanwhile."""
     overrides.check_method(protocol)
-    rig, run = overrides.bench(folder), read_run(folder)
+    run = read_run(folder)
+    rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])
     analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
@@ -265,9 +266,15 @@ def _camera_response(
 ) -> tuple[CameraResponse | None, tuple[str, ...]]:
     """Return the curves that colour the report's pictures, or a warning if they are missing."""
     try:
-        return camera_curves(rig, replacement, lvf), ()
+        camera = camera_curves(rig, replacement, lvf)
     except UsageError as error:
         if replacement is not None:
             raise
         is_named = rig.optics.camera is not None
         return None, (f"colours in the report are the camera's own: {error}",) if is_named else ()
+    if camera.has_ratios:
+        return camera, ()
+    return camera, (
+        f"the curves of {camera.name} have every channel scaled to 1: colours, and all that "
+        "compares channels, are off; name curves with the channels' ratios under 'optics:'",
+    )

@@ -100,6 +100,14 @@ class RunRecord:
         """Name of the run folder, with links resolved."""
         return self.folder.resolve().name
 
+    @property
+    def camera_identity(self) -> str:
+        """What the camera said of itself: maker and model first; empty if there is none."""
+        for attempt in self.attempts:
+            if identity := dict(attempt.start.get("devices", {})).get("camera"):
+                return str(identity)
+        return ""
+
     def completed(self) -> dict[str, Attempt]:
         """Return the completed attempt of each unit by the unit's name, in order of completion.
 

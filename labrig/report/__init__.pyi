@@ -11,6 +11,7 @@ from .contact_sheet import (
 )
 from .curve_sketch import (
     describe_curves as describe_curves,
+    describe_shipped_curves as describe_shipped_curves,
     draw_curves as draw_curves,
 )
 from .decay import (
@@ -78,4 +79,8 @@ from .sections import (
     Section as Section,
     Source as Source,
     Table as Table,
+)
+from .sweep import (
+    SweptPoint as SweptPoint,
+    sweep_chart as sweep_chart,
 )

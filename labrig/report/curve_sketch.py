@@ -1,19 +1,26 @@
 """Sketches of measured curves, as lines of text or as a picture."""
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
 
+from labrig import resources
+from labrig.number_format import aligned
 from labrig.optics import (
     Curve,
     CurveFile,
     band_means,
+    read_camera,
+    shipped_cameras,
 )
 from labrig.report.picture_file import require_picture, save_picture
 
 #: Bars of 0 to 8 eighths of the height of a line of text.
 BARS = " ▁▂▃▄▅▆▇█"
 COLUMNS = 48
+#: Width of a terminal.
+WIDTH = 100
 #: Largest number of curves that are described; a catalogue has hundreds.
 MAX_CURVES = 12
 _COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
@@ -50,6 +57,49 @@ def describe_curves(file: CurveFile) -> str:
     if len(curves) > MAX_CURVES:
         lines.append(f"and {len(curves) - MAX_CURVES} more; choose with --curve NAME")
     return "\n".join(lines)
+
+
+def describe_shipped_curves() -> str:
+    """Describe the shipped cameras, curves and colour filters in lines of text.
+
+    Returns
+    -------
+    str
+        Name of each, with maker and model, or what it is.
+
+    Examples
+    --------
+    >>> from labrig.report import describe_shipped_curves
+    >>> print(describe_shipped_curves().splitlines()[2])
+      arri_d21                   ARRI D21                  every channel scaled to 1
+    """
+    cameras = [
+        [
+            f"  {shipped.name}",
+            f"{shipped.maker} {shipped.model}",
+            "" if read_camera(shipped.path).has_ratios else "every channel scaled to 1",
+        ]
+        for shipped in shipped_cameras()
+    ]
+    folder = resources.folder("config/optics")
+    others = [[f"  {path.stem}", _first_sentence(path)] for path in sorted(folder.glob("*.csv"))]
+    filters = ", ".join(sorted(path.stem for path in (folder / "filters").glob("*.csv")))
+    return "\n".join(
+        [
+            "cameras; where a rig file names none, that of the frames is taken if it is here:",
+            *aligned(cameras),
+            "other curves:",
+            *aligned(others),
+            "colour filters, made up for the simulated rigs:",
+            *textwrap.wrap(filters, WIDTH, initial_indent="  ", subsequent_indent="  "),
+        ]
+    )
+
+
+def _first_sentence(path: Path) -> str:
+    """Return what the comment of a table begins with."""
+    with path.open(encoding="utf-8") as table:
+        return table.readline().removeprefix("# ").partition(". ")[0].strip().rstrip(".")
 
 
 def _describe_curve(name: str, curve: Curve) -> str:

@@ -54,12 +54,15 @@ class Table:
         Text below the table.
     title
         Heading of the table; empty without one.
+    links
+        Address to which the first cell of each row leads, empty without one; () without any.
     """
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
     title: str = ""
+    links: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,7 @@ from .fitted_excitation import (
 from .fitted_law import (
     AUTO as AUTO,
     EXPONENTIALS as EXPONENTIALS,
+    LAW_CHOICES as LAW_CHOICES,
     LAW_LABELS as LAW_LABELS,
     LAW_NAMES as LAW_NAMES,
     RATE_SPECTRUM as RATE_SPECTRUM,

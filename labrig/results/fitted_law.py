@@ -19,6 +19,8 @@ EXPONENTIALS, RATE_SPECTRUM = "exponentials", "rate-spectrum"
 AUTO = "auto"
 #: Names of the laws that a decay can be fitted with.
 LAW_NAMES = (EXPONENTIALS, *DECAY_LAWS, RATE_SPECTRUM)
+#: What can be asked for.
+LAW_CHOICES = (*LAW_NAMES, AUTO)
 #: Name of each law in sentences.
 LAW_LABELS = {
     EXPONENTIALS: "exponentials",
@@ -45,9 +47,8 @@ def require_law(name: str) -> None:
     >>> from labrig.results import require_law
     >>> require_law("becquerel")
     """
-    if name not in (AUTO, *LAW_NAMES):
-        known = ", ".join((*LAW_NAMES, AUTO))
-        raise UsageError(f"--law: expected one of {known}, got '{name}'")
+    if name not in LAW_CHOICES:
+        raise UsageError(f"--law: expected one of {', '.join(LAW_CHOICES)}, got '{name}'")
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +135,8 @@ class FittedLaw:
         """
         means, slopes = DECAY_LAWS[self.name].means(self.rate_per_s, self.shape, t_s, exposure_s)
         by_rate = self.amplitude * slopes[:, 0] / self.rate_per_s
-        offset = np.full(len(t_s), float(with_offset))
-        jacobian = np.stack([means, by_rate, self.amplitude * slopes[:, 1], offset], axis=1)
-        shift = self.offsets[int(np.argmax(self.channel_weights))] if with_offset else 0.0
-        return self.amplitude * means + shift, curve_variance(jacobian, self.covariance)
+        jacobian = np.stack([means, by_rate, self.amplitude * slopes[:, 1]], axis=1)
+        return _signal(self, self.amplitude * means, jacobian, with_offset=with_offset)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for `fit.json`."""
@@ -198,9 +197,7 @@ class FittedRateSpectrum:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the signal and its variance; see `FittedLaw.signal`."""
         means = exponential_means(self.rates_per_s, t_s, exposure_s)
-        jacobian = np.column_stack([means, np.full(len(t_s), float(with_offset))])
-        shift = self.offsets[int(np.argmax(self.channel_weights))] if with_offset else 0.0
-        return means @ self.amplitudes + shift, curve_variance(jacobian, self.covariance)
+        return _signal(self, means @ self.amplitudes, means, with_offset=with_offset)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for `fit.json`."""
@@ -214,6 +211,20 @@ class FittedRateSpectrum:
             "reduced_chi2": self.reduced_chi2,
             "bic": self.bic,
         }
+
+
+def _signal(
+    law: FittedLaw | FittedRateSpectrum,
+    decay: FloatArray,
+    jacobian: FloatArray,
+    *,
+    with_offset: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Return a decay (n,) with derivatives (n, p), maybe with the offset, and its variance."""
+    offset = law.offsets[int(np.argmax(law.channel_weights))] if with_offset else 0.0
+    by_offset = np.full(len(decay), float(with_offset))
+    variance = curve_variance(np.column_stack([jacobian, by_offset]), law.covariance)
+    return decay + offset, variance
 
 
 def fitted_law(content: Mapping[str, Any]) -> FittedLaw:

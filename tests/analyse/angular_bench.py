@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from labrig import resources
-from labrig.analyse.frames import camera_identity
 from labrig.calibration import CameraFile
 from labrig.optics import Flat
 from labrig.record import read_run
@@ -76,7 +75,7 @@ def true_camera(run: Path, sigma: float = 0.002) -> CameraFile:
         f_number=4.0,
         channels=("R", "G", "B"),
         flats=(Flat(f_number=4.0, falloff=(tuple(falloff),) * 3, sigma=sigma),),
-        camera=camera_identity(read_run(run)),
+        camera=read_run(run).camera_identity,
         flicker=0.007,
         flicker_sigma=0.001,
     )

@@ -33,6 +33,7 @@ def installed(package: Path, place: Path) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": str(place), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("words", "name"),
     [(("driver", "new"), "acme_relay"), (("protocol", "new", "--python"), "quick_look")],

@@ -66,3 +66,13 @@ def test_what_is_wrong_is_one_line(
     assert ended.code == code
     assert said in ended.err
     assert ended.err.count("\n") == 1
+
+
+def test_all_that_is_shipped_is_listed(labrig: Labrig) -> None:
+    ended = labrig("optics", "list")
+    assert ended.code == 0
+    lines = [" ".join(line.split()) for line in ended.out.splitlines()]
+    assert "canon_eos_600d Canon EOS 600D" in lines
+    assert "nikon_d5100 Nikon D5100 every channel scaled to 1" in lines
+    assert any(line.startswith("halogen_3000k A halogen lamp") for line in lines)
+    assert "bandpass-425" in ended.out

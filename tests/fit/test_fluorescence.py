@@ -99,6 +99,7 @@ def test_two_dyes_are_told_from_one(estimator: JointEstimator) -> None:
     assert worst_delta_e(fit, truth) < 2
 
 
+@pytest.mark.campaign
 def test_colours_of_random_surfaces_are_as_uncertain_as_they_say(
     quick_estimator: JointEstimator,
 ) -> None:

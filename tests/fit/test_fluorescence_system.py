@@ -123,6 +123,7 @@ def benches(
         yield truth, system.with_drift(np.full(len(FEW_NM), FLICKER)), rng
 
 
+@pytest.mark.campaign
 def test_errors_of_a_bench_are_in_sigma() -> None:
     lamps, pulls = [read_light("D65"), read_light("A")], []
     for truth, system, rng in benches(12):

@@ -208,6 +208,7 @@ def test_cross_validation_takes_the_least_number_within_a_standard_error() -> No
     assert fit.masked_mse < chosen.mse < 3 * fit.masked_mse
 
 
+@pytest.mark.campaign
 def test_cross_validation_finds_the_number_of_normal_densities() -> None:
     matrix = measured(bands(two_components(28)), 28, with_sigma=False)
     fit = fit_mixture(matrix, threshold=0.004, selection="cross-validation")

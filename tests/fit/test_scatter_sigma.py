@@ -17,6 +17,7 @@ from tests.pulls import assert_sigma_is_right
 T_S = np.linspace(0.5, 200, 60)
 
 
+@pytest.mark.campaign
 def test_sigma_of_values_and_rates_is_right() -> None:
     pulls = []
     for decay, noise in product(("1 state", "2 states"), ("constant", "2000 counts")):
@@ -35,6 +36,7 @@ def test_a_decay_of_another_law_is_not_taken_for_noise(decay: str, noise: str) -
     assert 0.9 < found.sigma_ratio < 1.12
 
 
+@pytest.mark.campaign
 def test_rates_of_too_few_states_scatter_by_their_sigma() -> None:
     """Three exponentials in a power law: without the misfit's curvature σ is a third too small."""
     found = coverage(DECAYS["power law"], NOISES["2000 counts"], 100, range(100, 136))

@@ -48,7 +48,7 @@ def test_a_file_is_read_sorted_and_normalised(tmp_path: Path) -> None:
 
 def test_a_misspelt_name_gets_a_hint() -> None:
     with pytest.raises(UsageError, match=f"did you mean '{NAME}'"):
-        read_camera("canon_eos_5d_mark_iii")
+        read_camera("canon_eos_5d_mrk_ii")
 
 
 @pytest.mark.parametrize(

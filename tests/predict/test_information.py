@@ -179,7 +179,10 @@ def test_reading_rules_where_it_is_raised() -> None:
     assert max(budget, key=lambda name: budget[name][0]) == READING
 
 
-@pytest.mark.parametrize(("fast_per_s", "slow_per_s", "snr"), [(0.06, 0.02, 7), (0.05, 0.03, 40)])
+@pytest.mark.parametrize(
+    ("fast_per_s", "slow_per_s", "snr"),
+    [(0.06, 0.02, 7), pytest.param(0.05, 0.03, 40, marks=pytest.mark.campaign)],
+)
 def test_the_chance_of_telling_two_states_is_how_often_the_fit_does(
     fast_per_s: float, slow_per_s: float, snr: float
 ) -> None:

@@ -87,7 +87,9 @@ def test_noise_follows_brightness() -> None:
     assert noise.variance_at(levels) == pytest.approx(levels, rel=0.1)
 
 
-@pytest.mark.parametrize("region", [None, (31, 17, 48, 52)])
+@pytest.mark.parametrize(
+    "region", [pytest.param(None, marks=pytest.mark.campaign), (31, 17, 48, 52)]
+)
 def test_sigma_covers_the_truth_as_often_as_it_says(
     make_raw: MakeRaw, region: tuple[int, int, int, int] | None
 ) -> None:

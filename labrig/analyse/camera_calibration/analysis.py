@@ -14,7 +14,7 @@ from labrig.analyse.camera_calibration.photon_transfer import (
     pairs_of,
     photon_transfer,
 )
-from labrig.analyse.frames import camera_identity, lens_of, part_frames, part_region, timed, untimed
+from labrig.analyse.frames import lens_of, part_frames, part_region, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.calibration import CameraFile, Linearity
 from labrig.errors import DataError
@@ -74,7 +74,7 @@ def analyse(part: Part) -> CameraCalibrationResult:
     )
     flats = _fit_flats(part, lit, darks)
     file = CameraFile(
-        camera=camera_identity(run),
+        camera=run.camera_identity,
         lens=lens_of(lit),
         iso=iso,
         f_number=protocol.camera.f_number,

@@ -24,7 +24,7 @@ from labrig.fit.least_squares import FloatArray
 from labrig.results import (
     AUTO,
     EXPONENTIALS,
-    LAW_NAMES,
+    LAW_CHOICES,
     RATE_SPECTRUM,
     Candidate,
     FittedRateSpectrum,
@@ -129,9 +129,8 @@ def fit_decay(
     k = 0.2046 ± 0.0029 1/s
     k = 0.0101 ± 0.0001 1/s
     """
-    if law not in (AUTO, *LAW_NAMES):
-        known = ", ".join((*LAW_NAMES, AUTO))
-        raise FitError(f"expected one of the laws {known}, got '{law}'")
+    if law not in LAW_CHOICES:
+        raise FitError(f"expected one of the laws {', '.join(LAW_CHOICES)}, got '{law}'")
     series = decay_series(
         t_s,
         values,

@@ -95,6 +95,7 @@ def test_it_is_a_glowing_bodys(result: FadeResult) -> None:
         assert change.best.reduced_chi2 < 2
 
 
+@pytest.mark.campaign
 def test_with_the_curves_of_another_camera_it_still_is(tmp_path: Path) -> None:
     """The blue of this seed's sensor sees a little of the red, where the curves have nothing."""
 
@@ -134,6 +135,7 @@ def test_the_result_and_its_file_are_read_back(run: Path, result: FadeResult) ->
     assert_read_back(result)
 
 
+@pytest.mark.campaign
 def test_killed_within_a_pass_it_goes_on_there(run: Path, result: FadeResult) -> None:
     units = list(read_run(run).completed())
     cut, resumed = cut_off_and_resumed(run, "pass-2")

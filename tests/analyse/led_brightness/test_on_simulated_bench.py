@@ -92,6 +92,7 @@ def test_spectra_and_brightnesses_are_the_rooms_and_come_back_from_files(tmp_pat
     assert "Camera / spectrometer" in page or "camera-and-spectrometer" in page
 
 
+@pytest.mark.campaign
 def test_with_an_absolute_scale_it_is_irradiance(tmp_path: Path) -> None:
     all_pulls, scales = [], []
     for seed in (2,):
@@ -168,6 +169,7 @@ def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Pa
     assert "590 nm" in found[LedFault.AMBIENT_LIGHT]
 
 
+@pytest.mark.campaign
 def test_an_led_that_stays_lit_and_clips_all_frames_is_one_clear_line(tmp_path: Path) -> None:
     run = recorded(tmp_path, stuck, leds=["590 nm"], exposures=3)
     with pytest.raises(DataError, match="an LED stays lit, or another light is on") as caught:
@@ -185,7 +187,9 @@ def test_if_none_lights_there_is_no_result(tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("has_spectrometer", [True, False])
+@pytest.mark.parametrize(
+    "has_spectrometer", [True, pytest.param(False, marks=pytest.mark.campaign)]
+)
 def test_two_alight_at_once_are_noticed(has_spectrometer: bool, tmp_path: Path) -> None:
     def two(rig: Rig) -> None:
         shine_like(rig, tmp_path, 4, {455.0: 1.0, 590.0: 0.6})
@@ -197,7 +201,9 @@ def test_two_alight_at_once_are_noticed(has_spectrometer: bool, tmp_path: Path) 
     assert set(result.calibration.leds) == {"430 nm", "590 nm"}
 
 
-@pytest.mark.parametrize("has_spectrometer", [True, False])
+@pytest.mark.parametrize(
+    "has_spectrometer", [True, pytest.param(False, marks=pytest.mark.campaign)]
+)
 def test_leds_in_another_order_are_noticed(has_spectrometer: bool, tmp_path: Path) -> None:
     def swapped(rig: Rig) -> None:
         shine_like(rig, tmp_path, 7, {590.0: 1.0})
@@ -224,6 +230,7 @@ def test_a_reference_that_fluoresces_is_named(tmp_path: Path) -> None:
     assert result.uv_scale == "measured"
 
 
+@pytest.mark.campaign
 def test_a_reference_that_fluoresces_is_named_by_the_camera_too(tmp_path: Path) -> None:
     def brightened(rig: Rig) -> None:
         shine_like(rig, tmp_path, 3, {430.0: 1.0, 500.0: 0.3})
@@ -289,7 +296,7 @@ def test_an_unfinished_run_keeps_what_is_measured(tmp_path: Path) -> None:
 
 def changed_curves(folder: Path, change: Callable[[list[float]], None]) -> str:
     """Path of the shipped camera's curves, each row R, G, B changed."""
-    path = resources.folder("config/optics") / "canon_eos_5d_mark_ii.json"
+    path = resources.folder("config/optics/cameras") / "canon_eos_5d_mark_ii.json"
     curves = json.loads(path.read_text(encoding="utf-8"))
     for row in curves["spectral_data"]["data"]["main"].values():
         change(row)

@@ -238,6 +238,7 @@ def test_an_led_that_does_not_light_is_left_out_and_named(
     assert _is_felt(result)
 
 
+@pytest.mark.campaign
 def test_the_thesis_method_that_was_asked_for_stands_before_that_of_all_leds(
     tmp_path: Path,
 ) -> None:
@@ -254,6 +255,7 @@ def test_the_thesis_method_that_was_asked_for_stands_before_that_of_all_leds(
     assert all("without σ" in line for line in done.lines)
 
 
+@pytest.mark.campaign
 def test_leds_in_another_order_count_as_what_they_are(tmp_path: Path) -> None:
     result = _result(tmp_path, _on_relays(RELAYS | {"455 nm": 3, "530 nm": 2}))
     assert result.leds == tuple(RELAYS)
@@ -269,6 +271,7 @@ def test_an_led_that_stays_lit_leaves_what_was_measured_before(tmp_path: Path) -
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.campaign
 def test_an_led_that_clips_is_left_out(tmp_path: Path) -> None:
     def bright(rig: dict[str, Any]) -> None:
         _on_relays(RELAYS)(rig)
@@ -282,6 +285,7 @@ def test_an_led_that_clips_is_left_out(tmp_path: Path) -> None:
     assert _is_felt(result)
 
 
+@pytest.mark.campaign
 def test_light_that_leaks_in_is_subtracted(tmp_path: Path) -> None:
     def leaking(rig: dict[str, Any]) -> None:
         rig["simulation"]["faults"] = [{"ambient_light": {"level": "0.5 %", "at": "3 min"}}]
@@ -335,6 +339,7 @@ def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Pat
     assert by_led.predicted.shape == by_led.pull.shape == (5, 3)
 
 
+@pytest.mark.campaign
 def test_a_lamp_that_does_not_light_is_left_out_and_the_leds_go_on(tmp_path: Path) -> None:
     def unplugged(rig: dict[str, Any]) -> None:
         rig["devices"]["illuminants"]["lamps"]["halogen"]["relay"] = 7

@@ -21,6 +21,11 @@ SCATTERS: dict[str, Draw] = {
     "heavy tails": lambda rng, n: rng.laplace(size=n) / np.sqrt(2),
     "skewed": lambda rng, n: rng.exponential(size=n) - 1,
 }
+#: The others take as long.
+FIRST_OF_SCATTERS = [
+    "normal",
+    *(pytest.param(name, marks=pytest.mark.campaign) for name in ("heavy tails", "skewed")),
+]
 
 
 def views(
@@ -44,7 +49,7 @@ def fits(draw: Draw, change: float = 0.0, seeds: int = SEEDS) -> list[AngleMeans
     ]
 
 
-@pytest.mark.parametrize("name", SCATTERS)
+@pytest.mark.parametrize("name", FIRST_OF_SCATTERS)
 def test_five_in_a_hundred_are_found_where_there_is_none(name: str) -> None:
     means = fits(SCATTERS[name])
     found = sum(fit.test.finds_dependence for fit in means)
@@ -56,7 +61,7 @@ def test_five_in_a_hundred_are_found_where_there_is_none(name: str) -> None:
     assert inside / SEEDS == pytest.approx(0.95, abs=0.035)
 
 
-@pytest.mark.parametrize("name", SCATTERS)
+@pytest.mark.parametrize("name", FIRST_OF_SCATTERS)
 def test_a_dependence_of_the_stated_size_is_found_in_nine_of_ten(name: str) -> None:
     exact = np.sqrt(SCATTER**2 + NOISE**2)
     stated = float(np.median([fit.test.detectable for fit in fits(SCATTERS["normal"], 0.0, 60)]))

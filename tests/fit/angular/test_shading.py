@@ -56,6 +56,7 @@ def test_roughness_is_found(roughness_deg: float) -> None:
     assert fit.by_incidence.finds_dependence or roughness_deg < 15
 
 
+@pytest.mark.campaign
 def test_level_and_power_over_many_seeds() -> None:
     def tests(by_view: float, seeds: int) -> list[tuple[bool, bool, float, float]]:
         found = []

@@ -91,8 +91,11 @@ def pulls(fit: BrightnessFit, log_b: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize(
     ("response", "seeds"),
-    [(RESPONSE_UNKNOWN, range(50)), (RESPONSE_CALIBRATED, range(40)), (None, range(20))],
-    ids=["spectrometer", "calibrated", "camera"],
+    [
+        pytest.param(RESPONSE_UNKNOWN, range(50), id="spectrometer", marks=pytest.mark.campaign),
+        pytest.param(RESPONSE_CALIBRATED, range(40), id="calibrated", marks=pytest.mark.campaign),
+        pytest.param(None, range(20), id="camera"),
+    ],
 )
 def test_errors_are_as_large_as_sigma_says(response: ResponseError | None, seeds: range) -> None:
     all_pulls = []

@@ -194,6 +194,7 @@ class TestRealTiles:
         assert len(papers) > 25
         assert all(reradiates(with_sigma(paper)) for paper in papers)
 
+    @pytest.mark.campaign
     def test_pulls_of_sums_over_columns(self) -> None:
         tiles = [corrected(tile) for tile in real_tiles()[1]]
         sums = np.array([tile.reradiated_fraction[:40] for tile in tiles])

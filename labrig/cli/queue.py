@@ -1,0 +1,182 @@
+"""`labrig queue`: measurements one after another."""
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labrig.cli.completion import complete_protocol
+from labrig.cli.default_rig import RigOption, rig_path
+from labrig.cli.protocol import protocol_path
+
+if TYPE_CHECKING:
+    from labrig.acquire import RigFile
+    from labrig.cli.prompt import Terminal
+    from labrig.execution import Watch
+    from labrig.queue import QueuedRun, QueueEntry
+    from labrig.recording import Recording
+
+app = typer.Typer(help="Measurements one after another.", no_args_is_help=True)
+
+File = Annotated[Path, typer.Option("--queue", help="File of the queue.")]
+Runs = Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")]
+QUEUE, RUNS = Path("queue.yaml"), Path("runs")
+
+
+@app.command("add")
+def add(
+    protocol: Annotated[
+        str,
+        typer.Argument(
+            help="A shipped protocol, such as 'decay', or a path to a YAML file.",
+            autocompletion=complete_protocol,
+        ),
+    ],
+    rig: RigOption = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE: a key of the protocol; may be given again."),
+    ] = None,
+    sweeps: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sweep",
+            help="KEY=VALUE, VALUE, …: a run for each value; of several, for all combinations.",
+        ),
+    ] = None,
+    queue: File = QUEUE,
+) -> None:
+    """Add a measurement, or a sweep of one, to the end of the queue."""
+    from labrig.acquire import read_protocol, with_absolute_paths
+    from labrig.queue import Queue, QueuedRun, change_queue, combinations
+
+    folder = queue.absolute().parent
+    added = []
+    for typed in combinations(settings or [], sweeps or []):
+        changes = with_absolute_paths(typed, Path.cwd())
+        read_protocol(protocol_path(protocol), changes)
+        named_rig = None if rig is None else _from(folder, rig, rig_path(rig))
+        source = _from(folder, protocol, protocol_path(protocol))
+        added.append(QueuedRun(protocol=source, rig=named_rig, set=changes))
+    now = change_queue(queue, lambda before: Queue(runs=(*before.runs, *added)))
+    typer.echo(f"{len(added)} added, {len(now.runs)} in {queue}; labrig queue run measures them")
+
+
+@app.command("list")
+def list_(
+    queue: File = QUEUE,
+    runs: Runs = RUNS,
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """What is in the queue, how far it is, and what was found."""
+    from json import dumps
+
+    from labrig.number_format import aligned
+    from labrig.queue import entries, queue_report, read_queue
+
+    listed = entries(read_queue(queue), runs)
+    if json:
+        typer.echo(dumps([_content(entry) for entry in listed], indent=1, ensure_ascii=False))
+    elif not listed:
+        typer.echo(f"nothing in {queue}")
+    else:
+        table = queue_report(queue.stem, listed).sections[0].tables[0]
+        typer.echo("\n".join(aligned([table.head, *table.rows])))
+
+
+@app.command("run")
+def run(
+    queue: File = QUEUE,
+    runs: Runs = RUNS,
+    yes: Annotated[
+        bool,
+        typer.Option(
+            "--yes",
+            help="Non-interactive: the rig's 'changer' does the manual steps, and nobody is asked "
+            "to change samples.",
+        ),
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Print every command to a device and its answer.")
+    ] = False,
+) -> None:
+    """Measure what is waiting or was interrupted. The last line is the page of results."""
+    from labrig.cli.prompt import Terminal
+    from labrig.queue import run_queue
+
+    typer.echo(run_queue(queue, runs, _Person(queue, runs, Terminal(), yes, verbose)))
+
+
+class _Person:
+    """A person at the terminal."""
+
+    def __init__(
+        self, queue: Path, runs: Path, terminal: "Terminal", yes: bool, verbose: bool
+    ) -> None:
+        self._folder = queue.absolute().parent
+        self._runs = runs
+        self._terminal = terminal
+        self._yes = yes
+        self._verbose = verbose
+
+    def prepare(self, queued: "QueuedRun") -> "Recording":
+        from labrig.recording import Recording
+
+        rig = None if queued.rig is None else _at(self._folder, queued.rig)
+        protocol = protocol_path(_at(self._folder, queued.protocol))
+        return Recording.prepare(protocol, rig_path(rig), self._runs, queued.changes)
+
+    def watch(self, rig: "RigFile") -> "Watch":
+        from labrig.cli.progress import progress
+
+        has_changer = "changer" in rig.devices
+        return partial(progress, yes=self._yes, has_changer=has_changer, verbose=self._verbose)
+
+    def change_sample(self, before: str, after: str) -> None:
+        from labrig.acquire import ManualStep
+
+        if self._yes:
+            return
+        step = ManualStep(
+            f"put the sample '{after}' in place of '{before}'", "it is measured next", "sample"
+        )
+        self._terminal.ask(step, None, step.takes_s, lambda: None)
+
+    def tell(self, text: str) -> None:
+        typer.echo(text, err=True)
+
+
+def _content(entry: "QueueEntry") -> dict[str, object]:
+    return {
+        "number": entry.number,
+        **entry.queued.model_dump(mode="json", by_alias=True),
+        "status": entry.status,
+        "states": [
+            {
+                "patch": state.patch,
+                "state": state.number,
+                "k_r_per_s": state.k_r_per_s.value,
+                "k_r_sigma_per_s": state.k_r_per_s.sigma,
+                "amplitude": state.amplitude.value,
+                "amplitude_sigma": state.amplitude.sigma,
+            }
+            for state in entry.states
+        ],
+        "warnings": list(entry.warnings),
+    }
+
+
+def _from(folder: Path, name: str, path: Path) -> str:
+    """Return a shipped name, or the path of a file from the queue's folder if it is in there."""
+    if Path(name).suffix == "" and len(Path(name).parts) == 1:
+        return name
+    absolute = path.absolute()
+    inside = absolute.is_relative_to(folder)
+    return f"./{absolute.relative_to(folder).as_posix()}" if inside else str(absolute)
+
+
+def _at(folder: Path, name: str) -> str:
+    """Return a shipped name, or the path of a file that is named from the queue's folder."""
+    is_name = Path(name).suffix == "" and len(Path(name).parts) == 1 and not name.startswith(".")
+    return name if is_name else str(folder / name)

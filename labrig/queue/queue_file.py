@@ -1,0 +1,126 @@
+"""The queue's file: measurements to be made, and the runs that were made of them."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.errors import DiskError, UsageError
+from labrig.yaml_file import read_model, yaml_text
+
+
+class QueuedRun(BaseModel):
+    """A measurement of a queue.
+
+    Attributes
+    ----------
+    protocol
+        Name of a shipped protocol, or path of its file.
+    rig
+        Name or path of the rig file; null for the default rig.
+    changes
+        Values of the protocol's keys instead of those in its file, by dotted keys such as
+        `charge` or `sample.name`; `set` in the file.
+    run
+        Name of the run folder; null before the run.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    protocol: str
+    rig: str | None = None
+    changes: dict[str, Any] = Field(default_factory=dict, alias="set")
+    run: str | None = None
+
+
+class Queue(BaseModel):
+    """Measurements in the order in which they are made.
+
+    Attributes
+    ----------
+    runs
+        The measurements.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    runs: tuple[QueuedRun, ...] = ()
+
+
+def read_queue(path: Path) -> Queue:
+    """Read the file of a queue.
+
+    Parameters
+    ----------
+    path
+        YAML file with the key `runs`.
+
+    Returns
+    -------
+    Queue
+        The queue.
+
+    Raises
+    ------
+    UsageError
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.queue import read_queue
+    >>> _ = Path("queue.yaml").write_text("runs: [{protocol: decay, set: {charge: 5 min}}]")
+    >>> read_queue(Path("queue.yaml")).runs[0].changes
+    {'charge': '5 min'}
+    """
+    if not path.is_file():
+        raise UsageError(f"{path}: no such queue; begin one with: labrig queue add PROTOCOL")
+    return read_model(path, Queue)
+
+
+def change_queue(path: Path, change: Callable[[Queue], Queue]) -> Queue:
+    """Replace a queue by what `change` makes of it, as one step for all processes.
+
+    Parameters
+    ----------
+    path
+        File of the queue; without one the queue is empty.
+    change
+        Function of the present queue.
+
+    Returns
+    -------
+    Queue
+        The queue as it is now.
+
+    Raises
+    ------
+    UsageError
+        The file is malformed.
+    DiskError
+        It cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.queue import Queue, QueuedRun, change_queue
+    >>> more = QueuedRun(protocol="decay", set={"charge": "5 min"})
+    >>> queue = change_queue(Path("nights.yaml"), lambda queue: Queue(runs=(*queue.runs, more)))
+    >>> len(queue.runs)
+    1
+    """
+    draft = path.with_name(f".{path.name}.draft")
+    try:
+        with FileLock(path.with_name(f".{path.name}.lock")):
+            queue = change(read_queue(path) if path.exists() else Queue())
+            runs = [
+                run.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+                for run in queue.runs
+            ]
+            draft.write_text(yaml_text({"runs": runs}), encoding="utf-8")
+            draft.replace(path)
+    except OSError as error:
+        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    return queue
