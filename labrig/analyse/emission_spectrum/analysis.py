@@ -203,13 +203,12 @@ def _difference_warnings(spectrum: PatchSpectrum) -> Iterator[str]:
 
 
 def _line_warnings(fit: SpectrumFit) -> Iterator[str]:
-    if fit.lines:
-        places = ", ".join(f"{line.wavelength_nm:.0f}" for line in fit.lines)
+    if fit.lines_nm:
+        places = ", ".join(f"{low:.0f} to {high:.0f}" for low, high in fit.lines_nm)
         yield (
-            f"light in lines much narrower than the filter's band, at {places} nm: the sum of a "
-            "line's light is measured, how it is divided between neighbouring wavelengths is not, "
-            "and where several lines are closer together than the band, errors exceed σ; if the "
-            "shape matters, use a spectrometer"
+            f"light in lines much narrower than the filter's band, at {places} nm: how much light "
+            "is near each of them is measured, how it is divided between neighbouring wavelengths "
+            "is not, and σ is large there; if the shape matters, use a spectrometer"
         )
 
 

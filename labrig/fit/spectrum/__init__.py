@@ -2,19 +2,17 @@
 
 from labrig.fit.spectrum.fit import (
     BandedSpectrum,
-    NarrowLine,
     SpectrumFit,
     fit_spectrum,
-    nonnegative_minimum,
 )
 from labrig.fit.spectrum.line import LineFit, fit_line
+from labrig.fit.spectrum.minimum import nonnegative_minimum
 from labrig.fit.spectrum.system import CurveError, SpectralSystem, curve_modes, system_through_lvf
 
 __all__ = [
     "BandedSpectrum",
     "CurveError",
     "LineFit",
-    "NarrowLine",
     "SpectralSystem",
     "SpectrumFit",
     "curve_modes",

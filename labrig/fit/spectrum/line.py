@@ -157,13 +157,3 @@ def line_at_knots(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) ->
     hat_functions: FloatArray = np.diff(ramp, n=2) / h**2
     # Far from the line rounding errors are all there is.
     return np.maximum(hat_functions, 0.0)
-
-
-def wings_at_knots(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
-    """Return the values (n,) at the knots of a Lorentzian of integral 1."""
-    h, half = float(knots_nm[1] - knots_nm[0]), fwhm_nm / 2
-    knots = np.concatenate([knots_nm[:1] - h, knots_nm, knots_nm[-1:] + h])
-    from_line = (knots - wavelength_nm) / half
-    ramp = from_line * np.arctan(from_line) - np.log1p(from_line**2) / 2
-    values: FloatArray = half / np.pi * np.diff(ramp, n=2) / h**2
-    return np.maximum(values, 0.0)
