@@ -21,8 +21,8 @@ from labrig.fit.spectrum.smooth import WEIGHTS, normalised
 #: much as a band of 40 nm with all the light: what is narrower is a matter of lines.
 WEIGHTS_WITH_LINES = WEIGHTS[26::3]
 #: Evidence with one line over that without above which there are lines. 150 is called decisive
-#: (Kass and Raftery, *Bayes factors*, J. Am. Stat. Assoc. 90, 1995); bands that are steep or have a kink
-#: reach that, too, if the system is a little off.
+#: (Kass and Raftery, *Bayes factors*, J. Am. Stat. Assoc. 90, 1995); bands that are steep or have a
+#: kink reach that, too, if the system is a little off.
 DECISIVE = 1000.0
 #: Weights of spectra rougher than any broad band, and their probability above which there are
 #: lines, too: of many lines one alone explains little.
@@ -35,7 +35,7 @@ BLOCK_NM, LOSS, SEARCH_FWHM_NM = 10.0, 6.0, 2.5
 #: How far from such a block lines may be, in nm: about a pass band.
 MARGIN_NM = 25.0
 #: Bases that are tried, and the mean distance of their lines in nm, even in its logarithm.
-CANDIDATES, DISTANCE_NM = 600, (1.5, 14.0)
+CANDIDATES, DISTANCE_NM = 300, (1.5, 14.0)
 #: Power to which the likelihood of a basis is taken: that of finitely many bases comes no nearer.
 TEMPER = 0.5
 
