@@ -98,8 +98,8 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
         (
             f"Λ* from {places} positions along the filter in {len(frames)} frames, largest value "
             f"1. {white}",
-            "Lines much narrower than the filter's band may come out broader than they are, by "
-            "more than the credible band says.",
+            "Of lines much narrower than the filter's band the sum of the light is measured; how "
+            "it is divided between neighbouring wavelengths is not, and their band is wide.",
         ),
         (
             Picture(

@@ -112,6 +112,7 @@ CAMPAIGNS = {
         _module("whole_phosphor"),
         _module("lvf_in_the_room", "--width", "402", "--seeds", "3"),
         _module("spectrum_through_lvf", "40"),
+        _module("spectrum_lines", "8"),
         _module("emission_spectra", "3"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
         _module("rate_information"),

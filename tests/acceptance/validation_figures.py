@@ -146,6 +146,21 @@ def _spectrum_bands(kind: str, camera: str) -> Extract:
     return extract
 
 
+def _lines(kind: str) -> Extract:
+    """Return the extract of a kind of light's errors in σ, and of how many are warned of."""
+
+    def extract(printed: str) -> str:
+        rms, largest, near, said, count = columns(
+            rf"^{kind} +([\d.]+) +([\d.]+) +([\d.]+) +[\d.]+% +[\d.]+% +(\d+)/(\d+)$", printed
+        )
+        return (
+            f"{rms[0]:.1f} σ rms, at most {largest[0]:.1f} σ; of 50 nm {near[0]:.1f} σ rms; "
+            f"{said[0]:.0f} of {count[0]:.0f}"
+        )
+
+    return extract
+
+
 def _emission(printed: str) -> str:
     furthest, one, two = columns(r"^\S+ +yes +[\d.]+ +([\d.]+) +(\d+)% +(\d+)%", printed)
     return (
@@ -454,6 +469,22 @@ FIGURES = (
         "spectrum_through_lvf",
         _spectrum_bands("mercury lines", "same curves"),
     ),
+    Figure(
+        "Broad spectra through the variable filter, one or two bands of 30 to 120 nm: errors of "
+        "the means over 10 nm above 2 % of the peak and of the mean over 50 nm about the peak, and "
+        "how many are said to have lines",
+        "spectrum_lines",
+        _lines("broad"),
+    ),
+    Figure("The same of a line 5 nm wide", "spectrum_lines", _lines("line 5")),
+    Figure("The same of a line 15 nm wide", "spectrum_lines", _lines("line 15")),
+    Figure(
+        "The same of a line 5 nm wide on a broad band", "spectrum_lines", _lines("line 5 on a band")
+    ),
+    Figure("The same of two lines 5 nm wide, 20 nm apart", "spectrum_lines", _lines("two 5 20")),
+    Figure("The same of eight lines like those of Tb³⁺", "spectrum_lines", _lines("Tb")),
+    Figure("The same of ten lines like those of Eu³⁺", "spectrum_lines", _lines("Eu")),
+    Figure("The same of a mercury lamp", "spectrum_lines", _lines("mercury")),
     Figure(
         "Emission spectra of five paints in the simulated room, camera curves as far off as "
         "laboratories disagree, with a picture of a grey card, three seeds each: largest error, "

@@ -49,7 +49,7 @@ from tests.analyse.spectral_bench import (
     record,
 )
 from tests.fit import lvf_pictures as made
-from tests.quick_yaml import write_quickly
+from tests.quick_yaml import read_quickly, write_quickly
 
 QUICK = {"protocol": "emission_spectrum", "charge": "2 min", "times": ["2 s", "12 s", "30 s"],
          "longest": "8 s"}  # fmt: skip
@@ -184,6 +184,25 @@ def test_a_mercury_lamp_that_did_not_light_is_reported(tmp_path: Path) -> None:
     run = record(tmp_path, keys, faults=["mercury_dead"])
     found = analysed(run)
     assert any("did not light" in warning for warning in found.warnings)
+
+
+def test_lines_narrower_than_the_band_are_reported(tmp_path: Path) -> None:
+    content = read_quickly(two_colours(tmp_path / "lines.yaml").read_text())
+    content["states"] = content["states"][1:]
+    content["spectrum"] = {
+        "wavelength_nm": [380.0, 541.0, 545.0, 549.0, 720.0], "value": [0.0, 0.0, 1.0, 0.0, 0.0],
+    }  # fmt: skip
+    (tmp_path / "lines.yaml").write_text(write_quickly(content))
+    keys = QUICK | {"white": False, "times": ["2 s"]}
+    found = analysed(record(tmp_path, keys, sample=str(tmp_path / "lines.yaml")))
+    (warning,) = (one for one in found.warnings if "lines much narrower" in one)
+    assert "540 to 550 nm" in warning
+    spectrum = found.patches[""].spectrum
+    value, covariance = np.array(spectrum.value), np.array(spectrum.covariance)
+    near = np.abs(WAVELENGTH_NM - 545) < 30
+    apart = np.sqrt(np.diag(covariance)[near].sum())
+    assert np.sqrt(covariance[np.ix_(near, near)].sum()) < 0.3 * apart
+    assert value[near].sum() > 0.95 * value.sum()
 
 
 @pytest.mark.shared_data

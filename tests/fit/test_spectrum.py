@@ -9,8 +9,13 @@ from numpy.typing import NDArray
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.spectrum import CurveError, SpectralSystem, fit_spectrum, system_through_lvf
-from labrig.fit.spectrum.fit import nonnegative_minimum
+from labrig.fit.spectrum import (
+    CurveError,
+    SpectralSystem,
+    fit_spectrum,
+    nonnegative_minimum,
+    system_through_lvf,
+)
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import CameraResponse, Spectrum
 from tests.fit import lvf_pictures as made

@@ -30,7 +30,7 @@ from labrig.analyse.frames import (
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.errors import DataError
-from labrig.fit.spectrum import fit_spectrum
+from labrig.fit.spectrum import SpectrumFit, fit_spectrum
 from labrig.protocols.emission_spectrum import SpectrumFrames, lamp_of
 from labrig.reduce import SeriesFrame
 from labrig.results import (
@@ -109,14 +109,18 @@ def _patch_spectrum(
     )
     charges, dead = _charges(reduction, frames)
 
-    def spectrum_of(frame: CombinedFrame, lamp: str, samples: int) -> EmissionSpectrum:
-        fit = fit_spectrum(frame.value, frame.sigma, model.system, samples=samples)
-        run = part.run.folder.resolve().name
+    run = part.run.folder.resolve().name
+
+    def fitted(frame: CombinedFrame, samples: int) -> SpectrumFit:
+        return fit_spectrum(frame.value, frame.sigma, model.system, samples=samples)
+
+    def spectrum_by(fit: SpectrumFit, lamp: str) -> EmissionSpectrum:
         return EmissionSpectrum.from_draws(
             fit.knots_nm, fit.value, fit.samples, sample=patch.material, lamp=lamp, run=run
         )
 
     first = charges[0]
+    first_fit = fitted(first.combined, SAMPLES)
     times = over_time(first.frames, model.centre_nm) if len(first.frames) > 1 else []
     lamps = [
         compared(
@@ -125,19 +129,21 @@ def _patch_spectrum(
         for charge in charges[1:]
     ]
     spectrum = PatchSpectrum(
-        spectrum=spectrum_of(first.combined, first.lamp, SAMPLES),
+        spectrum=spectrum_by(first_fit, first.lamp),
         channels=model.camera.channels,
         centre_nm=model.centre_nm,
         white_reference=model.white_reference,
         charges=tuple(
             ChargeSpectrum(
-                charge.lamp, charge.frames, spectrum_of(charge.combined, charge.lamp, FEW_SAMPLES)
+                charge.lamp,
+                charge.frames,
+                spectrum_by(fitted(charge.combined, FEW_SAMPLES), charge.lamp),
             )
             for charge in charges
         ),
         times=tuple(times),
         at_times=tuple(
-            spectrum_of(combined(first.frames.take([row])), first.lamp, FEW_SAMPLES)
+            spectrum_by(fitted(combined(first.frames.take([row])), FEW_SAMPLES), first.lamp)
             for row in range(len(first.frames))
         ),
         lamps=tuple(lamps),
@@ -149,6 +155,7 @@ def _patch_spectrum(
         *_clipping_warnings(first.frames),
         *_faint_warnings(len(first.frames), frames),
         *_difference_warnings(spectrum),
+        *_line_warnings(first_fit),
         *_uncharged_warnings(charges),
         *dead,
     ]
@@ -192,6 +199,16 @@ def _difference_warnings(spectrum: PatchSpectrum) -> Iterator[str]:
         yield (
             f"the spectrum depends on the lamp: {worst.what} it differs by "
             f"{worst.beyond_noise:.1%} (rms, beyond noise); is it the same sample, in its place?"
+        )
+
+
+def _line_warnings(fit: SpectrumFit) -> Iterator[str]:
+    if fit.lines_nm:
+        places = ", ".join(f"{low:.0f} to {high:.0f}" for low, high in fit.lines_nm)
+        yield (
+            f"light in lines much narrower than the filter's band, at {places} nm: how much light "
+            "is near each of them is measured, how it is divided between neighbouring wavelengths "
+            "is not, and σ is large there; if the shape matters, use a spectrometer"
         )
 
 

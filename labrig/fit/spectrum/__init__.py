@@ -4,9 +4,9 @@ from labrig.fit.spectrum.fit import (
     BandedSpectrum,
     SpectrumFit,
     fit_spectrum,
-    nonnegative_minimum,
 )
 from labrig.fit.spectrum.line import LineFit, fit_line
+from labrig.fit.spectrum.minimum import nonnegative_minimum
 from labrig.fit.spectrum.system import CurveError, SpectralSystem, curve_modes, system_through_lvf
 
 __all__ = [

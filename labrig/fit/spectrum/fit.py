@@ -8,112 +8,29 @@ non-negative spectrum nearest to them: its values may be exactly zero (Bardsley 
 algorithms for computational UQ of nonnegativity constrained linear inverse problems*, SIAM J. Sci.
 Comput. 42, 2020; Everink, Dong and Andersen, *Bayesian inference with projected densities*, 2023).
 
-The credible band holds for spectra that are not much narrower than the response of one value.
-Lines, such as a mercury lamp's through a filter of 25 nm, come out too broad, by more than their
-band; `fit_line` finds the wavelength of a single one.
+Where a line explains the values better, every draw has lines besides, in other places and of
+another width (`lines`): the band of a line is as wide as what the values leave open, and what they
+say of the sum of neighbouring lines stays in the covariance.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import EPSILON, FloatArray
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum.basis import Basis, Problem, smooth
+from labrig.fit.spectrum.lines import WithLines, lines_of
+from labrig.fit.spectrum.minimum import nonnegative_minimum
+from labrig.fit.spectrum.smooth import WEIGHTS, Prior, Whitened, normalised
 from labrig.fit.spectrum.system import SpectralSystem
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.fit.spectrum.values import measured
 from labrig.optics import band_means
-
-FEWEST_VALUES = 3
-
-
-def measured(
-    value: ArrayLike, sigma: ArrayLike, system: SpectralSystem
-) -> tuple[NDArray[np.bool_], SpectralSystem, FloatArray, FloatArray]:
-    """Return which values are usable, the system of those, their values and σ.
-
-    Raises
-    ------
-    FitError
-        There are too few values, none above its noise, or a σ of 0.
-    """
-    values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
-    used = np.isfinite(values) & np.isfinite(sigmas) & system.design.any(axis=1)
-    if (sigmas[used] <= 0).any():
-        raise FitError("expected every σ above 0, got some of 0; give the noise of every value")
-    if used.sum() < FEWEST_VALUES:
-        raise FitError(
-            f"expected {FEWEST_VALUES} or more values that are neither clipped nor missing, got "
-            f"{used.sum()}; expose shorter or light more of the filter"
-        )
-    part = system.of(used)
-    if not values[used] @ part.design.sum(axis=1) > 0:
-        raise FitError("expected values above 0, got none above their noise; expose longer")
-    return used, part, values[used], sigmas[used]
-
-
-#: Number of exchanges after which block pivoting counts as cycling.
-MAX_EXCHANGES = 25
-#: Rounding errors of slopes, and of coordinates relative to the largest.
-ROUNDING = 100 * EPSILON
-SMALLEST = 1e-9
-
-
-def nonnegative_minimum(
-    curvature: FloatArray, linear: FloatArray, free: NDArray[np.bool_]
-) -> FloatArray:
-    """Minimise xᵀGx/2 − bᵀx over x ≥ 0, started from the solution of a similar problem.
-
-    Block principal pivoting: all coordinates on the wrong side change sides at once (Júdice and
-    Pires, *A block principal pivoting algorithm for large-scale strictly monotone linear
-    complementarity problems*, Comput. Oper. Res. 21, 1994). Where that cycles, Lawson and Hanson's
-    active sets are used.
-
-    Parameters
-    ----------
-    curvature, linear
-        Positive definite G (n, n) and b (n,).
-    free
-        Initial guess of the coordinates that are not zero, shape (n,).
-
-    Returns
-    -------
-    ndarray
-        Minimum x, exactly 0 where the bound is active, shape (n,).
-    """
-    free = free.copy()
-    size = np.abs(curvature)
-    for _ in range(MAX_EXCHANGES):
-        x = np.zeros_like(linear)
-        if free.any():
-            x[free] = _solved(curvature[free][:, free], linear[free])
-        slope = curvature @ x - linear
-        slack = ROUNDING * (size @ np.abs(x) + np.abs(linear))
-        below = x < -SMALLEST * float(np.abs(x).max(initial=0.0))
-        wrong = np.where(free, below, slope < -slack)
-        if not wrong.any():
-            return np.maximum(x, 0.0)
-        free ^= wrong
-    upper = cholesky(curvature)
-    return nonnegative_least_squares(upper, solve_triangular(upper, linear, trans="T"))
-
-
-def _solved(curvature: FloatArray, linear: FloatArray) -> FloatArray:
-    # SciPy's own Cholesky functions take ten times as long to call as such a system to solve.
-    _, solution, info = lapack.dposv(curvature, linear)
-    if info:
-        raise LinAlgError("expected a positive definite matrix")
-    return np.asarray(solution)
-
 
 SAMPLES = 400
 #: Iterations in which the covariance of the design's errors follows the spectrum.
 ROUNDS = 3
-#: Grid of weights of the prior, for a spectrum of about 1.
-WEIGHTS = np.geomspace(1e-4, 1e8, 73)
-#: Added to the curvature of the fit, for a spectrum of about 1.
-MIN_CURVATURE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +40,8 @@ class SpectrumFit:
     Attributes
     ----------
     knots_nm, value
-        Knots in nm and mean of the samples, shape (n,), piecewise linear in between.
+        Knots in nm and mean of the samples, shape (n,), piecewise linear in between; those of the
+        system, or finer ones where there are lines.
     samples
         Draws from the posterior, shape (s, n); all their spread is uncertainty.
     weight
@@ -133,6 +51,9 @@ class SpectrumFit:
         widens the samples' spread.
     used
         Whether a value was used, shape (m,), bool.
+    lines_nm
+        First and last wavelength in nm of each stretch in which there are lines narrower than the
+        responses, how many is open.
     """
 
     knots_nm: FloatArray
@@ -141,6 +62,7 @@ class SpectrumFit:
     weight: float
     misfit: float
     used: NDArray[np.bool_]
+    lines_nm: tuple[tuple[float, float], ...] = ()
 
     def in_bands(self, edges_nm: ArrayLike, level: float = 0.6827) -> "BandedSpectrum":
         """Average over neighbouring bands, with their credible interval.
@@ -200,91 +122,78 @@ def fit_spectrum(
     used, part, y, s = measured(value, sigma, system)
     white_response = part.design.sum(axis=1)
     scale = float(y @ white_response) / float(white_response @ white_response)
-    roughness = _second_differences(part.knots_nm)
-    x, misfit = np.full(len(part.knots_nm), scale), 1.0
-    for _ in range(ROUNDS):
-        whitened, target = _whitened(part, y, misfit * s, x / scale, scale)
-        x, ratio = _likeliest(whitened, target, roughness)
-        x, misfit = x * scale, max(1.0, misfit * ratio)
+    prior = Prior.on(len(part.knots_nm))
+    flat = np.full(len(part.knots_nm), scale)
+
+    def settled(x: FloatArray, lines: WithLines | None) -> tuple[Problem, FloatArray, float]:
+        """Return the problem with the errors of a spectrum that it yields, that, and the misfit."""
+        misfit = 1.0
+        for _ in range(ROUNDS):
+            problem = Problem(Whitened.of(part, y, misfit * s, x / scale, scale), part, prior)
+            log_evidence = prior.log_evidence(problem.values)
+            smoothest = smooth(float(WEIGHTS[np.argmax(log_evidence)]))
+            basis = smoothest if lines is None else lines.dense
+            x, ratio = _likeliest(problem, basis)
+            x, misfit = x * scale, max(1.0, misfit * ratio)
+        return problem, x, misfit
+
+    problem, x, misfit = settled(flat, None)
+    log_evidence = prior.log_evidence(problem.values)
+    lines = lines_of(problem, log_evidence)
+    if lines is not None:
+        problem, x, misfit = settled(x, lines)
     rng = np.random.default_rng(seed)
-    draws, weights = _draw(whitened, target, roughness, samples, rng)
+    if lines is None:
+        weights = np.sort(rng.choice(WEIGHTS, samples, p=normalised(log_evidence)))
+        bases = [smooth(weight) for weight in weights.tolist()]
+        knots_nm = part.knots_nm
+    else:
+        tried, probability = lines.candidates(problem, rng)
+        bases = [tried[k] for k in rng.choice(len(tried), samples, p=probability)]
+        knots_nm = problem.fine_nm
+    draws = _draw(problem, bases, rng)
+    if lines is not None:
+        pairs = zip(bases, draws, strict=True)
+        spectra = np.array([problem.on_knots(basis, drawn) for basis, drawn in pairs]) * scale
+    else:
+        spectra = np.array(draws) * scale
     return SpectrumFit(
-        part.knots_nm, draws.mean(axis=0) * scale, draws * scale,
-        float(np.median(weights)), misfit, used,
+        knots_nm, spectra.mean(axis=0), spectra, float(np.median([one.weight for one in bases])),
+        misfit, used, () if lines is None else lines.stretches_nm,
     )  # fmt: skip
 
 
-def _whitened(
-    system: SpectralSystem, y: FloatArray, s: FloatArray, spectrum: FloatArray, scale: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return design and values in units of their total error, for a spectrum of about 1."""
-    covariance = np.diag((s / scale) ** 2) + system.covariance(spectrum)
-    lower = np.linalg.cholesky(covariance)
-    solution = np.linalg.solve(lower, np.column_stack([system.design, y / scale]))
-    return solution[:, :-1], solution[:, -1]
-
-
-def _second_differences(knots_nm: FloatArray) -> FloatArray:
-    """Return the second differences of values on an even grid as a matrix (n − 2, n)."""
-    n = len(knots_nm)
-    return np.diff(np.eye(n), n=2, axis=0)
-
-
-def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
-    """Return the probability of each of `WEIGHTS` under a flat prior, ignoring x ≥ 0."""
-    information, linear = design.T @ design, design.T @ target
-    log_evidence = np.empty(len(WEIGHTS))
-    for number, weight in enumerate(WEIGHTS):
-        lower = np.linalg.cholesky(information + weight * prior + _ridge(prior))
-        along = solve_triangular(lower, linear, lower=True)
-        log_determinant = 2 * float(np.log(np.diag(lower)).sum())
-        rank = len(prior) - 2
-        log_evidence[number] = (rank * np.log(weight) - log_determinant + along @ along) / 2
-    probability = np.exp(log_evidence - log_evidence.max())
-    normalised: FloatArray = probability / probability.sum()
-    return normalised
-
-
-def _likeliest(
-    design: FloatArray, target: FloatArray, roughness: FloatArray
-) -> tuple[FloatArray, float]:
-    """Return the spectrum at the most probable weight, and the root of χ² per degree of freedom."""
-    prior = roughness.T @ roughness
-    weight = float(WEIGHTS[np.argmax(_weights(design, target, prior))])
-    curvature = design.T @ design + weight * prior + _ridge(prior)
-    all_free = np.ones(len(prior), dtype=np.bool_)
-    x = nonnegative_minimum(curvature, design.T @ target, all_free)
+def _likeliest(problem: Problem, basis: Basis) -> tuple[FloatArray, float]:
+    """Return the spectrum on the knots, and the root of χ² per degree of freedom."""
+    values = problem.values
+    design, curvature = problem.matrices(basis)
+    x, _ = problem.likeliest(basis)
     free = x > 0
     leverage = np.linalg.solve(
         curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)]
     )
-    residual = target - design @ x
-    dof = max(len(target) - float(np.trace(leverage)), 1.0)
-    return x, float(np.sqrt(residual @ residual / dof))
+    residual = values.target - design @ x
+    dof = max(len(values.target) - float(np.trace(leverage)), 1.0)
+    spectrum = x
+    if len(basis.places):
+        spectrum = np.interp(values.knots_nm, problem.fine_nm, problem.on_knots(basis, x))
+    return spectrum, float(np.sqrt(residual @ residual / dof))
 
 
-def _draw(
-    design: FloatArray,
-    target: FloatArray,
-    roughness: FloatArray,
-    samples: int,
-    rng: np.random.Generator,
-) -> tuple[FloatArray, FloatArray]:
-    """Return (s, n) spectra and the (s,) weights with which they were drawn."""
-    information, prior = design.T @ design, roughness.T @ roughness
-    probability = _weights(design, target, prior)
-    weights = np.sort(rng.choice(WEIGHTS, samples, p=probability))
-    draws = np.empty((samples, len(prior)))
-    free = np.ones(len(prior), dtype=np.bool_)
-    for number, weight in enumerate(weights):
-        measured = design.T @ (target + rng.standard_normal(len(target)))
-        expected = np.sqrt(weight) * roughness.T @ rng.standard_normal(len(roughness))
-        curvature = information + weight * prior + _ridge(prior)
-        draws[number] = nonnegative_minimum(curvature, measured + expected, free)
-        free = draws[number] > 0
-    return draws, weights
-
-
-def _ridge(prior: FloatArray) -> FloatArray:
-    """Return a ridge that fixes what neither the values nor the prior constrain."""
-    return MIN_CURVATURE * np.eye(len(prior))
+def _draw(problem: Problem, bases: Sequence[Basis], rng: np.random.Generator) -> list[FloatArray]:
+    """Return smooth spectrum and powers, one draw for each basis."""
+    values, roughness = problem.values, problem.prior.roughness
+    n = len(values.knots_nm)
+    draws = []
+    free = np.ones(n, dtype=np.bool_)
+    for basis in bases:
+        design, curvature = problem.matrices(basis)
+        linear = design.T @ (values.target + rng.standard_normal(len(values.target)))
+        expected = roughness.T @ rng.standard_normal(len(roughness))
+        linear[:n] += np.sqrt(basis.weight) * expected
+        powers_free = np.ones(len(basis.places), dtype=np.bool_)
+        draws.append(
+            nonnegative_minimum(curvature, linear, np.concatenate([free[:n], powers_free]))
+        )
+        free = draws[-1] > 0
+    return draws

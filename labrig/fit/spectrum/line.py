@@ -16,8 +16,8 @@ from scipy.special import ndtr
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.spectrum.fit import measured
 from labrig.fit.spectrum.system import SpectralSystem
+from labrig.fit.spectrum.values import measured
 
 #: Full width at half maximum over σ of a Gaussian.
 FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))
@@ -74,7 +74,7 @@ def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm
     step = float(knots[1] - knots[0])
 
     def line_at(wavelength_nm: float) -> _LineAt:
-        return _line_at(part, y, s, _hat_functions(knots, wavelength_nm, fwhm_nm))
+        return _line_at(part, y, s, line_at_knots(knots, wavelength_nm, fwhm_nm))
 
     def minus_two_log_likelihood(wavelength_nm: float) -> float:
         return line_at(wavelength_nm).minus_two_log_likelihood
@@ -141,7 +141,7 @@ def _line_at(
     return _LineAt(shape, whitened, lower, strength, chi2, minus_two_log_likelihood)
 
 
-def _hat_functions(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
+def line_at_knots(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
     """Return the values (n,) at the knots of a line of integral 1, with its centre and its width.
 
     Linear interpolation between the knots adds h²/3 to its variance, h the distance of the knots:
@@ -155,4 +155,5 @@ def _hat_functions(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -
     density = np.exp(-(from_line**2) / 2) / np.sqrt(2 * np.pi)
     ramp = width * (from_line * ndtr(from_line) + density)
     hat_functions: FloatArray = np.diff(ramp, n=2) / h**2
-    return hat_functions
+    # Far from the line rounding errors are all there is.
+    return np.maximum(hat_functions, 0.0)

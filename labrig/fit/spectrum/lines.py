@@ -1,0 +1,162 @@
+"""Which spectra with lines explain some values, and whether there are lines at all.
+
+That there are lines is decided by the evidence of a smooth spectrum with and without one. If so, a
+spectrum may be any that is not negative and explains the values: many bases with random places and
+one of many widths are fitted, and those that explain the values are drawn from. A line that is
+divided between two neighbours, two that are one, and one with wings are among them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import log_ndtr, logsumexp
+
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum.basis import FWHM_NM, Basis, Places, Problem, smooth
+from labrig.fit.spectrum.smooth import WEIGHTS, normalised
+
+#: Weights besides lines. At the least of them, knots 5 nm apart, the smooth spectrum may bend as
+#: much as a band of 40 nm with all the light: what is narrower is a matter of lines.
+WEIGHTS_WITH_LINES = WEIGHTS[26::3]
+#: Evidence with one line over that without above which there are lines. 150 is called decisive
+#: (Kass and Raftery, *Bayes factors*, J. Am. Stat. Assoc. 90, 1995); bands that are steep or have a
+#: kink reach that, too, if the system is a little off.
+DECISIVE = 1000.0
+#: Weights of spectra rougher than any broad band, and their probability above which there are
+#: lines, too: of many lines one alone explains little.
+ROUGH_WEIGHTS, ROUGH = WEIGHTS[:20], 0.5
+#: A line is sought with widths up to this, every so many fine knots, and with these weights.
+SOUGHT_FWHM_NM, SOUGHT_EVERY, SOUGHT_WEIGHTS = 5.0, 5, WEIGHTS[::3]
+#: Width of the blocks of wavelengths in nm that have lines or not, and the loss of χ² up to which
+#: all blocks without lines together may have none; width of the lines of that search in nm.
+BLOCK_NM, LOSS, SEARCH_FWHM_NM = 10.0, 6.0, 2.5
+#: How far from such a block lines may be, in nm: about a pass band.
+MARGIN_NM = 25.0
+#: Bases that are tried, and the mean distance of their lines in nm, even in its logarithm.
+CANDIDATES, DISTANCE_NM = 300, (1.5, 14.0)
+#: Power to which the likelihood of a basis is taken: that of finitely many bases comes no nearer.
+TEMPER = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class WithLines:
+    """Where a spectrum has lines.
+
+    Attributes
+    ----------
+    dense
+        Basis with lines side by side, there.
+    allowed
+        Whether a fine knot may have a line, shape (q,).
+    stretches_nm
+        First and last wavelength in nm of each stretch that needs lines.
+    """
+
+    dense: Basis
+    allowed: NDArray[np.bool_]
+    stretches_nm: tuple[tuple[float, float], ...]
+
+    def candidates(
+        self, problem: Problem, rng: np.random.Generator
+    ) -> tuple[list[Basis], FloatArray]:
+        """Return bases, and the probability of each by how well it explains the values."""
+        bases = [self._candidate(problem, rng) for _ in range(CANDIDATES)]
+        cost = np.array([problem.likeliest(basis)[1] for basis in bases])
+        return bases, normalised(-TEMPER * cost / 2)
+
+    def _candidate(self, problem: Problem, rng: np.random.Generator) -> Basis:
+        fine = problem.fine_nm
+        width, weight = int(rng.integers(len(FWHM_NM))), float(rng.choice(WEIGHTS_WITH_LINES))
+        distance_nm = float(np.exp(rng.uniform(*np.log(DISTANCE_NM))))
+        gaps = distance_nm * rng.uniform(0.5, 1.5, int(2 * np.ptp(fine) / distance_nm))
+        nm = fine[0] + np.cumsum(gaps) - distance_nm * rng.random()
+        inside = nm[(nm > fine[0]) & (nm < fine[-1])]
+        places = np.unique(np.round((inside - fine[0]) / (fine[1] - fine[0])).astype(np.int_))
+        return Basis(weight, width, places[self.allowed[places]])
+
+
+def lines_of(problem: Problem, log_evidence: FloatArray) -> WithLines | None:
+    """Return where the spectrum has lines; None if it is explained without.
+
+    Parameters
+    ----------
+    problem
+        Values and prior.
+    log_evidence
+        Log evidence of each of `WEIGHTS` without lines.
+    """
+    places, of_one = _evidence_of_one(problem)
+    without = logsumexp(log_evidence)
+    rough = logsumexp(log_evidence[: len(ROUGH_WEIGHTS)]) - without
+    # Evidence is a mean over hypotheses.
+    one = logsumexp(of_one) - np.log(of_one.size) - without + np.log(len(WEIGHTS))
+    if rough < np.log(ROUGH) and one < np.log(DECISIVE):
+        return None
+    best = int(places[np.argmax(of_one.max(axis=(0, 1)))])
+    return _where(problem, best)
+
+
+def _sought(problem: Problem) -> Places:
+    """Return the fine knots at which lines are sought: a knot from the ends."""
+    margin = round((problem.values.knots_nm[1] - problem.values.knots_nm[0]) / _step_nm(problem))
+    return np.arange(margin, len(problem.fine_nm) - margin, SOUGHT_EVERY)
+
+
+def _step_nm(problem: Problem) -> float:
+    return float(problem.fine_nm[1] - problem.fine_nm[0])
+
+
+def _evidence_of_one(problem: Problem) -> tuple[Places, FloatArray]:
+    """Return p places and the log evidence (weights, widths, p) with one line of positive power.
+
+    Smooth spectrum and power are integrated out; that the spectrum is not negative is ignored.
+    """
+    values, places = problem.values, _sought(problem)
+    designs = problem.line_designs[FWHM_NM < SOUGHT_FWHM_NM][:, :, places]
+    tried = np.moveaxis(designs, 1, 0).reshape(len(values.target), -1)
+    direct, length2 = values.target @ tried, (tried**2).sum(axis=0)
+    power = float(np.ptp(values.knots_nm))
+    logs = []
+    for weight in SOUGHT_WEIGHTS.tolist():
+        lower = np.linalg.cholesky(
+            values.design.T @ values.design + problem.prior.precision(weight)
+        )
+        of_smooth = solve_triangular(lower, values.design.T, lower=True)
+        along, explained = of_smooth @ values.target, of_smooth @ tried
+        rest = np.maximum(length2 - (explained**2).sum(axis=0), 0.0)
+        information = rest + power**-2
+        z = (direct - along @ explained) / np.sqrt(information)
+        without = (float(problem.prior.log_determinant(weight)) + along @ along) / 2
+        without -= np.log(np.diag(lower)).sum()
+        occam = np.log(2) - np.log(information * power**2) / 2
+        logs.append(without + z**2 / 2 + occam + log_ndtr(z))
+    return places, np.array(logs).reshape(len(logs), -1, len(places))
+
+
+def _where(problem: Problem, best: int) -> WithLines:
+    """Take lines everywhere, and leave out those of as many blocks as hardly make a difference.
+
+    The block of the `best` single line stays.
+    """
+    fine, places = problem.fine_nm, _sought(problem)
+    weight = float(WEIGHTS_WITH_LINES[0])
+    width = int(np.argmin(np.abs(FWHM_NM - SEARCH_FWHM_NM)))
+    block_of = ((fine - fine[0]) // BLOCK_NM).astype(np.int_)
+    powers, least = problem.likeliest(Basis(weight, width, places))
+    kept = np.ones(block_of[-1] + 1, dtype=np.bool_)
+    light = np.bincount(block_of[places], powers[len(problem.values.knots_nm) :], len(kept))
+    for block in np.argsort(light).tolist():
+        kept[block] = False
+        fewer = places[kept[block_of[places]]]
+        basis = Basis(weight, width, fewer) if len(fewer) else smooth(weight)
+        kept[block] = problem.likeliest(basis)[1] > least + LOSS
+    kept[block_of[best]] = True
+    low_nm = fine[0] + BLOCK_NM * np.flatnonzero(kept)
+    beside_nm = np.maximum(low_nm[:, np.newaxis] - fine, fine - low_nm[:, np.newaxis] - BLOCK_NM)
+    allowed = beside_nm.min(axis=0) < MARGIN_NM
+    allowed[: places[0]] = allowed[places[-1] + 1 :] = False
+    groups = np.split(low_nm, np.flatnonzero(np.diff(low_nm) > BLOCK_NM) + 1)
+    stretches = tuple((float(one[0]), float(one[-1] + BLOCK_NM)) for one in groups)
+    return WithLines(Basis(weight, width, places[allowed[places]]), allowed, stretches)

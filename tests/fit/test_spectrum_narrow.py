@@ -1,0 +1,91 @@
+"""Lines much narrower than the filter's band, in a spectrum of which nothing is known before."""
+
+import numpy as np
+import pytest
+
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum import SpectrumFit, fit_spectrum, system_through_lvf
+from labrig.optics import Spectrum, band_means
+from tests.acceptance.spectrum_lines import BROAD, FINE_NM, light_of
+from tests.fit import lvf_pictures as made
+
+SYSTEM = system_through_lvf(made.curved_lvf(), made.of_the_house(), made.KNOTS_NM)
+#: Draws: few, for speed.
+SAMPLES = 60
+
+
+def gaussian(centre_nm: float, fwhm_nm: float, height: float = 1.0) -> FloatArray:
+    shape: FloatArray = height * np.exp(-np.log(16) * ((FINE_NM - centre_nm) / fwhm_nm) ** 2)
+    return shape
+
+
+def fitted(
+    light: Spectrum, rng: np.random.Generator, snr: float = 300.0, samples: int = SAMPLES
+) -> SpectrumFit:
+    picture = made.photographed(light, made.curved_lvf(), made.of_the_house(), rng, snr)
+    return fit_spectrum(picture.value, picture.sigma, SYSTEM, samples=samples)
+
+
+def pulls(light: Spectrum, fit: SpectrumFit) -> FloatArray:
+    """Errors in σ of the means over 10 nm above 2 % of the largest."""
+    draws = band_means(fit.knots_nm, fit.samples.T, made.EDGES_NM)
+    true = light.in_bands(made.EDGES_NM)
+    bright = true > 0.02 * true.max()
+    result: FloatArray = ((draws.mean(axis=1) - true) / draws.std(axis=1, ddof=1))[bright]
+    return result
+
+
+def test_of_a_line_the_sum_is_known_and_its_division_is_open() -> None:
+    light = Spectrum("line", FINE_NM, gaussian(543.0, 5.0))
+    fit = fitted(light, np.random.default_rng(1))
+    (stretch,) = fit.lines_nm
+    assert stretch[0] < 543 < stretch[1]
+    assert stretch[1] - stretch[0] < 40
+    assert np.abs(pulls(light, fit)).max() < 3
+    around = np.array([518.0, 568.0])
+    draws = band_means(fit.knots_nm, fit.samples.T, around)[0]
+    assert draws.mean() == pytest.approx(float(light.in_bands(around)[0]), rel=0.02)
+    bands = band_means(fit.knots_nm, fit.samples.T, made.EDGES_NM)
+    assert draws.std() / draws.mean() < 0.3 * bands.std(axis=1).max() / bands.mean(axis=1).max()
+
+
+def test_sigma_covers_lines_closer_than_the_band() -> None:
+    rng = np.random.default_rng(2)
+    light = light_of("Eu", rng)
+    fit = fitted(light, rng)
+    assert fit.lines_nm
+    assert np.sqrt(np.mean(pulls(light, fit) ** 2)) < 2
+
+
+def test_broad_spectra_have_no_lines() -> None:
+    for seed, (centre_nm, fwhm_nm) in enumerate([(470.0, 35.0), (530.0, 80.0), (600.0, 110.0)]):
+        light = Spectrum("broad", FINE_NM, gaussian(centre_nm, fwhm_nm))
+        assert fitted(light, np.random.default_rng(seed)).lines_nm == ()
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("kind", "least", "most"),
+    [("line 5", 0.4, 1.3), ("line 5 on a band", 0.4, 1.3), ("two 5 20", 0.4, 1.3),
+     ("Eu", 0.6, 1.5), ("mercury", 0.6, 2.5)],
+)  # fmt: skip
+def test_errors_are_those_that_sigma_says(kind: str, least: float, most: float) -> None:
+    """σ of one line may be twice too large, and too small for one at the border of two bands."""
+    of_all = []
+    for seed in range(12):
+        rng = np.random.default_rng([seed, 5])
+        light = light_of(kind, rng)
+        fit = fitted(light, rng, samples=200)
+        assert fit.lines_nm
+        of_all.append(pulls(light, fit))
+    assert least < np.sqrt(np.mean(np.square(np.concatenate(of_all)))) < most
+
+
+@pytest.mark.campaign
+def test_at_most_one_broad_spectrum_of_a_hundred_has_lines() -> None:
+    alarms = 0
+    for seed in range(100):
+        rng = np.random.default_rng([seed, 6])
+        fit = fitted(light_of(BROAD, rng), rng, float(10 ** rng.uniform(2, 3)), samples=2)
+        alarms += bool(fit.lines_nm)
+    assert alarms <= 1
