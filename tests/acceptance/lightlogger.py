@@ -12,6 +12,7 @@ states, and what σ noise alone would leave if the sensitivities were known.
 """
 
 import csv
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -92,7 +93,7 @@ def sensor(trained: list[Setting]) -> SpectralSystem:
     for channel in range(18):
         readings = np.array([setting.reading[channel] for setting in trained])
         sigma = np.hypot(RELATIVE_SIGMA * readings, MIN_FRACTION * readings.max())
-        fit = fit_spectrum(readings, sigma, SpectralSystem(KNOTS_NM, lights))
+        fit = fit_spectrum(readings, sigma, SpectralSystem(KNOTS_NM, lights), decisive=math.inf)
         design.append(_in_knots(Spectrum("channel", KNOTS_NM, fit.value)))
         deviation = (fit.samples - fit.value) / np.sqrt(len(fit.samples))
         _, strength, direction = np.linalg.svd(deviation, full_matrices=False)

@@ -30,7 +30,7 @@ from labrig.analyse.frames import (
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.errors import DataError
-from labrig.fit.spectrum import SpectrumFit, fit_spectrum
+from labrig.fit.spectrum import DECISIVE, SpectrumFit, fit_spectrum
 from labrig.protocols.emission_spectrum import SpectrumFrames, lamp_of
 from labrig.reduce import SeriesFrame
 from labrig.results import (
@@ -42,6 +42,9 @@ from labrig.results import (
     is_usable,
 )
 
+#: Evidence of lines that is asked for where no grey card tells how far the camera's curves are off:
+#: broad emissions reach 7000.
+DECISIVE_WITHOUT_CARD = 2e4
 #: Number of draws of the spectrum, and of those that are only shown.
 SAMPLES, FEW_SAMPLES = 400, 60
 #: Least brightness after another lamp relative to the glow left of the previous charge.
@@ -112,7 +115,13 @@ def _patch_spectrum(
     run = part.run.folder.resolve().name
 
     def fitted(frame: CombinedFrame, samples: int) -> SpectrumFit:
-        return fit_spectrum(frame.value, frame.sigma, model.system, samples=samples)
+        return fit_spectrum(
+            frame.value,
+            frame.sigma,
+            model.system,
+            samples=samples,
+            decisive=DECISIVE if model.white_reference else DECISIVE_WITHOUT_CARD,
+        )
 
     def spectrum_by(fit: SpectrumFit, lamp: str) -> EmissionSpectrum:
         return EmissionSpectrum.from_draws(

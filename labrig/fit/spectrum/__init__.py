@@ -6,10 +6,12 @@ from labrig.fit.spectrum.fit import (
     fit_spectrum,
 )
 from labrig.fit.spectrum.line import LineFit, fit_line
+from labrig.fit.spectrum.lines import DECISIVE
 from labrig.fit.spectrum.minimum import nonnegative_minimum
 from labrig.fit.spectrum.system import CurveError, SpectralSystem, curve_modes, system_through_lvf
 
 __all__ = [
+    "DECISIVE",
     "BandedSpectrum",
     "CurveError",
     "LineFit",

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.basis import Basis, Problem, smooth
-from labrig.fit.spectrum.lines import WithLines, lines_of
+from labrig.fit.spectrum.lines import DECISIVE, WithLines, lines_of
 from labrig.fit.spectrum.minimum import nonnegative_minimum
 from labrig.fit.spectrum.smooth import WEIGHTS, Prior, Whitened, normalised
 from labrig.fit.spectrum.system import SpectralSystem
@@ -99,6 +99,7 @@ def fit_spectrum(
     *,
     samples: int = SAMPLES,
     seed: int = 0,
+    decisive: float = DECISIVE,
 ) -> SpectrumFit:
     """Fit the spectrum that explains some values.
 
@@ -113,6 +114,9 @@ def fit_spectrum(
         Number of draws.
     seed
         Seed of the draws: the same values give the same spectrum.
+    decisive
+        Evidence of a narrow line over that of none from which the spectrum has lines; inf where
+        there can be none, as in the sensitivity of a channel.
 
     Raises
     ------
@@ -139,7 +143,7 @@ def fit_spectrum(
 
     problem, x, misfit = settled(flat, None)
     log_evidence = prior.log_evidence(problem.values)
-    lines = lines_of(problem, log_evidence)
+    lines = None if np.isinf(decisive) else lines_of(problem, log_evidence, decisive)
     if lines is not None:
         problem, x, misfit = settled(x, lines)
     rng = np.random.default_rng(seed)

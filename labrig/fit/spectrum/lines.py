@@ -77,7 +77,7 @@ class WithLines:
         return Basis(weight, width, places[self.allowed[places]])
 
 
-def lines_of(problem: Problem, log_evidence: FloatArray) -> WithLines | None:
+def lines_of(problem: Problem, log_evidence: FloatArray, decisive: float) -> WithLines | None:
     """Return where the spectrum has lines; None if it is explained without.
 
     Parameters
@@ -86,13 +86,15 @@ def lines_of(problem: Problem, log_evidence: FloatArray) -> WithLines | None:
         Values and prior.
     log_evidence
         Log evidence of each of `WEIGHTS` without lines.
+    decisive
+        Evidence with one line over that without above which there are lines.
     """
     places, of_one = _evidence_of_one(problem)
     without = logsumexp(log_evidence)
     rough = logsumexp(log_evidence[: len(ROUGH_WEIGHTS)]) - without
     # Evidence is a mean over hypotheses.
     one = logsumexp(of_one) - np.log(of_one.size) - without + np.log(len(WEIGHTS))
-    if rough < np.log(ROUGH) and one < np.log(DECISIVE):
+    if rough < np.log(ROUGH) and one < np.log(decisive):
         return None
     best = int(places[np.argmax(of_one.max(axis=(0, 1)))])
     return _where(problem, best)
