@@ -135,6 +135,7 @@ CAMPAIGNS = {
             called="decay_states_that_hide",
         ),
         _module("sao_charge_and_decay"),
+        _module("excitation_light"),
         _module("trap_models"),
         _module("lightlogger"),
         _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),

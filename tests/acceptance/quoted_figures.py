@@ -228,7 +228,18 @@ def _most_that_returns(printed: str) -> str:
 
 
 FLUORESCENT = f"{HOW_TO}/fluorescent.md"
+
+
+def _light_errors(printed: str) -> str:
+    pulls = dict(re.findall(r"^(?!layer)(.*): pulls ([\d.]+);", printed, re.M))
+    blue = dict(re.findall(r"^(\S.*?) +blue-paint .* σ +([\d.]+) %  closure", printed, re.M))
+    return "\n".join(
+        f"| {case} | {pull} | {float(blue[case]):.1f} |" for case, pull in pulls.items()
+    )
+
+
 QUOTES = (
+    Quote(f"{EXPLANATION}/excitation_fit.md", "excitation_light", _light_errors),
     *quoted_examples.QUOTES,
     *quoted_decay_fit.QUOTES,
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _charging),

@@ -190,6 +190,12 @@ def _real_charge_of_general_order(printed: str) -> str:
     return f"{charge:.1f}, {decay:.1f}"
 
 
+def _light_errors(printed: str) -> str:
+    # The last case is a thick layer, which no light explains.
+    (pulls,) = columns(r"^(?!layer).*: pulls ([\d.]+);", printed)
+    return f"rms of error over σ {span(pulls, 2)}"
+
+
 def _trap_models(order: str) -> Extract:
     """Return the extract of how many materials were predicted how, processed with an order."""
 
@@ -521,6 +527,12 @@ FIGURES = (
         "charge, in the decay",
         "sao_charge_and_decay",
         _real_charge_of_general_order,
+    ),
+    Figure(
+        "Excitation rates k_e ≥ 0.002 /s of six paints with the light as it is stated, and with "
+        "places, wavelengths or the lamp further off than anybody says, 60 runs each",
+        "excitation_light",
+        _light_errors,
     ),
     Figure(
         "Charging by the white lamp and decay predicted from an excitation of traps of first and "

@@ -67,7 +67,7 @@ def test_broad_spectra_have_no_lines() -> None:
 @pytest.mark.parametrize(
     ("kind", "least", "most"),
     [("line 5", 0.4, 1.3), ("line 5 on a band", 0.4, 1.3), ("two 5 20", 0.4, 1.3),
-     ("Eu", 0.6, 1.5), ("mercury", 0.6, 2.5)],
+     ("Eu", 0.6, 2.5), ("mercury", 0.6, 2.5)],
 )  # fmt: skip
 def test_errors_are_those_that_sigma_says(kind: str, least: float, most: float) -> None:
     """σ of one line may be twice too large, and too small for one at the border of two bands."""
