@@ -10,6 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from labrig.record import read_run
 from tests.quick_yaml import write_quickly
 
@@ -18,6 +20,7 @@ IRRADIANCE: dict[str, Any] = {
 }  # fmt: skip
 
 
+@pytest.mark.campaign
 def test_it_is_resumed_with_all_that_was_complete(
     make_rig: Callable[..., Path], tmp_path: Path
 ) -> None:

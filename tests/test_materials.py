@@ -47,7 +47,10 @@ def check(fit: dict[str, Any], name: str) -> None:
         assert state["k_r_sigma_per_s"] < 0.1 * k_r_per_s, "a σ of nothing proves nothing"
 
 
-@pytest.mark.parametrize("name", ["double-close-uneven", "double-medium-faint"])
+@pytest.mark.parametrize(
+    "name",
+    ["double-close-uneven", pytest.param("double-medium-faint", marks=pytest.mark.campaign)],
+)
 def test_two_states_are_distinguished(
     labrig: Labrig, make_rig: Make, tmp_path: Path, name: str
 ) -> None:

@@ -98,6 +98,7 @@ def test_without_curves_channels_have_to_be_named(tmp_path: Path) -> None:
     assert np.isnan(result.yarns[0].reflected_at_most)
 
 
+@pytest.mark.campaign
 def test_views_that_are_missing_are_named_and_the_others_used(both: Part) -> None:
     part, attempts = both, both.run.attempts
 
@@ -172,6 +173,7 @@ def test_a_sphere_is_lambertian_in_re_radiation_and_not_in_reflection(tmp_path: 
     assert reflected.shading.roughness_deg.value == pytest.approx(21.0, abs=3.0)
 
 
+@pytest.mark.campaign
 def test_what_a_sphere_loses_to_the_side_is_found(tmp_path: Path) -> None:
     run = record_sphere(tmp_path, {}, repositioning=0.01, reradiation_anisotropy=0.06)
     known = analyse(part_of(run, Inputs(camera=true_camera(run))))

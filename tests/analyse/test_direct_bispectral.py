@@ -222,6 +222,7 @@ def test_a_wrong_light_is_named_and_the_others_are_kept(
     assert len(columns.lights) == kept
 
 
+@pytest.mark.campaign
 def test_lights_in_another_order_and_a_sample_that_bleaches_are_said(quick: Path) -> None:
     swapped = {
         f"{stage}: {to}": (0.0, {f"{stage}: {by}": 1.0})
@@ -258,6 +259,7 @@ def test_what_the_room_adds_is_said_and_subtracted(tmp_path: Path) -> None:
     assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
 
 
+@pytest.mark.campaign
 def test_light_that_comes_after_the_dark_is_said_and_subtracted(tmp_path: Path) -> None:
     leak = {"ambient_light": {"level": "0.5 %", "at": "1 min"}}
     run = record(tmp_path, QUICK | {"leds": ["430 nm"]}, faults=[leak])
@@ -278,6 +280,7 @@ def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Pa
     assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
 
 
+@pytest.mark.campaign
 def test_filters_before_the_lamp_are_lights_too_and_leaks_are_said(tmp_path: Path) -> None:
     filters = {"filters": ["bandpass-425", "bandpass-475"], "samples": ["yellow-textile"]}
     result = analyse(part_of(record(tmp_path, filters | {"repetitions": 4})))

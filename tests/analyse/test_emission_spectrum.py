@@ -186,6 +186,7 @@ def test_a_mercury_lamp_that_did_not_light_is_reported(tmp_path: Path) -> None:
     assert any("did not light" in warning for warning in found.warnings)
 
 
+@pytest.mark.campaign
 def test_lines_narrower_than_the_band_are_reported(tmp_path: Path) -> None:
     content = read_quickly(two_colours(tmp_path / "lines.yaml").read_text())
     content["states"] = content["states"][1:]

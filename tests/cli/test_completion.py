@@ -29,13 +29,9 @@ def completed(typed: str, folder: Path) -> list[str]:
         ("labrig pla", ["plan"]),
         ("labrig run dec", ["decay", "decay-eleven"]),
         ("labrig run ./my-", []),  # the shell completes files itself
-        ("labrig plan decay --rig sim-p", ["sim-phosphor"]),
         ("labrig rig use sim-p", ["sim-phosphor"]),
         ("labrig plan decay --predict gre", ["green-paint"]),
         ("labrig resume la", ["last"]),
-        ("labrig process 2026-01-02", ["2026-01-02_b"]),
-        ("labrig figures la", ["last"]),
-        ("labrig compare 2026-01-01", ["2026-01-01_a"]),
         ("labrig runs show 2026-01-0", ["2026-01-02_b", "2026-01-01_a"]),
         ("labrig watch --runs elsewhere 2026", ["2026-01-03_c"]),
         ("labrig watch --runs nowhere 2026", []),

@@ -139,6 +139,7 @@ def test_a_free_offset_hides_no_flicker() -> None:
         assert 0.0045 < each.flicker < 0.0105
 
 
+@pytest.mark.campaign
 def test_the_drift_of_a_lamp_is_in_sigma() -> None:
     """Frames that err together tell less than independent ones."""
     pulls, told = [], 0

@@ -384,6 +384,7 @@ def test_postits_have_at_most_the_reference_error(colour: str) -> None:
     assert_allclose(fits[3].masked_mse, error(fits[3].mixture, wanted), rtol=1e-9)
 
 
+@pytest.mark.campaign
 @shared_data
 @needs_bispectral
 def test_measured_materials_are_four_components_to_a_millionth() -> None:

@@ -113,6 +113,7 @@ def test_with_the_curves_of_another_camera_it_still_is(tmp_path: Path) -> None:
     assert np.all(np.abs(fraction - true) < 3 * sigma + 1e-3)
 
 
+@pytest.mark.campaign
 def test_what_glows_after_the_lamp_is_no_glowing_bodys(tmp_path: Path) -> None:
     """A hundredth of a per cent that fades within a minute, as of a lamp's phosphor."""
 

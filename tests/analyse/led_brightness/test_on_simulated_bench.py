@@ -253,6 +253,7 @@ def test_light_of_the_room_is_subtracted_and_said(tmp_path: Path) -> None:
     assert np.abs(pulls(result, run)).max() < 3
 
 
+@pytest.mark.campaign
 def test_what_clips_at_the_shortest_exposure_is_left_to_the_spectrometer(tmp_path: Path) -> None:
     def bright(rig: Rig) -> None:
         rig["simulation"]["leds"][4]["level"] = "100 %"
@@ -266,6 +267,7 @@ def test_what_clips_at_the_shortest_exposure_is_left_to_the_spectrometer(tmp_pat
     assert result.leds["490 nm"].by_camera is None
 
 
+@pytest.mark.campaign
 def test_drift_is_reported_and_in_sigma(tmp_path: Path) -> None:
     def warming(rig: Rig) -> None:
         for led in rig["simulation"]["leds"]:
@@ -305,6 +307,7 @@ def changed_curves(folder: Path, change: Callable[[list[float]], None]) -> str:
     return str(changed)
 
 
+@pytest.mark.campaign
 def test_a_channel_that_sees_nothing_is_left_out(tmp_path: Path) -> None:
     """A filter before the lens, or another order of channels in the curves' file."""
 

@@ -158,6 +158,7 @@ def test_busy_may_mean_that_it_has_released_all_the_same(toy: ToyBench) -> None:
         assert toy.log().count("trigger") == 2
 
 
+@pytest.mark.campaign
 def test_a_camera_that_stays_busy(toy: ToyBench) -> None:
     with toy.connected({}, {"files": [NEF] * 4, "busy": 3}, clock=FastClock()) as camera:
         camera.configure(SETTINGS)

@@ -207,6 +207,7 @@ class TestRealTiles:
             )
         assert 0.7 < np.sqrt(np.mean(pulls[:, ULTRAVIOLET] ** 2)) < 1.2
 
+    @pytest.mark.campaign
     def test_tiles_do_not_reradiate_and_papers_do(self) -> None:
         tiles = [tile for half in real_tiles() for tile in half]
         assert np.mean([reradiates(with_sigma(tile)) for tile in tiles]) < 0.02
