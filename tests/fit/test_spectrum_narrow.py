@@ -1,4 +1,7 @@
-"""Lines much narrower than the filter's band, in a spectrum of which nothing is known before."""
+"""Lines much narrower than the filter's band, in a spectrum of which nothing is known before.
+
+Errors over σ of many lights, and false alarms: `tests.acceptance.spectrum_lines`.
+"""
 
 import numpy as np
 import pytest
@@ -6,7 +9,7 @@ import pytest
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import SpectrumFit, fit_spectrum, system_through_lvf
 from labrig.optics import Spectrum, band_means
-from tests.acceptance.spectrum_lines import BROAD, FINE_NM, light_of
+from tests.acceptance.spectrum_lines import FINE_NM, light_of
 from tests.fit import lvf_pictures as made
 
 SYSTEM = system_through_lvf(made.curved_lvf(), made.of_the_house(), made.KNOTS_NM)
@@ -61,31 +64,3 @@ def test_broad_spectra_have_no_lines() -> None:
     for seed, (centre_nm, fwhm_nm) in enumerate([(470.0, 35.0), (530.0, 80.0), (600.0, 110.0)]):
         light = Spectrum("broad", FINE_NM, gaussian(centre_nm, fwhm_nm))
         assert fitted(light, np.random.default_rng(seed)).lines_nm == ()
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("kind", "least", "most"),
-    [("line 5", 0.4, 1.3), ("line 5 on a band", 0.4, 1.3), ("two 5 20", 0.4, 1.3),
-     ("Eu", 0.6, 2.5), ("mercury", 0.6, 2.5)],
-)  # fmt: skip
-def test_errors_are_those_that_sigma_says(kind: str, least: float, most: float) -> None:
-    """σ of one line may be twice too large, and too small for one at the border of two bands."""
-    of_all = []
-    for seed in range(12):
-        rng = np.random.default_rng([seed, 5])
-        light = light_of(kind, rng)
-        fit = fitted(light, rng, samples=200)
-        assert fit.lines_nm
-        of_all.append(pulls(light, fit))
-    assert least < np.sqrt(np.mean(np.square(np.concatenate(of_all)))) < most
-
-
-@pytest.mark.campaign
-def test_at_most_one_broad_spectrum_of_a_hundred_has_lines() -> None:
-    alarms = 0
-    for seed in range(100):
-        rng = np.random.default_rng([seed, 6])
-        fit = fitted(light_of(BROAD, rng), rng, float(10 ** rng.uniform(2, 3)), samples=2)
-        alarms += bool(fit.lines_nm)
-    assert alarms <= 1
