@@ -33,6 +33,7 @@ print("fine")
 """
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("before", "as_folders"), [("", True), ("import sim, config, drivers, protocols", False)]
 )

@@ -179,6 +179,7 @@ def test_states_of_different_colours_are_reported(tmp_path: Path) -> None:
     assert any("the spectrum changes with time" in warning for warning in found.warnings)
 
 
+@pytest.mark.campaign
 def test_a_mercury_lamp_that_did_not_light_is_reported(tmp_path: Path) -> None:
     keys = QUICK | {"lamps": ["halogen", "mercury"], "white": False, "times": ["2 s", "12 s"]}
     run = record(tmp_path, keys, faults=["mercury_dead"])

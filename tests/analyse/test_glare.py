@@ -53,6 +53,7 @@ def camera(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return run.calibration
 
 
+@pytest.mark.campaign
 def test_the_trap_shows_the_lens_glare(camera: CameraFile) -> None:
     assert camera.glare is not None
     assert abs(camera.glare.fraction - GLARE) < 3 * camera.glare.sigma

@@ -45,6 +45,7 @@ def wired() -> Iterator[Wired]:
         yield Wired(address, lit)
 
 
+@pytest.mark.campaign
 def test_the_second_is_refused_and_the_lock_dies_with_the_first(
     wired: Wired, tmp_path: Path
 ) -> None:

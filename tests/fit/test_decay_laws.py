@@ -91,6 +91,7 @@ def test_beyond_three_times_the_measured_time_there_is_a_bracket_without_sigma()
     assert (true < 1.2 * forecast.high).all()
 
 
+@pytest.mark.campaign
 def test_the_errors_of_the_averaged_signal_are_as_large_as_their_sigma() -> None:
     pulls = []
     at_s = np.array([5.0, 150.0, 600.0])

@@ -132,6 +132,7 @@ def test_flicker_from_the_data_whatever_the_law(decay: truths.Decay, true_flicke
     assert 0.6 < np.std(found) / claimed < 1.5
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("decay", "name"),
     [

@@ -154,6 +154,7 @@ def test_a_run_that_cannot_be_fitted_does_not_stop_the_others(
     ] == "processed"
 
 
+@pytest.mark.campaign
 def test_another_sample_is_asked_for(make_rig: Make, make_protocol: Make, tmp_path: Path) -> None:
     make_rig(), make_protocol()
     names = ("red", "red", "blue")
