@@ -14,6 +14,7 @@ from labrig.errors import DataError
 from labrig.results import (
     EXPONENTIALS,
     LAW_LABELS,
+    LAW_SYMBOLS,
     FittedDecay,
     FittedLaw,
     Measured,
@@ -24,13 +25,6 @@ from labrig.yaml_file import read_yaml
 #: Significance level below which rates differ.
 DIFFERENT_P = 0.01
 NO_GAIN = Measured(1.0, 0.0)
-#: Symbols and units of the parameters of laws; τ belongs to the charge.
-LAW_SYMBOLS = {
-    "decay_time_s": ("τ", "s"),
-    "exponent": ("exponent", ""),
-    "kinetic_order": ("b", ""),
-    "retrapping": ("retrapping", ""),
-}
 #: Smallest p-value that is reported as a number.
 MIN_P = 1e-9
 
@@ -192,7 +186,7 @@ def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> Pat
     laws, counts = (a.law, b.law), (len(a.rates), len(b.rates))
     if a.law != b.law:
         return PatchComparison(name, laws, counts, (), math.nan, gain_b)
-    law_a, law_b = _chosen_law(a), _chosen_law(b)
+    law_a, law_b = a.chosen_law, b.chosen_law
     if law_a is not None and law_b is not None:
         differences, p_value = _differences_of_laws(law_a, law_b, a.brightest_channel, gain_b)
         return PatchComparison(name, laws, counts, differences, p_value, gain_b)
@@ -211,11 +205,6 @@ def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> Pat
     chi2 = sum(difference.pull**2 for difference in rates)
     p_value = float(chdtrc(len(rates), chi2))
     return PatchComparison(name, laws, counts, (*rates, *amplitudes), p_value, gain_b)
-
-
-def _chosen_law(fit: FittedDecay) -> FittedLaw | None:
-    """Return the law that describes the decay; None if it is a sum of exponentials."""
-    return next((law for law in fit.laws if law.name == fit.law), None)
 
 
 def _differences_of_laws(

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -168,6 +168,8 @@ def _print_runs(summaries: Sequence["RunSummary"]) -> None:
     """Print a table; never folded, so that every name can be copied."""
     from rich.cells import cell_len
 
+    from labrig.results import with_uncertainty
+
     def padded(text: str, width: int) -> str:
         return text + " " * (width - cell_len(text))
 
@@ -176,14 +178,16 @@ def _print_runs(summaries: Sequence["RunSummary"]) -> None:
     ]
     heading = ("run", "sample", "status")
     widths = [max(map(cell_len, column)) for column in zip(heading, *rows, strict=True)]
-    lines = ["  ".join([*map(padded, heading, widths), "k_r in 1/s"])]
+    lines = ["  ".join([*map(padded, heading, widths), "k_r in 1/s, or law"])]
     for run, (name, sample, status) in zip(summaries, rows, strict=True):
-        rates = [_printable(_short_rates(*patch)) for patch in run.rates.items()] or [""]
+        decays = [
+            _printable(_decay_text(*decay, with_uncertainty)) for decay in run.parameters.items()
+        ] or [""]
         cells = [padded(name, widths[0]), padded(sample, widths[1]), padded(status, widths[2])]
         if run.status in _COLOURS:
             cells[2] = typer.style(cells[2], fg=_COLOURS[run.status])
-        lines.append("  ".join([*cells, rates[0]]).rstrip())
-        lines += [" " * (sum(widths) + 6) + rate for rate in rates[1:]]
+        lines.append("  ".join([*cells, decays[0]]).rstrip())
+        lines += [" " * (sum(widths) + 6) + decay for decay in decays[1:]]
     typer.echo("\n".join(lines))
 
 
@@ -227,13 +231,15 @@ def _print_comparison(comparison: "Comparison") -> None:
 
 def _print_results(folder: Path) -> None:
     """Print each result and the settings in which it differs from the one before it."""
+    from labrig.number_format import plus_minus
     from labrig.process import other_settings
     from labrig.results import read_fitted_decays
 
     results = _result_folders(folder)
     for result, before in itertools.zip_longest(results, results[1:]):
         for patch, fit in read_fitted_decays(folder / result).items():
-            typer.echo(f"  {result}: {_rates(patch, fit.rates)} /s")
+            unit = " /s" if fit.chosen_law is None else ""
+            typer.echo(f"  {result}: {_decay_text(patch, fit.parameters, plus_minus)}{unit}")
             for warning in fit.warnings:
                 typer.echo(f"    warning: {warning}")
         if before is not None:
@@ -250,18 +256,18 @@ def _result_folders(folder: Path) -> list[str]:
     return ["result", *earlier]
 
 
-def _rates(patch: str, rates: Sequence["Measured"]) -> str:
-    from labrig.number_format import plus_minus
+def _decay_text(
+    patch: str,
+    parameters: Mapping[str, "Measured"],
+    number_text: Callable[[float, float], str],
+) -> str:
+    """Return the rates of a decay, or the parameters of its law with their symbols and units."""
+    from labrig.results import parameter_text
 
-    text = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in rates)
-    return f"{patch}: {text}" if patch else text
-
-
-def _short_rates(patch: str, rates: Sequence["Measured"]) -> str:
-    """Return the rates with σ in units of the last digits, so that they fit on a line."""
-    from labrig.results import with_uncertainty
-
-    text = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in rates)
+    text = ",  ".join(
+        parameter_text(name, number_text(each.value, each.sigma))
+        for name, each in parameters.items()
+    )
     return f"{patch}: {text}" if patch else text
 
 

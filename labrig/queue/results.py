@@ -77,7 +77,7 @@ class QueueEntry:
         """States of the decays that the run found."""
         if self.summary is None:
             return
-        for patch in self.summary.rates:
+        for patch in self.summary.parameters:
             fit = read_fitted_decay(self.summary.folder / "result" / patch / "fit.json")
             for number, state in enumerate(fit.states, 1):
                 yield FoundState(

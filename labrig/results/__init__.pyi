@@ -85,10 +85,12 @@ from .fitted_law import (
     LAW_CHOICES as LAW_CHOICES,
     LAW_LABELS as LAW_LABELS,
     LAW_NAMES as LAW_NAMES,
+    LAW_SYMBOLS as LAW_SYMBOLS,
     RATE_SPECTRUM as RATE_SPECTRUM,
     DecayForecast as DecayForecast,
     FittedLaw as FittedLaw,
     FittedRateSpectrum as FittedRateSpectrum,
+    parameter_text as parameter_text,
     require_law as require_law,
 )
 from .irradiance import (
