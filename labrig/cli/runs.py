@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.wording import counted, measurement
+from labrig.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
@@ -27,7 +28,8 @@ class _ListsByDefault(TyperGroup):
 
 
 app = typer.Typer(
-    help="The runs in a folder: list (the default, with its options), show one, compare two.",
+    help="The runs in a folder: list (the default, with its options), show one, compare two, "
+    "depths of traps from several.",
     cls=_ListsByDefault,
 )
 
@@ -151,6 +153,67 @@ def compare(
         _print_comparison(comparison)
 
 
+@app.command("trap-depth")
+def trap_depth(
+    run: Annotated[
+        list[str],
+        typer.Argument(help="Runs of one sample at two temperatures or more."),
+    ],
+    runs: Runs = Path("runs"),
+    temperatures: Annotated[
+        str | None,
+        typer.Option(
+            help="Temperature of each run in °C, '15, 21, 30'; without it that of the thermometer."
+        ),
+    ] = None,
+    temperature_sigma: Annotated[
+        str, typer.Option(help="σ of each temperature, such as '0.1 K'.")
+    ] = "0.3 K",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for trap_depth.json, the page, its figure.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Depths of traps from decays at several temperatures, by Arrhenius' law."""
+    from labrig.catalogue import find_run, trap_depths
+    from labrig.process import report_trap_depths
+    from labrig.results import trap_depths_json
+
+    folders = [find_run(Path(each), runs) for each in run]
+    depths = trap_depths(
+        folders, _temperatures_c(temperatures), _temperature_sigma_k(temperature_sigma)
+    )
+    names = tuple(folder.name for folder in folders)
+    if json:
+        typer.echo(trap_depths_json(depths, names))
+    else:
+        for each in depths:
+            place = f"{each.patch}, state {each.number}" if each.patch else f"state {each.number}"
+            typer.echo(f"{place}\n{each.depth}\n")
+    if out is not None:
+        typer.echo(f"report: {report_trap_depths(depths, names, out)}", err=json)
+
+
+def _temperatures_c(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        return [float(part.strip().removesuffix("C").rstrip(" °")) for part in text.split(",")]
+    except ValueError:
+        raise UsageError(
+            f"--temperatures: expected numbers in °C such as '15, 21, 30', got '{text}'"
+        ) from None
+
+
+def _temperature_sigma_k(text: str) -> float:
+    from labrig.quantity import TEMPERATURE_STEP_K, parse
+
+    try:
+        return parse(text, TEMPERATURE_STEP_K)
+    except ValueError as error:
+        raise UsageError(f"--temperature-sigma: {error}") from None
+
+
 def note(
     run: Run,
     text: Annotated[str, typer.Argument(help="What there is to say; Markdown if you like.")],
@@ -204,6 +267,8 @@ def _print_comparison(comparison: "Comparison") -> None:
 
     for key, value_a, value_b in comparison.protocol_differences:
         typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
+    for warning in comparison.warnings:
+        typer.echo(f"warning: {warning}")
     if comparison.missing:
         typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
     if not comparison.patches:

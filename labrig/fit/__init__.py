@@ -25,6 +25,7 @@ from labrig.fit.mixture import (
     fit_mixture,
     fit_mixture_texture,
 )
+from labrig.fit.trap_depth import fit_trap_depth
 
 __all__ = [
     "EPSILON",
@@ -48,6 +49,7 @@ __all__ = [
     "fit_luminance",
     "fit_mixture",
     "fit_mixture_texture",
+    "fit_trap_depth",
     "least_squares",
     "separate_columns",
 ]

@@ -84,3 +84,7 @@ from .sweep import (
     SweptPoint as SweptPoint,
     sweep_chart as sweep_chart,
 )
+from .trap_depth import (
+    trap_depth_chart as trap_depth_chart,
+    trap_depth_report as trap_depth_report,
+)

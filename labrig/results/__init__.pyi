@@ -188,6 +188,11 @@ from .series_table import (
 from .table_columns import (
     TableLayout as TableLayout,
 )
+from .trap_depth import (
+    StateDepth as StateDepth,
+    TrapDepth as TrapDepth,
+    trap_depths_json as trap_depths_json,
+)
 from .validate_illuminants import (
     LampComparison as LampComparison,
     LampPatch as LampPatch,

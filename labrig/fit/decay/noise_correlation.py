@@ -28,9 +28,9 @@ from labrig.fit.least_squares import FloatArray
 #: gives the flicker has measured it, and would have seen how a steady light drifts.
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92, 0.97])
 PRIOR_OF_NONE, PRIOR_OF_NONE_IF_GIVEN = 0.85, 0.95
-#: Factor by which the data raise the odds of a correlation from which a warning says so: substantial
-#: evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of 1200 series with independent
-#: noise five have it.
+#: Factor by which the data raise the odds of a correlation from which a warning says so:
+#: substantial evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of 1200 series
+#: with independent noise five have it.
 TOLD = 5.0
 #: Factors c that are weighed: noise that correlates is larger than its scatter about a curve that
 #: follows it. The flicker c ρ has half a Student's t distribution with 3 degrees of freedom before
