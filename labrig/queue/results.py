@@ -14,7 +14,8 @@ import numpy as np
 
 from labrig.acquire import read_protocol
 from labrig.catalogue import RunSummary, summarise
-from labrig.errors import LabrigError
+from labrig.errors import FitError, LabrigError
+from labrig.fit import fit_power_law
 from labrig.process import describe_without_run, write_with_report
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
@@ -25,6 +26,14 @@ SWEPT: tuple[tuple[str, str, str, Callable[["FoundState"], Measured]], ...] = (
     ("rates-{}", "Decay rates", "k_r / s⁻¹", lambda state: state.k_r_per_s),
     ("amplitudes-{}", "Amplitudes at lamp off", "Amplitude", lambda state: state.amplitude),
 )
+#: Heads of the table of slopes, and what it shows.
+SLOPE_HEAD = ("Quantity", "slope", "p")
+SLOPES = (
+    "Slopes with both axes logarithmic, d ln(quantity)/d ln(key), with σ in units of the last "
+    "places: 1 is proportional. p is the probability of values further from one slope."
+)
+#: Probability below which one slope does not describe the values.
+NO_SLOPE = 0.01
 #: Status before the run, beside those of runs.
 WAITING = "waiting"
 
@@ -257,7 +266,9 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
         for texts, points in [_swept(listed, key, quantity)]
         if (chart := sweep_chart(key, texts, label, points)) is not None
     )
-    swept = (Section("Over what was changed", figures=figures),) if figures else ()
+    slopes = tuple(row for key in keys for row in _slopes(listed, key))
+    tables = (Table(SLOPE_HEAD, slopes, SLOPES),) if slopes else ()
+    swept = (Section("Over what was changed", figures=figures, tables=tables),) if figures else ()
     about = describe_without_run(name, "queue", "", ())
     warnings = [f"no. {entry.number}: {text}" for entry in listed for text in entry.warnings]
     return Report(about, tuple(warnings), (runs, *swept))
@@ -276,6 +287,22 @@ def _rates(entry: QueueEntry) -> list[str]:
         ", ".join(str(state.k_r_per_s) for state in of_patch)
         for _, of_patch in groupby(entry.states, key=lambda state: state.patch)
     ]
+
+
+def _slopes(listed: Sequence[QueueEntry], key: str) -> Iterator[tuple[str, ...]]:
+    """Iterate over the slopes of quantities over a key, in logarithms, where they are told."""
+    for _, what, _, quantity in SWEPT:
+        points = _swept(listed, key, quantity)[1]
+        for patch, state in dict.fromkeys((point.patch, point.state) for point in points):
+            own = [point for point in points if (point.patch, point.state) == (patch, state)]
+            try:
+                law = fit_power_law([point.at for point in own], [point.measured for point in own])
+            except FitError:
+                continue
+            place = f"state {state}, {patch}" if patch else f"state {state}"
+            is_one = law.p_value >= NO_SLOPE
+            slope = str(law.exponent) if is_one else "not one slope"
+            yield f"{what}, {place}, over {key}", slope, f"{law.p_value:.2g}"
 
 
 def _swept(

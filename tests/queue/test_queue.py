@@ -84,7 +84,7 @@ def test_a_sweep_is_added_run_and_shown(
     rig, protocol = make_rig(), make_protocol()
     added = labrig(
         "queue", "add", protocol, "--rig", rig, "--set", "sample.name=paint", *queue,
-        "--sweep", "charge=[16 min, 30 min]",
+        "--sweep", "charge=[16 min, 20 min, 30 min]",
     )  # fmt: skip
     assert added.code == 0, added.err
     ended = labrig("queue", "run", *queue, *runs)
@@ -93,7 +93,7 @@ def test_a_sweep_is_added_run_and_shown(
     page = ended.run_folder.read_text("utf-8")
     with (tmp_path / "night-results/results.csv").open(encoding="utf-8", newline="") as table:
         rows = list(csv.DictReader(table))
-    assert [row["charge"] for row in rows] == ["16 min", "30 min"]
+    assert [row["charge"] for row in rows] == ["16 min", "20 min", "30 min"]
     for row in rows:
         k, sigma = float(row["k_r_per_s"]), float(row["k_r_sigma_per_s"])
         assert abs(k - 0.0322) < 4 * sigma
@@ -101,10 +101,13 @@ def test_a_sweep_is_added_run_and_shown(
     made: list[Any] = [
         read_protocol(tmp_path / "runs" / row["run"] / "protocol.yaml") for row in rows
     ]
-    assert [(one.charge, one.sample.name) for one in made] == [(960, "paint"), (1800, "paint")]
+    assert [(one.charge, one.sample.name) for one in made] == [
+        (960, "paint"), (1200, "paint"), (1800, "paint")
+    ]  # fmt: skip
     assert (tmp_path / "night-results/figures").is_dir()
+    assert "Amplitudes at lamp off, state 1, over charge" in page
     listed = json.loads(labrig("queue", "list", *queue, *runs, "--json").out)
-    assert [entry["status"] for entry in listed] == ["processed"] * 2
+    assert [entry["status"] for entry in listed] == ["processed"] * 3
     assert listed[1]["states"][0]["k_r_per_s"] == float(rows[1]["k_r_per_s"])
     assert labrig("queue", "run", *queue, *runs).err == "", "nothing is left to do"
 
