@@ -1,0 +1,515 @@
+"""Luminance of a glow from its frames and those of a grey card under the bare lamp.
+
+The radiance of the card is known, ρE/π by a meter's reading. The counts of the glow relative to the
+card's, ∫ c S dλ / ∫ c L dλ in every channel c, give the glow's spectrum S its scale; its luminance
+is 683 lm/W ∫ V S dλ.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labrig.analyse.colour_of_glow import ColourScale, colour_scale, emission_of
+from labrig.analyse.frames import (
+    intact_frames,
+    require_calibrated_camera,
+    steady_frames,
+    switched_time,
+    timing_warnings,
+)
+from labrig.analyse.inputs import Part
+from labrig.bench_optics import (
+    bare_lamp_spectrum,
+    camera_curves,
+    card_radiance,
+    card_reflectance,
+    illuminance_lx,
+)
+from labrig.calibration import CameraFile
+from labrig.errors import DataError, FitError
+from labrig.fit import fit_luminance
+from labrig.optics import mesopic_adaptation, mesopic_ratio
+from labrig.protocols.luminance import GlowUnit, LuminanceFrames
+from labrig.record import PERSON, FrameRole, RunRecord, glow_temperature_c
+from labrig.reduce import SeriesFrame, reduce_patches
+from labrig.region import Region
+from labrig.results import (
+    MCD_PER_M2,
+    VISIBLE_MCD_PER_M2,
+    ExcitationState,
+    FloatArray,
+    LuminanceDecay,
+    LuminanceResult,
+    Measured,
+    PatchLuminance,
+    ScaleFactor,
+    Series,
+)
+
+#: Scatter of a frame's light by shutter, aperture and lamp, where it was not calibrated (1 σ).
+FLICKER = 0.007
+#: Error of a shutter in seconds, and of the ratio of two sensitivities, not calibrated (1 σ).
+SHUTTER_S, ISO_RATIO = 3e-4, 0.02
+#: Relative σ of a grey card's reflectance and of the light's fall-off over it, without its own σ.
+CARD_SIGMA = 0.01
+#: Range of ln t about a change of ISO in which frames tell the ratio.
+NEAR_CHANGE = math.log(2.0)
+#: Light before the excitation, relative to 0.3 mcd/m², that is told, in σ of its own and at least.
+AMBIENT, AMBIENT_SIGMAS = 0.1, 4.0
+
+
+def analyse(part: Part) -> LuminanceResult:
+    """Measure luminances of all patches by the card under the bare lamp.
+
+    Raises
+    ------
+    UsageError
+        The rig file has no reading of a meter, or curves are missing.
+    DataError
+        Frames of card or glow are missing, damaged or clipped.
+    FitError
+        There are too few readings.
+    """
+    run, protocol = part.run, part.protocol
+    frames = intact_frames(run, part.overrides, LuminanceFrames.GLOW)
+    card = steady_frames(run, part.overrides, LuminanceFrames.CARD)
+    if not card:
+        raise DataError(f"{run.folder}: no card was photographed; go on with labrig resume")
+    require_calibrated_camera(part.inputs.camera, run, run.frames(LuminanceFrames.GLOW))
+    excitation = _excitation(part)
+    regions = part.overrides.patches(protocol)
+    counts = {
+        name: _counts(name, region, frames.decay, card, frames.dark, part.inputs.camera)
+        for name, region in regions.items()
+    }
+    patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW)]
+    for name, each in counts.items():
+        patches[name], told = _patch(each, name, excitation, part)
+        warnings += [f"{name}: {line}" if len(counts) > 1 else line for line in told]
+    return LuminanceResult(
+        patches=_with_ratios(patches),
+        excitation=excitation,
+        thickness=protocol.sample.thickness or "",
+        mass_per_area=protocol.mass_per_area or "",
+        adaptation_mcd_per_m2=protocol.adaptation_mcd_per_m2,
+        warnings=tuple(dict.fromkeys(warnings)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Counts:
+    """Signal of a patch of glow relative to that of the card in its place.
+
+    Attributes
+    ----------
+    t_s
+        Middles of the n exposures in seconds after lamp off.
+    ratio, sigma
+        Ratio of the glow to the card in the C channels, and σ by noise and flicker, shape (n, C).
+    iso
+        Sensitivity of every frame, shape (n,).
+    dark_sigma
+        σ of the dark level, common to frames at one ISO, relative to the card, shape (n, C).
+    card_sigma
+        Relative σ of the card's signal by noise and flicker.
+    shutter_sigma
+        Relative σ of the ratio by the shutter times.
+    iso_sigma
+        Relative σ of the ratio of every frame by its sensitivity's ratio to the card's, shape (n,).
+    iso_source
+        Origin of these ratios.
+    ambient
+        Light before the excitation relative to the card's, and its σ.
+    card
+        Signal of the card in the channels in DN/s.
+    channels
+        Names of the channels.
+    """
+
+    t_s: FloatArray
+    ratio: FloatArray
+    sigma: FloatArray
+    iso: FloatArray
+    dark_sigma: FloatArray
+    card_sigma: float
+    shutter_sigma: float
+    iso_sigma: FloatArray
+    iso_source: str
+    ambient: Measured
+    card: FloatArray
+    channels: tuple[str, ...]
+
+
+def _counts(
+    name: str,
+    region: Region,
+    glow: Sequence[SeriesFrame],
+    card: Sequence[SeriesFrame],
+    darks: Sequence[SeriesFrame],
+    camera: CameraFile | None,
+) -> _Counts:
+    """Reduce the frames of a patch, at every ISO by itself."""
+    lit = reduce_patches(card, {name: region}, darks, camera=camera)[name]
+    if not lit.usable.any():
+        raise DataError(
+            "every photograph of the card clips; lower camera.iso or close the aperture"
+        )
+    lit = lit.take(np.flatnonzero(lit.usable))
+    settings = float(lit.iso[0]), _f_number(lit)
+    flicker = FLICKER if camera is None else camera.flicker
+    card_dn = lit.values.mean(axis=0)
+    noise = np.sqrt(np.square(lit.sigma / lit.values).mean(axis=0)).min()
+    parts = []
+    for iso in sorted({frame.iso for frame in glow if frame.iso is not None}):
+        at_iso = [frame for frame in glow if frame.iso == iso]
+        series = reduce_patches(at_iso, {name: region}, darks, camera=camera)[name]
+        rows = np.flatnonzero(series.usable)
+        if len(rows):
+            parts.append(_at_iso(series.take(rows), card_dn, settings, camera, flicker))
+    if not parts:
+        raise DataError("every photograph of the glow clips; lower camera.iso")
+    t_s, ratio, sigma, iso, dark, iso_sigma, shutter = (
+        np.concatenate([getattr(part, field) for part in parts])
+        for field in ("t_s", "ratio", "sigma", "iso", "dark", "iso_sigma", "shutter")
+    )
+    order = np.argsort(t_s, kind="stable")
+    counts = _Counts(
+        t_s=t_s[order],
+        ratio=ratio[order],
+        sigma=sigma[order],
+        iso=iso[order],
+        dark_sigma=dark[order],
+        card_sigma=math.hypot(float(noise), flicker) / math.sqrt(len(lit.t_s)),
+        shutter_sigma=math.hypot(_shutter_sigma(camera, lit.exposure_s[0]), float(shutter.min())),
+        iso_sigma=iso_sigma[order],
+        iso_source="nominal" if camera is None else "the camera's calibration",
+        ambient=_ambient(name, region, darks, card_dn, settings, camera),
+        card=card_dn,
+        channels=lit.channels,
+    )
+    return _with_measured_isos(counts, flicker)
+
+
+@dataclass(frozen=True, eq=False)
+class _AtIso:
+    t_s: FloatArray
+    ratio: FloatArray
+    sigma: FloatArray
+    iso: FloatArray
+    dark: FloatArray
+    iso_sigma: FloatArray
+    shutter: FloatArray
+
+
+def _at_iso(
+    series: Series,
+    card_dn: FloatArray,
+    card_settings: tuple[float, float | None],
+    camera: CameraFile | None,
+    flicker: float,
+) -> _AtIso:
+    """Return the frames at one ISO relative to the card's at its own."""
+    iso = float(series.iso[0])
+    gain, gain_sigma = _gain((iso, _f_number(series)), card_settings, camera)
+    per_card = 1 / (card_dn * gain)
+    ratio = series.values * per_card
+    n = len(series.t_s)
+    return _AtIso(
+        t_s=series.t_s + series.exposure_s / 2,
+        ratio=ratio,
+        sigma=np.hypot(series.sigma * per_card, flicker * ratio),
+        iso=series.iso,
+        dark=np.broadcast_to(np.nan_to_num(series.dark_sigma) * per_card, ratio.shape),
+        iso_sigma=np.full(n, gain_sigma),
+        shutter=np.array([_shutter_sigma(camera, at_s) for at_s in series.exposure_s]),
+    )
+
+
+def _f_number(series: Series) -> float | None:
+    return None if np.isnan(series.f_number[0]) else float(series.f_number[0])
+
+
+def _gain(
+    settings: tuple[float, float | None],
+    card: tuple[float, float | None],
+    camera: CameraFile | None,
+) -> tuple[float, float]:
+    """Return the signal of the same light at some settings over that at the card's, and its σ."""
+    if settings == card:
+        return 1.0, 0.0
+    if camera is None:
+        return settings[0] / card[0], ISO_RATIO
+    (own, own_sigma), (of_card, card_sigma) = camera.scale(*settings), camera.scale(*card)
+    calibrated = own_sigma > 0 or settings[0] == camera.iso
+    return own / of_card, math.hypot(own_sigma, card_sigma, 0.0 if calibrated else ISO_RATIO)
+
+
+def _shutter_sigma(camera: CameraFile | None, exposure_s: float) -> float:
+    if camera is None or not camera.shutter:
+        return SHUTTER_S / float(exposure_s)
+    return camera.exposure_s(float(exposure_s))[1]
+
+
+def _ambient(
+    name: str,
+    region: Region,
+    darks: Sequence[SeriesFrame],
+    card_dn: FloatArray,
+    card_settings: tuple[float, float | None],
+    camera: CameraFile | None,
+) -> Measured:
+    """Return the light in the dark frames relative to the card's, by what their channels differ.
+
+    A sensor's dark current is the same in all channels, light is not: this is a lower limit.
+    """
+    iso = max(frame.iso for frame in darks if frame.iso is not None)
+    longest_s = max(frame.exposure_s for frame in darks)
+    own = [frame for frame in darks if frame.iso == iso]
+    series = reduce_patches(own, {name: region})[name]
+    rows, short = series.exposure_s == longest_s, series.exposure_s < longest_s
+    if not short.any():
+        return Measured(0.0, math.inf)
+    levels = series.values * series.exposure_s[:, np.newaxis]
+    light = (levels[rows].mean(axis=0) - levels[short].mean(axis=0)) / longest_s
+    sigma = levels[rows].std(axis=0, ddof=1) / longest_s / math.sqrt(int(rows.sum()))
+    gain, _ = _gain((float(iso), _f_number(series)), card_settings, camera)
+    brightest, darkest = int(np.argmax(light)), int(np.argmin(light))
+    scale = 1 / (card_dn[brightest] * gain)
+    difference = float(light[brightest] - light[darkest]) * scale
+    return Measured(difference, float(np.hypot(sigma[brightest], sigma[darkest])) * scale)
+
+
+def _with_measured_isos(counts: _Counts, flicker: float) -> _Counts:
+    """Return the counts with the ratios of sensitivities by frames at both, where they change.
+
+    About the change the logarithm of the signal is a parabola over ln t, with a step of the ISO.
+    """
+    isos = list(dict.fromkeys(counts.iso[np.argsort(counts.iso)].tolist()))
+    ratio, sigma = counts.ratio.copy(), counts.iso_sigma.copy()
+    brightest = int(np.argmax(counts.ratio[0] * counts.card))
+    measured = False
+    for lower, higher in zip(isos, isos[1:], strict=False):
+        later = counts.iso >= higher
+        at_change = np.log(counts.t_s[counts.iso == higher].min())
+        x = np.log(counts.t_s) - at_change
+        near = (np.abs(x) < NEAR_CHANGE) & np.isin(counts.iso, (lower, higher))
+        value = ratio[near, brightest]
+        if near.sum() < 6 or (value <= 0).any():
+            continue
+        error = counts.sigma[near, brightest] / value
+        step = (counts.iso[near] == higher).astype(np.float64)
+        powers = np.stack([np.ones_like(value), x[near], x[near] ** 2, step], axis=1)
+        prior = max(float(sigma[counts.iso == higher][0]), 1e-9)
+        rows = np.vstack([powers / error[:, np.newaxis], [0.0, 0.0, 0.0, 1 / prior]])
+        target = np.append(np.log(value) / error, 0.0)
+        solution, *_ = np.linalg.lstsq(rows, target, rcond=None)
+        step_sigma = math.sqrt(float(np.linalg.inv(rows.T @ rows)[3, 3]))
+        ratio[later] /= math.exp(solution[3])
+        before = float(sigma[counts.iso == lower][0])
+        sigma[later] = math.hypot(before, step_sigma)
+        measured = True
+    source = f"frames at both where it changes, and {counts.iso_source}"
+    scaled = counts.sigma * np.divide(
+        ratio, counts.ratio, out=np.ones_like(ratio), where=counts.ratio != 0
+    )
+    return replace(
+        counts,
+        ratio=ratio,
+        sigma=scaled,
+        iso_sigma=sigma,
+        iso_source=source if measured else counts.iso_source,
+    )
+
+
+def _patch(
+    counts: _Counts, name: str, excitation: ExcitationState, part: Part
+) -> tuple[PatchLuminance, list[str]]:
+    """Return the luminances of a patch, and doubts about them."""
+    rig, protocol = part.rig, part.protocol
+    camera = camera_curves(rig, part.overrides.camera, part.inputs.lvf)
+    known = emission_of(part, name)
+    weight = 1 / np.square(counts.sigma / np.maximum(counts.ratio, 1e-300))
+    early = np.flatnonzero((counts.ratio > 0).all(axis=1))
+    if not len(early):
+        raise DataError("no glow was seen in all channels; raise camera.iso or open the aperture")
+    relative = counts.ratio[early] / counts.ratio[early].max(axis=1)[:, np.newaxis]
+    inverse = weight[early]
+    colour = (relative * inverse).sum(axis=0) / inverse.sum(axis=0)
+    noise = np.maximum(1 / np.sqrt(inverse.sum(axis=0)), 1e-4)
+    scale = colour_scale(
+        colour,
+        noise * colour,
+        camera,
+        card_radiance(rig),
+        bare_lamp_spectrum(rig),
+        card_reflectance(rig),
+        known,
+    )
+    light = 1000 * counts.ratio @ scale.weights
+    sigma = 1000 * np.sqrt(np.square(counts.sigma) @ np.square(scale.weights))
+    dark = 1000 * np.abs(counts.dark_sigma @ np.abs(scale.weights))
+    factors = tuple(_factors(counts, scale, part))
+    constant = math.sqrt(sum(factor.relative_sigma**2 for factor in factors))
+    steps = np.sqrt(constant**2 + counts.iso_sigma**2 + np.square(dark / np.maximum(light, dark)))
+    order = _one_a_time(counts.t_s)
+    decay = fit_luminance(
+        counts.t_s[order],
+        light[order],
+        sigma[order],
+        scale_sigma=steps[order],
+        required=protocol.requirements,
+        colours=protocol.colours,
+        excitation=_text(excitation),
+        origin=part.run.folder.resolve().name,
+    )
+    last = int(np.searchsorted(counts.t_s, decay.visible_s.value if decay.visible_s else np.inf))
+    last = min(last, len(light) - 1)
+    at_end = (
+        ScaleFactor("sensitivity of the last frames", float(counts.iso_sigma[last]),
+                    counts.iso_source),
+        ScaleFactor("dark level at the end", float(dark[last] / max(light[last], dark[last])),
+                    "dark frames before the excitation"),
+    )  # fmt: skip
+    warnings = [*decay.warnings, *_warnings(counts, scale, part)]
+    return (
+        PatchLuminance(
+            decay=decay,
+            factors=(*factors, *at_end),
+            wavelength_nm=scale.wavelength_nm,
+            spectrum=scale.spectrum / scale.spectrum.max(),
+            emission=scale.source,
+            scotopic_ratio=scale.scotopic_ratio,
+            mesopic_ratio=_mesopic(scale, protocol.adaptation_mcd_per_m2),
+        ),
+        warnings,
+    )
+
+
+def _one_a_time(t_s: FloatArray) -> FloatArray:
+    """Return the rows whose times rise."""
+    return np.flatnonzero(np.concatenate([[True], np.diff(t_s) > 0]))
+
+
+def _factors(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[ScaleFactor]:
+    """Yield the factors that all luminances have in common."""
+    reading = part.rig.optics.luminance
+    camera = part.inputs.camera
+    assert reading is not None
+    meter = "luxmeter at the sample" if reading.at == "sample plane" else "meter on the card"
+    yield ScaleFactor(f"{meter}, {reading.value}", reading.sigma, "rig file")
+    if reading.f1_prime is not None and reading.lamp != "halogen":
+        # Meters are calibrated with illuminant A, which halogen lamps are close to.
+        mismatch = reading.f1_prime / math.sqrt(3)
+        yield ScaleFactor("meter's colour, f1′", mismatch, f"f1′ = {reading.f1_prime:.2g}, even")
+    if reading.at == "sample plane":
+        yield ScaleFactor("reflectance of the card", scale.card_sigma, scale.card_source)
+    yield ScaleFactor("light of the card", counts.card_sigma, "its photographs, noise and flicker")
+    calibrated = camera is not None and camera.shutter
+    shutter = "the camera's calibration" if calibrated else f"assumed: {1e3 * SHUTTER_S:g} ms"
+    yield ScaleFactor("shutter times, card to glow", counts.shutter_sigma, shutter)
+    yield ScaleFactor("aperture, card to glow", 0.0, "the same for all frames")
+    yield ScaleFactor("colour: curves, lamp, emission", scale.relative_sigma, scale.source)
+
+
+def _warnings(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[str]:
+    """Yield doubts about scale and darkness."""
+    doubt = scale.card_doubt(counts.card, counts.card_sigma)
+    if doubt is not None:
+        yield doubt
+    if scale.doubt is not None:
+        yield scale.doubt
+    if part.rig.optics.luminance is not None and part.rig.optics.luminance.lamp is None:
+        yield (
+            "the rig file does not say which lamp it has (optics: luminance: lamp): the same lux "
+            "of another lamp excite another glow"
+        )
+    ambient = 1000 * counts.ambient.value * float(scale.weights.sum())
+    sigma = 1000 * counts.ambient.sigma * float(scale.weights.sum())
+    if ambient > max(AMBIENT_SIGMAS * sigma, AMBIENT * VISIBLE_MCD_PER_M2):
+        yield (
+            f"the sample's place was not dark before the excitation, {ambient:.2g} {MCD_PER_M2} or "
+            "more by the colour of the dark frames: a status LED, or an earlier glow; it is "
+            "subtracted as long as it stays the same: cover LEDs, let the sample rest"
+        )
+
+
+def _mesopic(scale: ColourScale, adaptation_mcd_per_m2: float | None) -> Measured | None:
+    """Return mesopic over photopic luminance, for eyes adapted to light of the glow's colour."""
+    if adaptation_mcd_per_m2 is None:
+        return None
+    ratio = scale.scotopic_ratio
+
+    def at(scotopic_over_photopic: float) -> float:
+        m = mesopic_adaptation(adaptation_mcd_per_m2 / 1000, scotopic_over_photopic)
+        return mesopic_ratio(m, scotopic_over_photopic)
+
+    value = at(ratio.value)
+    slope = (at(ratio.value * 1.01) - value) / (0.01 * ratio.value)
+    return Measured(value, abs(slope) * ratio.sigma)
+
+
+def _excitation(part: Part) -> ExcitationState:
+    """Return how the sample was excited."""
+    protocol, reading = part.protocol, part.rig.optics.luminance
+    lux = illuminance_lx(part.rig)
+    assert reading is not None
+    conditions, rested_s = protocol.excitation.conditions, protocol.excitation.rested
+    charged_s = _charged_s(part.run)
+    sigma = reading.sigma if reading.at == "sample plane" else math.hypot(reading.sigma, CARD_SIGMA)
+    return ExcitationState(
+        standard=conditions.name,
+        lamp=reading.lamp,
+        illuminance=Measured(lux, sigma * lux, "lx"),
+        charged_s=charged_s,
+        rested_s=rested_s,
+        temperature_c=glow_temperature_c(part.run, (LuminanceFrames.GLOW,)),
+        deviations=tuple(conditions.deviations(reading.lamp, lux, charged_s, rested_s)),
+    )
+
+
+def _charged_s(run: RunRecord) -> float:
+    """Return how long the lamp shone on the uncovered sample, in seconds.
+
+    It does so from the last of: lamp on, a step by hand, a door or shield that moved.
+    """
+    attempt = run.completed()[GlowUnit.name]
+    first = next(frame for frame in attempt.frames if frame.role == LuminanceFrames.GLOW)
+    off = switched_time(attempt, first, "off")
+    begins = [
+        action.end_time if action.device == PERSON else action.middle_time
+        for action in attempt.actions
+        if action.start_time < off
+        and (action.device in (PERSON, "door", "shield") or action.action == "on")
+    ]
+    lit = [*begins, *([] if begins else [off])]
+    return off - max(lit)
+
+
+def _text(excitation: ExcitationState) -> str:
+    parts = [
+        f"{excitation.lamp} lamp" if excitation.lamp else "a lamp that is not stated",
+        f"{excitation.illuminance.value:.4g} lx",
+        f"{excitation.charged_s / 60:.3g} min",
+    ]
+    return f"{', '.join(parts)}; {excitation.accordance}"
+
+
+def _with_ratios(patches: Mapping[str, PatchLuminance]) -> dict[str, PatchLuminance]:
+    """Return the patches with their luminances relative to those of the first one."""
+    names = list(patches)
+    first = patches[names[0]]
+    result = {names[0]: first}
+    for name in names[1:]:
+        result[name] = replace(
+            patches[name], relative_to_first=dict(_ratios(first.decay, patches[name].decay))
+        )
+    return result
+
+
+def _ratios(first: LuminanceDecay, other: LuminanceDecay) -> Iterator[tuple[float, Measured]]:
+    """Yield time and ratio; what the scales have in common cancels, the colours' part does not."""
+    for mine, its in zip(first.at, other.at, strict=True):
+        if mine.luminance is not None and its.luminance is not None:
+            yield mine.t_s, its.luminance.over(mine.luminance)
