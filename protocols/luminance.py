@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -29,6 +30,9 @@ from labrig.acquire import (
     at,
 )
 from labrig.bench_optics import card_radiance, illuminance_lx, luminance
+from labrig.errors import UsageError
+from labrig.material import read_material
+from labrig.optics import read_spectrum
 from labrig.quantity import DurationS, duration_text
 from labrig.record import FrameRecord, FrameRole
 from labrig.region import CENTRE
@@ -61,6 +65,9 @@ CLASSES: dict[str, dict[int, float]] = {
 }
 #: Relative differences of illuminance and time of excitation within which they are as prescribed.
 LUX_TOLERANCE, TIME_TOLERANCE = 0.05, 0.02
+
+#: Suffixes of tables of an emission spectrum.
+TABLES = (".csv", ".txt", ".dat")
 
 #: Shutter times of the first frames of the glow, as fractions of the longest.
 FIRST = (1 / 4096, 1 / 512, 1 / 64)
@@ -129,7 +136,9 @@ class Conditions:
             Time in the dark before it in seconds; None if it is not stated.
         """
         if self.lamp is not None and lamp != self.lamp:
-            found = "the rig file does not say which lamp it has" if lamp is None else f"{lamp} lamp"
+            found = (
+                "the rig file does not say which lamp it has" if lamp is None else f"{lamp} lamp"
+            )
             yield f"{found}, not {self.lamp}"
         if self.illuminance_lx is not None and not math.isclose(
             illuminance_lx, self.illuminance_lx, rel_tol=LUX_TOLERANCE
@@ -321,6 +330,8 @@ class Luminance(ProtocolModel):
         UsageError
             The rig file has no reading, or curves are missing.
         """
+        if self.emission is not None:
+            _require_emission(self.emission)
         card = self.card
         if card == "auto":
             card = "after" if "door" in rig.devices else "before"
@@ -378,6 +389,20 @@ class Luminance(ProtocolModel):
         """Return the sanity checks of a unit's frames."""
         regions = list(self.patches.values())
         return SanityChecks(session, unit, regions, None, LuminanceFrames.GLOW)
+
+
+def _require_emission(named: str) -> None:
+    """Refuse an emission that the analysis could not read, hours later."""
+    path = Path(named)
+    if path.is_dir() and not (path / "result" / "result.json").is_file():
+        raise UsageError(
+            f"emission: {named}: expected a run of emission_spectrum with a result; make it with: "
+            f"labrig process {named}"
+        )
+    if path.suffix in TABLES:
+        read_spectrum(path)
+    elif not path.is_dir():
+        read_material(named)
 
 
 @dataclass(frozen=True)
@@ -473,18 +498,7 @@ class GlowUnit:
             begin_s = max(begin_s, last_s * STEP)
             if begin_s > protocol.until:
                 break
-            shots = session.choose(
-                "exposures",
-                lambda begin_s=begin_s, iso=iso: self._next(session, begin_s, iso, offers),
-                self._longest(begin_s, iso, offers),
-            )
-            now_s = session.clock.now() - off_s
-            session.run_sequence(
-                [
-                    at(time_s - now_s, Shoot(LuminanceFrames.GLOW, settings))
-                    for time_s, settings in zip(shots.begins_s, shots.settings, strict=True)
-                ]
-            )
+            shots = self._photograph(session, begin_s, off_s, iso)
             last_s, iso = shots.begins_s[-1], shots.settings[-1].iso
             if not checked and last_s > FADES_BY_S:
                 session.choose(
@@ -493,6 +507,20 @@ class GlowUnit:
                 checked = True
             if session.choose("dim enough", lambda: self._is_dim(session), worst=False):
                 break
+
+    def _photograph(self, session: Session, begin_s: float, off_s: float, iso: int) -> Shots:
+        """Take the next frames from a time after lamp off, and return them."""
+        offers = session.rig[CAMERA].offers()
+        shots = session.choose(
+            "exposures",
+            lambda: self._next(session, begin_s, iso, offers),
+            self._longest(begin_s, iso, offers),
+        )
+        now_s = session.clock.now() - off_s
+        glow = [Shoot(LuminanceFrames.GLOW, settings) for settings in shots.settings]
+        timed = zip(shots.begins_s, glow, strict=True)
+        session.run_sequence([at(time_s - now_s, shoot) for time_s, shoot in timed])
+        return shots
 
     def _excite(self, session: Session) -> None:
         """Light the rested sample with the warm lamp for the time of the excitation."""
@@ -506,7 +534,9 @@ class GlowUnit:
             if has_door(session):
                 face_camera(session)
                 session.perform(LAMP_ON)
-                session.wait(session.rig.warm_up_s("lamp"), "lamp warms up, the sample away from it")
+                session.wait(
+                    session.rig.warm_up_s("lamp"), "lamp warms up, the sample away from it"
+                )
             face_lamp(session)
             if not session.rig[LAMP].is_on():
                 session.perform(LAMP_ON)
@@ -523,6 +553,8 @@ class GlowUnit:
         """Return frames of these exposures and ISOs, as soon as the camera is ready for each."""
         begins_s, settings = [], []
         for exposure_s, iso in wanted:
+            if begin_s > self.protocol.until:
+                break
             begins_s.append(begin_s)
             settings.append(self.protocol.settings(exposure_s, iso))
             ready_s = begin_s + exposure_s + offers.overhead_s + MARGIN_S

@@ -22,7 +22,7 @@ def _photopic() -> FloatArray:
     import colour  # takes seconds to load
 
     table = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
-    return np.interp(WAVELENGTH_NM, table.wavelengths, table.values, left=0.0, right=0.0)
+    return np.asarray(np.interp(WAVELENGTH_NM, table.wavelengths, table.values, left=0, right=0))
 
 
 def luminance_mcd_per_m2(radiance: FloatArray, lamp: LampSettings) -> FloatArray:

@@ -10,7 +10,9 @@ from labrig.quantity import Fraction
 
 #: Units of readings, each with the place at which it is taken.
 UNITS = {"lx": "sample plane", "cd/m2": "card"}
-_READING = re.compile(r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>lx|cd\s*/\s*m(?:2|²))\s*")
+_READING = re.compile(
+    r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>lx|cd\s*/\s*m(?:2|²))\s*"
+)
 
 #: Kinds of lamps by which standards excite, and others that a bench may have.
 LampType = Literal["xenon", "D65 fluorescent", "fluorescent", "halogen", "LED", "daylight", "other"]

@@ -26,20 +26,25 @@ from labrig.optics import (
     read_spectrum,
     scotopic_efficacy,
 )
+from labrig.protocols.luminance import TABLES
 from labrig.results import EmissionSpectrumResult, FloatArray, Measured, read_result
 
 #: Error of a camera's curves.
 CURVES = CurveError()
-#: Relative errors of the lamp's spectrum, of an emission in a file without σ, and of one in bands,
-#: smooth over that many nm (1 σ).
-LAMP_ERROR, EMISSION_ERROR, BANDS_ERROR, SMOOTH_NM = 0.02, 0.02, 0.1, 40.0
+#: Relative errors of a lamp's spectrum and of an emission without σ, smooth over so many nm (1 σ).
+LAMP_ERROR, EMISSION_ERROR, SMOOTH_NM = 0.02, 0.02, 40.0
 #: Relative σ of a card's reflectance without one in its file.
 CARD_ERROR = 0.01
 #: Knots of an estimated spectrum, and limits of all integrals, in nm.
 KNOTS_NM: FloatArray = np.arange(400.0, 701.0, 10.0)
 LIMITS_NM = (360.0, 830.0)
+#: Emissions of phosphors, before anything is measured: middles of bands, median and spread of ln of
+#: their widths at half maximum, and number of candidates.
+BAND_NM, MEDIAN_FWHM_NM, SPREAD_FWHM, CANDIDATES = (420.0, 670.0), 75.0, 0.35, 5000
 #: Noise of the colour's channels, at least.
 LEAST_NOISE = 1e-3
+#: Relative σ of an estimated emission's luminance that is told.
+OPEN = 0.06
 #: Probability of a colour below which it is doubted.
 DOUBTED = 1e-4
 
@@ -78,7 +83,7 @@ class ColourScale:
     has_ratios
         Whether the curves tell the ratios between the channels.
     doubt
-        Why the colour is not that of the emission; None if it is.
+        Why the colour is not that of the emission, or what it leaves open; None if all is well.
     """
 
     weights: FloatArray
@@ -130,7 +135,7 @@ def emission_of(part: Part, name: str) -> Emission | None:
             )
         patch = result.patches.get(name) or next(iter(result.patches.values()))
         measured = patch.spectrum
-    elif named is not None and Path(named).suffix in (".csv", ".txt", ".dat"):
+    elif named is not None and Path(named).suffix in TABLES:
         spectrum = read_spectrum(Path(named))
         return Emission(spectrum, Path(named).name, _error(spectrum))
     elif named is not None:
@@ -138,7 +143,9 @@ def emission_of(part: Part, name: str) -> Emission | None:
     assert measured is not None
     nm, value, sigma = map(np.asarray, (measured.wavelength_nm, measured.value, measured.sigma))
     spectrum = Spectrum(measured.sample, nm, value, sigma)
-    return Emission(spectrum, f"emission spectrum {measured.run or measured.sample}", _error(spectrum))
+    return Emission(
+        spectrum, f"emission spectrum {measured.run or measured.sample}", _error(spectrum)
+    )
 
 
 def _error(spectrum: Spectrum) -> float:
@@ -150,25 +157,16 @@ def _error(spectrum: Spectrum) -> float:
 
 
 def _of_material(material: Material) -> Emission:
-    if material.spectrum is not None:
-        measured = material.spectrum
-        sigma = None if measured.sigma is None else np.array(measured.sigma)
-        nm, value = np.array(measured.wavelength_nm), np.array(measured.value)
-        spectrum = Spectrum(material.name, nm, value, sigma)
-        return Emission(spectrum, f"material {material.name}", _error(spectrum))
-    bands, states = material.bands_nm, material.states
-    if bands is None or any(state.reradiation is None for state in states):
+    if material.spectrum is None:
         raise UsageError(
-            f"emission: {material.name}: expected a material with a spectrum or re-radiation, got "
-            "neither; leave 'emission' out, or name a spectrum"
+            f"emission: {material.name}: expected a material with a spectrum, got none (bands are "
+            "too coarse for a luminance); measure it with emission_spectrum, or leave it out"
         )
-    value = np.sum([state.reradiation for state in states], axis=0)
-    edges = np.asarray(bands)
-    middles = (edges[1:] + edges[:-1]) / 2
-    nm = np.concatenate([edges[:1], middles, edges[-1:]])
-    shape = np.concatenate([[0.0], value, [0.0]])
-    spectrum = Spectrum(material.name, nm, shape)
-    return Emission(spectrum, f"material {material.name}, in bands", BANDS_ERROR)
+    measured = material.spectrum
+    sigma = None if measured.sigma is None else np.array(measured.sigma)
+    nm, value = np.array(measured.wavelength_nm), np.array(measured.value)
+    spectrum = Spectrum(material.name, nm, value, sigma)
+    return Emission(spectrum, f"material {material.name}", _error(spectrum))
 
 
 def colour_scale(
@@ -213,13 +211,13 @@ def colour_scale(
                 f"{known.source}: expected an emission that all channels see, got one that some do "
                 "not; name another one under 'emission:', or none"
             )
-        seen = step @ (photopic_efficacy(nodes) * shape)
+        seen = float(step @ (photopic_efficacy(nodes) * shape))
         luminous = shapes @ (step * photopic_efficacy(nodes)) / seen
         errors = np.vstack([bench.errors(shape), bench.signals(shapes) / expected])
         errors_v = np.concatenate([np.zeros(len(bench.changes)), luminous])
         share, sigma = _shares(errors, errors_v, noise / colour)
         weights, source = share * seen / expected, known.source
-        dark = step @ (scotopic_efficacy(nodes) * shape)
+        dark = float(step @ (scotopic_efficacy(nodes) * shape))
         by_shape = shapes @ (step * scotopic_efficacy(nodes)) / dark - luminous
         ratio = dark / seen
         scotopic = Measured(ratio, ratio * float(np.linalg.norm(by_shape)))
@@ -231,17 +229,25 @@ def colour_scale(
             )
     else:
         hats = hat_functions(KNOTS_NM, nodes)
-        fit = fit_spectrum(colour, noise, bench.system(hats), decisive=np.inf)
+        system = bench.system(hats)
+        fit = fit_spectrum(colour, noise, system, decisive=np.inf)
+        # Half of the draws have no other shape than smooth, half are a band or two.
+        draws = np.vstack([fit.samples, _bands(colour, noise, system, len(fit.samples))])
         photopic, dark_adapted = (
-            fit.samples @ ((step * efficacy) @ hats)
+            draws @ ((step * efficacy) @ hats)
             for efficacy in (photopic_efficacy(nodes), scotopic_efficacy(nodes))
         )
-        nm, spectrum, doubt = KNOTS_NM, fit.value, None
-        shape = hats @ fit.value
+        nm, spectrum, doubt = KNOTS_NM, draws.mean(axis=0), None
+        shape = hats @ spectrum
         share, _ = _shares(bench.errors(shape), np.zeros(len(bench.changes)), noise / colour)
         weights = share * float(photopic.mean()) / colour
         sigma = float(photopic.std(ddof=1) / photopic.mean())
         source = "estimated from three channels"
+        if sigma > OPEN:
+            doubt = (
+                f"three channels leave {sigma:.0%} of this glow's luminance open: measure its "
+                "emission with emission_spectrum, and name that run under 'emission:'"
+            )
         ratios = dark_adapted / photopic
         scotopic = Measured(float(ratios.mean()), float(ratios.std(ddof=1)))
     card_sigma, card_source = CARD_ERROR, f"assumed: {100 * CARD_ERROR:g} %"
@@ -322,6 +328,35 @@ class _Bench:
         modes = np.einsum("mqc,qn->mcn", self.changes, hats) / self.card[:, np.newaxis]
         modes -= self.card_errors[:, :, np.newaxis] * design
         return SpectralSystem(KNOTS_NM, design, modes)
+
+
+def _bands(colour: FloatArray, noise: FloatArray, system: SpectralSystem, count: int) -> FloatArray:
+    """Return draws of spectra of one band or two that explain the colour, shape (count, knots).
+
+    The prior is that of emissions of phosphors; each candidate counts by its likelihood, and has
+    its scale by the channels.
+    """
+    rng = np.random.default_rng(0)
+    middle = rng.uniform(*BAND_NM, (2, CANDIDATES, 1))
+    width = MEDIAN_FWHM_NM * np.exp(SPREAD_FWHM * rng.standard_normal((2, CANDIDATES, 1)))
+    bands = np.exp(-4 * np.log(2) * ((system.knots_nm - middle) / width) ** 2) / width
+    second = rng.uniform(0, 0.5, CANDIDATES) * (rng.uniform(size=CANDIDATES) < 0.5)
+    candidates = bands[0] + second[:, np.newaxis] * (bands[1] - bands[0])
+    signals = candidates @ system.design.T
+    errors = np.einsum("mcn,kn->kmc", system.modes, candidates) / signals[:, np.newaxis]
+    covariance = np.swapaxes(errors, 1, 2) @ errors + np.diag((noise / colour) ** 2)
+    inverse = np.linalg.inv(covariance)
+    logs = np.log(colour / signals)
+    precision = inverse.sum(axis=(1, 2))
+    level = np.einsum("kc,kcd->k", logs, inverse) / precision
+    left = logs - level[:, np.newaxis]
+    chi2 = np.einsum("kc,kcd,kd->k", left, inverse, left)
+    evidence = -(chi2 + np.linalg.slogdet(covariance)[1] + np.log(precision)) / 2
+    probability = np.exp(evidence - evidence.max())
+    chosen = rng.choice(CANDIDATES, count, p=probability / probability.sum())
+    scale = np.exp(level + rng.standard_normal(CANDIDATES) / np.sqrt(precision))
+    drawn: FloatArray = candidates[chosen] * scale[chosen, np.newaxis]
+    return drawn
 
 
 def _lamp_error(lamp: Spectrum) -> float:

@@ -8,6 +8,7 @@ is 683 lm/W ∫ V S dλ.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,11 +29,11 @@ from labrig.bench_optics import (
     illuminance_lx,
 )
 from labrig.calibration import CameraFile
-from labrig.errors import DataError, FitError
+from labrig.errors import DataError
 from labrig.fit import fit_luminance
 from labrig.optics import mesopic_adaptation, mesopic_ratio
 from labrig.protocols.luminance import GlowUnit, LuminanceFrames
-from labrig.record import PERSON, FrameRole, RunRecord, glow_temperature_c
+from labrig.record import PERSON, RunRecord, glow_temperature_c
 from labrig.reduce import SeriesFrame, reduce_patches
 from labrig.region import Region
 from labrig.results import (
@@ -40,6 +41,7 @@ from labrig.results import (
     VISIBLE_MCD_PER_M2,
     ExcitationState,
     FloatArray,
+    IntArray,
     LuminanceDecay,
     LuminanceResult,
     Measured,
@@ -51,7 +53,7 @@ from labrig.results import (
 #: Scatter of a frame's light by shutter, aperture and lamp, where it was not calibrated (1 σ).
 FLICKER = 0.007
 #: Error of a shutter in seconds, and of the ratio of two sensitivities, not calibrated (1 σ).
-SHUTTER_S, ISO_RATIO = 3e-4, 0.02
+SHUTTER_S, ISO_RATIO = 2e-4, 0.02
 #: Relative σ of a grey card's reflectance and of the light's fall-off over it, without its own σ.
 CARD_SIGMA = 0.01
 #: Range of ln t about a change of ISO in which frames tell the ratio.
@@ -170,7 +172,7 @@ def _counts(
             parts.append(_at_iso(series.take(rows), card_dn, settings, camera, flicker))
     if not parts:
         raise DataError("every photograph of the glow clips; lower camera.iso")
-    t_s, ratio, sigma, iso, dark, iso_sigma, shutter = (
+    t_s, ratio, sigma, isos, dark, iso_sigma, shutter = (
         np.concatenate([getattr(part, field) for part in parts])
         for field in ("t_s", "ratio", "sigma", "iso", "dark", "iso_sigma", "shutter")
     )
@@ -179,7 +181,7 @@ def _counts(
         t_s=t_s[order],
         ratio=ratio[order],
         sigma=sigma[order],
-        iso=iso[order],
+        iso=isos[order],
         dark_sigma=dark[order],
         card_sigma=math.hypot(float(noise), flicker) / math.sqrt(len(lit.t_s)),
         shutter_sigma=math.hypot(_shutter_sigma(camera, lit.exposure_s[0]), float(shutter.min())),
@@ -290,7 +292,7 @@ def _with_measured_isos(counts: _Counts, flicker: float) -> _Counts:
     ratio, sigma = counts.ratio.copy(), counts.iso_sigma.copy()
     brightest = int(np.argmax(counts.ratio[0] * counts.card))
     measured = False
-    for lower, higher in zip(isos, isos[1:], strict=False):
+    for lower, higher in pairwise(isos):
         later = counts.iso >= higher
         at_change = np.log(counts.t_s[counts.iso == higher].min())
         x = np.log(counts.t_s) - at_change
@@ -387,7 +389,7 @@ def _patch(
     )
 
 
-def _one_a_time(t_s: FloatArray) -> FloatArray:
+def _one_a_time(t_s: FloatArray) -> IntArray:
     """Return the rows whose times rise."""
     return np.flatnonzero(np.concatenate([[True], np.diff(t_s) > 0]))
 

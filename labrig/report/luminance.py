@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping
 from functools import partial
 
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
@@ -62,28 +61,22 @@ def _section(result: LuminanceResult) -> Section:
     """Return the section with figure, table, excitation and marking."""
     excitation = result.excitation
     several = len(result.patches) > 1
-    lamp = f"{excitation.lamp} lamp" if excitation.lamp else "lamp not stated"
-    stated = [
-        f"Excited by: {lamp}, {plus_minus(excitation.illuminance.value, excitation.illuminance.sigma)}"
-        f" lx, for {duration_text(excitation.charged_s)}"
-        + (
-            f", after {duration_text(excitation.rested_s)} in the dark."
-            if excitation.rested_s is not None
-            else ", after a time in the dark that is not stated."
-        ),
-        f"{excitation.accordance.capitalize()}.",
-        "Sample: thickness "
-        f"{result.thickness or 'not stated'}, mass per area {result.mass_per_area or 'not stated'}; "
-        + (
-            f"{excitation.temperature_c:.1f} °C."
-            if excitation.temperature_c is not None
-            else "temperature not measured."
-        ),
+    lux = plus_minus(excitation.illuminance.value, excitation.illuminance.sigma)
+    rested = excitation.rested_s
+    after = "a time that is not stated" if rested is None else duration_text(rested)
+    temperature = excitation.temperature_c
+    warmth = "temperature not measured" if temperature is None else f"{temperature:.1f} °C"
+    mass = result.mass_per_area or "not stated"
+    stated = (
+        f"Excited by: {f'{excitation.lamp} lamp' if excitation.lamp else 'a lamp not stated'}, "
+        f"{lux} lx, for {duration_text(excitation.charged_s)}, after {after} in the dark.",
+        f"{excitation.accordance[0].upper()}{excitation.accordance[1:]}.",
+        f"Sample: thickness {result.thickness or 'not stated'}, mass per area {mass}; {warmth}.",
         *(
             f"{f'{name}: marking' if several else 'Marking'} {patch.decay.marking or 'none'}."
             for name, patch in result.patches.items()
         ),
-    ]
+    )
     caption = (
         f"Luminance after lamp off, with 1 σ of every reading; dashed: {VISIBLE_MCD_PER_M2:g} "
         f"{MCD_PER_M2}, a hundred times the limit of visibility."
@@ -93,7 +86,7 @@ def _section(result: LuminanceResult) -> Section:
         tables.append(_ranking(result))
     return Section(
         "Luminance of the afterglow",
-        tuple(stated),
+        stated,
         (Picture("luminance", partial(_figure, result.patches), caption),),
         tuple(tables),
     )
@@ -227,7 +220,8 @@ def _figure(patches: Mapping[str, PatchLuminance]) -> Figure:
     axes.set_ylim(lowest / 2, 2 * highest)
     mark_decades(axes)
     low, high = axes.get_xlim()
-    set_ticks(axes.xaxis, [(s, duration_text(s)) for s in MARKED_S if low <= s <= high])
+    marked = ((s, duration_text(s)) for s in MARKED_S if low <= s <= high)
+    set_ticks(axes.xaxis, tuple(marked))
     axes.set_xlabel("After lamp off")
     axes.set_ylabel(f"Luminance / ({MCD_PER_M2})")
     legend_above(figure, entries, columns=4)

@@ -92,8 +92,7 @@ def luminance_requirement(text: str) -> "LuminanceRequirement":
             raise ValueError
     except ValueError:
         raise ValueError(
-            "expected a least luminance and a time, such as '140 mcd/m2 at 10 min', "
-            f"got '{text}'"
+            f"expected a least luminance and a time, such as '140 mcd/m2 at 10 min', got '{text}'"
         ) from None
     return LuminanceRequirement(t_s, least)
 
