@@ -72,7 +72,7 @@ TABLES = (".csv", ".txt", ".dat")
 #: Shutter times of the first frames of the glow, as fractions of the longest.
 FIRST = (1 / 4096, 1 / 512, 1 / 64)
 #: Ratio of the times of neighbouring frames, and frames that are chosen together.
-STEP, TOGETHER = 1.08, 5
+STEP, TOGETHER = 1.08, 3
 #: Longest exposure relative to the time after lamp off: the luminance changes little meanwhile.
 SHORT = 0.1
 #: Fraction of the range below which a higher ISO is taken, and by how much it is higher.

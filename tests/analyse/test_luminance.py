@@ -1,6 +1,5 @@
 """Luminances of simulated glows against the room's own; what is not as it should be is told."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -88,7 +87,7 @@ def test_luminances_are_those_of_the_room(long_run: Path) -> None:
     content = json.loads((done.report.parent / "luminance.json").read_text())
     assert content["origin"] == long_run.name
     assert content["marking"] == decay.marking
-    rows = list(csv.reader((done.report.parent / "luminance.csv").open()))
+    rows = (done.report.parent / "luminance.csv").read_text().splitlines()
     assert len(rows) == 1 + len(decay.t_s)
     page = done.report.read_text()
     assert "0.4 mm" in page
@@ -99,7 +98,9 @@ def test_a_reading_on_the_card_is_the_same_scale(long_run: Path) -> None:
     part = part_of(long_run)
     (by_lux,) = analyse(part).patches.values()
     on_card = {"value": f"{luminance(card_radiance(part.rig))} cd/m2", "at": "card"}
-    (by_card,) = analyse(changed(part, on_card | {"lamp": "LED", "f1_prime": 0.06})).patches.values()
+    (by_card,) = analyse(
+        changed(part, on_card | {"lamp": "LED", "f1_prime": 0.06})
+    ).patches.values()
     ours, its = by_lux.decay.luminance_mcd_per_m2, by_card.decay.luminance_mcd_per_m2
     assert its == pytest.approx(ours, rel=1e-6)
     assert sigma_of(by_card.factors, "meter's colour") == pytest.approx(0.06 / np.sqrt(3))
@@ -108,8 +109,8 @@ def test_a_reading_on_the_card_is_the_same_scale(long_run: Path) -> None:
 
 def test_another_lamp_than_the_rig_file_says_is_noticed(long_run: Path) -> None:
     part = part_of(long_run)
-    (warning,) = analyse(changed(part, lamp="xenon_projector")).warnings
-    assert "another colour" in warning
+    told = analyse(changed(part, lamp="xenon_projector")).warnings
+    assert any(line.startswith("the card under the lamp has another colour") for line in told)
     without = changed(part, {"lamp": None})
     assert any("which lamp" in line for line in analyse(without).warnings)
 
@@ -138,7 +139,7 @@ def test_an_led_and_a_card_that_fluoresces_are_noticed(tmp_path: Path) -> None:
         QUICK
         | {
             "excitation": {"preset": "own", "time": "1 min"},
-            "until": "3 min",
+            "until": "150 s",
             "patches": {"bright": [0.05, 0.1, 0.4, 0.8], "dim": [0.55, 0.1, 0.4, 0.8]},
         },
         sample=[
