@@ -261,7 +261,7 @@ class Luminance(ProtocolModel):
         wavelengths and values. Default: estimated from the colour of the glow.
     colours
         Letters of the colours for the marking, for example `K-W`.
-    class
+    rank
         Class of JIS Z 9107 to be met: `JA`, `JB`, `JC` or `JD`.
     require
         Least luminances, for example `[140 mcd/m2 at 10 min]`.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import resources
-from labrig.acquire import read_rig_file
+from labrig.acquire import RigFile, read_rig_file
 from labrig.bench import open_bench
 from labrig.protocols.luminance import LuminanceFrames
 from labrig.record import PERSON, read_run
@@ -26,13 +26,36 @@ QUICK: dict[str, Any] = {
 }
 
 
-def write_glow(folder: Path, brightness: float) -> Path:
-    """Write a material that fades as the shipped power law, that much brighter."""
+def write_glow(
+    folder: Path,
+    brightness: float,
+    band_nm: tuple[float, float] = (520.0, 75.0),
+    one_trap: bool = False,
+) -> Path:
+    """Write a material that glows in a band of that middle and width, and is so much brighter.
+
+    It fades as the shipped power law does, or has one state, for traps of another law.
+    """
     content = read_quickly((resources.folder("config/materials") / "power-law.yaml").read_text())
-    for state in content["states"]:
-        state["reradiation"] = [brightness * value for value in state["reradiation"]]
+    middle_nm, fwhm_nm = band_nm
+    nm = np.arange(380.0, 721.0, 5.0)
+    value = np.exp(-4 * np.log(2) * ((nm - middle_nm) / fwhm_nm) ** 2)
+    edges = np.array(content["bands_nm"])
+    power = np.diff(np.interp(edges, nm, np.cumsum(value)))
+    if one_trap:
+        excited = [0.02, 0.015, 0.002, 0.0, 0.0, 0.0, 0.0, 0.0]
+        states: list[dict[str, Any]] = [
+            {"k_r_per_s": 0.01, "k_e_per_s": excited, "reradiation": [1.0]}
+        ]
+    else:
+        states = content["states"]
+    for state in states:
+        total = brightness * float(np.sum(state["reradiation"]))
+        state["reradiation"] = (total * power / power.sum()).tolist()
+    spectrum = {"wavelength_nm": nm.tolist(), "value": value.tolist()}
     path = folder / "glow.yaml"
-    path.write_text(write_quickly(content | {"name": "glow"}))
+    keys = {"name": "glow", "states": states, "spectrum": spectrum}
+    path.write_text(write_quickly(content | keys))
     return path
 
 
@@ -79,20 +102,35 @@ def true_luminance(run: Path) -> Callable[[Sequence[float]], FloatArray]:
     )
     uncovered = max(a.end_time for a in actions if a.device == PERSON and a.end_time < off)
     rig = read_rig_file(run / "rig.yaml")
+    opened = wall_s(rig)
 
     def at(times_s: Sequence[float]) -> FloatArray:
-        with open_bench(rig, "rig") as bench:
-            assert bench.room is not None
-            room, clock = bench.room.room, bench.room.clock
-            clock.sleep(lamp_on - clock.wall(clock.now()))
-            room.tasks["grey card"]()
-            room.switch_lamp(True)
-            clock.sleep(uncovered - lamp_on)
-            room.tasks["sample"]()
-            clock.sleep(off - uncovered)
-            room.switch_lamp(False)
-            off_s = clock.now()
-            clock.sleep(max(times_s) + 1.0)
-            return np.array([room.true_luminance(off_s + time_s) for time_s in times_s])
+        begin_s, warm_s, lit_s = lamp_on - opened, uncovered - lamp_on, off - uncovered
+        return luminance_after(rig, times_s, begin_s, warm_s, lit_s)
 
     return at
+
+
+def wall_s(rig: RigFile) -> float:
+    """Time at which the clock of the room begins, in seconds since 1970."""
+    with open_bench(rig, "rig") as bench:
+        return bench.clock.wall(0.0)
+
+
+def luminance_after(
+    rig: RigFile, times_s: Sequence[float], begin_s: float, warm_s: float, lit_s: float
+) -> FloatArray:
+    """True luminances (times, patches) after the lamp burnt over the card, then on the sample."""
+    with open_bench(rig, "rig") as bench:
+        assert bench.room is not None
+        room, clock = bench.room.room, bench.room.clock
+        clock.sleep(begin_s)
+        room.tasks["grey card"]()
+        room.switch_lamp(True)
+        clock.sleep(warm_s)
+        room.tasks["sample"]()
+        clock.sleep(lit_s)
+        room.switch_lamp(False)
+        off_s = clock.now()
+        clock.sleep(max(times_s) + 1.0)
+        return np.array([room.true_luminance(off_s + time_s) for time_s in times_s])
