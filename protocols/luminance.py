@@ -376,6 +376,11 @@ class Luminance(ProtocolModel):
         """Return the longest shutter time at a time after lamp off."""
         return offers.exposure_at_most(min(self.longest, SHORT * at_s))
 
+    def next_s(self, begin_s: float, offers: CameraOffers) -> float:
+        """Return the begin of the frame after one, however long that exposes."""
+        spent_s = self.longest_exposure_s(begin_s, offers) + offers.overhead_s + MARGIN_S
+        return max(begin_s + spent_s, begin_s * STEP)
+
     def first_frames(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Return begin and shutter time of the first frames: one of them is right."""
         frames, at_s = [], self.first
@@ -494,8 +499,7 @@ class GlowUnit:
         )
         last_s, iso, checked = first[-1][0], protocol.camera.iso, False
         while True:
-            begin_s = session.clock.now() - off_s + offers.overhead_s + MARGIN_S
-            begin_s = max(begin_s, last_s * STEP)
+            begin_s = max(protocol.next_s(last_s, offers), session.clock.now() - off_s + MARGIN_S)
             if begin_s > protocol.until:
                 break
             shots = self._photograph(session, begin_s, off_s, iso)
@@ -550,15 +554,14 @@ class GlowUnit:
     def _shots(
         self, begin_s: float, wanted: Sequence[tuple[float, int]], offers: CameraOffers
     ) -> Shots:
-        """Return frames of these exposures and ISOs, as soon as the camera is ready for each."""
+        """Return frames of these exposures and ISOs until the run's end."""
         begins_s, settings = [], []
         for exposure_s, iso in wanted:
             if begin_s > self.protocol.until:
                 break
             begins_s.append(begin_s)
             settings.append(self.protocol.settings(exposure_s, iso))
-            ready_s = begin_s + exposure_s + offers.overhead_s + MARGIN_S
-            begin_s = max(ready_s, begin_s * STEP)
+            begin_s = self.protocol.next_s(begin_s, offers)
         return Shots(tuple(begins_s), tuple(settings))
 
     def _next(self, session: Session, begin_s: float, iso: int, offers: CameraOffers) -> Shots:

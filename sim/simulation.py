@@ -66,6 +66,8 @@ class Patch(Part):
         one that follows from the excitation rates. Null: it follows from them, and is 0.5 for
         states without excitation rates. With `kinetics` it is that of traps of `depth_ev` at the
         surface.
+    brightness
+        Factor by which its glow is brighter than the material's file says.
     shape
         Shape of the sample: `flat`, or a `sphere` as large as fits into the region, lit from the
         left.
@@ -75,6 +77,7 @@ class Patch(Part):
 
     material: str
     region: Region = MIDDLE
+    brightness: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     shape: Literal["flat", "sphere"] = "flat"
     initial_charge: Charge | None = None
     kinetics: KineticsSettings | None = None

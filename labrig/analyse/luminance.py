@@ -370,9 +370,9 @@ def _patch(
     last = min(last, len(light) - 1)
     at_end = (
         ScaleFactor("sensitivity of the last frames", float(counts.iso_sigma[last]),
-                    counts.iso_source),
+                    counts.iso_source, is_common=False),
         ScaleFactor("dark level at the end", float(dark[last] / max(light[last], dark[last])),
-                    "dark frames before the excitation"),
+                    "dark frames before the excitation", is_common=False),
     )  # fmt: skip
     warnings = [*decay.warnings, *_warnings(counts, scale, part)]
     return (
@@ -412,7 +412,8 @@ def _factors(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[ScaleF
     shutter = "the camera's calibration" if calibrated else f"assumed: {1e3 * SHUTTER_S:g} ms"
     yield ScaleFactor("shutter times, card to glow", counts.shutter_sigma, shutter)
     yield ScaleFactor("aperture, card to glow", 0.0, "the same for all frames")
-    yield ScaleFactor("colour: curves, lamp, emission", scale.relative_sigma, scale.source)
+    colour = scale.relative_sigma
+    yield ScaleFactor("colour: curves, lamp, emission", colour, scale.source, is_common=False)
 
 
 def _warnings(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[str]:
@@ -502,16 +503,22 @@ def _with_ratios(patches: Mapping[str, PatchLuminance]) -> dict[str, PatchLumina
     """Return the patches with their luminances relative to those of the first one."""
     names = list(patches)
     first = patches[names[0]]
+    common = math.sqrt(sum(one.relative_sigma**2 for one in first.factors if one.is_common))
     result = {names[0]: first}
     for name in names[1:]:
-        result[name] = replace(
-            patches[name], relative_to_first=dict(_ratios(first.decay, patches[name].decay))
-        )
+        ratios = dict(_ratios(first.decay, patches[name].decay, common))
+        result[name] = replace(patches[name], relative_to_first=ratios)
     return result
 
 
-def _ratios(first: LuminanceDecay, other: LuminanceDecay) -> Iterator[tuple[float, Measured]]:
-    """Yield time and ratio; what the scales have in common cancels, the colours' part does not."""
-    for mine, its in zip(first.at, other.at, strict=True):
-        if mine.luminance is not None and its.luminance is not None:
-            yield mine.t_s, its.luminance.over(mine.luminance)
+def _ratios(
+    first: LuminanceDecay, other: LuminanceDecay, common: float
+) -> Iterator[tuple[float, Measured]]:
+    """Yield time and ratio, without the relative σ that both have in common."""
+    for entries in zip(first.at, other.at, strict=True):
+        mine, its = (entry.luminance for entry in entries)
+        if mine is not None and its is not None:
+            own = ((one.sigma / one.value) ** 2 - common**2 for one in (mine, its))
+            ratio = its.value / mine.value
+            relative = math.sqrt(sum(max(variance, 0.0) for variance in own))
+            yield entries[0].t_s, Measured(ratio, relative * ratio)

@@ -26,11 +26,14 @@ class ScaleFactor:
         Relative standard uncertainty of the luminances by it.
     source
         Origin of factor and σ.
+    is_common
+        Whether all patches of a run have its error in common.
     """
 
     name: str
     relative_sigma: float
     source: str
+    is_common: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,8 +95,8 @@ class PatchLuminance:
     mesopic_ratio
         Mesopic over photopic luminance where an adaptation luminance is given; else None.
     relative_to_first
-        Luminances over those of the first patch at the times of the table, at which both are
-        known; empty for the first one.
+        Luminances over those of the first patch at the times of the table at which both are known;
+        None for the first one. What all patches have in common is not in their σ.
     """
 
     decay: LuminanceDecay
