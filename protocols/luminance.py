@@ -43,10 +43,10 @@ from labrig.results import (
     luminance_unit,
 )
 
-from .steps.afterglow import Afterglow, dark_level
+from .steps.afterglow import Afterglow, dark_level, glow
 from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, Iso
 from .steps.darkness import levels, range_dn
-from .steps.exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET, MeteringFrame, measure_frame
+from .steps.exposure_metering import TARGET, FloatArray, MeteringFrame, measure_frame
 from .steps.glow import dark_frames
 from .steps.patch_names import Patches
 from .steps.sample_pose import check_visible, face_camera, face_lamp, has_door, lights_out
@@ -497,18 +497,24 @@ class GlowUnit:
                 ),
             ]
         )
-        last_s, iso, checked = first[-1][0], protocol.camera.iso, False
+        self._follow(session, first[-1][0], off_s)
+
+    def _follow(self, session: Session, last_s: float, off_s: float) -> None:
+        """Photograph the glow from the last of the first frames on until it is dim."""
+        protocol, iso, is_checked = self.protocol, self.protocol.camera.iso, False
+        offers = session.rig[CAMERA].offers()
         while True:
             begin_s = max(protocol.next_s(last_s, offers), session.clock.now() - off_s + MARGIN_S)
-            if begin_s > protocol.until:
-                break
-            shots = self._photograph(session, begin_s, off_s, iso)
-            last_s, iso = shots.begins_s[-1], shots.settings[-1].iso
-            if not checked and last_s > FADES_BY_S:
+            is_over = begin_s > protocol.until
+            if not is_checked and (is_over or last_s > FADES_BY_S):
                 session.choose(
                     "after lamp off", lambda: self._afterglow(session), worst=Afterglow.FADING
                 ).require(session.warn)
-                checked = True
+                is_checked = True
+            if is_over:
+                break
+            shots = self._photograph(session, begin_s, off_s, iso)
+            last_s, iso = shots.begins_s[-1], shots.settings[-1].iso
             if session.choose("dim enough", lambda: self._is_dim(session), worst=False):
                 break
 
@@ -529,6 +535,11 @@ class GlowUnit:
     def _excite(self, session: Session) -> None:
         """Light the rested sample with the warm lamp for the time of the excitation."""
         protocol = self.protocol
+        if arrangement_after(Arrangement(), session) is None:
+            session.warn(
+                "the run was resumed: if the lamp has shone on the sample since, let it rest as "
+                "long as before and begin a new run"
+            )
         if protocol.card == "before":
             if not session.rig[LAMP].is_on():  # as in a resumed run
                 CardUnit(protocol).wanted.set_up(session, None, "it covers the sample meanwhile")
@@ -571,7 +582,7 @@ class GlowUnit:
         """
         frame, measured = self._last(session)
         if measured is None:
-            return self._longest(begin_s, iso, offers)
+            return self._shots(begin_s, [(offers.exposures_s[0], iso)] * TOGETHER, offers)
         channels = [channel for patch in measured.patches for channel in patch.channels.values()]
         at_s = self.protocol.first + measured.start_s - self._frames(session)[0].start_time
         to_begin = at_s / begin_s / (range_dn(measured) * measured.exposure_s * frame.iso)
@@ -599,18 +610,26 @@ class GlowUnit:
     def _frames(self, session: Session) -> list[FrameRecord]:
         return [f for f in session.frames(LuminanceFrames.GLOW) if f.unit == self.name]
 
+    def _signal(self, session: Session, frame: FrameRecord, measured: MeteringFrame) -> FloatArray:
+        """Return a frame's signal above the dark frames of its ISO in DN, (patches, channels)."""
+        regions = list(self.protocol.patches.values())
+        darks = [
+            measure_frame(dark, regions)
+            for dark in session.frames(FrameRole.DARK)
+            if dark.iso == frame.iso
+        ]
+        return levels(measured) - dark_level(darks, measured.exposure_s)
+
     def _afterglow(self, session: Session) -> Afterglow:
         """Return whether the light after lamp off fades; a lamp that burns on does not."""
-        regions, rates = list(self.protocol.patches.values()), []
+        regions, rates, clips = list(self.protocol.patches.values()), [], False
         for frame in self._frames(session):
             measured = measure_frame(frame, regions)
-            if not any(patch.clipped for patch in measured.patches):
-                channels = [c for patch in measured.patches for c in patch.channels.values()]
-                brightest = max(channels, key=lambda channel: channel.mean)
-                if brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN):
-                    rates.append(brightest.mean / frame.exposure_s / frame.iso)
+            clips = any(patch.clipped for patch in measured.patches)
+            signal = glow(measured, levels(measured) - self._signal(session, frame, measured), 0.0)
+            if signal.seen and not clips:
+                rates.append(signal.brightest / frame.iso)
         if not rates:
-            clips = measured.patches[0].clipped
             return Afterglow.STEADY if clips else Afterglow.ABSENT
         return Afterglow.STEADY if rates[-1] > (1 - FADED) * rates[0] else Afterglow.FADING
 
@@ -624,14 +643,8 @@ class GlowUnit:
         if not cards or measured is None or isinstance(self.protocol.card_cd_per_m2, str):
             return False
         regions = list(self.protocol.patches.values())
-        darks = [
-            measure_frame(dark, regions)
-            for dark in session.frames(FrameRole.DARK)
-            if dark.iso == frame.iso
-        ]
-        dark = dark_level(darks, measured.exposure_s)
-        glow = (levels(measured) - dark) / measured.exposure_s / frame.iso
         lit = [levels(measure_frame(card, regions)) / card.exposure_s / card.iso for card in cards]
-        ratio = (glow / np.mean(lit, axis=0)).max(axis=1)
+        per_s = self._signal(session, frame, measured) / measured.exposure_s / frame.iso
+        ratio = (per_s / np.mean(lit, axis=0)).max(axis=1)
         limit = ENOUGH * VISIBLE_MCD_PER_M2 / (1000 * self.protocol.card_cd_per_m2)
         return bool((ratio < limit).all())

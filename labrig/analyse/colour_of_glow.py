@@ -250,10 +250,7 @@ def colour_scale(
             )
         ratios = dark_adapted / photopic
         scotopic = Measured(float(ratios.mean()), float(ratios.std(ddof=1)))
-    card_sigma, card_source = CARD_ERROR, f"assumed: {100 * CARD_ERROR:g} %"
-    if reflectance.sigma is not None:
-        card_sigma = float(np.mean(reflectance.sigma / reflectance.value))
-        card_source = "its curve"
+    card_sigma, card_source = card_error(reflectance)
     return ColourScale(
         weights=np.asarray(weights),
         relative_sigma=float(sigma),
@@ -268,6 +265,13 @@ def colour_scale(
         has_ratios=camera.has_ratios,
         doubt=doubt,
     )
+
+
+def card_error(reflectance: Transmittance) -> tuple[float, str]:
+    """Return the relative σ of a card's reflectance and its origin."""
+    if reflectance.sigma is None:
+        return CARD_ERROR, f"assumed: {100 * CARD_ERROR:g} %"
+    return float(np.mean(reflectance.sigma / reflectance.value)), "its curve"
 
 
 @dataclass(frozen=True, eq=False)

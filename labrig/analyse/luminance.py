@@ -12,14 +12,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.analyse.colour_of_glow import ColourScale, colour_scale, emission_of
+from labrig.analyse.colour_of_glow import ColourScale, card_error, colour_scale, emission_of
 from labrig.analyse.frames import (
+    IntactFrames,
     intact_frames,
     require_calibrated_camera,
     steady_frames,
     switched_time,
     timing_warnings,
+    without_stray_light,
 )
+from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import (
     bare_lamp_spectrum,
@@ -34,7 +37,13 @@ from labrig.fit import fit_luminance
 from labrig.optics import mesopic_adaptation, mesopic_ratio
 from labrig.protocols.luminance import GlowUnit, LuminanceFrames
 from labrig.record import PERSON, RunRecord, glow_temperature_c
-from labrig.reduce import SeriesFrame, reduce_patches
+from labrig.reduce import (
+    WHOLE_FRAME,
+    WHOLE_FRAME_NAME,
+    SeriesFrame,
+    reduce_patches,
+    sensor_layout,
+)
 from labrig.region import Region
 from labrig.results import (
     MCD_PER_M2,
@@ -54,10 +63,14 @@ from labrig.results import (
 FLICKER = 0.007
 #: Error of a shutter in seconds, and of the ratio of two sensitivities, not calibrated (1 σ).
 SHUTTER_S, ISO_RATIO = 2e-4, 0.02
-#: Relative σ of a grey card's reflectance and of the light's fall-off over it, without its own σ.
-CARD_SIGMA = 0.01
 #: Range of ln t about a change of ISO in which frames tell the ratio.
 NEAR_CHANGE = math.log(2.0)
+#: Signal in σ from which a glow is seen.
+SEEN = 5.0
+#: Change of the colour that is told, in its σ and relative to the strongest channel.
+COLOUR_SIGMAS, COLOUR_CHANGE = 6.0, 0.02
+#: Luminance at the end over that at half of the time, from which it hardly falls, and the least time.
+LINGERS, LINGERS_S = 0.95, 60.0
 #: Light before the excitation, relative to 0.3 mcd/m², that is told, in σ of its own and at least.
 AMBIENT, AMBIENT_SIGMAS = 0.1, 4.0
 
@@ -75,7 +88,9 @@ def analyse(part: Part) -> LuminanceResult:
         There are too few readings.
     """
     run, protocol = part.run, part.protocol
-    frames = intact_frames(run, part.overrides, LuminanceFrames.GLOW)
+    frames, stray = without_stray_light(
+        intact_frames(run, part.overrides, LuminanceFrames.GLOW), part.inputs.blank
+    )
     card = steady_frames(run, part.overrides, LuminanceFrames.CARD)
     if not card:
         raise DataError(f"{run.folder}: no card was photographed; go on with labrig resume")
@@ -86,7 +101,9 @@ def analyse(part: Part) -> LuminanceResult:
         name: _counts(name, region, frames.decay, card, frames.dark, part.inputs.camera)
         for name, region in regions.items()
     }
-    patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW)]
+    patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW), *stray]
+    if part.inputs.camera is None or part.inputs.camera.glare is None:
+        warnings += _veiled(frames, regions)
     for name, each in counts.items():
         patches[name], told = _patch(each, name, excitation, part)
         warnings += [f"{name}: {line}" if len(counts) > 1 else line for line in told]
@@ -332,17 +349,16 @@ def _patch(
     rig, protocol = part.rig, part.protocol
     camera = camera_curves(rig, part.overrides.camera, part.inputs.lvf)
     known = emission_of(part, name)
-    weight = 1 / np.square(counts.sigma / np.maximum(counts.ratio, 1e-300))
-    early = np.flatnonzero((counts.ratio > 0).all(axis=1))
-    if not len(early):
-        raise DataError("no glow was seen in all channels; raise camera.iso or open the aperture")
-    relative = counts.ratio[early] / counts.ratio[early].max(axis=1)[:, np.newaxis]
-    inverse = weight[early]
-    colour = (relative * inverse).sum(axis=0) / inverse.sum(axis=0)
-    noise = np.maximum(1 / np.sqrt(inverse.sum(axis=0)), 1e-4)
+    seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).all(axis=1)
+    if not seen.any():
+        raise DataError(
+            f"{name}: no glow was seen in all channels; raise iso_at_most, open the aperture, or "
+            "excite for longer"
+        )
+    colour, noise = _colour(counts, np.flatnonzero(seen))
     scale = colour_scale(
         colour,
-        noise * colour,
+        noise,
         camera,
         card_radiance(rig),
         bare_lamp_spectrum(rig),
@@ -389,6 +405,58 @@ def _patch(
     )
 
 
+def _colour(counts: _Counts, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the mean ratios to the card in some frames, that of the strongest 1, and their σ."""
+    strongest = int(np.argmax((counts.ratio[rows] / counts.sigma[rows]).sum(axis=0)))
+    reference = counts.ratio[rows, strongest, np.newaxis]
+    relative = counts.ratio[rows] / reference
+    sigma = counts.sigma[rows] / reference
+    weight = 1 / (np.square(sigma) + np.square(relative * sigma[:, [strongest]]))
+    weight[:, strongest] = 1.0
+    total = weight.sum(axis=0)
+    dark = (weight * counts.dark_sigma[rows] / reference).sum(axis=0) / total
+    noise = np.hypot(1 / np.sqrt(total), dark)
+    noise[strongest] = 0.0
+    return (weight * relative).sum(axis=0) / total, noise
+
+
+def _other_light(counts: _Counts) -> Iterator[str]:
+    """Yield a warning if the light changes its colour, or stays at a level, as another light does."""
+    halves = np.log(counts.t_s) > np.log(counts.t_s[[0, -1]]).mean()
+    seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).all(axis=1)
+    early, late = (np.flatnonzero(seen & half) for half in (~halves, halves))
+    if len(early) > 1 and len(late) > 1:
+        (first, first_sigma), (last, last_sigma) = _colour(counts, early), _colour(counts, late)
+        change, sigma = (
+            np.abs(last / last.max() - first / first.max()),
+            np.hypot(first_sigma, last_sigma),
+        )
+        if (change > np.maximum(COLOUR_SIGMAS * sigma, COLOUR_CHANGE)).any():
+            yield (
+                f"the colour of the glow changes by {change.max():.1%} with time: another light "
+                "came on, the lamp glows on, or the emission depends on time; the luminances take "
+                "it for the same"
+            )
+    brightest = int(np.argmax(counts.ratio[0] * counts.card))
+    signal = counts.ratio[:, brightest]
+    half = int(np.argmin(np.abs(counts.t_s - counts.t_s[-1] / 2)))
+    if counts.t_s[-1] > LINGERS_S and signal[-1] > LINGERS * signal[half] > 0:
+        yield (
+            "at the end the luminance hardly falls: a light may have come on, or a state lives "
+            "much longer than the run"
+        )
+
+
+def _veiled(frames: IntactFrames, regions: Mapping[str, Region]) -> tuple[str, ...]:
+    """Return a warning if the glare of a usual lens matters beside a bright patch."""
+    iso = frames.decay[-1].iso
+    last = [frame for frame in frames.decay if frame.iso == iso][:1]
+    wanted = {**regions, WHOLE_FRAME_NAME: WHOLE_FRAME}
+    series = reduce_patches(last, wanted, frames.dark)
+    whole = series.pop(WHOLE_FRAME_NAME)
+    return glare_warning(series, regions, whole, sensor_layout(last[0]))
+
+
 def _one_a_time(t_s: FloatArray) -> IntArray:
     """Return the rows whose times rise."""
     return np.flatnonzero(np.concatenate([[True], np.diff(t_s) > 0]))
@@ -423,6 +491,7 @@ def _warnings(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[str]:
         yield doubt
     if scale.doubt is not None:
         yield scale.doubt
+    yield from _other_light(counts)
     if part.rig.optics.luminance is not None and part.rig.optics.luminance.lamp is None:
         yield (
             "the rig file does not say which lamp it has (optics: luminance: lamp): the same lux "
@@ -460,7 +529,9 @@ def _excitation(part: Part) -> ExcitationState:
     assert reading is not None
     conditions, rested_s = protocol.excitation.conditions, protocol.excitation.rested
     charged_s = _charged_s(part.run)
-    sigma = reading.sigma if reading.at == "sample plane" else math.hypot(reading.sigma, CARD_SIGMA)
+    by_card = reading.at == "card"
+    card_sigma = card_error(card_reflectance(part.rig))[0] if by_card else 0.0
+    sigma = math.hypot(reading.sigma, card_sigma)
     return ExcitationState(
         standard=conditions.name,
         lamp=reading.lamp,
