@@ -502,21 +502,19 @@ class GlowUnit:
     def _follow(self, session: Session, last_s: float, off_s: float) -> None:
         """Photograph the glow from the last of the first frames on until it is dim."""
         protocol, iso, is_checked = self.protocol, self.protocol.camera.iso, False
-        offers = session.rig[CAMERA].offers()
-        while True:
+        offers, is_over = session.rig[CAMERA].offers(), False
+        while not is_over:
             begin_s = max(protocol.next_s(last_s, offers), session.clock.now() - off_s + MARGIN_S)
             is_over = begin_s > protocol.until
+            if not is_over:
+                shots = self._photograph(session, begin_s, off_s, iso)
+                last_s, iso = shots.begins_s[-1], shots.settings[-1].iso
+                is_over = session.choose("dim enough", lambda: self._is_dim(session), worst=False)
             if not is_checked and (is_over or last_s > FADES_BY_S):
                 session.choose(
                     "after lamp off", lambda: self._afterglow(session), worst=Afterglow.FADING
                 ).require(session.warn)
                 is_checked = True
-            if is_over:
-                break
-            shots = self._photograph(session, begin_s, off_s, iso)
-            last_s, iso = shots.begins_s[-1], shots.settings[-1].iso
-            if session.choose("dim enough", lambda: self._is_dim(session), worst=False):
-                break
 
     def _photograph(self, session: Session, begin_s: float, off_s: float, iso: int) -> Shots:
         """Take the next frames from a time after lamp off, and return them."""

@@ -69,7 +69,7 @@ NEAR_CHANGE = math.log(2.0)
 SEEN = 5.0
 #: Change of the colour that is told, in its σ and relative to the strongest channel.
 COLOUR_SIGMAS, COLOUR_CHANGE = 6.0, 0.02
-#: Luminance at the end over that at half of the time, from which it hardly falls, and the least time.
+#: Luminance at the end over that at half of the time from which it hardly falls; the least time.
 LINGERS, LINGERS_S = 0.95, 60.0
 #: Light before the excitation, relative to 0.3 mcd/m², that is told, in σ of its own and at least.
 AMBIENT, AMBIENT_SIGMAS = 0.1, 4.0
@@ -349,13 +349,14 @@ def _patch(
     rig, protocol = part.rig, part.protocol
     camera = camera_curves(rig, part.overrides.camera, part.inputs.lvf)
     known = emission_of(part, name)
-    seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).all(axis=1)
+    seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).any(axis=1)
     if not seen.any():
         raise DataError(
-            f"{name}: no glow was seen in all channels; raise iso_at_most, open the aperture, or "
-            "excite for longer"
+            f"{name}: no glow was seen; raise iso_at_most, open the aperture, or excite for longer"
         )
     colour, noise = _colour(counts, np.flatnonzero(seen))
+    # A channel that does not see the glow has a value all the same, of its noise.
+    colour = np.maximum(colour, noise)
     scale = colour_scale(
         colour,
         noise,
@@ -421,7 +422,7 @@ def _colour(counts: _Counts, rows: IntArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _other_light(counts: _Counts) -> Iterator[str]:
-    """Yield a warning if the light changes its colour, or stays at a level, as another light does."""
+    """Yield a warning if the light changes its colour or stays at a level, as other light does."""
     halves = np.log(counts.t_s) > np.log(counts.t_s[[0, -1]]).mean()
     seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).all(axis=1)
     early, late = (np.flatnonzero(seen & half) for half in (~halves, halves))
