@@ -29,8 +29,8 @@ from labrig.optics import (
 from labrig.protocols.luminance import TABLES
 from labrig.results import EmissionSpectrumResult, FloatArray, Measured, read_result
 
-#: Error of a camera's curves: laboratories differ by 2 % to 6 % RMS of the peak, which is 7 % of the
-#: curve itself on average.
+#: Error of a camera's curves: laboratories differ by 2 % to 6 % RMS of the peak, which is some 7 %
+#: of the curve itself.
 CURVES = CurveError(relative=0.07)
 #: Relative errors of a lamp's spectrum and of an emission without σ, smooth over so many nm (1 σ).
 LAMP_ERROR, EMISSION_ERROR, SMOOTH_NM = 0.02, 0.02, 40.0

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from labrig.sim.lamp import BURNING_SPECTRUM
+from labrig.optics import photopic_efficacy
+from labrig.sim.lamp import BURNING_SPECTRUM, WAVELENGTH_NM
 from labrig.sim.luminance import PHOTOPIC, luminance_mcd_per_m2
 from labrig.sim.optics import REFLECTED
 from labrig.sim.simulation import LampSettings
@@ -14,10 +15,7 @@ def test_a_white_under_the_lamp_has_the_luminance_of_its_illuminance() -> None:
     lamp = LampSettings(illuminance=500.0, irradiance=2.0)
     white = REFLECTED * lamp.irradiance * BURNING_SPECTRUM
     assert luminance_mcd_per_m2(white, lamp) == pytest.approx(1000 * 500 / np.pi)
-    colour = pytest.importorskip("colour")
-    table = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
-    expected = np.interp(np.arange(301.25, 780.0, 2.5), table.wavelengths, table.values, left=0)
-    assert pytest.approx(expected, abs=0.005) == PHOTOPIC
+    assert pytest.approx(photopic_efficacy(WAVELENGTH_NM), abs=3.5) == 683 * PHOTOPIC
 
 
 def test_the_luminance_of_a_glow_is_in_proportion_to_its_brightness() -> None:
