@@ -1,3 +1,7 @@
+from .luminances import (
+    FoundLuminance as FoundLuminance,
+    dose_slope as dose_slope,
+)
 from .queue_file import (
     Queue as Queue,
     QueuedRun as QueuedRun,

@@ -5,6 +5,7 @@ import io
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,11 @@ from labrig.acquire import read_protocol
 from labrig.catalogue import RunSummary, summarise
 from labrig.errors import LabrigError
 from labrig.process import describe_without_run, write_with_report
+from labrig.quantity import duration_text
+from labrig.queue.luminances import FoundLuminance, dose_slope, found_luminances
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
-from labrig.results import Measured, read_fitted_decay, read_result
+from labrig.results import MCD_PER_M2, Measured, read_fitted_decay, read_result
 
 #: Name of the figure, what it shows, label of its axis, and the quantity.
 SWEPT: tuple[tuple[str, str, str, Callable[["FoundState"], Measured]], ...] = (
@@ -86,6 +89,12 @@ class QueueEntry:
                     Measured(state.k_r_per_s, state.k_r_sigma_per_s),
                     Measured(state.amplitude, state.amplitude_sigma),
                 )
+
+    @property
+    def luminances(self) -> Iterator[FoundLuminance]:
+        """Luminances that the run found."""
+        if self.summary is not None and self.status == "processed":
+            yield from found_luminances(self.summary.folder)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -183,22 +192,30 @@ def write_results(folder: Path, name: str, listed: Sequence[QueueEntry]) -> Path
 
 
 def _csv(listed: Sequence[QueueEntry]) -> str:
-    """Return a line for each rate of each run, and one of a run that found none."""
+    """Return a line for each rate and luminance of each run, and one of a run that found none."""
     keys = _keys(listed)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    found = ("k_r_per_s", "k_r_sigma_per_s", "amplitude", "amplitude_sigma")
-    table.writerow(["number", "protocol", *keys, "status", "run", "patch", "state", *found])
+    found = ["k_r_per_s", "k_r_sigma_per_s", "amplitude", "amplitude_sigma"]
+    luminous = any(True for entry in listed for _ in entry.luminances)
+    light = ["t_s", "luminance_mcd_per_m2", "luminance_sigma_mcd_per_m2"] if luminous else []
+    head = ["number", "protocol", *keys, "status", "run", "patch", "state", *found, *light]
+    table.writerow(head)
     for entry in listed:
         queued = entry.queued
         start = [entry.number, queued.protocol, *(queued.changes.get(key, "") for key in keys)]
         start += [entry.status, queued.run or ""]
-        states = [
+        rows: list[list[object]] = [
             [state.patch, state.number, k_r.value, k_r.sigma, amplitude.value, amplitude.sigma]
             for state in entry.states
             for k_r, amplitude in [(state.k_r_per_s, state.amplitude)]
         ]
-        table.writerows([*start, *cells] for cells in states or [[""] * (2 + len(found))])
+        rows += [
+            [one.patch, *[""] * (1 + len(found)), one.t_s, one.luminance.value, one.luminance.sigma]
+            for one in entry.luminances
+        ]
+        for cells in rows or [[]]:
+            table.writerow([*start, *cells, *[""] * (len(head) - len(start) - len(cells))])
     return text.getvalue().rstrip("\n")
 
 
@@ -254,13 +271,42 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
         Picture(name.format(n), chart, f"{what} over {key}. Bars are ± 1 σ.")
         for n, key in enumerate(keys, 1)
         for name, what, label, quantity in SWEPT
-        for texts, points in [_swept(listed, key, quantity)]
+        for texts, points in [_swept(listed, key, partial(_of_states, quantity))]
         if (chart := sweep_chart(key, texts, label, points)) is not None
     )
-    swept = (Section("Over what was changed", figures=figures),) if figures else ()
+    luminous = [_luminous(listed, key, n) for n, key in enumerate(keys, 1)]
+    figures += tuple(picture for picture, _ in luminous if picture is not None)
+    slopes = tuple(slope for _, slope in luminous if slope is not None)
+    swept = (Section("Over what was changed", figures=figures, tables=slopes),) if figures else ()
     about = describe_without_run(name, "queue", "", ())
     warnings = [f"no. {entry.number}: {text}" for entry in listed for text in entry.warnings]
     return Report(about, tuple(warnings), (runs, *swept))
+
+
+def _luminous(
+    listed: Sequence[QueueEntry], key: str, number: int
+) -> tuple[Picture | None, Table | None]:
+    """Return luminances over a key, and the slopes of these charge–dose curves."""
+    texts, points = _swept(
+        listed,
+        key,
+        lambda entry: [
+            (one.patch, duration_text(one.t_s), one.luminance) for one in entry.luminances
+        ],
+    )
+    chart = sweep_chart(key, texts, f"L / {MCD_PER_M2}", points)
+    if chart is None:
+        return None, None
+    caption = f"Luminances at times after lamp off over {key}. Bars are ± 1 σ, with the scale's."
+    rows = []
+    for patch, name in dict.fromkeys((point.patch, point.name) for point in points):
+        own = [point for point in points if (point.patch, point.name) == (patch, name)]
+        slope = dose_slope([point.at for point in own], [point.measured for point in own])
+        rows += [(patch, name, str(slope))] if slope is not None else []
+    head = ("patch", "after lamp off", "slope")
+    told = f"Slopes d ln L/d ln {key}, with σ by the scatter about a straight line."
+    table = Table(head, tuple(rows), told) if rows else None
+    return Picture(f"luminances-{number}", chart, caption), table
 
 
 def _report_of(entry: QueueEntry, folder: Path) -> str:
@@ -278,16 +324,32 @@ def _rates(entry: QueueEntry) -> list[str]:
     ]
 
 
+def _of_states(
+    quantity: Callable[[FoundState], Measured], entry: QueueEntry
+) -> list[tuple[str, str, Measured]]:
+    return [(state.patch, f"state {state.number}", quantity(state)) for state in entry.states]
+
+
 def _swept(
-    listed: Sequence[QueueEntry], key: str, quantity: Callable[[FoundState], Measured]
+    listed: Sequence[QueueEntry],
+    key: str,
+    quantities: Callable[[QueueEntry], Sequence[tuple[str, str, Measured]]],
 ) -> tuple[dict[float, str], list[SweptPoint]]:
-    """Return the values of a key, as typed by their numbers, and a quantity of all runs."""
+    """Return the values of a key, as typed by their numbers, and quantities of all runs.
+
+    Parameters
+    ----------
+    listed, key
+        Entries of the queue, and the key.
+    quantities
+        Function of an entry that returns patch, name and value of its quantities.
+    """
     of_key = [entry for entry in listed if key in entry.queued.changes]
     values = {entry.number: entry.value(key) for entry in of_key}
     known = [entry for entry in of_key if not np.isnan(values[entry.number])]
     texts = {values[entry.number]: str(entry.queued.changes[key]) for entry in known}
     return texts, [
-        SweptPoint(values[entry.number], state.patch, state.number, quantity(state))
+        SweptPoint(values[entry.number], patch, name, measured)
         for entry in known
-        for state in entry.states
+        for patch, name, measured in quantities(entry)
     ]
