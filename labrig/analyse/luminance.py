@@ -6,9 +6,8 @@ is 683 lm/W ∫ V S dλ.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from labrig.analyse.frames import (
     without_stray_light,
 )
 from labrig.analyse.glare import glare_warning
+from labrig.analyse.glow_ratios import SHUTTER_S, GlowRatios, glow_ratios
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import (
     bare_lamp_spectrum,
@@ -31,7 +31,6 @@ from labrig.bench_optics import (
     card_reflectance,
     illuminance_lx,
 )
-from labrig.calibration import CameraFile
 from labrig.errors import DataError
 from labrig.fit import fit_luminance
 from labrig.optics import mesopic_adaptation, mesopic_ratio
@@ -40,7 +39,6 @@ from labrig.record import PERSON, RunRecord, glow_temperature_c
 from labrig.reduce import (
     WHOLE_FRAME,
     WHOLE_FRAME_NAME,
-    SeriesFrame,
     reduce_patches,
     sensor_layout,
 )
@@ -56,15 +54,8 @@ from labrig.results import (
     Measured,
     PatchLuminance,
     ScaleFactor,
-    Series,
 )
 
-#: Scatter of a frame's light by shutter, aperture and lamp, where it was not calibrated (1 σ).
-FLICKER = 0.007
-#: Error of a shutter in seconds, and of the ratio of two sensitivities, not calibrated (1 σ).
-SHUTTER_S, ISO_RATIO = 2e-4, 0.02
-#: Range of ln t about a change of ISO in which frames tell the ratio.
-NEAR_CHANGE = math.log(2.0)
 #: Signal in σ from which a glow is seen.
 SEEN = 5.0
 #: Change of the colour that is told, in its σ and relative to the strongest channel.
@@ -98,7 +89,7 @@ def analyse(part: Part) -> LuminanceResult:
     excitation = _excitation(part)
     regions = part.overrides.patches(protocol)
     counts = {
-        name: _counts(name, region, frames.decay, card, frames.dark, part.inputs.camera)
+        name: glow_ratios(name, region, frames.decay, card, frames.dark, part.inputs.camera)
         for name, region in regions.items()
     }
     patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW), *stray]
@@ -117,233 +108,8 @@ def analyse(part: Part) -> LuminanceResult:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Counts:
-    """Signal of a patch of glow relative to that of the card in its place.
-
-    Attributes
-    ----------
-    t_s
-        Middles of the n exposures in seconds after lamp off.
-    ratio, sigma
-        Ratio of the glow to the card in the C channels, and σ by noise and flicker, shape (n, C).
-    iso
-        Sensitivity of every frame, shape (n,).
-    dark_sigma
-        σ of the dark level, common to frames at one ISO, relative to the card, shape (n, C).
-    card_sigma
-        Relative σ of the card's signal by noise and flicker.
-    shutter_sigma
-        Relative σ of the ratio by the shutter times.
-    iso_sigma
-        Relative σ of the ratio of every frame by its sensitivity's ratio to the card's, shape (n,).
-    iso_source
-        Origin of these ratios.
-    ambient
-        Light before the excitation relative to the card's, and its σ.
-    card
-        Signal of the card in the channels in DN/s.
-    channels
-        Names of the channels.
-    """
-
-    t_s: FloatArray
-    ratio: FloatArray
-    sigma: FloatArray
-    iso: FloatArray
-    dark_sigma: FloatArray
-    card_sigma: float
-    shutter_sigma: float
-    iso_sigma: FloatArray
-    iso_source: str
-    ambient: Measured
-    card: FloatArray
-    channels: tuple[str, ...]
-
-
-def _counts(
-    name: str,
-    region: Region,
-    glow: Sequence[SeriesFrame],
-    card: Sequence[SeriesFrame],
-    darks: Sequence[SeriesFrame],
-    camera: CameraFile | None,
-) -> _Counts:
-    """Reduce the frames of a patch, at every ISO by itself."""
-    lit = reduce_patches(card, {name: region}, darks, camera=camera)[name]
-    if not lit.usable.any():
-        raise DataError(
-            "every photograph of the card clips; lower camera.iso or close the aperture"
-        )
-    lit = lit.take(np.flatnonzero(lit.usable))
-    settings = float(lit.iso[0]), _f_number(lit)
-    flicker = FLICKER if camera is None else camera.flicker
-    card_dn = lit.values.mean(axis=0)
-    noise = np.sqrt(np.square(lit.sigma / lit.values).mean(axis=0)).min()
-    parts = []
-    for iso in sorted({frame.iso for frame in glow if frame.iso is not None}):
-        at_iso = [frame for frame in glow if frame.iso == iso]
-        series = reduce_patches(at_iso, {name: region}, darks, camera=camera)[name]
-        rows = np.flatnonzero(series.usable)
-        if len(rows):
-            parts.append(_at_iso(series.take(rows), card_dn, settings, camera, flicker))
-    if not parts:
-        raise DataError("every photograph of the glow clips; lower camera.iso")
-    t_s, ratio, sigma, isos, dark, iso_sigma, shutter = (
-        np.concatenate([getattr(part, field) for part in parts])
-        for field in ("t_s", "ratio", "sigma", "iso", "dark", "iso_sigma", "shutter")
-    )
-    order = np.argsort(t_s, kind="stable")
-    counts = _Counts(
-        t_s=t_s[order],
-        ratio=ratio[order],
-        sigma=sigma[order],
-        iso=isos[order],
-        dark_sigma=dark[order],
-        card_sigma=math.hypot(float(noise), flicker) / math.sqrt(len(lit.t_s)),
-        shutter_sigma=math.hypot(_shutter_sigma(camera, lit.exposure_s[0]), float(shutter.min())),
-        iso_sigma=iso_sigma[order],
-        iso_source="nominal" if camera is None else "the camera's calibration",
-        ambient=_ambient(name, region, darks, card_dn, settings, camera),
-        card=card_dn,
-        channels=lit.channels,
-    )
-    return _with_measured_isos(counts, flicker)
-
-
-@dataclass(frozen=True, eq=False)
-class _AtIso:
-    t_s: FloatArray
-    ratio: FloatArray
-    sigma: FloatArray
-    iso: FloatArray
-    dark: FloatArray
-    iso_sigma: FloatArray
-    shutter: FloatArray
-
-
-def _at_iso(
-    series: Series,
-    card_dn: FloatArray,
-    card_settings: tuple[float, float | None],
-    camera: CameraFile | None,
-    flicker: float,
-) -> _AtIso:
-    """Return the frames at one ISO relative to the card's at its own."""
-    iso = float(series.iso[0])
-    gain, gain_sigma = _gain((iso, _f_number(series)), card_settings, camera)
-    per_card = 1 / (card_dn * gain)
-    ratio = series.values * per_card
-    n = len(series.t_s)
-    return _AtIso(
-        t_s=series.t_s + series.exposure_s / 2,
-        ratio=ratio,
-        sigma=np.hypot(series.sigma * per_card, flicker * ratio),
-        iso=series.iso,
-        dark=np.broadcast_to(np.nan_to_num(series.dark_sigma) * per_card, ratio.shape),
-        iso_sigma=np.full(n, gain_sigma),
-        shutter=np.array([_shutter_sigma(camera, at_s) for at_s in series.exposure_s]),
-    )
-
-
-def _f_number(series: Series) -> float | None:
-    return None if np.isnan(series.f_number[0]) else float(series.f_number[0])
-
-
-def _gain(
-    settings: tuple[float, float | None],
-    card: tuple[float, float | None],
-    camera: CameraFile | None,
-) -> tuple[float, float]:
-    """Return the signal of the same light at some settings over that at the card's, and its σ."""
-    if settings == card:
-        return 1.0, 0.0
-    if camera is None:
-        return settings[0] / card[0], ISO_RATIO
-    (own, own_sigma), (of_card, card_sigma) = camera.scale(*settings), camera.scale(*card)
-    calibrated = own_sigma > 0 or settings[0] == camera.iso
-    return own / of_card, math.hypot(own_sigma, card_sigma, 0.0 if calibrated else ISO_RATIO)
-
-
-def _shutter_sigma(camera: CameraFile | None, exposure_s: float) -> float:
-    if camera is None or not camera.shutter:
-        return SHUTTER_S / float(exposure_s)
-    return camera.exposure_s(float(exposure_s))[1]
-
-
-def _ambient(
-    name: str,
-    region: Region,
-    darks: Sequence[SeriesFrame],
-    card_dn: FloatArray,
-    card_settings: tuple[float, float | None],
-    camera: CameraFile | None,
-) -> Measured:
-    """Return the light in the dark frames relative to the card's, by what their channels differ.
-
-    A sensor's dark current is the same in all channels, light is not: this is a lower limit.
-    """
-    iso = max(frame.iso for frame in darks if frame.iso is not None)
-    longest_s = max(frame.exposure_s for frame in darks)
-    own = [frame for frame in darks if frame.iso == iso]
-    series = reduce_patches(own, {name: region})[name]
-    rows, short = series.exposure_s == longest_s, series.exposure_s < longest_s
-    if not short.any():
-        return Measured(0.0, math.inf)
-    levels = series.values * series.exposure_s[:, np.newaxis]
-    light = (levels[rows].mean(axis=0) - levels[short].mean(axis=0)) / longest_s
-    sigma = levels[rows].std(axis=0, ddof=1) / longest_s / math.sqrt(int(rows.sum()))
-    gain, _ = _gain((float(iso), _f_number(series)), card_settings, camera)
-    brightest, darkest = int(np.argmax(light)), int(np.argmin(light))
-    scale = 1 / (card_dn[brightest] * gain)
-    difference = float(light[brightest] - light[darkest]) * scale
-    return Measured(difference, float(np.hypot(sigma[brightest], sigma[darkest])) * scale)
-
-
-def _with_measured_isos(counts: _Counts, flicker: float) -> _Counts:
-    """Return the counts with the ratios of sensitivities by frames at both, where they change.
-
-    About the change the logarithm of the signal is a parabola over ln t, with a step of the ISO.
-    """
-    isos = list(dict.fromkeys(counts.iso[np.argsort(counts.iso)].tolist()))
-    ratio, sigma = counts.ratio.copy(), counts.iso_sigma.copy()
-    brightest = int(np.argmax(counts.ratio[0] * counts.card))
-    measured = False
-    for lower, higher in pairwise(isos):
-        later = counts.iso >= higher
-        at_change = np.log(counts.t_s[counts.iso == higher].min())
-        x = np.log(counts.t_s) - at_change
-        near = (np.abs(x) < NEAR_CHANGE) & np.isin(counts.iso, (lower, higher))
-        value = ratio[near, brightest]
-        if near.sum() < 6 or (value <= 0).any():
-            continue
-        error = counts.sigma[near, brightest] / value
-        step = (counts.iso[near] == higher).astype(np.float64)
-        powers = np.stack([np.ones_like(value), x[near], x[near] ** 2, step], axis=1)
-        prior = max(float(sigma[counts.iso == higher][0]), 1e-9)
-        rows = np.vstack([powers / error[:, np.newaxis], [0.0, 0.0, 0.0, 1 / prior]])
-        target = np.append(np.log(value) / error, 0.0)
-        solution, *_ = np.linalg.lstsq(rows, target, rcond=None)
-        step_sigma = math.sqrt(float(np.linalg.inv(rows.T @ rows)[3, 3]))
-        ratio[later] /= math.exp(solution[3])
-        before = float(sigma[counts.iso == lower][0])
-        sigma[later] = math.hypot(before, step_sigma)
-        measured = True
-    source = f"frames at both where it changes, and {counts.iso_source}"
-    scaled = counts.sigma * np.divide(
-        ratio, counts.ratio, out=np.ones_like(ratio), where=counts.ratio != 0
-    )
-    return replace(
-        counts,
-        ratio=ratio,
-        sigma=scaled,
-        iso_sigma=sigma,
-        iso_source=source if measured else counts.iso_source,
-    )
-
-
 def _patch(
-    counts: _Counts, name: str, excitation: ExcitationState, part: Part
+    counts: GlowRatios, name: str, excitation: ExcitationState, part: Part
 ) -> tuple[PatchLuminance, list[str]]:
     """Return the luminances of a patch, and doubts about them."""
     rig, protocol = part.rig, part.protocol
@@ -367,7 +133,8 @@ def _patch(
         known,
     )
     light = 1000 * counts.ratio @ scale.weights
-    sigma = 1000 * np.sqrt(np.square(counts.sigma) @ np.square(scale.weights))
+    noise_sigma = 1000 * np.sqrt(np.square(counts.sigma) @ np.square(scale.weights))
+    sigma = np.hypot(noise_sigma, counts.flicker * light)
     dark = 1000 * np.abs(counts.dark_sigma @ np.abs(scale.weights))
     factors = tuple(_factors(counts, scale, part))
     constant = math.sqrt(sum(factor.relative_sigma**2 for factor in factors))
@@ -406,7 +173,7 @@ def _patch(
     )
 
 
-def _colour(counts: _Counts, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+def _colour(counts: GlowRatios, rows: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the mean ratios to the card in some frames, that of the strongest 1, and their σ."""
     strongest = int(np.argmax((counts.ratio[rows] / counts.sigma[rows]).sum(axis=0)))
     reference = counts.ratio[rows, strongest, np.newaxis]
@@ -421,7 +188,7 @@ def _colour(counts: _Counts, rows: IntArray) -> tuple[FloatArray, FloatArray]:
     return (weight * relative).sum(axis=0) / total, noise
 
 
-def _other_light(counts: _Counts) -> Iterator[str]:
+def _other_light(counts: GlowRatios) -> Iterator[str]:
     """Yield a warning if the light changes its colour or stays at a level, as other light does."""
     halves = np.log(counts.t_s) > np.log(counts.t_s[[0, -1]]).mean()
     seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).all(axis=1)
@@ -463,7 +230,7 @@ def _one_a_time(t_s: FloatArray) -> IntArray:
     return np.flatnonzero(np.concatenate([[True], np.diff(t_s) > 0]))
 
 
-def _factors(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[ScaleFactor]:
+def _factors(counts: GlowRatios, scale: ColourScale, part: Part) -> Iterator[ScaleFactor]:
     """Yield the factors that all luminances have in common."""
     reading = part.rig.optics.luminance
     camera = part.inputs.camera
@@ -485,7 +252,7 @@ def _factors(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[ScaleF
     yield ScaleFactor("colour: curves, lamp, emission", colour, scale.source, is_common=False)
 
 
-def _warnings(counts: _Counts, scale: ColourScale, part: Part) -> Iterator[str]:
+def _warnings(counts: GlowRatios, scale: ColourScale, part: Part) -> Iterator[str]:
     """Yield doubts about scale and darkness."""
     doubt = scale.card_doubt(counts.card, counts.card_sigma)
     if doubt is not None:
