@@ -46,6 +46,7 @@ from labrig.region import Region
 from labrig.results import (
     MCD_PER_M2,
     VISIBLE_MCD_PER_M2,
+    BoolArray,
     ExcitationState,
     FloatArray,
     IntArray,
@@ -96,8 +97,16 @@ def analyse(part: Part) -> LuminanceResult:
     if part.inputs.camera is None or part.inputs.camera.glare is None:
         warnings += _veiled(frames, regions)
     for name, each in counts.items():
+        if not _is_seen(each).any():
+            warnings.append(f"{name}: no glow was seen in this patch, which is left out")
+            continue
         patches[name], told = _patch(each, name, excitation, part)
         warnings += [f"{name}: {line}" if len(counts) > 1 else line for line in told]
+    if not patches:
+        raise DataError(
+            f"{run.folder}: no glow was seen; raise iso_at_most, open the aperture, or excite for "
+            "longer"
+        )
     return LuminanceResult(
         patches=_with_ratios(patches),
         excitation=excitation,
@@ -115,12 +124,7 @@ def _patch(
     rig, protocol = part.rig, part.protocol
     camera = camera_curves(rig, part.overrides.camera, part.inputs.lvf)
     known = emission_of(part, name)
-    seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).any(axis=1)
-    if not seen.any():
-        raise DataError(
-            f"{name}: no glow was seen; raise iso_at_most, open the aperture, or excite for longer"
-        )
-    colour, noise = _colour(counts, np.flatnonzero(seen))
+    colour, noise = _colour(counts, np.flatnonzero(_is_seen(counts).any(axis=1)))
     # A channel that does not see the glow has a value all the same, of its noise.
     colour = np.maximum(colour, noise)
     scale = colour_scale(
@@ -173,6 +177,11 @@ def _patch(
     )
 
 
+def _is_seen(counts: GlowRatios) -> BoolArray:
+    """Return whether a signal is clearly above noise and dark level, shape (n, channels)."""
+    return np.asarray(counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma))
+
+
 def _colour(counts: GlowRatios, rows: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the mean ratios to the card in some frames, that of the strongest 1, and their σ."""
     strongest = int(np.argmax((counts.ratio[rows] / counts.sigma[rows]).sum(axis=0)))
@@ -191,7 +200,7 @@ def _colour(counts: GlowRatios, rows: IntArray) -> tuple[FloatArray, FloatArray]
 def _other_light(counts: GlowRatios) -> Iterator[str]:
     """Yield a warning if the light changes its colour or stays at a level, as other light does."""
     halves = np.log(counts.t_s) > np.log(counts.t_s[[0, -1]]).mean()
-    seen = (counts.ratio > SEEN * np.hypot(counts.sigma, counts.dark_sigma)).all(axis=1)
+    seen = _is_seen(counts).all(axis=1)
     early, late = (np.flatnonzero(seen & half) for half in (~halves, halves))
     if len(early) > 1 and len(late) > 1:
         (first, first_sigma), (last, last_sigma) = _colour(counts, early), _colour(counts, late)
