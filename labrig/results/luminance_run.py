@@ -11,7 +11,7 @@ from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv, write_text
 
 #: Columns of `luminance.csv`, which `labrig fit luminance` reads.
-HEAD = ("time/s", "luminance/(mcd/m2)", "sigma/(mcd/m2)")
+HEAD = ("t_s", "luminance_mcd_per_m2", "luminance_mcd_per_m2_sigma")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part
+from labrig.analyse import Part, evaluate_luminance_table
 from labrig.analyse.luminance import analyse
 from labrig.bench_optics import card_radiance, luminance
 from labrig.process import process_and_report
@@ -87,8 +87,10 @@ def test_luminances_are_those_of_the_room(long_run: Path) -> None:
     content = json.loads((done.report.parent / "luminance.json").read_text())
     assert content["origin"] == long_run.name
     assert content["marking"] == decay.marking
-    rows = (done.report.parent / "luminance.csv").read_text().splitlines()
-    assert len(rows) == 1 + len(decay.t_s)
+    again, _ = evaluate_luminance_table(done.report.parent / "luminance.csv")
+    assert again.luminance_mcd_per_m2 == pytest.approx(decay.luminance_mcd_per_m2)
+    assert again.visible_s is not None
+    assert again.visible_s.value == pytest.approx(decay.visible_s.value)
     page = done.report.read_text()
     assert "0.4 mm" in page
     assert decay.marking in page
