@@ -94,6 +94,11 @@ def analyse(part: Part) -> LuminanceResult:
         for name, region in regions.items()
     }
     patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW), *stray]
+    if not frames.dark:
+        warnings.append(
+            "without dark frames the level without light is that of the files: its error, in no σ "
+            "here, grows towards the dim end"
+        )
     if part.inputs.camera is None or part.inputs.camera.glare is None:
         warnings += _veiled(frames, regions)
     for name, each in counts.items():
