@@ -279,6 +279,8 @@ class Luminance(ProtocolModel):
         `auto` is that of the rig file's reading.
     """
 
+    rate_frames = (LuminanceFrames.GLOW,)
+
     protocol: Literal["luminance"] = "luminance"
     excitation: Excitation = Excitation()
     until: DurationS = Field(7200.0, gt=0)

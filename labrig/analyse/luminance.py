@@ -320,7 +320,7 @@ def _excitation(part: Part) -> ExcitationState:
         illuminance=Measured(lux, sigma * lux, "lx"),
         charged_s=charged_s,
         rested_s=rested_s,
-        temperature_c=glow_temperature_c(part.run, (LuminanceFrames.GLOW,)),
+        temperature_c=glow_temperature_c(part.run, protocol.rate_frames),
         deviations=tuple(conditions.deviations(reading.lamp, lux, charged_s, rested_s)),
     )
 
