@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from labrig.region import Region, region_pixels
 
 from .arrangement import Card
-from .lamp import WAVELENGTH_NM
+from .lamp import CELL_NM, WAVELENGTH_NM
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -19,6 +19,17 @@ FRAME_REFLECTANCE = 0.04
 #: A grey card's reflectance over its nominal one.
 GREY_NM = (380.0, 420.0, 480.0, 560.0, 640.0, 700.0, 780.0)
 GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
+
+#: An optical brightener: light that it absorbs, and middle and width (1 σ) of what it re-radiates.
+BRIGHTENED = WAVELENGTH_NM < 430.0
+BRIGHTENER_NM, BRIGHTENER_SIGMA_NM = 440.0, 18.0
+
+
+def brightened(light: FloatArray, fraction: float) -> FloatArray:
+    """Return what a brightener re-radiates of a light (wavelengths,), as from a white card."""
+    shape = np.exp(-(((WAVELENGTH_NM - BRIGHTENER_NM) / BRIGHTENER_SIGMA_NM) ** 2) / 2)
+    absorbed = fraction * CELL_NM * light[BRIGHTENED].sum()
+    return np.asarray(absorbed * shape / (CELL_NM * shape.sum()))
 
 
 def reflectances(card: Card, grey: float) -> FloatArray:

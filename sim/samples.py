@@ -81,7 +81,13 @@ class Samples:
         self._state_of_cells = np.concatenate(states)
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
         self.cells = self._patches.of(self._state_of_cells, cell)
-        emitted = np.concatenate([emission(material) for material in phosphors])
+        brightnesses = [patch.brightness for patch in simulation.patches]
+        emitted = np.concatenate(
+            [
+                brightness * emission(material)
+                for brightness, material in zip(brightnesses, phosphors, strict=True)
+            ]
+        )
         state, share = np.arange(len(emitted)), np.ones(len(emitted))
         if (traps := self._patches.traps) is not None:
             state, share = traps.state, traps.share

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from .angles import Angles
 from .arrangement import Arrangement
-from .cards import reflectances
+from .cards import brightened, reflectances
 from .layout import Layout, Places
 from .lights import VisibleLight
 from .lvf import Lvf
@@ -137,11 +137,15 @@ class View:
             # The filter lies on the card as it would on the sample.
             piece = self._layout.piece[places.cell[covered]]
             card = self._below_lvf(arrangement.turned)[piece] * card
+        light = reflected.cloth if self._simulation.door is None else reflected.door
+        glow = np.zeros_like(light)
+        if arrangement.card == "grey card":
+            glow = brightened(light, self._simulation.grey_card_fluorescence)
         if self._simulation.door is None:
-            radiance[covered] = self._reflected * card * reflected.cloth
+            radiance[covered] = self._reflected * (card * light + glow)
         else:
             # What the closed door hides is what the card hides, and the door's own outside.
-            radiance[covered] += self._reflected * (card - CLOTH_REFLECTANCE) * reflected.door
+            radiance[covered] += self._reflected * ((card - CLOTH_REFLECTANCE) * light + glow)
 
     def _turned_away(self, tilt_deg: int) -> float:
         """Return the radiance of a sample relative to one that faces the camera."""

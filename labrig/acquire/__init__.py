@@ -10,6 +10,7 @@ from labrig.acquire.loading import (
     load_driver,
     read_protocol,
 )
+from labrig.acquire.luminance_reading import LampType, LuminanceReading
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -47,7 +48,9 @@ __all__ = [
     "Finding",
     "Frame",
     "FramePixels",
+    "LampType",
     "LateAction",
+    "LuminanceReading",
     "ManualStep",
     "Optics",
     "PartUnit",

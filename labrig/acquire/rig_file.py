@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from labrig import resources
+from labrig.acquire.luminance_reading import LuminanceReading
 from labrig.acquire.roles import ROLES
 from labrig.calibration import CalibrationKind, kinds
 from labrig.errors import UsageError
@@ -114,6 +115,10 @@ class Optics(BaseModel):
     emission_library
         Measured emissions that dyes of fluorescent samples may have: a folder of re-radiation
         matrices or of tables of spectra, or one such file.
+    luminance
+        Reading of a luxmeter at the sample or of a luminance meter on the card, under the bare
+        lamp, for example `{value: 312 lx, sigma: 3 %, at: sample plane, lamp: halogen}`. The
+        protocol `luminance` needs it.
     direct
         Run of the protocol `direct_bispectral` on samples of the same names, with which estimated
         re-radiation is compared.
@@ -184,6 +189,7 @@ class Optics(BaseModel):
 
     emission_library: str | None = None
     direct: str | None = None
+    luminance: LuminanceReading | None = None
 
     def filter_files(self) -> dict[str, Path]:
         """Return the files of the colour filters' transmittances by name.

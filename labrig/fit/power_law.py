@@ -31,7 +31,7 @@ class PowerLaw:
     p_value: float
 
 
-def fit_power_law(x: ArrayLike, values: Sequence[Measured]) -> PowerLaw:
+def fit_power_law(x: ArrayLike, values: Sequence[Measured], common_sigma: float = 0.0) -> PowerLaw:
     """Fit y ∝ xⁿ, a line in logarithms, to measured quantities.
 
     Parameters
@@ -40,6 +40,8 @@ def fit_power_law(x: ArrayLike, values: Sequence[Measured]) -> PowerLaw:
         Places, > 0, in any unit, shape (n,).
     values
         Quantities there, > 0, with finite σ > 0, one of each place.
+    common_sigma
+        Part of their relative σ that all have in common, such as that of a scale: it cancels.
 
     Returns
     -------
@@ -73,7 +75,13 @@ def fit_power_law(x: ArrayLike, values: Sequence[Measured]) -> PowerLaw:
             f"expected places, values and σ above 0, got {value[row]:g} ± {sigma[row]:g} at "
             f"{places[row]:g}; leave it out"
         )
-    log_x, log_y, weight = np.log(places), np.log(value), (value / sigma) ** 2
+    own2 = (sigma / value) ** 2 - common_sigma**2
+    if own2.min() <= 0:
+        raise FitError(
+            f"expected relative σ above the common one of {common_sigma:g}, got "
+            f"{float((sigma / value).min()):g}"
+        )
+    log_x, log_y, weight = np.log(places), np.log(value), 1 / own2
     from_mean = log_x - np.average(log_x, weights=weight)
     information = float(weight @ from_mean**2)
     exponent = float(weight @ (from_mean * log_y)) / information

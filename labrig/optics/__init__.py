@@ -43,6 +43,12 @@ from labrig.optics.lvf import (
     peak_shape,
     signal_through,
 )
+from labrig.optics.photometry import (
+    mesopic_adaptation,
+    mesopic_ratio,
+    photopic_efficacy,
+    scotopic_efficacy,
+)
 from labrig.optics.piecewise import (
     band_integrals,
     band_means,
@@ -94,9 +100,12 @@ __all__ = [
     "is_narrow",
     "lab",
     "lamp_calibration",
+    "mesopic_adaptation",
+    "mesopic_ratio",
     "nominal_lvf",
     "observer",
     "peak_shape",
+    "photopic_efficacy",
     "quadrature",
     "read_camera",
     "read_checked_curves",
@@ -108,6 +117,7 @@ __all__ = [
     "read_spectrum",
     "read_transmittance",
     "rho_squared",
+    "scotopic_efficacy",
     "shipped_camera",
     "shipped_cameras",
     "signal_through",

@@ -119,12 +119,21 @@ from .led_fluorescence import (
 )
 from .luminance import (
     MARKING_S as MARKING_S,
+    MCD_PER_M2 as MCD_PER_M2,
     TABLE_S as TABLE_S,
     VISIBLE_MCD_PER_M2 as VISIBLE_MCD_PER_M2,
     LuminanceAt as LuminanceAt,
     LuminanceDecay as LuminanceDecay,
     LuminanceRequirement as LuminanceRequirement,
     Verdict as Verdict,
+    luminance_requirement as luminance_requirement,
+    luminance_unit as luminance_unit,
+)
+from .luminance_run import (
+    ExcitationState as ExcitationState,
+    LuminanceResult as LuminanceResult,
+    PatchLuminance as PatchLuminance,
+    ScaleFactor as ScaleFactor,
 )
 from .lvf_calibration import (
     CameraCurves as CameraCurves,

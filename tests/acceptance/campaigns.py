@@ -119,6 +119,7 @@ CAMPAIGNS = {
         *(_module("manual_examples", page, called=f"manual_{page}") for page in EXAMPLES),
         _module("decay_fit_example"),
         _module("veiling_glare"),
+        _module("luminance_pulls", "--seeds", "50"),
         _module("law_confusion", "--seeds", "100"),
         *(
             _module(

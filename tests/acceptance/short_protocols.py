@@ -49,6 +49,7 @@ SHORTER: dict[str, dict[str, Any]] = {
         "rest": {"at_least": "1 min", "check_every": "2 min", "at_most": "4 min"},
     },
     "isotropy": {"charge": "2 min", "angles": [20, 60], "frames": 2},
+    "luminance": {"until": "3 min", "longest": "10 s"},
     "saturation": {"charges": ["2 min", "10 min"], "for": "60 s"},
     "phosphor": {},
 }  # fmt: skip
@@ -66,6 +67,7 @@ RIGS = {
     "direct_bispectral": "sim-fluorescent",
     "led_brightness": "sim-fluorescent",
     "led_fluorescence": "sim-fluorescent",
+    "luminance": "sim-luminance",
     "validate_illuminants": "sim-fluorescent",
 }
 

@@ -34,6 +34,8 @@ def test_every_shipped_protocol_can_be_planned(name: str, rig: str) -> None:
     # One rig has a bank of LEDs.
     lit = ("led_", "direct_", "angular_", "validate_")
     rig = "sim-fluorescent" if name.startswith(lit) else rig
+    # And one the reading of a luxmeter.
+    rig = "sim-luminance" if name == "luminance" else rig
     laid_out = planned(resources.find("protocols", "protocol", name), rig)
     assert laid_out.duration_s > 1800
     # A direct measurement reads spectra only.
