@@ -39,12 +39,16 @@ class CameraResponse:
         white balanced, to colours.
     channels
         Names of the channels.
+    sigma
+        One standard deviation of the sensitivities, shape (n, channels), where it is known; a
+        factor common to all is not in it.
     """
 
     name: str
     wavelength_nm: FloatArray
     sensitivity: FloatArray
     channels: tuple[str, ...] = CHANNELS
+    sigma: FloatArray | None = None
 
     @property
     def has_ratios(self) -> bool:
@@ -80,8 +84,8 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
     name_or_path
         Name of a shipped camera such as `canon_eos_5d_mark_ii`, maker and model as the camera
         states them, such as `Canon EOS 5D Mark II`, or the path of a file: JSON as rawtoaces writes
-        it, or a CSV table with the columns `wavelength_nm,R,G,B`, or those four
-        columns without a header (Jiang et al. 2013).
+        it, or a CSV table with the columns `wavelength_nm,R,G,B`, with σ in `R_sigma` … where it is
+        known, or the first four columns without a header (Jiang et al. 2013).
 
     Returns
     -------
@@ -203,7 +207,9 @@ def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:
     """Check curves and scale them to a maximum of 1."""
     curves = [file.curves[name] for name in names]
     wavelength_nm, values = curves[0].wavelength_nm, np.stack([c.value for c in curves], axis=1)
-    check_curve(wavelength_nm, values, None)
+    sigmas = [curve.sigma for curve in curves if curve.sigma is not None]
+    sigma = np.stack(sigmas, axis=1) if len(sigmas) == len(curves) else None
+    check_curve(wavelength_nm, values, sigma)
     if len(wavelength_nm) < 3:
         raise ValueError("there are fewer than three wavelengths")
     if (values.max(axis=0) <= 0).any() or values.min() < _NOISE_BELOW_ZERO * values.max():
@@ -211,4 +217,6 @@ def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:
     if np.linalg.matrix_rank(values / values.max(axis=0), tol=1e-6) < len(names):
         raise ValueError("two channels are the same")
     channels = CHANNELS if names == CHANNELS else MONOCHROME
-    return CameraResponse(file.title, wavelength_nm, values / values.max(), channels)
+    scale = float(values.max())
+    relative = None if sigma is None else sigma / scale
+    return CameraResponse(file.title, wavelength_nm, values / scale, channels, relative)

@@ -6,7 +6,6 @@ from typing import Self
 
 import numpy as np
 
-from labrig import resources
 from labrig.optics import (
     CIE_1931,
     CameraResponse,
@@ -14,7 +13,7 @@ from labrig.optics import (
     delta_e,
     lab,
     observer,
-    read_transmittance,
+    read_colour_chart,
     white_xyz,
 )
 from labrig.results import FloatArray, Measured
@@ -27,7 +26,6 @@ EMISSION_NM = 20.0
 STEP_NM = 5.0
 #: Number of draws of errors.
 DRAWS = 400
-PATCHES = tuple(f"patch_{number:02d}" for number in range(1, 25))
 
 
 def camera_matrix(camera: CameraResponse, light: Spectrum | None) -> FloatArray:
@@ -72,8 +70,7 @@ def chart_matrix(values: FloatArray, light: Spectrum) -> tuple[FloatArray, tuple
 
 def _chart_xyz(light: Spectrum) -> tuple[FloatArray, FloatArray]:
     """Return X, Y, Z of the chart's patches, and of a perfect white, whose Y is 1."""
-    path = resources.curve_path("colorchecker")
-    reflectances = [read_transmittance(path, name) for name in PATCHES]
+    reflectances = read_colour_chart("colorchecker")
     eye = observer(CIE_1931)
     nm = eye.wavelength_nm
     seen = light.at(nm)[:, np.newaxis] * eye.functions
