@@ -5,8 +5,13 @@ from labrig.errors import UsageError
 from labrig.optics.curve_file import read_curve_file, read_transmittance
 from labrig.optics.spectrum import Transmittance
 
-#: Number of patches of a ColorChecker, six in a row.
-CHART_PATCHES = 24
+#: Names of the patches of a ColorChecker, row by row; there are six in a row.
+CHART_PATCHES = (
+    "dark skin", "light skin", "blue sky", "foliage", "blue flower", "bluish green",
+    "orange", "purplish blue", "moderate red", "purple", "yellow green", "orange yellow",
+    "blue", "green", "red", "yellow", "magenta", "cyan",
+    "white", "neutral 8", "neutral 6.5", "neutral 5", "neutral 3.5", "black",
+)  # fmt: skip
 
 
 def read_colour_chart(named: str) -> tuple[Transmittance, ...]:
@@ -32,12 +37,12 @@ def read_colour_chart(named: str) -> tuple[Transmittance, ...]:
     >>> from labrig.optics import read_colour_chart
     >>> patches = read_colour_chart("colorchecker")
     >>> len(patches), patches[18].at([450, 550, 650]).round(2).tolist()
-    (24, [0.89, 0.91, 0.92])
+    (24, [0.9, 0.91, 0.92])
     """
     file = read_curve_file(resources.curve_path(named))
-    if len(file.curves) != CHART_PATCHES:
+    if len(file.curves) != len(CHART_PATCHES):
         raise UsageError(
-            f"{file.path}: expected the {CHART_PATCHES} patches of a ColorChecker, a column for "
-            f"each, row by row from the brown one, got {len(file.curves)}"
+            f"{file.path}: expected the {len(CHART_PATCHES)} patches of a ColorChecker, a column "
+            f"for each, row by row from the brown one, got {len(file.curves)}"
         )
     return tuple(read_transmittance(file.path, name) for name in file.curves)

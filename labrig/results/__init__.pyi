@@ -18,6 +18,10 @@ from .camera_calibration import (
     PairScatter as PairScatter,
     PhotonTransfer as PhotonTransfer,
 )
+from .camera_curves import (
+    CURVES_FILE as CURVES_FILE,
+    CameraCurvesResult as CameraCurvesResult,
+)
 from .charging_series import (
     Charge as Charge,
     ChargingSeries as ChargingSeries,
