@@ -127,6 +127,13 @@ def compared(name: str, fit: CameraCurvesFit, camera: CameraResponse) -> Estimat
     return Estimate(name, fit, rms, _difference(fit.family_mean, truth, inside, sigma)[0], pulls)
 
 
+def rms_of_curves(curves: CameraResponse, truth: CameraResponse) -> float:
+    """`Estimate.rms` of curves beside the truth."""
+    inside = (SEEN_NM[0] <= GRID_NM) & (SEEN_NM[1] >= GRID_NM)
+    one = np.ones((len(GRID_NM), len(curves.channels)))
+    return _difference(curves.at(GRID_NM), truth.at(GRID_NM), inside, one)[0]
+
+
 def _difference(
     curves: FloatArray, truth: FloatArray, inside: np.ndarray, sigma: FloatArray
 ) -> tuple[float, FloatArray]:
