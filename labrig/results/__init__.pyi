@@ -28,6 +28,12 @@ from .charging_series import (
     EarlierCharges as EarlierCharges,
     Transient as Transient,
 )
+from .colour_check import (
+    CheckedColour as CheckedColour,
+    CheckedPatch as CheckedPatch,
+    ColourCheckResult as ColourCheckResult,
+    ColourSummary as ColourSummary,
+)
 from .decay import (
     DecayPatch as DecayPatch,
     DecayResult as DecayResult,

@@ -34,9 +34,10 @@ def record(
     rig["devices"]["camera"].pop("warm_up")
     rig["devices"]["lamp"]["warm_up"] = "10 min"
     rig["optics"]["lvf"] = "lvf.yaml"
+    # The filter was calibrated before anything changed.
+    settings = LvfSettings.model_validate(rig["simulation"]["lvf"])
     change(rig)
     folder.mkdir(parents=True, exist_ok=True)
-    settings = LvfSettings.model_validate(rig["simulation"]["lvf"])
     LVF_KIND.write(folder, true_lvf_of(settings, WIDTH, HEIGHT))
     (folder / "rig.yaml").write_text(write_quickly(rig))
     (folder / "protocol.yaml").write_text(write_quickly(protocol))

@@ -2,10 +2,21 @@
 
 from labrig.fit.camera_curves.family import GRID_NM, CurveFamily, camera_family
 from labrig.fit.camera_curves.fit import CameraCurvesFit, fit_camera_curves
-from labrig.fit.camera_curves.readings import ChartReadings, FilterReadings
+from labrig.fit.camera_curves.readings import (
+    ADDED,
+    COURSE,
+    COURSE_NM,
+    LEVEL,
+    ChartReadings,
+    FilterReadings,
+)
 
 __all__ = [
+    "ADDED",
+    "COURSE",
+    "COURSE_NM",
     "GRID_NM",
+    "LEVEL",
     "CameraCurvesFit",
     "ChartReadings",
     "CurveFamily",

@@ -11,12 +11,13 @@ import pytest
 from labrig.analyse import Overrides, Part
 from labrig.analyse.camera_curves import analyse
 from labrig.errors import DataError, LabrigError, UsageError
+from labrig.fit.camera_curves import GRID_NM
 from labrig.optics import CameraResponse, read_camera
 from labrig.process import process_and_report
 from labrig.results import CURVES_FILE, CameraCurvesResult
 from tests.analyse.chart_bench import record, true_curves, with_camera
 from tests.analyse.recorded import part_of
-from tests.fit.unknown_cameras import GRID_NM, rms_of_curves
+from tests.fit.unknown_cameras import rms_of_curves
 from tests.results.made import assert_read_back
 
 #: In the room's camera, and in no family from which its curves are concluded.
