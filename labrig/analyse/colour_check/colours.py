@@ -75,18 +75,20 @@ class PublishedChart:
         screen = white_xyz("D65", observer(CIE_1931))
         return np.asarray(np.maximum(xyz, 0.0) / self.white * screen)
 
-    def own_reflectances(self, rng: np.random.Generator) -> FloatArray:
-        """Draw the reflectances of one's own chart, shape (p, n)."""
-        count = len(self.reflectance)
+    def own_reflectances(
+        self, rng: np.random.Generator, draws: int, rows: slice = slice(None)
+    ) -> FloatArray:
+        """Draw the reflectances of patches of one's own chart, shape (draws, p, n)."""
+        known = self.reflectance[rows]
         smooth = smooth_modes(GRID_NM, COURSE_NM)
-        courses, added = rng.standard_normal((2, count, len(smooth))) @ smooth
-        level = rng.standard_normal((count, 1))
+        courses, added = rng.standard_normal((2, draws, len(known), len(smooth))) @ smooth
+        level = rng.standard_normal((draws, len(known), 1))
         relative = 1 + LEVEL * level + COURSE * courses
-        return np.asarray(np.maximum(self.reflectance * relative + ADDED * added, 0.0))
+        return np.asarray(np.maximum(known * relative + ADDED * added, 0.0))
 
 
-def drawn_curves(camera: CameraResponse, rng: np.random.Generator) -> FloatArray:
-    """Draw curves of a camera with their errors on `GRID_NM`, shape (n, k).
+def drawn_curves(camera: CameraResponse, rng: np.random.Generator, draws: int) -> FloatArray:
+    """Draw curves of a camera with their errors on `GRID_NM`, shape (draws, n, k).
 
     Curves without σ err as those of one camera by several laboratories do.
     """
@@ -94,13 +96,14 @@ def drawn_curves(camera: CameraResponse, rng: np.random.Generator) -> FloatArray
     if camera.sigma is None:
         error, peak = CurveError(), curves.max(axis=0)
         smooth = smooth_modes(GRID_NM, error.correlation_nm)
-        relative, added = rng.standard_normal((2, curves.shape[1], len(smooth))) @ smooth
-        changed = curves * (1 + error.relative * relative.T) + error.added * peak * added.T
+        shape = (2, draws, curves.shape[1], len(smooth))
+        relative, added = np.swapaxes(rng.standard_normal(shape) @ smooth, 2, 3)
+        changed = curves * (1 + error.relative * relative) + error.added * peak * added
         return np.asarray(np.maximum(changed, 0.0))
     smooth = smooth_modes(GRID_NM, CURVES_NM)
-    courses = rng.standard_normal((curves.shape[1], len(smooth))) @ smooth
+    courses = rng.standard_normal((draws, curves.shape[1], len(smooth))) @ smooth
     sigma = np.array([np.interp(GRID_NM, camera.wavelength_nm, s) for s in camera.sigma.T]).T
-    return np.asarray(np.maximum(curves + sigma * courses.T, 0.0))
+    return np.asarray(np.maximum(curves + sigma * np.swapaxes(courses, 1, 2), 0.0))
 
 
 def checked(

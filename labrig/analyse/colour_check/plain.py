@@ -65,21 +65,15 @@ def plain_colours(
     balance = scene.card / expected
     xyz = (scene.value / balance) @ matrix.T
     rng = np.random.default_rng(0)
-    drawn, balances = [], []
-    for _ in range(DRAWS):
-        curves = drawn_curves(camera, rng)
-        patches = (chart.own_reflectances(rng) * chart.light) @ curves
-        patches *= 1 + scene.sigma / scene.value * rng.standard_normal(patches.shape)
-        patches *= 1 + scene.place @ (scene.unevenness * rng.standard_normal(2))[:, np.newaxis]
-        seen = reflectance @ curves
-        seen *= 1 + CARD_LEVEL * rng.standard_normal()
-        seen *= 1 + CARD_EACH * rng.standard_normal(len(seen))
-        factor = seen / expected
-        balances.append(factor / factor.mean())
-        drawn.append((patches / factor) @ matrix.T)
-    return PlainColours(
-        xyz,
-        np.array(drawn),
-        balance / balance.mean(),
-        np.std(balances, axis=0),
-    )
+    curves = drawn_curves(camera, rng, DRAWS)
+    patches = (chart.own_reflectances(rng, DRAWS) * chart.light) @ curves
+    patches *= 1 + scene.sigma / scene.value * rng.standard_normal(patches.shape)
+    uneven = scene.unevenness * rng.standard_normal((DRAWS, 2)) @ scene.place.T
+    patches *= 1 + uneven[:, :, np.newaxis]
+    seen = reflectance @ curves
+    seen *= 1 + CARD_LEVEL * rng.standard_normal((DRAWS, 1))
+    seen *= 1 + CARD_EACH * rng.standard_normal(seen.shape)
+    factors = seen / expected
+    balances = factors / factors.mean(axis=1, keepdims=True)
+    drawn = (patches / factors[:, np.newaxis, :]) @ matrix.T
+    return PlainColours(xyz, drawn, balance / balance.mean(), balances.std(axis=0))

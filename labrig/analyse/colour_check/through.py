@@ -129,7 +129,7 @@ def _by_errors(
     chart: PublishedChart, row: int, errors: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
     """Return X, Y, Z of a patch by errors of chart, card and spectrum, shape (draws, 3)."""
-    own = np.array([chart.own_reflectances(rng)[row] for _ in range(len(errors))])
+    own = chart.own_reflectances(rng, len(errors), slice(row, row + 1))[:, 0]
     level = 1 + CARD_LEVEL * rng.standard_normal((len(errors), 1))
     return np.asarray(level * (own @ chart.seen + errors))
 

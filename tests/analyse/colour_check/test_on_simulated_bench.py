@@ -17,8 +17,8 @@ from tests.analyse.chart_bench import record, with_camera
 from tests.analyse.recorded import part_of
 from tests.results.made import assert_read_back
 
-#: Blue, green, red and white, one of each.
-SOME = {"protocol": "colour_check", "through": [13, 14, 15, 19], "repeats": 1}
+#: Green and white.
+SOME: dict[str, Any] = {"protocol": "colour_check", "through": [14, 19], "repeats": 1}
 #: The curves that labrig has of the room's camera, as its own body calls itself.
 CAMERA = "canon_eos_5d_mark_ii"
 
@@ -50,20 +50,18 @@ def test_colours_are_right_end_to_end(run: Path) -> None:
     assert result.through.allowed < 2
     assert not result.warnings
     seen = [name for name, patch in result.patches.items() if patch.through is not None]
-    assert seen == ["blue", "green", "red", "white"]
+    assert seen == ["green", "white"]
     assert_read_back(result)
     rows = (done.report.parent / "colour_check.csv").read_text().splitlines()
     assert len(rows) == 1 + 24
     page = done.report.read_text()
-    assert page.count("background:#") >= 24 + 24 + 4
-    assert result.patches["blue"].published_lab == pytest.approx([23.3, 12.2, -49.6], abs=6)
+    assert page.count("background:#") >= 24 + 24 + 2
 
 
 @pytest.mark.parametrize(
     ("optics", "said"),
     [
         ({"lamp": "xenon_projector"}, "the lamp's spectrum or the camera's curves are not"),
-        ({"camera": "arri_d21"}, "the lamp's spectrum or the camera's curves are not"),
         ({"camera": "nikon_d850"}, "filter or camera are not as they were calibrated"),
     ],
 )
@@ -115,6 +113,6 @@ def test_what_is_missing_is_one_clear_line(run: Path) -> None:
     with pytest.raises(UsageError, match="needs the LVF calibrated before the camera") as caught:
         analyse(without)
     assert "\n" not in str(caught.value)
+    protocol = part.protocol.model_copy(update={"chart": "grey_card_18"})
     with pytest.raises(UsageError, match="expected the 24 patches of a ColorChecker, a column"):
-        protocol = part.protocol.model_copy(update={"chart": "grey_card_18"})
         analyse(replace(part, protocol=protocol))
