@@ -1,13 +1,20 @@
 """Analysis of camera curves: the chart's patches, and the family of shipped cameras."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from labrig.acquire import RigFile
 from labrig.analyse.chart_scene import ChartScene, chart_scene, frames_of
 from labrig.analyse.frames import steady_frames
 from labrig.analyse.inputs import Part
-from labrig.bench_optics import card_reflectance, lamp_spectrum
+from labrig.bench_optics import (
+    card_reflectance,
+    lamp_spectrum,
+    lens_transmittance,
+    polariser_transmittance,
+)
 from labrig.errors import DataError, UsageError
 from labrig.fit.camera_curves import (
     GRID_NM,
@@ -20,6 +27,7 @@ from labrig.optics import (
     CHANNELS,
     CHART_PATCHES,
     CameraResponse,
+    Spectrum,
     read_camera,
     read_colour_chart,
     shipped_cameras,
@@ -55,7 +63,7 @@ def analyse(part: Part) -> CameraCurvesResult:
         Frames are missing or damaged, or no chart is to be seen in them.
     """
     protocol = part.protocol
-    lamp, patches = lamp_spectrum(part.rig), read_colour_chart(protocol.chart)
+    lamp, patches = _seen_lamp(part.rig), read_colour_chart(protocol.chart)
     left_out = _left_out(part)
     cameras = [
         read_camera(camera.path) for camera in shipped_cameras() if camera.name not in left_out
@@ -94,6 +102,21 @@ def analyse(part: Part) -> CameraCurvesResult:
         mean_sigma=_mean_sigma(camera),
         warnings=tuple(_warnings(fit, scene, through is not None)),
     )
+
+
+def _seen_lamp(rig: RigFile) -> Spectrum:
+    """Return the lamp as it comes through what is before the camera.
+
+    A rig file that names a lens or a polariser has curves without them; all that use such curves
+    multiply them by those, and would else count them twice.
+    """
+    lamp = lamp_spectrum(rig)
+    for part in (lens_transmittance(rig), polariser_transmittance(rig)):
+        if part is not None:
+            passed = part.at(lamp.wavelength_nm)
+            sigma = None if lamp.sigma is None else lamp.sigma * passed
+            lamp = replace(lamp, value=lamp.value * passed, sigma=sigma)
+    return lamp
 
 
 def _left_out(part: Part) -> tuple[str, ...]:

@@ -76,7 +76,8 @@ RIGS = {
 }
 #: Sensors on which a ColorChecker is found; all others are smaller.
 SMALL = {"width": 96, "height": 64}
-SENSORS = dict.fromkeys(("camera_curves", "colour_check"), {"width": 288, "height": 192})
+CHART_SENSOR = {"width": 288, "height": 192}
+SENSORS = dict.fromkeys(("camera_curves", "colour_check"), CHART_SENSOR)
 
 
 @dataclass(frozen=True)

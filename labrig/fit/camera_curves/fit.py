@@ -135,13 +135,15 @@ def fit_camera_curves(
     family = camera_family(cameras, grey_light)
     problem = _Problem.of(chart, through, lamp, light, grey_value, family)
     posterior = problem.solve()
-    scaled = posterior.mean.reshape(family.mean.shape) * grey_value[:, np.newaxis]
+    # Less than nothing is not seen; σ, which reaches there, stays.
+    curves = np.maximum(posterior.mean, 0.0).reshape(family.mean.shape)
+    scaled = curves * grey_value[:, np.newaxis]
     scale = np.repeat(grey_value, len(GRID_NM))
     covariance = _without_common_factor(scaled, posterior.covariance * scale[:, np.newaxis] * scale)
     highest = float(scaled.max())
     sigma = np.sqrt(np.diag(covariance)).reshape(scaled.shape).T / highest
     camera = CameraResponse(name, GRID_NM, scaled.T / highest, CHANNELS, sigma)
-    predicted, predicted_sigma = problem.chart_values(posterior)
+    predicted, predicted_sigma = problem.chart_values(curves, posterior.misfit)
     return CameraCurvesFit(
         camera=camera,
         covariance=covariance / highest**2,
@@ -271,13 +273,11 @@ class _Problem:
             curves, (covariance + covariance.T) / 2, float(unusualness), float(misfit)
         )
 
-    def chart_values(self, posterior: _Posterior) -> tuple[FloatArray, FloatArray]:
+    def chart_values(self, curves: FloatArray, misfit: float) -> tuple[FloatArray, FloatArray]:
         """Return values of the chart, and σ of readings less values, shape (p, k) each."""
         shape, size = self.blocks[0].value.shape, self.blocks[0].value.size
-        design = self.design[:size]
-        curves = posterior.mean.reshape(self.family.mean.shape)
-        errors = posterior.misfit**2 * self.errors(curves)[:size, :size]
-        values = (design @ posterior.mean).reshape(shape)
+        errors = misfit**2 * self.errors(curves)[:size, :size]
+        values = (self.design[:size] @ curves.ravel()).reshape(shape)
         return values, np.sqrt(np.diag(errors)).reshape(shape)
 
 

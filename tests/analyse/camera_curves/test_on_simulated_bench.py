@@ -9,6 +9,7 @@ import pytest
 
 from labrig.analyse import Overrides, Part
 from labrig.analyse.camera_curves import analyse
+from labrig.bench_optics import camera_curves
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.fit.camera_curves import GRID_NM
 from labrig.optics import CameraResponse, read_camera
@@ -85,6 +86,23 @@ def test_another_lamp_than_the_rig_files_is_said(run: Path) -> None:
     optics = part.rig.optics.model_copy(update={"lamp": "xenon_projector"})
     other = analyse(replace(part, rig=part.rig.model_copy(update={"optics": optics})))
     assert any("the lamp is not the one of the rig file" in line for line in other.warnings)
+
+
+def test_a_lens_that_the_rig_file_names_is_not_in_the_curves(
+    run: Path, by_chart: CameraCurvesResult
+) -> None:
+    part = asked_anew(part_of(run), through=False)
+    optics = part.rig.optics.model_copy(update={"lens": "photographic_lens"})
+    rig = part.rig.model_copy(update={"optics": optics})
+    body = analyse(replace(part, rig=rig))
+    assert not body.warnings
+    seen = camera_curves(rig, str(_written(body, run.parent)))
+    assert rms_of_curves(seen, by_chart.response()) < 0.01
+
+
+def _written(result: CameraCurvesResult, folder: Path) -> Path:
+    result.write_files(folder)
+    return folder / CURVES_FILE
 
 
 def test_what_cannot_be_used_is_one_clear_line(run: Path) -> None:
