@@ -20,7 +20,7 @@ from labrig.analyse.frames import steady_frames
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
-from labrig.fit.spectrum import SpectrumFit, fit_spectrum
+from labrig.fit.spectrum import fit_spectrum
 from labrig.optics import Spectrum
 from labrig.protocols.colour_check import CheckFrames, patch_unit
 from labrig.protocols.steps.chart_scenes import THROUGH_UNIT
@@ -101,11 +101,34 @@ def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
     )
 
 
-def _fitted(model: ForwardModel, frame: CombinedFrame, seed: int) -> SpectrumFit:
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """A spectrum on its knots, shape (k,), and draws of it, (s, k), in the unit of the values."""
+
+    knots_nm: FloatArray
+    value: FloatArray
+    samples: FloatArray
+
+
+def _fitted(model: ForwardModel, frame: CombinedFrame, seed: int) -> _Spectrum:
+    """Return the spectrum that explains a frame, as bright as the frame by the model's own scale.
+
+    The scale of the curves is open, and a smooth spectrum is likelier: a fit by itself would be the
+    darker the rougher a spectrum is.
+    """
     # A lit surface has no lines under a lamp that has none.
-    return fit_spectrum(
+    fit = fit_spectrum(
         frame.value, frame.sigma, model.system, samples=DRAWS, seed=seed, decisive=np.inf
     )
+    used = np.isfinite(frame.value) & np.isfinite(frame.sigma)
+    value, design = frame.value[used], model.system.design[used]
+
+    def as_bright(spectra: FloatArray) -> FloatArray:
+        expected = spectra @ design.T
+        factor = (expected @ value) / np.square(expected).sum(axis=-1)
+        return np.asarray(factor[..., np.newaxis] * spectra)
+
+    return _Spectrum(fit.knots_nm, as_bright(fit.value), as_bright(fit.samples))
 
 
 def _xyz(chart: PublishedChart, knots_nm: FloatArray, spectrum: FloatArray) -> FloatArray:
