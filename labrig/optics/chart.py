@@ -37,7 +37,7 @@ def read_colour_chart(named: str) -> tuple[Transmittance, ...]:
     >>> from labrig.optics import read_colour_chart
     >>> patches = read_colour_chart("colorchecker")
     >>> len(patches), patches[18].at([450, 550, 650]).round(2).tolist()
-    (24, [0.9, 0.91, 0.92])
+    (24, [0.88, 0.91, 0.92])
     """
     file = read_curve_file(resources.curve_path(named))
     if len(file.curves) != len(CHART_PATCHES):
