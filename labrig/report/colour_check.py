@@ -73,7 +73,7 @@ def _text(result: ColourCheckResult) -> Iterator[str]:
         f"white under this lamp. Plainly: by the curves of {result.camera}, balanced by a grey "
         "card in the chart's place."
     )
-    yield from (line.capitalize() + "." for line in _lines(result))
+    yield from (f"{line[0].upper()}{line[1:]}." for line in _lines(result))
     balance = ", ".join(
         f"{name} {plus_minus(value, sigma)}"
         for name, value, sigma in zip(

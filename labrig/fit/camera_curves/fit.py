@@ -274,10 +274,17 @@ class _Problem:
         )
 
     def chart_values(self, curves: FloatArray, misfit: float) -> tuple[FloatArray, FloatArray]:
-        """Return values of the chart, and σ of readings less values, shape (p, k) each."""
+        """Return values of the chart, as bright as the readings, and σ of readings less values.
+
+        The shape of both is (p, k).
+        """
         shape, size = self.blocks[0].value.shape, self.blocks[0].value.size
         errors = misfit**2 * self.errors(curves)[:size, :size]
-        values = (self.design[:size] @ curves.ravel()).reshape(shape)
+        values = self.design[:size] @ curves.ravel()
+        weight = values / np.diag(errors)
+        keep = np.eye(size) - np.outer(values, weight) / (weight @ values)
+        values = (values * (weight @ self.value[:size]) / (weight @ values)).reshape(shape)
+        errors = keep @ errors @ keep.T
         return values, np.sqrt(np.diag(errors)).reshape(shape)
 
 
