@@ -8,12 +8,23 @@ import pytest
 
 from labrig.errors import FitError
 from labrig.fit.camera_curves import GRID_NM, ChartReadings, fit_camera_curves
-from labrig.optics import CIE_1931, delta_e, lab, observer, read_camera, shipped_cameras
+from labrig.optics import (
+    CIE_1931,
+    CameraResponse,
+    delta_e,
+    illuminant,
+    lab,
+    observer,
+    read_camera,
+    shipped_cameras,
+)
+from labrig.reduce import find_colour_chart, measure, read_raw
 from tests.fit import unknown_cameras as made
 from tests.pulls import assert_sigma_is_right
 
 #: Of three makers, and none of them like the camera of the simulated room.
 THREE = ("nikon_d850", "sony_ilce_7m3", "fujifilm_x_t3")
+PHOTOGRAPH = Path(__file__).parents[3] / "shared/data/raw_photos/canon_550d_kissx4_colorchecker.dng"
 JIANG = Path(__file__).parents[3] / "shared/data/camera_sensitivity/ssf_data"
 
 
@@ -130,3 +141,33 @@ def test_cameras_of_another_laboratory_are_found_within_what_laboratories_differ
     # Three laboratories differ by 2 to 6 % about one camera.
     assert np.median(rms) < 0.05
     assert np.sqrt(np.mean(np.square(pulls))) < 1.7
+
+
+@pytest.mark.shared_data
+@pytest.mark.skipif(not PHOTOGRAPH.is_file(), reason="the folder of real data is not there")
+def test_a_real_photograph_of_a_chart_tells_the_sensor_and_what_lamp_it_was() -> None:
+    """A Canon EOS 550D, whose sensor is that of the 600D; nothing is known of the light."""
+    raw = read_raw(PHOTOGRAPH)
+    seen = [measure(raw, region).channels for region in find_colour_chart(PHOTOGRAPH)]
+    value = np.array([[patch[name].mean for name in "RGB"] for patch in seen])
+    noise = np.array([[patch[name].sigma for name in "RGB"] for patch in seen])
+    readings = ChartReadings(
+        value, np.hypot(noise, 0.003 * value), made.chart(), made.PLACE, unevenness=0.1
+    )
+    sister = "canon_eos_600d"
+    others = [read_camera(one.path) for one in shipped_cameras() if one.name != sister]
+    fits = {
+        name: fit_camera_curves(readings, illuminant(name), others) for name in ("A", "D50", "D65")
+    }
+    unusual = {name: fit.unusualness for name, fit in fits.items()}
+    assert unusual["A"] < 1.3 < 2 < min(unusual["D50"], unusual["D65"]), "it was a filament"
+    found = fits["A"]
+    assert 1 < found.misfit < 3, "another edition of the chart, in a room that is not dark"
+    truth = read_camera(sister)
+    for name, ours, true in zip(
+        "RGB", found.camera.sensitivity.T, truth.sensitivity.T, strict=True
+    ):
+        one = CameraResponse(name, GRID_NM, ours[:, np.newaxis], (name,))
+        other = CameraResponse(name, truth.wavelength_nm, true[:, np.newaxis], (name,))
+        # The ratios between the channels depend on the lamp, which is not known.
+        assert made.rms_of_curves(one, other) < 0.06
