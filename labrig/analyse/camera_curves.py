@@ -43,6 +43,8 @@ ODD_CHART = 1.6
 #: Distance from the family's mean from which a camera is like none of them; of the shipped ones
 #: against all others 1.6 at most, but for two. Under another lamp than the file's it is 2.3 to 6.
 ODD_CAMERA = 2.0
+#: The same where the filter tells the curves better than the family does.
+ODD_BY_FILTER = 5.0
 #: Mean σ of the curves, relative to their peaks, from which they are poor.
 POOR = 0.04
 #: Wavelengths in nm over which σ is averaged.
@@ -170,7 +172,7 @@ def _warnings(fit: CameraCurvesFit, scene: ChartScene, filtered: bool) -> Iterat
             "glare (name a table of your own chart as 'chart:'); σ was raised by as much, and the "
             f"patch that is off most, {worst}, is off by {pulls.max():.1f} of it"
         )
-    if fit.unusualness > ODD_CAMERA:
+    if fit.unusualness > (ODD_BY_FILTER if filtered else ODD_CAMERA):
         yield (
             f"the camera is {fit.unusualness:.1f} times as far from the mean of the shipped ones "
             "as these are: the lamp is not the one of the rig file (its spectrum enters the curves "

@@ -17,7 +17,7 @@ from labrig.results import CheckedPatch, ColourCheckResult, ColourSummary
 
 #: Pull of the card's balance, misfit of the card through the filter, and shift of its strip in nm,
 #: from which something has changed.
-ODD_BALANCE, ODD_MISFIT, MOVED_NM = 3.5, 2.0, 2.0
+ODD_BALANCE, ODD_MISFIT, MOVED_NM = 3.5, 2.5, 2.0
 
 
 def analyse(part: Part) -> ColourCheckResult:
@@ -106,6 +106,6 @@ def _through_warnings(
     if through.misfit > ODD_MISFIT:
         yield (
             f"the grey card through the filter differs {through.misfit:.1f} times as much as "
-            "errors allow from what lamp, filter and camera make of it; the lamp is not that of "
-            "the rig file, or filter or camera are not as they were calibrated"
+            "errors allow from what lamp, filter and camera make of it; the lamp or the camera's "
+            "curves are not those of the rig file, or the filter is not as it was calibrated"
         )
