@@ -51,10 +51,10 @@ def test_their_sigma_is_that_of_their_errors() -> None:
 
 
 def test_a_filter_tells_curves_to_two_per_cent() -> None:
-    names = [*THREE[:2], "canon_powershot_s90"]
+    names = [THREE[0], "canon_powershot_s90"]
     refined = made.left_out(names, with_filter=True)
     assert max(each.rms for each in refined) < 0.03
-    for each in refined[:2]:
+    for each in refined[:1]:
         assert each.rms < estimates()[each.name].rms
 
 
@@ -156,11 +156,9 @@ def test_a_real_photograph_of_a_chart_tells_the_sensor_and_what_lamp_it_was() ->
     )
     sister = "canon_eos_600d"
     others = [read_camera(one.path) for one in shipped_cameras() if one.name != sister]
-    fits = {
-        name: fit_camera_curves(readings, illuminant(name), others) for name in ("A", "D50", "D65")
-    }
+    fits = {name: fit_camera_curves(readings, illuminant(name), others) for name in ("A", "D50")}
     unusual = {name: fit.unusualness for name, fit in fits.items()}
-    assert unusual["A"] < 1.3 < 2 < min(unusual["D50"], unusual["D65"]), "it was a filament"
+    assert unusual["A"] < 1.3 < 2 < unusual["D50"], "it was a filament"
     found = fits["A"]
     assert 1 < found.misfit < 3, "another edition of the chart, in a room that is not dark"
     truth = read_camera(sister)

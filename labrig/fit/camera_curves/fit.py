@@ -29,8 +29,6 @@ LAMP_SIGMA, LAMP_NM = 0.01, 60.0
 UNUSUAL = np.geomspace(0.1, 40.0, 25)
 MISFITS = np.geomspace(0.4, 60.0, 18)
 UNUSUAL_DOF, MISFIT_DOF = 4.0, 12.0
-#: Least probability of a pair of factors that counts.
-NEGLIGIBLE = 1e-3
 #: Iterations in which errors relative to the curves follow the curves.
 ROUNDS = 4
 #: Reflectances from which a patch tells the scale of the channels, and their largest relative range
@@ -256,21 +254,24 @@ class _Problem:
         curves = mean
         for _ in range(ROUNDS):
             errors = self.errors(curves.reshape(family.mean.shape).clip(0.0))
-            errors = errors[np.ix_(used, used)]
-            weights, factors = _weighed(signal, errors, residual)
-            parts = [
-                (weight, np.linalg.solve(unusual * signal + misfit * errors, unusual * spread).T)
-                for weight, (unusual, misfit) in zip(weights, factors, strict=True)
-            ]
-            means = [mean + gain @ residual for _, gain in parts]
-            curves = np.asarray(sum(w * each for (w, _), each in zip(parts, means, strict=True)))
-        covariance = np.zeros_like(prior)
-        for (weight, gain), each, (unusual, _) in zip(parts, means, factors, strict=True):
-            off = each - curves
-            covariance += weight * (unusual * (prior - gain @ spread) + np.outer(off, off))
-        unusualness, misfit = np.sqrt(weights @ factors)
+            # Values in these directions err independently, whatever the two factors.
+            variance, directions = eigh(signal, errors[np.ix_(used, used)])
+            variance = np.maximum(variance, 0.0)
+            projected = directions.T @ residual
+            weights, unusual, misfit = _weighed(variance, projected)
+            total = unusual[:, np.newaxis] * variance + misfit[:, np.newaxis]
+            steps = unusual[:, np.newaxis] * projected / total
+            step = weights @ steps
+            towards = directions.T @ spread
+            curves = mean + step @ towards
+        told = weights @ (np.square(unusual)[:, np.newaxis] / total)
+        among = (steps - step).T * weights @ (steps - step)
+        covariance = (weights @ unusual) * prior + towards.T @ (among - np.diag(told)) @ towards
         return _Posterior(
-            curves, (covariance + covariance.T) / 2, float(unusualness), float(misfit)
+            curves,
+            (covariance + covariance.T) / 2,
+            float(np.sqrt(weights @ unusual)),
+            float(np.sqrt(weights @ misfit)),
         )
 
     def chart_values(self, curves: FloatArray, misfit: float) -> tuple[FloatArray, FloatArray]:
@@ -289,23 +290,24 @@ class _Problem:
 
 
 def _weighed(
-    signal: FloatArray, errors: FloatArray, residual: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return probabilities (f,) of pairs of factors of family and errors, and these, (f, 2)."""
-    values, vectors = eigh(signal, errors)
-    projected = np.square(vectors.T @ residual)
-    variance = (
-        UNUSUAL[:, np.newaxis, np.newaxis] * np.maximum(values, 0.0)
-        + MISFITS[np.newaxis, :, np.newaxis]
-    )
-    log_evidence = -(np.log(variance) + projected / variance).sum(axis=2) / 2
+    variance: FloatArray, projected: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return probabilities of pairs of factors, and the factors of family and errors, (f,) each.
+
+    Parameters
+    ----------
+    variance
+        Variances of independent values by the family, in units of those by errors, shape (m,).
+    projected
+        These values less those of the family's mean, in σ of their errors, shape (m,).
+    """
+    total = UNUSUAL[:, np.newaxis, np.newaxis] * variance + MISFITS[np.newaxis, :, np.newaxis]
+    log_evidence = -(np.log(total) + np.square(projected) / total).sum(axis=2) / 2
     log_evidence -= UNUSUAL_DOF / 2 * (np.log(UNUSUAL) + 1 / UNUSUAL)[:, np.newaxis]
     log_evidence -= MISFIT_DOF / 2 * (np.log(MISFITS) + 1 / MISFITS)
     weights = np.exp(log_evidence - log_evidence.max())
-    weights /= weights.sum()
-    rows, columns = np.nonzero(weights > NEGLIGIBLE)
-    chosen = weights[rows, columns]
-    return chosen / chosen.sum(), np.stack([UNUSUAL[rows], MISFITS[columns]], axis=1)
+    unusual, misfit = np.meshgrid(UNUSUAL, MISFITS, indexing="ij")
+    return (weights / weights.sum()).ravel(), unusual.ravel(), misfit.ravel()
 
 
 def _without_common_factor(curves: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -81,6 +81,7 @@ def test_more_cameras_are_told_within_two_per_cent(tmp_path: Path, name: str) ->
     assert error_of(analyse(part), name) < 0.012
 
 
+@pytest.mark.campaign
 def test_another_lamp_than_the_rig_files_is_said(run: Path) -> None:
     part = asked_anew(part_of(run), through=False)
     optics = part.rig.optics.model_copy(update={"lamp": "xenon_projector"})

@@ -78,13 +78,16 @@ def test_a_wrong_lamp_and_wrong_curves_are_noticed(
     assert result.card_misfit > 2
 
 
-def test_a_filter_that_was_moved_is_noticed(tmp_path: Path) -> None:
-    def moved(rig: dict[str, Any]) -> None:
-        with_known_camera(rig)
-        strip = rig["simulation"]["lvf"]["before_camera"]
-        strip["region"] = [strip["region"][0] + 0.02, *strip["region"][1:]]
-
-    result = analyse(part_of(record(tmp_path, SOME | {"through": [14]}, moved)))
+def test_a_filter_that_was_moved_is_noticed(run: Path) -> None:
+    part = part_of(run)
+    calibrated = part.inputs.lvf
+    assert calibrated is not None
+    strip = calibrated.before_camera
+    assert strip is not None
+    # The filter now lies to the right of where its calibration had it.
+    ends = {side: (x - 0.02, y) for side, (x, y) in (("left", strip.left), ("right", strip.right))}
+    before = calibrated.model_copy(update={"before_camera": strip.model_copy(update=ends)})
+    result = analyse(replace(part, inputs=replace(part.inputs, lvf=before)))
     assert result.filter_shift_nm == pytest.approx(0.02 / 0.88 * 324, abs=2)
     assert any("nm along itself from where it was calibrated" in line for line in result.warnings)
 
