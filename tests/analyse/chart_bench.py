@@ -18,7 +18,7 @@ from tests.analyse.spectral_bench import true_lvf_of
 from tests.quick_yaml import read_quickly, write_quickly
 
 FloatArray = NDArray[np.float64]
-WIDTH, HEIGHT = 288, 192
+WIDTH, HEIGHT = 240, 160
 
 
 def record(
