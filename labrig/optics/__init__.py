@@ -2,6 +2,7 @@
 
 from labrig.optics.camera import (
     CHANNELS,
+    CURVES_FILE,
     CameraResponse,
     read_camera,
     read_checked_curves,
@@ -66,6 +67,7 @@ __all__ = [
     "CHART_PATCHES",
     "CIE_1931",
     "CIE_2015",
+    "CURVES_FILE",
     "NOMINAL_FWHM_NM",
     "SLICES",
     "Bands",

@@ -17,6 +17,8 @@ from labrig.optics.spectrum import check_curve
 
 CHANNELS = ("R", "G", "B")
 MONOCHROME = ("L",)
+#: File of curves in the result of a run of `camera_curves`.
+CURVES_FILE = "curves.csv"
 #: Lowest value of a measured curve, relative to its maximum, that counts as noise.
 _NOISE_BELOW_ZERO = -0.05
 #: Suffixes of tables; names of shipped cameras have none.
@@ -83,7 +85,8 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
     ----------
     name_or_path
         Name of a shipped camera such as `canon_eos_5d_mark_ii`, maker and model as the camera
-        states them, such as `Canon EOS 5D Mark II`, or the path of a file: JSON as rawtoaces writes
+        states them, such as `Canon EOS 5D Mark II`, or the folder of a run of `camera_curves`, or
+        the path of a file: JSON as rawtoaces writes
         it, or a CSV table with the columns `wavelength_nm,R,G,B`, with σ in `R_sigma` … where it is
         known, or the first four columns without a header (Jiang et al. 2013).
 
@@ -194,8 +197,22 @@ def read_checked_curves(
 
 
 def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a shipped camera, by its name or its own, or the path as given."""
+    """Return the file of a shipped camera, by its name or its own, or that of a path.
+
+    Raises
+    ------
+    UsageError
+        There is no such camera, or a folder that is no processed run of `camera_curves`.
+    """
     path = Path(name_or_path)
+    if path.is_dir() and len(path.parts) > 1:
+        found = next(iter([*path.glob(f"result/{CURVES_FILE}"), *path.glob(CURVES_FILE)]), None)
+        if found is None:
+            raise UsageError(
+                f"{path}: expected a run of camera_curves with {CURVES_FILE} in its result, found "
+                "none; process it first, or name the file of the curves itself"
+            )
+        return found
     if path.suffix.lower() in _TABLES:
         return path
     if len(path.parts) == 1 and (shipped := shipped_camera(str(path))):

@@ -19,7 +19,6 @@ from .camera_calibration import (
     PhotonTransfer as PhotonTransfer,
 )
 from .camera_curves import (
-    CURVES_FILE as CURVES_FILE,
     CameraCurvesResult as CameraCurvesResult,
 )
 from .charging_series import (

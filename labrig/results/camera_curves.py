@@ -6,13 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from labrig.optics import CHART_PATCHES, CameraResponse
+from labrig.optics import CHART_PATCHES, CURVES_FILE, CameraResponse
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_text
-
-#: File of the curves, which a rig file names under `optics: camera`.
-CURVES_FILE = "curves.csv"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -12,9 +12,9 @@ from labrig.analyse.camera_curves import analyse
 from labrig.bench_optics import camera_curves
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.fit.camera_curves import GRID_NM
-from labrig.optics import CameraResponse, read_camera
+from labrig.optics import CURVES_FILE, CameraResponse, read_camera
 from labrig.process import process_and_report
-from labrig.results import CURVES_FILE, CameraCurvesResult
+from labrig.results import CameraCurvesResult
 from tests.analyse.chart_bench import record, true_curves, with_camera
 from tests.analyse.recorded import part_of
 from tests.fit.unknown_cameras import rms_of_curves
@@ -65,7 +65,8 @@ def test_the_filter_halves_the_error(run: Path, by_chart: CameraCurvesResult) ->
     assert error_of(done.result, UNKNOWN) < 0.6 * error_of(by_chart, UNKNOWN)
     assert done.result.mean_sigma < 0.5 * by_chart.mean_sigma
     assert_read_back(done.result)
-    written = read_camera(done.report.parent / CURVES_FILE)
+    # A rig file names the run, as it does for calibrations.
+    written = read_camera(run)
     assert written.sigma is not None
     np.testing.assert_allclose(written.sensitivity, done.result.sensitivity, atol=1e-5)
     np.testing.assert_allclose(written.sigma, done.result.sigma, atol=1e-5)
@@ -117,6 +118,11 @@ def test_what_cannot_be_used_is_one_clear_line(run: Path) -> None:
     with pytest.raises(DataError, match=r"clip") as caught:
         analyse(replace(asked_anew(part, through=False), overrides=overrides))
     assert "\n" not in str(caught.value)
+
+
+def test_a_folder_without_curves_is_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"expected a run of camera_curves with curves\.csv"):
+        read_camera(tmp_path)
 
 
 def test_a_chart_that_is_not_seen_stops_the_run(tmp_path: Path) -> None:

@@ -11,8 +11,9 @@ from labrig.analyse import Part
 from labrig.analyse.camera_curves import analyse as analyse_curves
 from labrig.analyse.colour_check import analyse
 from labrig.errors import UsageError
+from labrig.optics import CURVES_FILE
 from labrig.process import process_and_report
-from labrig.results import CURVES_FILE, ColourCheckResult
+from labrig.results import ColourCheckResult
 from tests.analyse.chart_bench import record, with_camera
 from tests.analyse.recorded import part_of
 from tests.results.made import assert_read_back
