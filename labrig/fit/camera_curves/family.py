@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 GRID_NM: FloatArray = np.arange(380.0, 781.0, 5.0)
 #: Part of the variance between cameras that is a smooth difference of no other camera, and the
 #: distance in nm at which it is independent. Both were chosen by leaving out each shipped camera.
-OWN_SHARE, OWN_NM = 0.1, 12.0
+OWN_SHARE, OWN_NM = 0.08, 12.0
 #: Relative prior σ of the scale of each channel, which the chart's own greys tell better.
 SCALE_SIGMA = 0.1
 #: Fewest cameras that tell how cameras differ.
