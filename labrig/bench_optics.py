@@ -96,7 +96,8 @@ def camera_curves(
             f"{camera.name}: expected channels that see through lens and polariser, got one that "
             "sees nothing; check 'lens' and 'polariser' under 'optics:'"
         )
-    return replace(camera, sensitivity=seen / seen.max())
+    sigma = None if camera.sigma is None else passed[:, np.newaxis] * camera.sigma / seen.max()
+    return replace(camera, sensitivity=seen / seen.max(), sigma=sigma)
 
 
 def with_shipped_camera(rig: RigFile, identity: str) -> RigFile:

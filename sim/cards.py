@@ -13,6 +13,7 @@ IntArray = NDArray[np.intp]
 
 #: Rows and columns of a ColorChecker; its patches leave this part of their distance to the frame.
 ROWS, COLUMNS = 4, 6
+PATCHES = ROWS * COLUMNS
 FRAME = 0.12
 FRAME_REFLECTANCE = 0.04
 
@@ -49,11 +50,17 @@ def reflectances(card: Card, grey: float) -> FloatArray:
 
 
 def surfaces(
-    card: Card, chart: Region, width: int, height: int, black_trap: Region | None = None
+    card: Card,
+    chart: Region,
+    width: int,
+    height: int,
+    black_trap: Region | None = None,
+    chart_patch: int = 0,
 ) -> IntArray:
     """Return the surface of a card on top in every pixel, shape (height, width).
 
-    A grey card fills the picture but for the trap, a ColorChecker its region. A blank lies below.
+    A grey card fills the picture but for the trap, a ColorChecker its region, or one of its patches
+    the picture. A blank lies below.
     """
     surface = np.zeros((height, width), dtype=np.intp)
     if card == "grey card":
@@ -61,6 +68,8 @@ def surfaces(
         if black_trap is not None:
             x, y, wide, high = region_pixels(black_trap, width, height)
             surface[y : y + high, x : x + wide] = 2
+    elif card == "colorchecker" and chart_patch:
+        surface[:] = chart_patch
     elif card == "colorchecker":
         x, y, wide, high = region_pixels(chart, width, height)
         row, in_row = np.divmod((np.arange(high) + 0.5) / high * ROWS, 1)

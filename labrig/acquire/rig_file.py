@@ -88,8 +88,9 @@ class Optics(BaseModel):
     ----------
     camera
         Spectral sensitivities of the camera: name of a shipped file, such as
-        `canon_eos_5d_mark_ii`, or path of a file. Default: the shipped file of the model that the
-        camera says it is, if there is one.
+        `canon_eos_5d_mark_ii`, path of a file, or folder of the run of protocol `camera_curves`
+        that estimated them. Default: the shipped file of the model that the camera says it is, if
+        there is one.
     lamp
         Spectrum of the lamp: name of a shipped file, such as `halogen_3000k`, or path of a file.
     grey_card

@@ -2,6 +2,7 @@
 
 from labrig.optics.camera import (
     CHANNELS,
+    CURVES_FILE,
     CameraResponse,
     read_camera,
     read_checked_curves,
@@ -15,6 +16,7 @@ from labrig.optics.camera_model import (
     f_number_text,
     rho_squared,
 )
+from labrig.optics.chart import CHART_PATCHES, read_colour_chart
 from labrig.optics.colorimetry import (
     CIE_1931,
     CIE_2015,
@@ -68,8 +70,10 @@ from labrig.optics.strip import SLICES, Strip
 
 __all__ = [
     "CHANNELS",
+    "CHART_PATCHES",
     "CIE_1931",
     "CIE_2015",
+    "CURVES_FILE",
     "NOMINAL_FWHM_NM",
     "SLICES",
     "Bands",
@@ -109,6 +113,7 @@ __all__ = [
     "quadrature",
     "read_camera",
     "read_checked_curves",
+    "read_colour_chart",
     "read_curve_file",
     "read_hyperspectral_cube",
     "read_light",

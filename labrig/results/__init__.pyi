@@ -18,11 +18,20 @@ from .camera_calibration import (
     PairScatter as PairScatter,
     PhotonTransfer as PhotonTransfer,
 )
+from .camera_curves import (
+    CameraCurvesResult as CameraCurvesResult,
+)
 from .charging_series import (
     Charge as Charge,
     ChargingSeries as ChargingSeries,
     EarlierCharges as EarlierCharges,
     Transient as Transient,
+)
+from .colour_check import (
+    CheckedColour as CheckedColour,
+    CheckedPatch as CheckedPatch,
+    ColourCheckResult as ColourCheckResult,
+    ColourSummary as ColourSummary,
 )
 from .decay import (
     DecayPatch as DecayPatch,

@@ -19,6 +19,7 @@ from labrig.acquire import (
     Unit,
 )
 from labrig.errors import DeviceError
+from labrig.optics import CHART_PATCHES
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw
@@ -59,12 +60,20 @@ class Arrangement:
         Name of the colour filter before the lamp.
     lamp
         Lamp that the relay switches.
+    chart_patch
+        Patch of the ColorChecker, from 1 on, that alone is seen; 0 is the whole chart.
     """
 
     stage: Stage = "sample"
     lvf: LvfPlace = "away"
     filter: str | None = None
     lamp: LampKind = "halogen"
+    chart_patch: int = 0
+
+    @property
+    def laid(self) -> tuple[Stage, int]:
+        """Object that lamp and camera face, and its patch."""
+        return self.stage, self.chart_patch
 
     def set_up(self, session: Session, before: "Arrangement | None", why: str) -> None:
         """Ask for the manual steps from `before`; the lamp is switched off for another one.
@@ -80,7 +89,7 @@ class Arrangement:
         """
         if before is None or self.lamp != before.lamp:
             _lamp_off(session)
-        for name in ("lamp", "stage", "lvf", "filter"):
+        for name in ("lamp", "laid", "lvf", "filter"):
             if before is None or getattr(self, name) != getattr(before, name):
                 instruction, task = self._step(name)
                 session.ask(ManualStep(instruction, why, task))
@@ -90,7 +99,14 @@ class Arrangement:
         match name:
             case "lamp":
                 return f"connect the {self.lamp} lamp to the relay", f"lamp {self.lamp}"
-            case "stage":
+            case "laid" if self.chart_patch:
+                name = CHART_PATCHES[self.chart_patch - 1]
+                return (
+                    f"lay the ColorChecker so that its patch {self.chart_patch}, {name}, alone is "
+                    "seen, from end to end of the variable filter",
+                    f"{self.stage} {self.chart_patch}",
+                )
+            case "laid":
                 return _STAGE[self.stage], self.stage
             case "lvf":
                 return _LVF[self.lvf], f"lvf {self.lvf}"
