@@ -51,6 +51,7 @@ from .steps.sample_pose import (
     visible_after_s,
 )
 from .steps.sanity_checks import SanityChecks
+from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
 #: Earliest first photograph after lamp off: a halogen lamp has gone dark by then.
 EARLIEST_S = 0.5
@@ -283,6 +284,8 @@ class DecayFrames(StrEnum):
     PLATEAU = "plateau"
 
 
+#: Reason for the sample by itself.
+WHY = "its glow is photographed by itself"
 #: Shutter times of the daylight photograph: one of them is right whatever the lamp.
 DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
 LAMP_SETTLES_S = 5.0
@@ -396,18 +399,19 @@ class DaylightUnit:
         self.protocol.checks(session, self.name).switch_off(under_lamp)
 
 
-class Decay(DecaySettings):
+class Decay(DecaySettings, ScenesProtocol):
     """Decay protocol; `decay.yaml` is the commented example."""
 
-    def units(self) -> Sequence[Unit]:
+    def scenes(self) -> Sequence[Scene]:
         """Return darks, metering, decays and daylight, as far as needed."""
         units: list[Unit] = []
-        if self.dark == "frames":
-            units.append(DarkUnit(self))
         if isinstance(self.exposure, str):
             longest_s = self.charge if isinstance(self.charge, float) else METER_CHARGE_S
             units.append(MeterUnit(self, longest_s))
         units += [DecayUnit(self, f"decay-{number}") for number in range(1, self.repeats + 1)]
         if self.daylight:
             units.append(DaylightUnit(self))
-        return units
+        scenes = [Scene(unit, Arrangement(), WHY) for unit in units]
+        if self.dark != "frames":
+            return scenes
+        return [Scene(DarkUnit(self), Arrangement(), WHY, is_dark=True), *scenes]

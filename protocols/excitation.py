@@ -42,6 +42,7 @@ from .steps.glow import dark_frames
 from .steps.patch_names import FilterPatches
 from .steps.sample_pose import charge, check_visible, face_camera, face_lamp, lights_out
 from .steps.sanity_checks import SanityChecks
+from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
 
 class ExcitationFrames(StrEnum):
@@ -239,16 +240,12 @@ class ExcitationSettings(ProtocolModel):
         ]
 
 
-LVF_ON = ManualStep(
-    "lay the variable filter on the sample, between it and the lamp",
-    "every place is then charged by light of another wavelength",
-    "lvf on sample",
-)
-LVF_AWAY = ManualStep(
-    "take the variable filter away",
-    "the lamp by itself charges the sample now",
-    "lvf away",
-)
+#: Arrangements for the charges through the filter and by the lamp itself, and their reasons.
+LVF_ON = Arrangement(lvf="on sample")
+LVF_AWAY = Arrangement()
+THROUGH_IT = "every place is then charged by light of another wavelength"
+BY_ITSELF = "the lamp by itself charges the sample now"
+
 FRESH = ManualStep(
     "put in a fresh sample, one that has been in the dark for hours",
     "it takes the place of waiting until the glow is gone",
@@ -336,9 +333,8 @@ class DarkUnit(ExcitationUnit):
 class _MeterUnit(ExcitationUnit):
     """A charge whose glow determines the exposures."""
 
-    def _meter(self, session: Session, unit: str, hand: ManualStep, charge_s: float) -> None:
+    def _meter(self, session: Session, unit: str, charge_s: float) -> None:
         session.wait_until_warm("camera")
-        session.ask(hand)
         ladder = self.protocol.ladder(session.rig[CAMERA].offers())
         check_visible(session, ladder[0][0])
         charge(session, charge_s)
@@ -362,8 +358,8 @@ class StripMeter(_MeterUnit):
     name: str = "strip-meter"
 
     def run(self, session: Session) -> None:
-        """Lay the filter on, charge, take a ladder of exposures."""
-        self._meter(session, self.name, LVF_ON, self.protocol.first_charge)
+        """Charge, take a ladder of exposures."""
+        self._meter(session, self.name, self.protocol.first_charge)
 
 
 @dataclass(frozen=True)
@@ -373,9 +369,9 @@ class DirectMeter(_MeterUnit):
     name: str = "direct-meter"
 
     def run(self, session: Session) -> None:
-        """Take the filter away, charge, take a ladder of exposures."""
+        """Charge, take a ladder of exposures."""
         self.rest(session)
-        self._meter(session, self.name, LVF_AWAY, self.protocol.direct[0])
+        self._meter(session, self.name, self.protocol.direct[0])
 
 
 #: Largest expected ratio of the glow to that of the reference charge, for exposures.
@@ -533,16 +529,22 @@ class DirectUnit(_ChargeUnit):
         self._charge(session, ExcitationFrames.DIRECT, protocol.direct[self.number - 1], lasting_s)
 
 
-class Excitation(ExcitationSettings):
+class Excitation(ExcitationSettings, ScenesProtocol):
     """Excitation protocol; `excitation.yaml` is the commented example."""
 
-    def units(self) -> Sequence[Unit]:
+    def scenes(self) -> Sequence[Scene]:
         """Return darks, then metering and charges through the filter, then the same without it."""
-        return [
-            DarkUnit(self),
+        through: list[Unit] = [
             StripMeter(self),
             *(DoublingUnit(self, number) for number in range(1, self.at_most + 1)),
             *(RefiningUnit(self, number) for number in range(1, self.refine + 1)),
+        ]
+        direct: list[Unit] = [
             DirectMeter(self),
             *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
+        ]
+        return [
+            Scene(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
+            *(Scene(unit, LVF_ON, THROUGH_IT) for unit in through),
+            *(Scene(unit, LVF_AWAY, BY_ITSELF) for unit in direct),
         ]

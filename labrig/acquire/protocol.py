@@ -70,6 +70,8 @@ class ProtocolModel(BaseModel):
     rate_frames: ClassVar[Collection[str]] = (FrameRole.DECAY,)
     #: Kinds of calibrations on which the results depend.
     rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
+    #: Whether calibrations that are kept beside the runs are used; not by what measures them anew.
+    uses_calibrations: ClassVar[bool] = True
 
     protocol: str
     sample: Sample = Sample()
