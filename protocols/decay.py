@@ -40,7 +40,7 @@ from .steps.camera_settings import (
     longest_exposure_s,
 )
 from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, glow, measure_frame
-from .steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
+from .steps.glow import METER_CHARGE_S, DarkUnit, MeterCharge, MeterUnit
 from .steps.patch_names import Patches
 from .steps.sample_pose import (
     charge,
@@ -89,6 +89,10 @@ class DecaySettings(ProtocolModel):
         the glow stops growing.
     plateau
         Criterion by which `charge: plateau` ends.
+    meter
+        Time for which the lamp shines on the sample before the photographs by which exposures are
+        chosen, for example `5 min`. A longer charge must not glow more than twice as bright.
+        Default: as long as `charge`, at most 10 minutes.
     every
         Time between the begins of two photographs, for example `5 s`.
     duration
@@ -123,6 +127,7 @@ class DecaySettings(ProtocolModel):
     protocol: Literal["decay"] = "decay"
     charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
     plateau: Plateau = Plateau()
+    meter: MeterCharge = None
     every: DurationS = Field(5.0, gt=0)
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"

@@ -20,7 +20,7 @@ from .steps.camera_settings import CameraSettings
 from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from .steps.grey_card import light_card
 from .steps.patch_names import FilterPatches
-from .steps.sample_pose import check_visible, lights_out
+from .steps.sample_pose import charge, check_visible, lights_out
 from .steps.scenes import Arrangement, LampKind, Scene, ScenesProtocol
 
 #: Begin of the units' names, which end with the lamp.
@@ -110,6 +110,10 @@ class EmissionSpectrum(GlowSettings, ScenesProtocol):
     def regions(self) -> Sequence[Region]:
         """Return the region of the LVF, or every patch; the brightest decides."""
         return list(self.patches.values()) or [self.region]
+
+    def charge_sample(self, session: Session, duration_s: float) -> None:
+        """Charge for that long: a spectrum does not depend on whether the lamp is warm."""
+        charge(session, duration_s)
 
     def scenes(self) -> Sequence[Scene]:
         """Return darks, metering and spectrum for each lamp, then the white card."""

@@ -4,11 +4,13 @@ After Nalbach et al., sections 4.2 to 4.7.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import PartUnit, ProtocolModel, Unit
+from labrig.acquire import PartUnit, ProtocolModel, RigFile, Unit
+from labrig.calibration import REFERENCE_KIND, kinds
 
 from .excitation import ExcitationFrames
 from .steps.chain import Chain, Part
@@ -17,6 +19,9 @@ from .steps.scenes import Arrangement, Scene, in_turn
 
 #: Protocols that measure the bench and not the sample.
 BENCH = frozenset({"camera_calibration", "blank", "lvf_calibration", "fade", "irradiance"})
+#: Protocols that use the variable filter on a sample, and the one that checks the bench for them.
+THROUGH_THE_FILTER = frozenset({"emission_spectrum", "excitation"})
+CHECK = "calibration_check"
 #: Protocols that measure every patch of the chain.
 OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation")
 
@@ -30,12 +35,16 @@ class Phosphor(Chain):
         Regions of several materials by name: `[x, y, width, height]` in pixels, or all four as
         fractions of the frame, one above the other, each as long as the filter. Their results lie
         in folders of these names. Default: one material.
+    calibrate
+        Which parts that calibrate the bench are run: with `as needed` those whose result the rig
+        file does not name and no kept calibration has; with `always` all.
     """
 
     rate_frames = (*ProtocolModel.rate_frames, *ExcitationFrames)
 
     protocol: Literal["phosphor"] = "phosphor"
     patches: FilterPatches = Field(default_factory=dict)
+    calibrate: Literal["as needed", "always"] = "as needed"
 
     @model_validator(mode="after")
     def _patches_beside_parts(self) -> Self:
@@ -67,13 +76,46 @@ class Phosphor(Chain):
             )
         return {"patches": self.patches} | keys
 
+    def suited_to(self, rig: RigFile) -> Self:
+        """Return the chain without the parts whose calibrations the rig has, beginning by a check.
+
+        The check compares the bench with that of the calibration; it needs the filter at hand.
+        """
+        if self.calibrate == "always":
+            return super().suited_to(rig)
+        known = {kind.protocol for kind in kinds() if rig.optics.named(kind) is not None}
+        chain = list(zip(self.parts, self.chain(), strict=True))
+        kept = [
+            (content, part.protocol.protocol)
+            for content, part in chain
+            if part.protocol.protocol not in BENCH & known
+        ]
+        if not kept:
+            return super().suited_to(rig)
+        parts = [content for content, _ in kept]
+        names = {name for _, name in kept}
+        if REFERENCE_KIND.protocol in known and names & THROUGH_THE_FILTER and CHECK not in names:
+            parts.insert(0, {"protocol": CHECK})
+        return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).suited_to(rig)
+
     def units(self) -> Sequence[Unit]:
         """Return the units of all parts in order; on a calibrated bench, by arrangement."""
         chain = self.chain()
         if BENCH.intersection(part.protocol.protocol for part in chain):
             return [PartUnit(part.name, unit) for part in chain for unit in part.protocol.units()]
-        scenes = [(part, scene) for part in chain for scene in part.scenes()]
-        return in_turn([scene for _, scene in sorted(scenes, key=_turn)])
+        scenes = sorted(((part, scene) for part in chain for scene in part.scenes()), key=_turn)
+        return in_turn(_darks_as_next([scene for _, scene in scenes]))
+
+
+def _darks_as_next(scenes: Sequence[Scene]) -> list[Scene]:
+    """Return the scenes with dark frames taken in the arrangement of the scene after them."""
+    arranged: list[Scene] = []
+    for scene in reversed(scenes):
+        if scene.is_dark and arranged:
+            following = arranged[-1]
+            scene = replace(scene, arrangement=following.arrangement, why=following.why)
+        arranged.append(scene)
+    return arranged[::-1]
 
 
 def _turn(scene_of: tuple[Part, Scene]) -> int:

@@ -22,7 +22,10 @@ from .exposure_metering import SEEN_SIGMA, MeteringFrame, measure_frame
 from .sample_pose import face_lamp
 
 #: Reason for laying the card.
-CARD_REASON = "what is measured next is its light"
+CARD_REASON = (
+    "what is measured next is its light; it lies on the outside of the closed door, without a door "
+    "over the sample"
+)
 
 #: Shutter times of the metering: one of them is right whatever the lamp.
 METERED_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1.0)

@@ -38,10 +38,7 @@ LampKind = Literal["halogen", "mercury"]
 
 _STAGE = {
     "sample": "take the card away, so that the sample lies in its place",
-    "grey card": (
-        "lay the grey card where lamp and camera both see it (on the outside of the closed door; "
-        "without a door over the sample)"
-    ),
+    "grey card": "lay the grey card where lamp and camera both see it",
     "colorchecker": "lay the ColorChecker where lamp and camera see all of it",
     "blank": "put a grey card in the sample's place (in the door, if there is one)",
 }
