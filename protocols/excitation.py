@@ -35,7 +35,7 @@ from .steps.camera_settings import (
     dark_exposures_s,
     longest_exposure_s,
 )
-from .steps.charge_times import FloatArray, most_informative_s, still_grows
+from .steps.charge_times import FloatArray, fades_below_s, most_informative_s, still_grows
 from .steps.darkness import levels
 from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
 from .steps.glow import dark_frames
@@ -75,7 +75,10 @@ PLACES = 12
 
 
 class Rest(BaseModel):
-    """Rest in the dark between two charges, until the sample hardly glows.
+    """Rest in the dark between two charges, until the sample should hardly glow.
+
+    How long that takes follows from how the glow faded after the last charge. What is left of it is
+    measured then, and accounted for.
 
     Attributes
     ----------
@@ -84,17 +87,14 @@ class Rest(BaseModel):
         for example `2 %`.
     at_least
         Shortest rest, for example `1 min`.
-    check_every
-        Time between two photographs that check the glow, for example `3 min`.
     at_most
-        Longest rest, for example `15 min`. The glow that is left is measured and accounted for.
+        Longest rest, for example `15 min`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     below: Fraction = Field(0.02, gt=0, lt=1)
     at_least: DurationS = Field(60.0, ge=0)
-    check_every: DurationS = Field(180.0, gt=0)
     at_most: DurationS = Field(900.0, ge=0)
 
     @model_validator(mode="after")
@@ -280,36 +280,35 @@ class ExcitationUnit:
         if self.protocol.samples > 1:
             session.ask(FRESH)
             return
-        session.wait(rule.at_least, "resting in the dark")
-        rested_s = rule.at_least
+        rest_s = session.choose("rest", lambda: self._rest_s(session), worst=rule.at_most)
+        session.wait(rest_s, "resting in the dark")
         exposure_s = max(
             self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
         )
-        look_now = Shoot(FrameRole.REST, self.protocol.settings(exposure_s))
-        while True:
-            face_camera(session)
-            session.perform(look_now)
-            face_lamp(session)
-            dark = session.choose("dark again", lambda: self._is_dark(session), worst=False)
-            remaining_s = rule.at_most - rested_s
-            if dark or remaining_s <= 0:
-                return
-            session.wait(min(rule.check_every, remaining_s), "resting in the dark")
-            rested_s += rule.check_every
+        face_camera(session)
+        session.perform(Shoot(FrameRole.REST, self.protocol.settings(exposure_s)))
+        face_lamp(session)
 
-    def _is_dark(self, session: Session) -> bool:
-        """Return whether the glow of every patch is low against that after the last charge."""
+    def _rest_s(self, session: Session) -> float:
+        """Return the time until the glow of every patch is low against that after the last charge.
+
+        It goes on fading as it did between the last two photographs.
+        """
         frames = [
             *session.frames(ExcitationFrames.STRIP),
             *session.frames(ExcitationFrames.DIRECT),
             *session.frames(FrameRole.METER),
         ]
-        darks = self.darks(session)
         last_unit = max(frames, key=lambda frame: frame.start_time).unit
-        last_frames = [frame for frame in frames if frame.unit == last_unit]
-        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in last_frames], axis=0)
-        present = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
-        return bool((present < self.protocol.rest.below * brightest).all())
+        last_frames = sorted(
+            (frame for frame in frames if frame.unit == last_unit),
+            key=lambda frame: frame.start_time,
+        )
+        darks, rule = self.darks(session), self.protocol.rest
+        glows = np.array([self.rates(frame, darks).max(axis=1) for frame in last_frames])
+        pause_s = last_frames[-1].start_time - last_frames[-2].start_time
+        until_s = fades_below_s(glows, pause_s, rule.below)
+        return min(max(until_s, rule.at_least), rule.at_most)
 
 
 @dataclass(frozen=True)

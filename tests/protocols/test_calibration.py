@@ -8,6 +8,7 @@ from labrig import resources
 from labrig.acquire import Plan, read_protocol
 from labrig.fit.lvf import most_informative_filters
 from labrig.optics import read_transmittance
+from labrig.protocols.calibration import Calibration
 from tests.protocols.protocol_files import (
     assert_one_clear_line,
     assert_timeline_as_agreed,
@@ -32,6 +33,7 @@ def test_a_bench_is_calibrated_in_three_hours_and_25_steps_by_hand(laid_out: Pla
 
 def test_all_units_of_the_parts_are_done_once_and_dark_frames_first(laid_out: Plan) -> None:
     parts = read_protocol(resources.find("protocols", "protocol", "calibration"))
+    assert isinstance(parts, Calibration)
     alone = {f"{part.name}/{unit.name}" for part in parts.chain() for unit in part.protocol.units()}
     put_back = {name for name in alone if name.endswith("/put-back")}
     filters = {name for name in alone if name.startswith("lvf_calibration/filter-")}

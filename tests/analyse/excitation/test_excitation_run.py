@@ -42,7 +42,7 @@ QUICK: dict[str, Any] = {
     "direct": ["10 s", "1 min", "4 min"],
     "for": "40 s",
     "last_decay": "60 s",
-    "rest": {"at_least": "1 min", "check_every": "3 min", "at_most": "4 min"},
+    "rest": {"at_least": "1 min", "at_most": "4 min"},
 }
 TILT = np.radians(1.0)
 
