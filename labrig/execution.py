@@ -24,6 +24,8 @@ from labrig.acquire import (
     run_units,
 )
 from labrig.bench import Bench
+from labrig.bench_optics import calibration
+from labrig.calibration import REFERENCE_KIND
 from labrig.clock import Clock, Interrupted, Slept
 from labrig.errors import (
     DataError,
@@ -110,6 +112,7 @@ def execute(
             if CAMERA in rig:
                 _refuse_what_the_camera_cannot(rig[CAMERA], protocol, folder, bench)
             devices = rig.identities()
+            _refuse_another_camera(bench, devices)
             _arrange_again(manual_actions, rig, observer)
             _report_exchanged_camera(folder, devices, observer)
             rig_metadata = {"rig": rig.name, "devices": devices} | {
@@ -274,6 +277,17 @@ def _refuse_what_the_camera_cannot(
             files = " and ".join(str(folder.path / name) for name in ("protocol.yaml", "rig.yaml"))
             error.args = (f"{error} (this run's own files are {files})",)
         raise
+
+
+def _refuse_another_camera(bench: Bench, devices: dict[str, str]) -> None:
+    """Raise `ProtocolError` if the bench was calibrated with another camera."""
+    reference = calibration(bench.file, REFERENCE_KIND)
+    camera = devices.get(CAMERA.key)
+    if reference is not None and camera is not None and not reference.is_of(camera):
+        raise ProtocolError(
+            f"expected the calibrated camera, {reference.camera}, got {camera}; calibrate the "
+            "bench with this one (labrig run calibration), or connect the other"
+        )
 
 
 def _arrange_again(manual_actions: Sequence[ActionRecord], rig: Rig, observer: RunObserver) -> None:

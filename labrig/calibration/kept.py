@@ -77,6 +77,11 @@ def kept_calibrations(runs: Path) -> list[KeptCalibration]:
     runs
         Folder of the run folders.
 
+    Returns
+    -------
+    list of KeptCalibration
+        The calibrations of all benches; empty if there are none.
+
     Raises
     ------
     UsageError

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
+from labrig.calibration.camera_file import camera_body
 from labrig.calibration.kind import CalibrationKind
 from labrig.finite import Finite, NotNegative, Positive
 from labrig.optics import Strip
@@ -95,6 +96,10 @@ class ReferenceFile(_Part):
     picture: CardPicture | None = None
     source: str = ""
     run: str | None = None
+
+    def is_of(self, camera: str) -> bool:
+        """Return whether a camera is the calibrated one, by its identity without the firmware."""
+        return self.camera is None or camera_body(camera) == camera_body(self.camera)
 
     def age_s(self, now_s: float) -> float:
         """Return the time from the calibration to `now_s`, seconds since 1970; at least 0."""

@@ -11,12 +11,29 @@ TEXT = (
 
 
 def calibration_sections(run: RunRecord) -> tuple[Section, ...]:
-    """Return the section on calibrations that were found; none if there were none.
+    """Return the section on calibrations that were found beside the runs.
+
+    Parameters
+    ----------
+    run
+        A recorded run.
+
+    Returns
+    -------
+    tuple of Section
+        A table of their files and ages; empty if there were none.
 
     Raises
     ------
     UsageError
         The run's record of them is malformed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import calibration_sections
+    >>> calibration_sections(labrig.read_run("runs/decay"))
+    ()
     """
     path = run.folder / CALIBRATIONS_FILE
     if not path.is_file():

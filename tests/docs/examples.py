@@ -2,7 +2,8 @@
 
 It holds what a bench has after its first measurements: `runs/decay`, a run of the simulated bench
 with its results; `material.yaml` and `series.csv` from it; `frame.dng`, one of its frames; the
-calibrations `camera.yaml`, `lvf.yaml`, `fade.yaml`, `blank.yaml` and `irradiance.yaml`; and
+calibrations `camera.yaml`, `lvf.yaml`, `fade.yaml`, `blank.yaml`, `irradiance.yaml` and
+`reference.yaml`; and
 `paper.csv`, the re-radiation matrix of a fluorescent paper.
 """
 
@@ -27,6 +28,6 @@ def make_examples(folder: Path) -> None:
         shutil.copy(run / "result" / name, folder)
     shutil.copy(sorted((run / "frames").iterdir())[-1], folder / "frame.dng")
     for path in CALIBRATIONS.glob("*/*.yaml"):
-        if path.stem in {"camera", "lvf", "fade", "blank", "irradiance"}:
+        if path.stem in {"camera", "lvf", "fade", "blank", "irradiance", "reference"}:
             shutil.copy(path, folder)
     write_reradiation(folder / "paper.csv", two_dyes(noise=0.0))

@@ -150,7 +150,7 @@ def test_charges_double_until_the_glow_stops_growing(run: Path) -> None:
         for action in attempt.actions
         if action.is_manual
     ]
-    assert asked == [("strip-meter", "lvf on sample"), ("direct-meter", "lvf away")]
+    assert asked == [("dark", "lvf on sample"), ("direct-meter", "lvf away")]
 
 
 @pytest.mark.campaign
