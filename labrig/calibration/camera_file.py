@@ -118,7 +118,8 @@ class CameraFile(CameraModel):
         if camera_body(camera) != camera_body(self.camera):
             raise DataError(
                 f"calibration of another camera: expected '{camera_body(self.camera)}', the frames "
-                f"are of '{camera_body(camera)}'; calibrate this one, or leave optics.camera_file out"
+                f"are of '{camera_body(camera)}'; calibrate this one, or leave optics.camera_file "
+                "out"
             )
         if lens is not None and self.lens is not None and lens != self.lens:
             raise DataError(

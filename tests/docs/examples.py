@@ -17,6 +17,7 @@ from tests.material.reradiation.formats.matrices import two_dyes
 TESTS = Path(__file__).parents[1]
 RUN = TESTS / "recordings/decay/run"
 CALIBRATIONS = TESTS / "acceptance/recorded_phosphor"
+REFERENCE = Path(__file__).with_name("reference.yaml")
 
 
 def make_examples(folder: Path) -> None:
@@ -28,6 +29,7 @@ def make_examples(folder: Path) -> None:
         shutil.copy(run / "result" / name, folder)
     shutil.copy(sorted((run / "frames").iterdir())[-1], folder / "frame.dng")
     for path in CALIBRATIONS.glob("*/*.yaml"):
-        if path.stem in {"camera", "lvf", "fade", "blank", "irradiance", "reference"}:
+        if path.stem in {"camera", "lvf", "fade", "blank", "irradiance"}:
             shutil.copy(path, folder)
+    shutil.copy(REFERENCE, folder)
     write_reradiation(folder / "paper.csv", two_dyes(noise=0.0))
