@@ -99,9 +99,10 @@ class Phosphor(Chain):
         return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).suited_to(rig)
 
     def units(self) -> Sequence[Unit]:
-        """Return the units of all parts in order; on a calibrated bench, by arrangement."""
+        """Return the units of all parts in order; on a checked bench, by arrangement."""
         chain = self.chain()
-        if BENCH.intersection(part.protocol.protocol for part in chain):
+        protocols = {part.protocol.protocol for part in chain}
+        if CHECK not in protocols or BENCH & protocols:
             return [PartUnit(part.name, unit) for part in chain for unit in part.protocol.units()]
         scenes = sorted(((part, scene) for part in chain for scene in part.scenes()), key=_turn)
         return in_turn(_darks_as_next([scene for _, scene in scenes]))
