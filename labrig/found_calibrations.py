@@ -1,16 +1,19 @@
 """Calibrations that are kept beside the runs, found for a rig whose file names none."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 from labrig.acquire import RigFile
 from labrig.calibration import (
+    CAMERA_KIND,
     REFERENCE_KIND,
     KeptCalibration,
     kept_calibrations,
     kinds,
 )
+from labrig.optics import f_number_text
 from labrig.quantity import duration_text
 
 
@@ -42,6 +45,35 @@ class FoundCalibrations:
             }
             for kind, each in self.kept.items()
         }
+
+    def without_apertures(self, f_numbers: Collection[float]) -> Self:
+        """Return this without a camera's calibration that lacks one of these apertures.
+
+        Frames at another aperture would be refused later, when the run is over.
+
+        Raises
+        ------
+        UsageError
+            The camera's calibration is malformed.
+        """
+        kept = self.kept.get(CAMERA_KIND.name)
+        if kept is None:
+            return self
+        camera = CAMERA_KIND.read(kept.files()[CAMERA_KIND.name])
+        missing = [f_number for f_number in f_numbers if camera.flat_at(f_number) is None]
+        if not missing:
+            return self
+        optics = self.rig.optics.model_copy(update={CAMERA_KIND.optics_key: None})
+        note = (
+            f"{CAMERA_KIND.name} of the calibration {kept.folder.name} is not used: it has no flat "
+            f"field at {f_number_text(missing[0])} (f_numbers of camera_calibration)"
+        )
+        return replace(
+            self,
+            rig=self.rig.model_copy(update={"optics": optics}),
+            kept={name: each for name, each in self.kept.items() if name != CAMERA_KIND.name},
+            notes=(*self.notes, note),
+        )
 
 
 def find_calibrations(rig: RigFile, runs: Path, now_s: float) -> FoundCalibrations:

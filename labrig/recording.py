@@ -1,7 +1,7 @@
 """Runs: preparing, recording and resuming a protocol on a bench in a run folder."""
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -24,6 +24,9 @@ from labrig.found_calibrations import FoundCalibrations, find_calibrations
 from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
 from labrig.run_log import run_log
 from labrig.yaml_file import yaml_text
+
+#: Protocol that compares a bench with its calibration.
+CHECK = "calibration_check"
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,7 @@ class Recording:
         found = find_calibrations(rig, runs, wall_at_start(rig, str(rig_path)))
         if not requested.uses_calibrations:
             found = FoundCalibrations(rig, {}, ())
+        found = found.without_apertures(set(_f_numbers(requested.model_dump())))
         protocol = requested.suited_to(found.rig)
         require_optics(found.rig)
         run_plan = _planned(protocol, protocol_path, found.rig, rig_path)
@@ -83,7 +87,19 @@ class Recording:
             "--optics"
             for name in self.protocol.unmeasured(self.rig)
         )
-        return (*self.found.notes, *unmeasured, *self.protocol.notes(self.rig))
+        unchecked = (
+            "nothing in this run compares the bench with that calibration: labrig run "
+            "calibration_check does",
+        )
+        is_unchecked = self.found.kept and not any(
+            CHECK in (unit.rpartition("/")[0], self.protocol.protocol) for unit in self.plan.units
+        )
+        return (
+            *self.found.notes,
+            *(unchecked if is_unchecked else ()),
+            *unmeasured,
+            *self.protocol.notes(self.rig),
+        )
 
     def record(self, watch: Watch, created: Callable[[Path], None] = lambda folder: None) -> Path:
         """Create a run folder, record into it and return its path.
@@ -156,6 +172,18 @@ def resume_run(path: Path, watch: Watch) -> Path:
     ):
         execute(folder, protocol, bench, run_plan, watch)
     return path
+
+
+def _f_numbers(keys: Any) -> Iterator[float]:
+    """Yield all f-numbers in a protocol's keys."""
+    if isinstance(keys, Mapping):
+        for key, value in keys.items():
+            if key == "f_number" and isinstance(value, float | int):
+                yield float(value)
+            yield from _f_numbers(value)
+    elif isinstance(keys, list | tuple):
+        for value in keys:
+            yield from _f_numbers(value)
 
 
 def _planned(protocol: ProtocolModel, path: Path, rig: RigFile, rig_path: Path) -> Plan:

@@ -14,7 +14,7 @@ from labrig.errors import DataError, UsageError
 from labrig.fit.lvf import compare_card_pictures, place_means
 from labrig.quantity import Count, DurationS
 from labrig.record import FrameRecord
-from labrig.reduce import find_strip, read_exif, read_hdr_frame, strip_profile
+from labrig.reduce import find_strip, read_hdr_frame, strip_profile
 from labrig.results import Measured, PictureChange
 
 from .steps.camera_settings import CameraSettings
@@ -115,9 +115,6 @@ class CheckUnit(SceneUnit):
         frames = self.own(session)
         reference = REFERENCE_KIND.read(Path(self.protocol.reference))
         rules = self.protocol.rules or CalibrationRules()
-        lens = read_exif(frames[0].path.read_bytes()).lens
-        if lens is not None and reference.lens is not None and lens != reference.lens:
-            return (("lens", f"calibrated with the lens {reference.lens}, not with {lens}"),)
         change = picture_change(frames, picture_of(reference, self.protocol.reference))
         return tuple(broken_rules(change, rules))
 

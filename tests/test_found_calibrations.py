@@ -11,6 +11,7 @@ import pytest
 from labrig import resources
 from labrig.acquire import CalibrationRules, RigFile, read_protocol, read_rig_file
 from labrig.calibration import (
+    CAMERA_KIND,
     FADE_KIND,
     IRRADIANCE_KIND,
     REFERENCE_KIND,
@@ -24,7 +25,7 @@ from labrig.calibration import (
 from labrig.errors import DataError, ProtocolError, UsageError
 from labrig.fit.lvf import compare_card_pictures, place_means
 from labrig.found_calibrations import find_calibrations
-from labrig.optics import Strip
+from labrig.optics import Flat, Strip
 from labrig.process import process_run
 from labrig.protocols.phosphor import Phosphor
 from labrig.record import CALIBRATIONS_FILE, read_run
@@ -153,7 +154,6 @@ def moved(rig: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (other_lens, "calibrated with the lens EF75mm, 75 mm, not with EF50mm, 50 mm"),
         (dimmer, "times as bright as when it was calibrated: the lamp aged"),
         (other_card, "this is another card"),
         (aged, "the lamp is redder than when it was calibrated"),
@@ -169,6 +169,18 @@ def test_a_bench_that_has_changed_is_refused_in_one_line(
     assert said in refusal
     assert "calibrate anew (labrig run calibration)" in refusal
     assert "\n" not in refusal
+
+
+def test_another_lens_is_refused_by_the_first_frame_of_any_run(tmp_path: Path) -> None:
+    kept(tmp_path / "runs", reference(None, camera=None))
+    decay = {"protocol": "decay", "sample": {"name": "with another lens"}}
+    with pytest.raises(ProtocolError) as caught:
+        record(tmp_path, decay, other_lens)
+    said = "expected the calibrated lens, EF75mm, 75 mm, got EF50mm, 50 mm; calibrate the bench"
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    (run,) = (tmp_path / "runs").glob("2026*")
+    assert len(list((run / "frames").iterdir())) == 1
 
 
 def test_another_camera_is_refused_before_anything_is_lit(
@@ -272,6 +284,24 @@ def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) ->
     always = read_protocol(protocol, {"calibrate": "always"}).suited_to(found)
     assert isinstance(always, Phosphor)
     assert len(always.parts) == 8
+
+
+def test_a_camera_without_a_flat_field_at_the_aperture_is_not_used(
+    rig: RigFile, tmp_path: Path
+) -> None:
+    folder = kept(tmp_path, reference(None))
+    flat = CameraFile(
+        camera="a camera", iso=100, f_number=4, channels=("L",), flicker=0.01, flicker_sigma=0.001,
+        flats=(Flat(f_number=4, falloff=((-0.1,),)),),
+    )  # fmt: skip
+    CAMERA_KIND.write(folder, flat)
+    found = find_calibrations(rig, tmp_path, MADE.timestamp())
+    assert found.without_apertures([4.0]) is found
+    assert found.rig.optics.named(CAMERA_KIND) is not None
+    stopped_down = found.without_apertures([4.0, 5.6])
+    assert stopped_down.rig.optics.named(CAMERA_KIND) is None
+    assert stopped_down.rig.optics.named(FADE_KIND) is not None
+    assert "no flat field at f/5.6" in stopped_down.notes[-1]
 
 
 def test_without_a_calibration_there_is_nothing_to_check(rig: RigFile, tmp_path: Path) -> None:
