@@ -15,6 +15,7 @@ from labrig.calibration import (
     FADE_KIND,
     IRRADIANCE_KIND,
     REFERENCE_KIND,
+    CameraFile,
     CardPicture,
     Change as ChangeInTime,
     FadeFile,
