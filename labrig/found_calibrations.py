@@ -8,6 +8,7 @@ from typing import Self
 from labrig.acquire import RigFile
 from labrig.calibration import (
     CAMERA_KIND,
+    LVF_KIND,
     REFERENCE_KIND,
     KeptCalibration,
     kept_calibrations,
@@ -106,6 +107,8 @@ def find_calibrations(rig: RigFile, runs: Path, now_s: float) -> FoundCalibratio
             notes.append(f"the calibration {each.folder.name} is not used: {reason}")
             continue
         kept = dict.fromkeys(each.files(), each) | kept
+    if LVF_KIND.name in kept:
+        kept[REFERENCE_KIND.name] = kept[LVF_KIND.name]  # its picture belongs to that filter
     found = {kind.name: kept[kind.name] for kind in wanted if kind.name in kept}
     if REFERENCE_KIND.name in found and len(found) == 1:
         found = {}  # all that it belongs to is named by the rig file

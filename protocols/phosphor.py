@@ -10,6 +10,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import PartUnit, ProtocolModel, RigFile, Unit
+from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, kinds
 
 from .excitation import ExcitationFrames
@@ -94,7 +95,9 @@ class Phosphor(Chain):
             return super().suited_to(rig)
         parts = [content for content, _ in kept]
         names = {name for _, name in kept}
-        if REFERENCE_KIND.protocol in known and names & THROUGH_THE_FILTER and CHECK not in names:
+        reference = calibration(rig, REFERENCE_KIND)
+        can_be_checked = reference is not None and reference.picture is not None
+        if can_be_checked and names & THROUGH_THE_FILTER and CHECK not in names:
             parts.insert(0, {"protocol": CHECK})
         return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).suited_to(rig)
 

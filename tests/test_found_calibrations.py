@@ -223,6 +223,17 @@ def test_the_newest_of_this_bench_is_found_and_what_is_named_goes_before(
     assert note.startswith("irradiance of the calibration newer, 48 h old")
 
 
+def test_the_picture_is_that_of_the_filter_that_is_found(rig: RigFile, tmp_path: Path) -> None:
+    older = kept(tmp_path, reference(None), "with-filter")
+    (older / "lvf.yaml").write_text("read later")
+    kept(tmp_path, reference(None, made=MADE + timedelta(days=1)), "fade-anew")
+    found = find_calibrations(rig, tmp_path, MADE.timestamp()).kept
+    assert {name: each.folder.name for name, each in found.items()} == {
+        "fade": "fade-anew", "irradiance": "fade-anew", "lvf": "with-filter",
+        "reference": "with-filter",
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("key", ["lamp", "grey_card", "curves"])
 def test_one_with_other_light_is_not_used(key: str, rig: RigFile, tmp_path: Path) -> None:
     kept(tmp_path, reference(None, **{key: "another"}))
@@ -282,6 +293,9 @@ def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) ->
     units = [unit.name for unit in chain.units()]
     assert units[:2] == ["calibration_check/card", "emission_spectrum/white"]
     assert units[-2:] == ["decay/meter", "decay/decay-1"]
+    REFERENCE_KIND.write(folder, reference(None))
+    without_check = read_protocol(protocol).suited_to(found)
+    assert [unit.name for unit in without_check.units()][0] == "emission_spectrum/dark"
     always = read_protocol(protocol, {"calibrate": "always"}).suited_to(found)
     assert isinstance(always, Phosphor)
     assert len(always.parts) == 8
