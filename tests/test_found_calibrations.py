@@ -295,7 +295,7 @@ def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) ->
     assert units[-2:] == ["decay/meter", "decay/decay-1"]
     REFERENCE_KIND.write(folder, reference(None))
     without_check = read_protocol(protocol).suited_to(found)
-    assert [unit.name for unit in without_check.units()][0] == "emission_spectrum/dark"
+    assert next(unit.name for unit in without_check.units()) == "emission_spectrum/dark"
     always = read_protocol(protocol, {"calibrate": "always"}).suited_to(found)
     assert isinstance(always, Phosphor)
     assert len(always.parts) == 8
