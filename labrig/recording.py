@@ -1,7 +1,7 @@
 """Runs: preparing, recording and resuming a protocol on a bench in a run folder."""
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -72,7 +72,7 @@ class Recording:
         found = find_calibrations(rig, runs, wall_at_start(rig, str(rig_path)))
         if not requested.uses_calibrations:
             found = FoundCalibrations(rig, {}, ())
-        found = found.without_apertures(set(_f_numbers(requested.model_dump())))
+        found = found.without_apertures(requested.apertures())
         protocol = requested.suited_to(found.rig)
         require_optics(found.rig)
         run_plan = _planned(protocol, protocol_path, found.rig, rig_path)
@@ -172,18 +172,6 @@ def resume_run(path: Path, watch: Watch) -> Path:
     ):
         execute(folder, protocol, bench, run_plan, watch)
     return path
-
-
-def _f_numbers(keys: Any) -> Iterator[float]:
-    """Yield all f-numbers in a protocol's keys."""
-    if isinstance(keys, Mapping):
-        for key, value in keys.items():
-            if key == "f_number" and isinstance(value, float | int):
-                yield float(value)
-            yield from _f_numbers(value)
-    elif isinstance(keys, list | tuple):
-        for value in keys:
-            yield from _f_numbers(value)
 
 
 def _planned(protocol: ProtocolModel, path: Path, rig: RigFile, rig_path: Path) -> Plan:

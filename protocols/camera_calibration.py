@@ -291,6 +291,8 @@ class CameraCalibration(ScenesProtocol):
         camera's shortest.
     """
 
+    uses_calibrations = False
+
     protocol: Literal["camera_calibration"] = "camera_calibration"
     camera: CameraSettings = CameraSettings(iso=100, f_number=4.0)
     isos: tuple[Iso, ...] = Field((100, 200, 400, 800, 1600), min_length=1)

@@ -35,6 +35,7 @@ from labrig.reduce import find_strip, read_hdr_frame, strip_profile
 from labrig.results import CalibrationCheckResult
 from tests.analyse.excitation.test_excitation_run import true_irradiance
 from tests.analyse.recorded import record
+from tests.protocols.protocol_files import written
 from tests.quick_yaml import read_quickly, write_quickly
 
 WIDTH, HEIGHT = 192, 64
@@ -317,6 +318,9 @@ def test_a_camera_without_a_flat_field_at_the_aperture_is_not_used(
     assert stopped_down.rig.optics.named(CAMERA_KIND) is None
     assert stopped_down.rig.optics.named(FADE_KIND) is not None
     assert "no flat field at f/5.6" in stopped_down.notes[-1]
+    parts = [{"protocol": "decay", "camera": {"iso": 100, "f_number": 8}}, {"protocol": "fade"}]
+    chain = written(tmp_path, protocol="phosphor", parts=parts)
+    assert read_protocol(chain).apertures() == {8.0, 4.0}
 
 
 def test_without_a_calibration_there_is_nothing_to_check(rig: RigFile, tmp_path: Path) -> None:

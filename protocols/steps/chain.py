@@ -1,6 +1,6 @@
 """A chain of protocols in one run, whose parts are written as in files of their own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import Any, Self
 
 from pydantic import Field, model_validator
@@ -51,6 +51,10 @@ class Chain(ProtocolModel):
             if (part_unit := unit_within(part.name, unit)) is not None:
                 return part.protocol.patches_of(part_unit)
         return super().patches_of(unit)
+
+    def apertures(self) -> Set[float]:
+        """Return the f-numbers of the frames of all parts."""
+        return {f_number for part in self.chain() for f_number in part.protocol.apertures()}
 
     def named_regions(self) -> Mapping[str, Region]:
         """Return the regions of all parts; those that a part shares with the chain stand once."""
