@@ -2,6 +2,7 @@
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
+from labrig.acquire.calibration_rules import CalibrationRules
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.loading import (
     driver_and_settings,
@@ -41,6 +42,7 @@ __all__ = [
     "MAX_STEPS",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
+    "CalibrationRules",
     "CameraOffers",
     "Connections",
     "DeviceEntry",

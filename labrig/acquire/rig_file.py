@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from labrig import resources
+from labrig.acquire.calibration_rules import CalibrationRules
 from labrig.acquire.luminance_reading import LuminanceReading
 from labrig.acquire.roles import ROLES
 from labrig.calibration import CalibrationKind, kinds
@@ -138,6 +139,9 @@ class Optics(BaseModel):
     leds
         Spectra and brightnesses of the LEDs: their file `leds.yaml`, or the folder of the run of
         protocol `led_brightness` that measured them.
+    reference
+        Bench to which calibrations belong: its file `reference.yaml`, or the folder of the run of
+        protocol `calibration` that measured it.
     blank
         Background and stray light of the bench after lamp off: its file `blank.yaml`, or the folder
         of the run of protocol `blank` that measured it.
@@ -229,6 +233,8 @@ class RigFile(BaseModel):
         Devices of the bench, each under the key of its role, such as `lamp` or `camera`.
     optics
         Spectral curves of the bench's parts, and its calibrations.
+    calibrations
+        Limits within which calibrations that are kept beside the runs still hold.
     on_finish
         What happens when a run has ended: `bell` rings the terminal's bell, a list of words is a
         command to start, for example `[notify-send, labrig]`. Default: nothing.
@@ -242,6 +248,7 @@ class RigFile(BaseModel):
     name: str
     devices: dict[str, DeviceEntry] = Field(min_length=1)
     optics: Optics = Optics()
+    calibrations: CalibrationRules = CalibrationRules()
     on_finish: Literal["bell"] | tuple[str, ...] | None = Field(
         None, description="when a run has ended: bell, or a command as a list of words"
     )

@@ -22,6 +22,11 @@ from labrig.calibration.irradiance_file import (
     IRRADIANCE_KIND,
     IrradianceFile,
 )
+from labrig.calibration.kept import (
+    KeptCalibration,
+    keep_calibration,
+    kept_calibrations,
+)
 from labrig.calibration.kind import CalibrationKind, kinds
 from labrig.calibration.leds_file import (
     LEDS_KIND,
@@ -38,6 +43,11 @@ from labrig.calibration.lvf_file import (
     LvfFile,
     WavelengthColumns,
 )
+from labrig.calibration.reference_file import (
+    REFERENCE_KIND,
+    CardPicture,
+    ReferenceFile,
+)
 
 __all__ = [
     "BLANK_KIND",
@@ -46,23 +56,29 @@ __all__ = [
     "IRRADIANCE_KIND",
     "LEDS_KIND",
     "LVF_KIND",
+    "REFERENCE_KIND",
     "UV_NM",
     "BandColumns",
     "BlankFile",
     "CalibratedLed",
     "CalibrationKind",
     "CameraFile",
+    "CardPicture",
     "Change",
     "CurveColumns",
     "FadeFile",
     "IrradianceFile",
+    "KeptCalibration",
     "LedSource",
     "LedsFile",
     "Linearity",
     "LvfFile",
     "Noise",
+    "ReferenceFile",
     "UvScale",
     "Warming",
     "WavelengthColumns",
+    "keep_calibration",
+    "kept_calibrations",
     "kinds",
 ]

@@ -1,3 +1,6 @@
+from .calibrations_used import (
+    calibration_sections as calibration_sections,
+)
 from .charge import (
     charge_report as charge_report,
 )

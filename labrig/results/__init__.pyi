@@ -12,6 +12,11 @@ from .blank import (
     BlankResult as BlankResult,
     StrayLight as StrayLight,
 )
+from .calibration import CalibrationResult as CalibrationResult
+from .calibration_check import (
+    CalibrationCheckResult as CalibrationCheckResult,
+    PictureChange as PictureChange,
+)
 from .camera_calibration import (
     CameraCalibrationResult as CameraCalibrationResult,
     FittedFlat as FittedFlat,

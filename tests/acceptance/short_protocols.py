@@ -48,7 +48,7 @@ SHORTER: dict[str, dict[str, Any]] = {
     "decay-eleven": {"charge": "5 min", "for": "60 s"},
     "excitation": {
         "at_most": 3, "refine": 1, "direct": ["10 s", "4 min"], "for": "40 s", "last_decay": "60 s",
-        "rest": {"at_least": "1 min", "check_every": "2 min", "at_most": "4 min"},
+        "rest": {"at_least": "1 min", "at_most": "4 min"},
     },
     "isotropy": {"charge": "2 min", "angles": [20, 60], "frames": 2},
     "luminance": {"until": "3 min", "longest": "10 s"},

@@ -109,6 +109,10 @@ def _phosphor_sigma(printed: str) -> str:
     return ", ".join(f"{names[name]} {value}" for name, value in rms.items())
 
 
+def _each_sample(printed: str) -> str:
+    return match(r"^each sample +(.*)$", printed)
+
+
 def _variable_filter(printed: str) -> str:
     (centre,) = columns(r"^ +centre / nm +[\d.]+ +([\d.]+)", printed)
     (width,) = columns(r"^ +width / 1 +[\d.]+ +([\d.]+)", printed)
@@ -421,6 +425,21 @@ FIGURES = (
         "Same runs: rms of error over σ (1 if σ is right)",
         "whole_phosphor",
         _phosphor_sigma,
+    ),
+    Figure(
+        "A phosphor measured with a calibration of the bench made once for all eight paints",
+        "reused_calibration",
+        _phosphor,
+    ),
+    Figure(
+        "Same runs: rms of error over σ (1 if σ is right)",
+        "reused_calibration",
+        _phosphor_sigma,
+    ),
+    Figure(
+        "Same bench, frames of a 21-megapixel camera: what each further sample takes",
+        "reused_calibration",
+        _each_sample,
     ),
     Figure(
         "Linear variable filter calibrated in the simulated room with real colour filters, three "
