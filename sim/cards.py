@@ -20,6 +20,9 @@ FRAME_REFLECTANCE = 0.04
 GREY_NM = (380.0, 420.0, 480.0, 560.0, 640.0, 700.0, 780.0)
 GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
 
+#: Optical brightener of paper: where it absorbs, and peak and width (1 σ) of what it emits, in nm.
+BRIGHTENER_BELOW_NM, BRIGHTENER_NM = 440.0, (490.0, 30.0)
+
 
 def reflectances(card: Card, grey: float) -> FloatArray:
     """Return reflectances of all surfaces of a card, shape (surfaces, wavelengths).
@@ -28,13 +31,21 @@ def reflectances(card: Card, grey: float) -> FloatArray:
     the black trap in it 2; of a ColorChecker, row by row, 1 to 24, its frame is 25.
     """
     nothing = np.zeros((1, len(WAVELENGTH_NM)))
-    if card == "sample":
+    if card in ("sample", "lit sample"):
         return nothing
     if card == "colorchecker":
         frame = np.full((1, len(WAVELENGTH_NM)), FRAME_REFLECTANCE)
         return np.concatenate([nothing, _colorchecker(), frame])
     card_reflectance = grey * np.interp(WAVELENGTH_NM, GREY_NM, GREY)[None, :]
     return np.concatenate([nothing, card_reflectance, nothing])
+
+
+def brightened(light: FloatArray, fraction: float) -> FloatArray:
+    """Return the light that a brightener re-radiates under light of shape (…, wavelengths)."""
+    middle_nm, wide_nm = BRIGHTENER_NM
+    emitted = np.exp(-(((WAVELENGTH_NM - middle_nm) / wide_nm) ** 2) / 2)
+    absorbed = light[..., WAVELENGTH_NM < BRIGHTENER_BELOW_NM].sum(axis=-1, keepdims=True)
+    return np.asarray(fraction * absorbed * emitted / emitted.sum())
 
 
 def surfaces(

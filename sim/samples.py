@@ -183,7 +183,13 @@ class Samples:
         arrangement
             Arrangement of the bench until `end_s`.
         """
-        _, exposure_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
+        visible = lights.openness
+        if arrangement.card == "lit sample" and self._has_door:
+
+            def visible(time_s: float) -> float:
+                return 1 - lights.openness(time_s)
+
+        _, exposure_s = self.evolve(level, start_s, end_s, arrangement, lights, visible)
         radiance_s = self.of_cells(exposure_s)[:, None] * self.radiance_at_one
         # States are in the order of their cells, and every cell but the cloth has some.
         first_states = np.searchsorted(self.cells.patch, np.arange(1, self.cells.patch[-1] + 1))

@@ -71,6 +71,9 @@ class Patch(Part):
         left.
     kinetics
         How its traps fill and empty; null: by the rate equation of first order in a thin layer.
+    prompt
+        Fraction of the light absorbed where the sample is excited best that it re-radiates at once,
+        in the colour of its glow, for example `5 %`; elsewhere in proportion to its excitation.
     """
 
     material: str
@@ -78,6 +81,7 @@ class Patch(Part):
     shape: Literal["flat", "sphere"] = "flat"
     initial_charge: Charge | None = None
     kinetics: KineticsSettings | None = None
+    prompt: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
 
 
 class SensorSettings(Part):
@@ -281,6 +285,9 @@ class Simulation(Part):
     inter_reflection
         Irradiance of every surface by the light of all surfaces in the frame, over that of a dome
         as bright as they are on average, for example `2 %`.
+    grey_card_fluorescence
+        Fraction of the violet light below 440 nm that the grey card re-radiates about 490 nm, as
+        the brightener in paper does, for example `5 %`.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
@@ -313,6 +320,7 @@ class Simulation(Part):
     filters: str | None = None
     filters_bent: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     grey_card: Annotated[Fraction, Field(gt=0, le=0.95)] = 0.18
+    grey_card_fluorescence: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.0
     chart: Region = MIDDLE
     black_trap: Region | None = None
     ambient: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0

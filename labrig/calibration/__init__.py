@@ -38,6 +38,11 @@ from labrig.calibration.lvf_file import (
     LvfFile,
     WavelengthColumns,
 )
+from labrig.calibration.reflectance_file import (
+    REFLECTANCE_KIND,
+    PatchReflectance,
+    ReflectanceFile,
+)
 
 __all__ = [
     "BLANK_KIND",
@@ -46,6 +51,7 @@ __all__ = [
     "IRRADIANCE_KIND",
     "LEDS_KIND",
     "LVF_KIND",
+    "REFLECTANCE_KIND",
     "UV_NM",
     "BandColumns",
     "BlankFile",
@@ -61,6 +67,8 @@ __all__ = [
     "Linearity",
     "LvfFile",
     "Noise",
+    "PatchReflectance",
+    "ReflectanceFile",
     "UvScale",
     "Warming",
     "WavelengthColumns",

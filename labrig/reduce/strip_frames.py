@@ -13,6 +13,7 @@ from labrig.reduce.measured_frames import SeriesFrame
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.series import reduce_patches
 from labrig.reduce.strip import FoundStrip, find_strip, strip_profile
+from labrig.region import Region
 from labrig.results import FloatArray, SliceValues, StripProfile
 
 #: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
@@ -191,7 +192,54 @@ def slice_values(
     >>> values["lit"].value.shape
     (31, 3)
     """
-    series = reduce_patches(frames, strip.slices(), darks, camera=camera)
+    return region_values(frames, strip.slices(), darks, camera)
+
+
+def region_values(
+    frames: Sequence[SeriesFrame],
+    regions: Mapping[str, Region],
+    darks: Sequence[SeriesFrame],
+    camera: CameraModel | None,
+) -> Mapping[str, SliceValues]:
+    """Measure the light in every region, scene by scene, such as in a strip's slices in a patch.
+
+    Parameters
+    ----------
+    frames
+        Light frames; those of one unit show one scene at several exposures.
+    regions
+        Regions by name, as (x, y, width, height) in fractions of the frame.
+    darks
+        Dark frames at their exposure times.
+    camera
+        Calibration of the camera; None uses the values as they are.
+
+    Returns
+    -------
+    dict of str to SliceValues
+        Signal in DN/s and its standard uncertainty by unit, shape (regions, channels).
+
+    Raises
+    ------
+    DataError
+        ISO or f-number differ within a unit, no dark frames match, or the calibration is of another
+        camera or aperture.
+    FrameError, UsageError
+        A frame cannot be read, or a region leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import SeriesFrame, region_values
+    >>> run = labrig.read_run("runs/decay")
+    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
+    >>> first = run.frames("decay")[0]
+    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
+    >>> halves = {"left": (0.25, 0.25, 0.25, 0.5), "right": (0.5, 0.25, 0.25, 0.5)}
+    >>> region_values(frames, halves, darks, camera=None)["lit"].value.shape
+    (2, 3)
+    """
+    series = reduce_patches(frames, regions, darks, camera=camera)
     units = dict.fromkeys(frame.unit for frame in frames)
     values_by_unit = {}
     for unit in units:

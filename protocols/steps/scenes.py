@@ -29,12 +29,13 @@ from .exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET
 from .sample_pose import face_lamp
 from .sanity_checks import SanityChecks
 
-Stage = Literal["sample", "grey card", "colorchecker"]
+Stage = Literal["sample", "lit sample", "grey card", "colorchecker"]
 LvfPlace = Literal["away", "before camera", "on sample"]
 LampKind = Literal["halogen", "mercury"]
 
 _STAGE = {
     "sample": "take the card away, so that the sample lies in its place",
+    "lit sample": "lay the sample itself in the grey card's place, where lamp and camera both see it",
     "grey card": "lay the grey card where lamp and camera both see it",
     "colorchecker": "lay the ColorChecker where lamp and camera see all of it",
 }
@@ -388,13 +389,17 @@ class SceneUnit:
         """Arrange, light, photograph, and check the photographs."""
         session.wait_until_warm("camera")
         self.arrange(session)
-        light(session, self.warm_up_s(session))
+        self.light(session)
         self.bracketing.photograph(session, self.name, self.role, self.wanted.lamp)
         self.check(session)
 
     def arrange(self, session: Session) -> None:
         """Ask for the arrangement."""
         self.wanted.set_up(session, arrangement_after(self.before, session), self.why)
+
+    def light(self, session: Session) -> None:
+        """Switch the lamp on and wait until it is steady."""
+        light(session, self.warm_up_s(session))
 
     def warm_up_s(self, session: Session) -> float:
         """Return the warm-up time of the lamp in use, in seconds."""
