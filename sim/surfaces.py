@@ -110,6 +110,9 @@ def reradiation_on_grid(matrix: ReradiationMatrix) -> FloatArray:
 def _prompt_on_grid(material: Material, absorbed: FloatArray) -> FloatArray:
     """Return prompt fluorescence in each cell of the grid per light in each, (out, in).
 
+    Whatever excites it, it has the spectrum of the glow (Kasha); light within that spectrum excites
+    as much less as there is less of it at longer wavelengths.
+
     Raises
     ------
     UsageError
@@ -123,9 +126,9 @@ def _prompt_on_grid(material: Material, absorbed: FloatArray) -> FloatArray:
     edges = np.array(material.bands_nm)
     excited = np.interp(WAVELENGTH_NM, (edges[1:] + edges[:-1]) / 2, np.sum(rates, axis=0))
     emitted = emission(material).sum(axis=0)
-    is_stokes = WAVELENGTH_NM[:, np.newaxis] > WAVELENGTH_NM
-    per_light = np.outer(emitted / emitted.sum(), absorbed * excited / excited.max())
-    return np.asarray(np.where(is_stokes, per_light, 0.0))
+    emitted /= emitted.sum()
+    absorbed = absorbed * excited / excited.max() * (1 - np.cumsum(emitted))
+    return np.asarray(np.outer(emitted, absorbed))
 
 
 def _reflectance(material: Material | ReradiationMatrix) -> FloatArray:

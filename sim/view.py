@@ -151,7 +151,8 @@ class View:
         thrown_back = card * on_card
         if arrangement.card == "grey card" and self._simulation.grey_card_fluorescence:
             glowing = brightened(on_card, self._simulation.grey_card_fluorescence)
-            thrown_back += np.where(card.any(axis=1)[:, np.newaxis], glowing, 0.0)
+            is_card = np.asarray(places.surface[covered] == 1)
+            thrown_back += np.where(is_card[:, np.newaxis], glowing, 0.0)
         if self._simulation.door is None:
             radiance[covered] = self._reflected * thrown_back
         else:

@@ -17,6 +17,7 @@ from labrig.calibration import (
     IrradianceFile,
     LedsFile,
     LvfFile,
+    ReflectanceFile,
     kinds,
 )
 from labrig.material import Material
@@ -32,7 +33,7 @@ class Inputs:
 
     Attributes
     ----------
-    camera, blank, fade, lvf, irradiance, leds
+    camera, blank, fade, lvf, irradiance, leds, reflectance
         Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
         in the same run.
     others
@@ -52,6 +53,7 @@ class Inputs:
     lvf: LvfFile | None = None
     irradiance: IrradianceFile | None = None
     leds: LedsFile | None = None
+    reflectance: ReflectanceFile | None = None
     others: Mapping[str, Any] = field(default_factory=dict)
     spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
     decays: Mapping[str, FittedDecay] = field(default_factory=dict)

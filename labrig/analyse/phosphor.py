@@ -2,6 +2,7 @@
 
 from labrig import plugins
 from labrig.analyse.inputs import Part
+from labrig.analyse.surface import with_reflectances
 from labrig.errors import DataError, FitError
 from labrig.results import PhosphorResult, RunResult
 
@@ -40,6 +41,6 @@ def analyse(part: Part) -> PhosphorResult:
     return PhosphorResult(
         parts=parts,
         failed={name: str(error) for name, error in failures.items()},
-        materials=inputs.materials,
+        materials=with_reflectances(inputs.materials, inputs.reflectance),
         warnings=tuple(warnings),
     )

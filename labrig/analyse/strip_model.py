@@ -1,4 +1,4 @@
-"""Model of frames of a filter's strip, each channel of which sees the filter in places of its own."""
+"""Model of frames of a filter's strip, which each channel sees in places of its own."""
 
 from collections.abc import Sequence
 from dataclasses import fields

@@ -20,6 +20,7 @@ from labrig.calibration.fade_file import (
 )
 from labrig.calibration.irradiance_file import (
     IRRADIANCE_KIND,
+    CardLight,
     IrradianceFile,
 )
 from labrig.calibration.kind import CalibrationKind, kinds
@@ -58,6 +59,7 @@ __all__ = [
     "CalibratedLed",
     "CalibrationKind",
     "CameraFile",
+    "CardLight",
     "Change",
     "CurveColumns",
     "FadeFile",

@@ -6,6 +6,7 @@ dr/dt = (1 − r) Σ_j k_e,j E_j − k_r rᵇ, and radiance L_j = Σ_i Λ_i,j k_
 
 import os
 from itertools import pairwise
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -392,6 +393,17 @@ class Material(_Part):
             if not getattr(self, name):
                 content.pop(name, None)
         return content
+
+    @property
+    def scale_per_count(self) -> float:
+        """Product of all scale factors: radiance per count; 1 without a scale."""
+        return prod(factor.value for factor in self.scale_factors)
+
+    @model_validator(mode="after")
+    def _scale_has_its_factors(self) -> Self:
+        if self.scale_factors and self.scale is None:
+            raise ValueError("expected 'scale' beside 'scale_factors', got nothing")
+        return self
 
     @property
     def is_first_order(self) -> bool:

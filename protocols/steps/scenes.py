@@ -35,7 +35,7 @@ LampKind = Literal["halogen", "mercury"]
 
 _STAGE = {
     "sample": "take the card away, so that the sample lies in its place",
-    "lit sample": "lay the sample itself in the grey card's place, where lamp and camera both see it",
+    "lit sample": "lay the sample in the grey card's place, where lamp and camera both see it",
     "grey card": "lay the grey card where lamp and camera both see it",
     "colorchecker": "lay the ColorChecker where lamp and camera see all of it",
 }

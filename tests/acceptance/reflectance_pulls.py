@@ -41,7 +41,7 @@ class Case:
     """A sample and its room."""
 
     name: str
-    albedo: Mapping[float, float]
+    albedo: Mapping[int, float]
     room: Mapping[str, Any] = field(default_factory=dict)
     patch: Mapping[str, Any] = field(default_factory=dict)
     sensor: Mapping[str, Any] = field(default_factory=dict)
@@ -64,13 +64,13 @@ CASES = (
 )
 
 
-def coloured(albedo: Mapping[float, float]) -> Material:
+def coloured(albedo: Mapping[int, float]) -> Material:
     """Blue paint on a ground of that albedo."""
-    known = Albedo(wavelength_nm=tuple(albedo), value=tuple(albedo.values()))
+    known = Albedo(wavelength_nm=tuple(map(float, albedo)), value=tuple(albedo.values()))
     return read_material("blue-paint").model_copy(update={"albedo": known})
 
 
-def true_albedo(albedo: Mapping[float, float]) -> FloatArray:
+def true_albedo(albedo: Mapping[int, float]) -> FloatArray:
     """Means about `NM`, as the room has it."""
     in_room = np.interp(ROOM_NM, list(albedo), list(albedo.values()))
     return np.asarray(band_means(ROOM_NM, in_room, edges_from_centres(NM)))
@@ -112,13 +112,13 @@ def measured(folder: Path, case: Case, seed: int, **protocol: Any) -> Reflectanc
         region = [0.03, 0.1, 0.94, 0.8]
         sample = {"material": str(folder / "sample.yaml"), "region": region} | dict(case.patch)
         rig["simulation"] |= {"sample": [sample], "seed": seed} | dict(case.room)
-        rig["simulation"]["sensor"] = {"width": WIDTH, "height": HEIGHT} | case.sensor
+        rig["simulation"]["sensor"] = dict(case.sensor) | {"width": WIDTH, "height": HEIGHT}
 
     content = {"protocol": "reflectance", "sample": {"name": "sample"}, **protocol}
     return analyse(part_of(record(folder, content, change)))
 
 
-def pulls(patch: MeasuredReflectance, albedo: Mapping[float, float]) -> tuple[FloatArray, ...]:
+def pulls(patch: MeasuredReflectance, albedo: Mapping[int, float]) -> tuple[FloatArray, ...]:
     """Error over σ, and error, of the albedo at the wavelengths that are judged."""
     error = (patch.albedo - true_albedo(albedo))[JUDGED]
     return error / patch.albedo_sigma[JUDGED], error

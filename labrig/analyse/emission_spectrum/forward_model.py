@@ -113,9 +113,11 @@ def forward_models(
     models = {}
     for patch, slices in patches.items():
         # At either end pixels reach a little beyond the places that were calibrated.
-        places = np.clip(channel_positions(layout, strip, slices), lvf.position[0], lvf.position[-1])
+        seen = channel_positions(layout, strip, slices)
+        places = np.clip(seen, lvf.position[0], lvf.position[-1])
         lvfs = tuple(lvf.at(positions) for positions in places)
-        models[patch] = ForwardModel(slices, holder, lvfs, camera, strip_system(lvfs, camera, KNOTS_NM))
+        system = strip_system(lvfs, camera, KNOTS_NM)
+        models[patch] = ForwardModel(slices, holder, lvfs, camera, system)
     return models, refused
 
 

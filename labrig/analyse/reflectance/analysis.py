@@ -11,7 +11,7 @@ from labrig.analyse.strip import StripFrames, StripPatch, for_each_patch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
 from labrig.calibration import ReflectanceFile
 from labrig.errors import DataError, FitError, UsageError
-from labrig.fit.reflectance import AlbedoFit, fit_albedo
+from labrig.fit.reflectance import AlbedoFit, fit_albedo, unresolved
 from labrig.number_format import plus_minus
 from labrig.optics import Transmittance, band_means, edges_from_centres
 from labrig.reduce import FLICKER
@@ -21,9 +21,6 @@ from labrig.results import FloatArray, Measured, MeasuredReflectance, Reflectanc
 WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)
 #: Relative σ of a card whose curve has none.
 CARD_SIGMA = 0.01
-#: Error at the foot of an edge that a filter's band is too wide for, over the second difference of
-#: the albedo there.
-UNRESOLVED = 0.12
 #: Relative change of the card's light between its two scenes that causes a warning.
 DRIFT = 0.03
 #: Significance in σ, and size, from which luminescence and light thrown back are reported.
@@ -102,8 +99,8 @@ def _patch(patch: StripPatch, bench: _Bench) -> tuple[MeasuredReflectance, list[
     def columns(value: FloatArray, draws: FloatArray, nm: FloatArray) -> tuple[FloatArray, ...]:
         mean = band_means(nm, value, edges)
         spread = band_means(nm, draws.T, edges).std(axis=1, ddof=1)
-        bend = np.pad(np.abs(np.diff(mean, n=2)), 1, mode="edge")
-        return mean, np.sqrt(spread**2 + (of_all * mean) ** 2 + (UNRESOLVED * bend) ** 2)
+        missed = unresolved(WAVELENGTH_NM, mean)
+        return mean, np.sqrt(spread**2 + (of_all * mean) ** 2 + missed**2)
 
     total, one = fit.radiance_factor, fit.albedo
     glow, at_off = white.glow_at(WAVELENGTH_NM, bench.card)

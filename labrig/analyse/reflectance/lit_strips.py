@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.acquire import DOOR
 from labrig.analyse.frames import intact_frames
@@ -24,11 +23,11 @@ from labrig.results import FloatArray, Measured, SliceValues
 KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
 #: Significance from which light counts: of the card at a place, and of the glow at all places.
 CARD_SEEN, GLOW_SEEN = 20.0, 10.0
-#: Least part of the light of a value that comes from its place's band, and reach of a band in nm.
-IN_BAND, IN_BAND_NM = 0.9, 40.0
+#: Reach of a place's band in nm, and relative σ of the light from outside of it.
+IN_BAND_NM, OUTSIDE_SIGMA = 40.0, 0.2
 #: Number of free amounts of luminescence by white light, and reach of its change of colour in
 #: widths of the emission; cosine of the angle between colours that are alike.
-WHITE_AMOUNTS, REDDEST = 3, 2.5
+WHITE_AMOUNTS, REDDEST = 2, 2.5
 ALIKE = 0.9995
 #: Share of the change from the first photograph of the glow back to lamp off that is uncertain.
 BACK_TO_OFF = 0.3
@@ -241,10 +240,10 @@ class _Scenes:
             tuple(frame.t_s + frame.exposure_s / 2 for frame in glow_frames),
         )
 
-    def within(self, used: NDArray[np.bool_]) -> "_Scenes":
-        """Return the scenes with only some places and channels of the sample, (p, channels)."""
-        value = np.where(used, self.sample.value, np.nan)
-        return replace(self, sample=replace(self.sample, value=value))
+    def within(self, inside: FloatArray) -> "_Scenes":
+        """Return the scenes with a σ for what is not `inside` of a place's band, (p, channels)."""
+        sigma = np.hypot(self.sample.sigma, OUTSIDE_SIGMA * (1 - inside) * self.sample.value)
+        return replace(self, sample=replace(self.sample, sigma=sigma))
 
     @property
     def card(self) -> SliceValues:
@@ -314,14 +313,16 @@ def _narrow_courses(
     """
     card, glow = scenes.card.value, scenes.glow
     places, channels = card.shape
-    courses = []
-    for place in range(places) if glow is not None else ():
+    courses: list[FloatArray] = []
+    if glow is None:
+        return np.zeros((0, card.size))
+    for place in range(places):
         colours = [glow.value[place]]
         if is_direct:
             colours = [glow.value.sum(axis=0)]
-            if white.glow is not None:
+            if (spread := white.glow) is not None:
                 redder = white_nm > centre_nm[place]
-                colours.append(np.maximum(white.glow.value[redder].sum(axis=0), 0.0))
+                colours.append(np.maximum(spread.value[redder].sum(axis=0), 0.0))
         for colour in _different(colours):
             course = np.zeros((places, channels))
             course[place] = colour / card[place]
@@ -350,20 +351,18 @@ def _light_system(
     return strip_system(lvfs, lit, KNOTS_NM), centre_nm
 
 
-def _in_band(light: SpectralSystem, centre_nm: FloatArray) -> NDArray[np.bool_]:
-    """Return which values are of light of the place's own band, shape (p · channels,).
+def _in_band(light: SpectralSystem, centre_nm: FloatArray) -> FloatArray:
+    """Return the fraction of each value that is light of the place's own band, (p · channels,).
 
     A channel that is blind there sees what leaks through the filter all over the spectrum.
     """
     channels = len(light.design) // len(centre_nm)
     away_nm = np.abs(light.knots_nm - np.repeat(centre_nm, channels)[:, np.newaxis])
     inside = np.where(away_nm < IN_BAND_NM, light.design, 0.0).sum(axis=1)
-    return np.asarray(inside > IN_BAND * light.design.sum(axis=1))
+    return np.asarray(inside / light.design.sum(axis=1))
 
 
-def _known_by_card(
-    light: SpectralSystem, seen: SliceValues, card: Transmittance
-) -> SpectralSystem:
+def _known_by_card(light: SpectralSystem, seen: SliceValues, card: Transmittance) -> SpectralSystem:
     """Return the system corrected by the card's light, which tells what the curves are off by."""
     grey = Spectrum(card.name, light.knots_nm, card.at(light.knots_nm))
     expected = light.design @ grey.value

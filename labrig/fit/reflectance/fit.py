@@ -2,11 +2,12 @@
 
 Light that comes back is reflection, prompt fluorescence and glow (Nalbach et al., eq. 2). Two
 pictures through a variable filter divide them. Lit by white light and seen at one wavelength after
-the other, luminescence is where the emission is; lit by one wavelength after the other and seen as a
-whole, it has the emission's colour wherever the light excites, and there is next to none where the
-light is as red as the emission. In both its course is that of the glow, which is photographed alone;
-its amount is free, one number for the white light and one for each place of the narrow light. The
-albedo is what both have in common.
+the other, luminescence is where the emission is; lit by one wavelength after the other and seen as
+a whole, it has the emission's colour wherever the light excites, and there is next to none where
+the light is as red as the emission. In both its course is that of the glow, which is photographed
+alone. A sample that does not fluoresce has just the glow; of another one the amounts are free, one
+or two for the white light and for each place of the narrow light. The albedo is what both pictures
+have in common.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,9 @@ THROWN_BACK_SIGMA = 0.02
 PROMPT_SIGMAS, PROMPT_MISFIT = 3.0, 1.2
 #: Stiffest prior of an albedo: second differences of 0.3 % over 5 nm, as of reflectances of paints.
 STIFFEST = 1e5
+#: Error at the foot of an edge that a filter's band is too wide for, over the second difference of
+#: the albedo there, over two times 10 nm.
+UNRESOLVED, UNRESOLVED_NM = 0.1, 10.0
 #: Of that part, where sample and card are alike and nothing tells it.
 LEAST_PRECISION = 1.0
 
@@ -220,9 +224,7 @@ def fit_albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> Albedo
     )
     if is_prompt:
         strips, albedo = (white, narrow), free
-    return AlbedoFit(
-        albedo, total, amount, amount_sigma, is_prompt, *_thrown_back(*strips, card)
-    )
+    return AlbedoFit(albedo, total, amount, amount_sigma, is_prompt, *_thrown_back(*strips, card))
 
 
 def _albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> SpectrumFit:
@@ -239,6 +241,35 @@ def _steady(white: LitStrip) -> tuple[float, float]:
     course = white.luminescence[0] / white.sigma**2
     norm = float(course @ white.luminescence[0])
     return float(course @ white.glow) / norm, float(course @ white.glow_sigma) / norm
+
+
+def unresolved(wavelength_nm: FloatArray, value: FloatArray) -> FloatArray:
+    """Return the error of an albedo by bends that the filter's band does not resolve.
+
+    Parameters
+    ----------
+    wavelength_nm
+        Evenly spaced wavelengths in nm, shape (n,).
+    value
+        Albedo at them, shape (n,).
+
+    Returns
+    -------
+    ndarray
+        One standard deviation, shape (n,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.fit.reflectance import unresolved
+    >>> unresolved(np.arange(500.0, 541.0, 10.0), np.array([0.1, 0.1, 0.1, 0.3, 0.5])).round(3)
+    array([0.  , 0.  , 0.02, 0.  , 0.  ])
+    """
+    step = max(round(UNRESOLVED_NM / (wavelength_nm[1] - wavelength_nm[0])), 1)
+    bend = np.zeros_like(value)
+    bend[step:-step] = value[2 * step :] - 2 * value[step:-step] + value[: -2 * step]
+    bend[:step], bend[-step:] = bend[step], bend[-step - 1]
+    return np.asarray(UNRESOLVED * np.abs(bend))
 
 
 def _scaled_freely(narrow: LitStrip, other_sigma: float) -> LitStrip:
@@ -292,6 +323,8 @@ def _thrown_back(white: LitStrip, narrow: LitStrip, card: Transmittance) -> tupl
     onto, _ = replace(narrow, value=excess * (narrow.system.design @ mean)).reflected()
     expected = system.design @ mean
     spread = np.cov(system.design @ draws.T) + system.covariance(mean) + np.eye(len(value))
+    missed = system.design * unresolved(knots, mean)
+    spread += missed @ missed.T
     # The two strips' scales differ by their own errors, too.
     scale_sigma = float(np.hypot(white.scale_sigma, narrow.scale_sigma))
     slopes = np.column_stack([onto, expected])
