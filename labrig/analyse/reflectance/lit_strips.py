@@ -271,17 +271,28 @@ class _Scenes:
     @property
     def at_off(self) -> Measured:
         """Glow at lamp off over that of `glow`, as it fades from photograph to photograph."""
-        levels = [float(np.nansum(np.maximum(glow.value, 0.0))) for glow in self.glows]
-        chosen = next(
-            n for n in reversed(range(len(levels))) if np.isfinite(self.glows[n].value).all()
-        )
-        if chosen == 0 or min(levels[:2]) <= 0:
+        glow = self.glow
+        if glow is None:
             return Measured(1.0, BACK_TO_OFF)
-        first_s, second_s = self.glow_times_s[:2]
-        rate_per_s = max(np.log(levels[0] / levels[1]) / (second_s - first_s), 0.0)
-        back = float(np.exp(rate_per_s * first_s))
-        ratio = levels[0] / levels[chosen]
-        return Measured(ratio * back, ratio * BACK_TO_OFF * max(back - 1, 0.02))
+        levels, sigmas = np.transpose([_level_of(one, glow) for one in self.glows])
+        (first_s, second_s), (first, second) = self.glow_times_s[:2], levels[:2]
+        if len(levels) < 2 or min(first, second) <= 0:
+            return Measured(1.0, BACK_TO_OFF)
+        fading = max(float(np.log(first / second)) * first_s / (second_s - first_s), 0.0)
+        at_off = float(first * np.exp(fading))
+        noise = sigmas[0] / first * (1 + first_s / (second_s - first_s))
+        return Measured(at_off, at_off * float(np.hypot(noise, BACK_TO_OFF * np.expm1(fading))))
+
+
+def _level_of(glow: SliceValues, pattern: SliceValues) -> tuple[float, float]:
+    """Return a glow over another one of the same pattern by least squares, and σ."""
+    seen = np.isfinite(glow.value) & np.isfinite(glow.sigma) & (glow.sigma > 0)
+    weight = np.where(seen, np.where(seen, glow.sigma, 1.0) ** -2, 0.0)
+    total = float((weight * pattern.value**2).sum())
+    if not total > 0:
+        return 0.0, 0.0
+    level = float((weight * pattern.value * np.where(seen, glow.value, 0.0)).sum())
+    return level / total, total**-0.5
 
 
 def _white_courses(scenes: _Scenes, centre_nm: FloatArray) -> FloatArray:

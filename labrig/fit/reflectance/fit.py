@@ -23,6 +23,8 @@ from labrig.optics import Transmittance
 
 #: σ of the part of a sample's light that a filter close above it throws back onto it.
 THROWN_BACK_SIGMA = 0.02
+#: Number of draws of a reflectance, and of those that are only a step to it.
+SAMPLES, FEW_SAMPLES = 400, 100
 #: Significance of an amount of luminescence above the glow's, and ratio of misfits without and with
 #: free amounts, from which a sample fluoresces.
 PROMPT_SIGMAS, PROMPT_MISFIT = 3.0, 1.2
@@ -103,7 +105,8 @@ class LitStrip:
         onto = np.diag(1 / self.sigma)
         if courses := [row for row in self.luminescence / self.sigma if row.any()]:
             onto = null_space(np.array(courses)).T @ onto
-        modes = np.einsum("ij,kjn->kin", onto, self.system.modes)
+        shape = (len(onto), len(self.system.knots_nm))
+        modes = onto @ self.system.modes if len(self.system.modes) else np.empty((0, *shape))
         system = SpectralSystem(self.system.knots_nm, onto @ self.system.design, modes)
         return onto @ self.value, system
 
@@ -230,7 +233,7 @@ def fit_albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> Albedo
 def _albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> SpectrumFit:
     """Fit the reflectance of two strips, with the light that the filter may throw back."""
     scaled = _scaled_freely(narrow, white.scale_sigma)
-    excess = _excess(narrow, _fitted([white, scaled]), card)
+    excess = _excess(narrow, _fitted([white, scaled], FEW_SAMPLES), card)
     return _fitted([white, scaled.with_modes(THROWN_BACK_SIGMA * excess[np.newaxis])])
 
 
@@ -278,7 +281,7 @@ def _scaled_freely(narrow: LitStrip, other_sigma: float) -> LitStrip:
     return narrow.with_modes(np.full((1, len(narrow.value)), sigma))
 
 
-def _fitted(strips: Sequence[LitStrip]) -> SpectrumFit:
+def _fitted(strips: Sequence[LitStrip], samples: int = SAMPLES) -> SpectrumFit:
     """Fit one reflectance to several strips, each with errors of its own."""
     parts = [strip.reflected() for strip in strips]
     rows = [len(value) for value, _ in parts]
@@ -297,7 +300,7 @@ def _fitted(strips: Sequence[LitStrip]) -> SpectrumFit:
     )
     value = np.concatenate([value for value, _ in parts])
     ones = np.ones_like(value)
-    return fit_spectrum(value, ones, whole, decisive=np.inf, stiffest=STIFFEST)
+    return fit_spectrum(value, ones, whole, samples=samples, decisive=np.inf, stiffest=STIFFEST)
 
 
 def _excess(strip: LitStrip, fit: SpectrumFit, card: Transmittance) -> FloatArray:
@@ -314,7 +317,7 @@ def _thrown_back(white: LitStrip, narrow: LitStrip, card: Transmittance) -> tupl
     It brightens what is brighter than the card by more than the card: the ratio of narrow to white
     light rises with the excess.
     """
-    seen = _fitted([white])
+    seen = _fitted([white], FEW_SAMPLES)
     value, system = narrow.reflected()
     knots = system.knots_nm
     draws = np.array([np.interp(knots, seen.knots_nm, draw) for draw in seen.samples])
