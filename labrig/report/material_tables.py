@@ -87,13 +87,18 @@ def describe_phosphor(material: Material) -> str:
     return "\n".join([*lines, *surface_lines(material), table.caption])
 
 
-def surface_lines(material: Material) -> Iterator[str]:
-    """Yield lines on scale, albedo, total radiance factor and layer, as far as they are known.
+def surface_lines(material: Material) -> tuple[str, ...]:
+    """Describe scale, albedo, total radiance factor and layer, as far as they are known.
 
     Parameters
     ----------
     material
         A phosphor.
+
+    Returns
+    -------
+    tuple of str
+        A line for each; none of a material of which only the glow is known.
 
     Examples
     --------
@@ -106,6 +111,10 @@ def surface_lines(material: Material) -> Iterator[str]:
     ...     print(line.partition(",")[0])
       albedo 0.200 ± 0.010 (450 nm)
     """
+    return tuple(_surface_lines(material))
+
+
+def _surface_lines(material: Material) -> Iterator[str]:
     if material.scale is not None:
         yield f"  scale: {material.scale}"
     for factor in material.scale_factors:
