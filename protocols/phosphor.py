@@ -18,7 +18,7 @@ from .excitation import ExcitationFrames
 from .steps.patch_names import FilterPatches
 
 #: Protocols that measure every patch of the chain.
-OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation")
+OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation", "reflectance")
 
 
 class Phosphor(ProtocolModel):

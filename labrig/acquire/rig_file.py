@@ -132,6 +132,9 @@ class Optics(BaseModel):
     leds
         Spectra and brightnesses of the LEDs: their file `leds.yaml`, or the folder of the run of
         protocol `led_brightness` that measured them.
+    reflectance
+        Albedo and total radiance factor of samples: their file `reflectance.yaml`, or the folder of
+        the run of protocol `reflectance` that measured them.
     blank
         Background and stray light of the bench after lamp off: its file `blank.yaml`, or the folder
         of the run of protocol `blank` that measured it.
