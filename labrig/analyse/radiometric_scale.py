@@ -196,7 +196,7 @@ def scale_of(
             unit="1",
         ),
         ScaleFactor(name="radiance of a diffuse white over irradiance, 1/π", value=1 / np.pi,
-                    sigma=0.0, unit="1/sr"),
+                    unit="1/sr"),
     )  # fmt: skip
 
 

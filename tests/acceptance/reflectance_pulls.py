@@ -45,6 +45,7 @@ class Case:
     room: Mapping[str, Any] = field(default_factory=dict)
     patch: Mapping[str, Any] = field(default_factory=dict)
     sensor: Mapping[str, Any] = field(default_factory=dict)
+    without: tuple[str, ...] = ()
 
 
 EDGE = {300: 0.08, 540: 0.08, 580: 0.75, 780: 0.8}
@@ -60,6 +61,7 @@ CASES = (
     Case("blue, prompt 20 %", BLUE, patch={"prompt": 0.2}),
     Case("orange edge, prompt 20 %", EDGE, patch={"prompt": 0.2}),
     Case("gloss and inter-reflection", BLUE, {"gloss": 0.04, "inter_reflection": 0.02}),
+    Case("no door, prompt 20 %", BLUE, patch={"prompt": 0.2}, without=("door", "shield", "servo")),
     Case("fluorescent card", BLUE, {"grey_card_fluorescence": 0.05}),
 )
 
@@ -113,6 +115,10 @@ def measured(folder: Path, case: Case, seed: int, **protocol: Any) -> Reflectanc
         sample = {"material": str(folder / "sample.yaml"), "region": region} | dict(case.patch)
         rig["simulation"] |= {"sample": [sample], "seed": seed} | dict(case.room)
         rig["simulation"]["sensor"] = dict(case.sensor) | {"width": WIDTH, "height": HEIGHT}
+
+        for name in case.without:
+            rig["devices"].pop(name, None)
+            rig["simulation"].pop(name, None)
 
     content = {"protocol": "reflectance", "sample": {"name": "sample"}, **protocol}
     return analyse(part_of(record(folder, content, change)))

@@ -48,7 +48,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
             for region, prompt in zip(PATCHES.values(), (0.0, 0.2), strict=True)
         ]
 
-    protocol = {"protocol": "reflectance", "patches": PATCHES, "longest": "4 s",
+    protocol = {"protocol": "reflectance", "patches": PATCHES, "longest": "4 s", "repeats": 1,
                 "charge": "5 min"}  # fmt: skip
     return record(folder, protocol, change)
 

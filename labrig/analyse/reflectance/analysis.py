@@ -25,6 +25,8 @@ CARD_SIGMA = 0.01
 DRIFT = 0.03
 #: Significance in σ, and size, from which luminescence and light thrown back are reported.
 SIGMAS, SEEN = 3.0, 0.01
+#: Largest albedo of a diffuse surface.
+BRIGHTEST = 1.0
 #: Misfit from which the channels contradict one another.
 CONTRADICTION = 1.5
 
@@ -156,6 +158,13 @@ def _warnings(
             f"the channels contradict one another (misfit {patch.misfit:.1f}): {colour}, or sample "
             "and card did not lie alike, so that the albedo may be wrong by more than its σ; "
             "measure with a cut-on filter before the lamp"
+        )
+    brightest = int(np.argmax(patch.albedo - SIGMAS * patch.albedo_sigma))
+    if patch.albedo[brightest] - SIGMAS * patch.albedo_sigma[brightest] > BRIGHTEST:
+        yield (
+            f"an albedo of {patch.albedo[brightest]:.2f} at "
+            f"{patch.wavelength_nm[brightest]:.0f} nm is more than a white sends back: gloss reaches the camera, or the card's curve is not "
+            "that of this card; light the sample from the side"
         )
     prompt = patch.excess - patch.glow
     if fit.is_prompt and prompt.max() > SEEN:

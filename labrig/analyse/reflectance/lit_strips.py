@@ -14,7 +14,7 @@ from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import LvfFile
 from labrig.fit.reflectance import LitStrip, relative_to_card
 from labrig.fit.spectrum import SpectralSystem
-from labrig.optics import CameraResponse, Spectrum, Strip, Transmittance
+from labrig.optics import CameraResponse, Lvf, Spectrum, Strip, Transmittance
 from labrig.protocols.reflectance import ReflectanceFrames
 from labrig.reduce import FLICKER, SensorLayout, SeriesFrame, region_values, sensor_layout
 from labrig.results import FloatArray, Measured, SliceValues
@@ -142,8 +142,10 @@ def both_arranged(
         Frames are missing, or no patch lies below the filter.
     """
     is_direct = DOOR.key in part.rig.devices
-    white = _seen(part, frames, WHITE, calibrated, before_camera)
-    narrow = _seen(part, frames, NARROW, calibrated, on_sample)
+    white = _seen(part, frames, WHITE, calibrated, calibrated.lvf, before_camera)
+    # Without a door the camera sees the sample through the filter that lies on it.
+    below = calibrated.lvf if is_direct else calibrated.lvf.twice()
+    narrow = _seen(part, frames, NARROW, calibrated, below, on_sample)
     whites, narrows = {}, {}
     for patch in white.patches:
         one = white.patches[patch]
@@ -198,7 +200,12 @@ class _Seen:
 
 
 def _seen(
-    part: Part, frames: StripFrames, names: Arrangement, calibrated: LvfFile, strip: Strip
+    part: Part,
+    frames: StripFrames,
+    names: Arrangement,
+    calibrated: LvfFile,
+    lvf: Lvf,
+    strip: Strip,
 ) -> _Seen:
     """Measure card, sample and glow along a strip, for every patch."""
     layout = sensor_layout(frames.dark[0])
@@ -208,7 +215,7 @@ def _seen(
     patches, drifts = {}, []
     for patch, regions in slices.items():
         scenes = _Scenes.of(part, frames, names, regions)
-        light, centre_nm = _light_system(calibrated, strip, layout, regions, lit)
+        light, centre_nm = _light_system(lvf, strip, layout, regions, lit)
         light = _known_by_card(light, scenes.card, card)
         scenes = scenes.within(_in_band(light, centre_nm).reshape(scenes.sample.value.shape))
         drifts.append(scenes.drift)
@@ -352,10 +359,9 @@ def _different(colours: Sequence[FloatArray]) -> list[FloatArray]:
 
 
 def _light_system(
-    calibrated: LvfFile, strip: Strip, layout: SensorLayout, regions: Slices, lit: CameraResponse
+    lvf: Lvf, strip: Strip, layout: SensorLayout, regions: Slices, lit: CameraResponse
 ) -> tuple[SpectralSystem, FloatArray]:
     """Return the system of the light by the reflectance, and the wavelength of each place."""
-    lvf = calibrated.lvf
     places = np.clip(channel_positions(layout, strip, regions), lvf.position[0], lvf.position[-1])
     lvfs = tuple(lvf.at(positions) for positions in places)
     centre_nm = np.mean([one.bands.centre_nm for one in lvfs], axis=0)
