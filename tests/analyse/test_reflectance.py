@@ -81,11 +81,11 @@ def test_prompt_fluorescence_is_in_the_radiance_factor_and_not_in_the_albedo(
     np.testing.assert_allclose(patch.excess[red], 0, atol=0.01)
 
 
-def test_the_glow_over_the_reflected_light_is_the_rooms(result: ReflectanceResult) -> None:
+def test_the_glow_over_the_reflected_light_is_that_of_the_paint(result: ReflectanceResult) -> None:
     """The steady glow is the same in both patches, though one of them fluoresces."""
     plain, prompt = (result.patches[name].glow for name in ("plain", "prompt"))
     assert float(plain.max()) > 0.001
-    np.testing.assert_allclose(prompt.max(), plain.max(), rtol=0.05)
+    np.testing.assert_allclose(prompt.sum(), plain.sum(), rtol=0.08)
 
 
 def test_the_result_is_read_back_and_makes_a_material(

@@ -163,8 +163,9 @@ def _warnings(
     if patch.albedo[brightest] - SIGMAS * patch.albedo_sigma[brightest] > BRIGHTEST:
         yield (
             f"an albedo of {patch.albedo[brightest]:.2f} at "
-            f"{patch.wavelength_nm[brightest]:.0f} nm is more than a white sends back: gloss reaches the camera, or the card's curve is not "
-            "that of this card; light the sample from the side"
+            f"{patch.wavelength_nm[brightest]:.0f} nm is more than a white sends back: gloss "
+            "reaches the camera, or the card's curve is not that of this card; light the sample "
+            "from the side"
         )
     prompt = patch.excess - patch.glow
     if fit.is_prompt and prompt.max() > SEEN:

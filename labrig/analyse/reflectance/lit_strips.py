@@ -282,13 +282,33 @@ class _Scenes:
         if glow is None:
             return Measured(1.0, BACK_TO_OFF)
         levels, sigmas = np.transpose([_level_of(one, glow) for one in self.glows])
-        (first_s, second_s), (first, second) = self.glow_times_s[:2], levels[:2]
-        if len(levels) < 2 or min(first, second) <= 0:
+        found = [
+            _back_to_off(self.glow_times_s[n : n + 2], levels[n : n + 2], sigmas[n : n + 2])
+            for n in range(len(levels) - 1)
+        ]
+        known = [one for one in found if one is not None]
+        if not known:
             return Measured(1.0, BACK_TO_OFF)
-        fading = max(float(np.log(first / second)) * first_s / (second_s - first_s), 0.0)
-        at_off = float(first * np.exp(fading))
-        noise = sigmas[0] / first * (1 + first_s / (second_s - first_s))
-        return Measured(at_off, at_off * float(np.hypot(noise, BACK_TO_OFF * np.expm1(fading))))
+        value, sigma = np.transpose([(one.value, one.sigma) for one in known])
+        weight = sigma**-2
+        return Measured(float(weight @ value / weight.sum()), float(weight.sum() ** -0.5))
+
+
+def _back_to_off(
+    times_s: Sequence[float], levels: FloatArray, sigmas: FloatArray
+) -> Measured | None:
+    """Return the level at lamp off by two later ones, as of an exponential; None without light.
+
+    A glow of several rates fades faster at first: a part of the rise is in σ.
+    """
+    if (levels <= GLOW_SEEN * sigmas).any():
+        return None
+    (first_s, second_s), (first, second) = times_s, levels
+    lever = first_s / (second_s - first_s)
+    rise = max(float(np.log(first / second)) * lever, 0.0)
+    at_off = float(first * np.exp(rise))
+    noise = np.hypot((1 + lever) * sigmas[0] / first, lever * sigmas[1] / second)
+    return Measured(at_off, at_off * float(np.hypot(noise, BACK_TO_OFF * np.expm1(rise))))
 
 
 def _level_of(glow: SliceValues, pattern: SliceValues) -> tuple[float, float]:
