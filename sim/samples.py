@@ -11,17 +11,19 @@ from labrig.errors import UsageError
 from labrig.material import Material, State, read_any_material
 
 from .arrangement import Arrangement, Arrangements
-from .lamp import SETTLED_S
+from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .layout import Layout
 from .lights import Lights
 from .lvf import Lvf
-from .optics import emission
+from .optics import REFLECTED, emission
 from .phosphor import Light, Phosphor, phosphor
 from .simulation import Simulation
 from .temperature import rate_factor
 
 FloatArray = NDArray[np.float64]
 
+#: Unit of the lamp's mean spectral irradiance among the factors of an absolute scale.
+IRRADIANCE_UNIT = "W/m²/nm"
 #: What a sample that does not glow is among those that do.
 DARK = Material(
     name="dark",
@@ -81,7 +83,10 @@ class Samples:
         self._state_of_cells = np.concatenate(states)
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
         self.cells = self._patches.of(self._state_of_cells, cell)
-        emitted = np.concatenate([emission(material) for material in phosphors])
+        irradiance = simulation.lamp.irradiance
+        emitted = np.concatenate(
+            [in_table_scale(material, irradiance) * emission(material) for material in phosphors]
+        )
         state, share = np.arange(len(emitted)), np.ones(len(emitted))
         if (traps := self._patches.traps) is not None:
             state, share = traps.state, traps.share
@@ -203,6 +208,38 @@ class Samples:
             passed = Lvf(self._lvf).below(self._lvf.on_sample, turned)[self._piece]
             self._below_lvf[turned] = replace(self.cells, excitation=self.cells.excitation * passed)
         return self._below_lvf[turned]
+
+
+def in_table_scale(material: Material, irradiance: float) -> float:
+    """Return the factor from a file's Λ to the room's radiance, 1 without a scale.
+
+    Parameters
+    ----------
+    material
+        Material of a sample.
+    irradiance
+        Irradiance of the warm lamp in multiples of the norm of a material's excitation rates.
+
+    Raises
+    ------
+    UsageError
+        Λ is absolute, and the file does not say how bright the lamp was.
+    """
+    if material.scale is None or material.bands_nm is None:
+        return 1.0
+    low_nm, high_nm = material.bands_nm[0], material.bands_nm[-1]
+    inside = (low_nm < WAVELENGTH_NM) & (high_nm > WAVELENGTH_NM)
+    # A diffuse white has the radiance E/π.
+    lamp = np.pi * REFLECTED * irradiance * float(filament_spectrum(BURNING_K)[inside].mean())
+    if material.scale == "relative":
+        return lamp
+    for factor in material.scale_factors:
+        if factor.unit == IRRADIANCE_UNIT:
+            return lamp / factor.value
+    raise UsageError(
+        f"{material.name}: expected the lamp's mean spectral irradiance among 'scale_factors' of a "
+        f"material with 'scale: absolute' (unit: {IRRADIANCE_UNIT}), got none"
+    )
 
 
 def _refuse_two_laws(material: object, model: str) -> None:
