@@ -49,6 +49,7 @@ SHORTER: dict[str, dict[str, Any]] = {
         "rest": {"at_least": "1 min", "check_every": "2 min", "at_most": "4 min"},
     },
     "isotropy": {"charge": "2 min", "angles": [20, 60], "frames": 2},
+    "reflectance": {"charge": "2 min", "longest": "4 s", "repeats": 1},
     "saturation": {"charges": ["2 min", "10 min"], "for": "60 s"},
     "phosphor": {},
 }  # fmt: skip
@@ -58,6 +59,7 @@ NEEDED = {
     "irradiance": ("lvf",),
     "emission_spectrum": ("lvf",),
     "excitation": ("lvf", "irradiance", "fade"),
+    "reflectance": ("lvf",),
 }
 ANOTHER_DAY = "2026-01-02T00:02:00Z"
 RIGS = {
