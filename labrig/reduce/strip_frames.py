@@ -199,13 +199,16 @@ def slice_values(
     return {unit: _slice_values(series, unit) for unit in _units(frames)}
 
 
-def region_values(
+def evened_values(
     frames: Sequence[SeriesFrame],
     regions: Mapping[str, Region],
     darks: Sequence[SeriesFrame],
     camera: CameraModel | None,
 ) -> Mapping[str, SliceValues]:
-    """Measure the light in every region, scene by scene, such as in a strip's slices in a patch.
+    """Measure the light in every region, scene by scene, without the flicker between its frames.
+
+    Bright regions clip in the long exposures, and dim ones are seen in those only. What is seen in
+    several frames tells how bright each is, and all are brought to one brightness.
 
     Parameters
     ----------
@@ -234,13 +237,13 @@ def region_values(
     Examples
     --------
     >>> import labrig
-    >>> from labrig.reduce import SeriesFrame, region_values
+    >>> from labrig.reduce import SeriesFrame, evened_values
     >>> run = labrig.read_run("runs/decay")
     >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
     >>> first = run.frames("decay")[0]
     >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
     >>> halves = {"left": (0.25, 0.25, 0.25, 0.5), "right": (0.5, 0.25, 0.25, 0.5)}
-    >>> region_values(frames, halves, darks, camera=None)["lit"].value.shape
+    >>> evened_values(frames, halves, darks, camera=None)["lit"].value.shape
     (2, 3)
     """
     series = reduce_patches(frames, regions, darks, camera=camera)
@@ -269,11 +272,7 @@ def _slice_values(series: Mapping[str, Series], unit: str) -> SliceValues:
 
 
 def _evened(series: Mapping[str, Series], unit: str) -> Mapping[str, Series]:
-    """Return the series with the frames of a unit brought to one brightness.
-
-    Bright regions clip in the long exposures, dim ones are seen in those only: the flicker from
-    frame to frame would set them apart. What is seen in several frames tells it.
-    """
+    """Return the series with the frames of a unit brought to one brightness."""
     usable = np.array([_usable(region, unit) for region in series.values()])
     value = np.array([region.values for region in series.values()])
     sigma = np.array([region.sigma for region in series.values()])
