@@ -157,6 +157,35 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
         yield Bench(file, source, room.clock, room)
 
 
+def wall_at_start(file: RigFile, source: str) -> float:
+    """Return the time in seconds since 1970 at which a run on a rig would begin now.
+
+    Parameters
+    ----------
+    file
+        The validated rig file.
+    source
+        Path of the rig file, for messages.
+
+    Returns
+    -------
+    float
+        Time of the PC's clock; of a simulated room its epoch.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.bench import wall_at_start
+    >>> wall_at_start(labrig.read_rig_file("runs/decay/rig.yaml"), "rig.yaml")
+    1767225600.0
+    """
+    if file.simulation is None:
+        return SystemClock().wall()
+    from labrig import sim
+
+    return sim.describe_room(file.simulation, source).epoch_s
+
+
 def with_frame_size(file: RigFile, source: str) -> RigFile:
     """Return a rig file that says how large its camera's frames are, if they are simulated.
 

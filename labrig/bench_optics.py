@@ -17,6 +17,8 @@ from labrig.optics import (
     CameraResponse,
     Spectrum,
     Transmittance,
+    photopic_efficacy,
+    quadrature,
     read_camera,
     read_spectrum,
     read_transmittance,
@@ -28,6 +30,8 @@ FileT = TypeVar("FileT", bound=BaseModel)
 
 #: Wavelengths in nm between which all that is before a camera has to be known.
 SEEN_NM = (400.0, 700.0)
+#: Wavelengths in nm over which luminances are integrated.
+VISIBLE_NM = (360.0, 830.0)
 #: Standard uncertainty in nm of the peak of an LED by its data sheet: makers sort them to 2–5 nm.
 DATA_SHEET_NM = 2.0
 #: Distance of an LED's centroid from its peak, in widths at half maximum (1 σ): blue and green ones
@@ -92,7 +96,8 @@ def camera_curves(
             f"{camera.name}: expected channels that see through lens and polariser, got one that "
             "sees nothing; check 'lens' and 'polariser' under 'optics:'"
         )
-    return replace(camera, sensitivity=seen / seen.max())
+    sigma = None if camera.sigma is None else passed[:, np.newaxis] * camera.sigma / seen.max()
+    return replace(camera, sensitivity=seen / seen.max(), sigma=sigma)
 
 
 def with_shipped_camera(rig: RigFile, identity: str) -> RigFile:
@@ -161,6 +166,61 @@ def lamp_spectrum(rig: RigFile) -> Spectrum:
 def card_reflectance(rig: RigFile) -> Transmittance:
     """Read the reflectance of the rig's grey card."""
     return read_transmittance(resources.curve_path(_named(rig.optics.grey_card, "grey_card")))
+
+
+def bare_lamp_spectrum(rig: RigFile) -> Spectrum:
+    """Read the lamp's spectrum that belongs to the reading `optics.luminance`."""
+    reading = rig.optics.luminance
+    named = None if reading is None else reading.spectrum
+    return lamp_spectrum(rig) if named is None else read_spectrum(resources.curve_path(named))
+
+
+def card_radiance(rig: RigFile) -> Spectrum:
+    """Return the spectral radiance of the grey card under the bare lamp in W m⁻² sr⁻¹ nm⁻¹.
+
+    It is ρ E/π, and its luminance that of the reading `optics.luminance`.
+
+    Raises
+    ------
+    UsageError
+        There is no reading, or a curve is missing.
+    """
+    reading = rig.optics.luminance
+    if reading is None:
+        raise UsageError(
+            f"rig '{rig.name}': expected a reading of a luxmeter or luminance meter; add under "
+            "'optics:' luminance: {value: 312 lx, sigma: 3 %, at: sample plane, lamp: halogen}"
+        )
+    lamp, card = bare_lamp_spectrum(rig), card_reflectance(rig)
+    grid_nm = np.union1d(np.arange(VISIBLE_NM[0], VISIBLE_NM[1] + 1), lamp.wavelength_nm)
+    reflected = lamp.at(grid_nm) * card.at(grid_nm)
+    on_card = reading.at == "card"
+    seen = luminance(Spectrum(lamp.name, grid_nm, reflected if on_card else lamp.at(grid_nm)))
+    if seen <= 0:
+        raise UsageError(f"{lamp.name}: expected a lamp with visible light, got none")
+    scale = reading.number / seen / (1.0 if on_card else math.pi)
+    return Spectrum("grey card under the bare lamp", grid_nm, scale * reflected)
+
+
+def illuminance_lx(rig: RigFile) -> float:
+    """Return the illuminance of the sample under the bare lamp in lx, by `optics.luminance`.
+
+    Raises
+    ------
+    UsageError
+        There is no reading, or a curve is missing.
+    """
+    lit, card, lamp = card_radiance(rig), card_reflectance(rig), bare_lamp_spectrum(rig)
+    relative = luminance(replace(lit, value=lamp.at(lit.wavelength_nm)))
+    reflected = lamp.at(lit.wavelength_nm) * card.at(lit.wavelength_nm)
+    # The same factor leads from the lamp's curve to the irradiance at all wavelengths.
+    return math.pi * relative * luminance(lit) / luminance(replace(lit, value=reflected))
+
+
+def luminance(spectrum: Spectrum) -> float:
+    """Return the luminance in cd/m² of a spectral radiance in W m⁻² sr⁻¹ nm⁻¹."""
+    nodes, weights = quadrature(*VISIBLE_NM, spectrum.wavelength_nm)
+    return float(weights @ (spectrum.at(nodes) * photopic_efficacy(nodes)))
 
 
 def filter_transmittances(rig: RigFile, names: Sequence[str]) -> list[Transmittance]:
@@ -294,6 +354,8 @@ def require_optics(rig: RigFile) -> None:
         lamp_spectrum(rig)
     if rig.optics.grey_card is not None:
         card_reflectance(rig)
+    if rig.optics.luminance is not None:
+        card_radiance(rig)
     if rig.optics.filters is not None:
         rig.optics.filter_files()
     if rig.optics.emission_library is not None:

@@ -24,6 +24,7 @@ from labrig.acquire import (
     run_units,
 )
 from labrig.bench import Bench
+from labrig.calibrated_bench import LensObserver, require_calibrated_camera
 from labrig.clock import Clock, Interrupted, Slept
 from labrig.errors import (
     DataError,
@@ -35,7 +36,6 @@ from labrig.errors import (
 )
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
-from labrig.run_log import LoggedObserver
 from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 from labrig.trial_frame import offers_with_frame_size
 
@@ -81,7 +81,7 @@ def execute(
     done = record.completed()
     # More signals while the attempt is being closed must not cut that short.
     with interrupting(bench.clock), watch(laid_out, list(done), bench.clock) as watching:
-        observer = LoggedObserver(watching)
+        observer = LensObserver(watching, bench.file)
         for unit in interrupted_units:
             observer.warn(f"the unit {unit} was cut off and is done again")
         for oddity in _oddities(folder, record):
@@ -110,6 +110,7 @@ def execute(
             if CAMERA in rig:
                 _refuse_what_the_camera_cannot(rig[CAMERA], protocol, folder, bench)
             devices = rig.identities()
+            require_calibrated_camera(bench.file, devices)
             _arrange_again(manual_actions, rig, observer)
             _report_exchanged_camera(folder, devices, observer)
             rig_metadata = {"rig": rig.name, "devices": devices} | {

@@ -20,6 +20,10 @@ from pydantic_core import core_schema
 
 TIME_S = {"us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 FRACTION = {"%": 0.01}
+TEMPERATURE_STEP_K = {"K": 1.0}
+#: Boltzmann's constant in eV/K, exact since 2019, and 0 °C in K.
+BOLTZMANN_EV_PER_K = 8.617333262e-5
+ZERO_C_K = 273.15
 SIZE_BYTES = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}
 
 _PATTERN = re.compile(

@@ -16,13 +16,17 @@ from labrig.acquire import (
     read_protocol,
     read_rig_file,
 )
-from labrig.bench import open_bench, with_frame_size
+from labrig.bench import open_bench, wall_at_start, with_frame_size
 from labrig.bench_optics import require_optics
 from labrig.errors import DiskError, ProtocolError, UsageError
 from labrig.execution import Watch, execute
-from labrig.record import RunFolder, RunSize, read_run, size_text
+from labrig.found_calibrations import FoundCalibrations, find_calibrations
+from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
 from labrig.run_log import run_log
 from labrig.yaml_file import yaml_text
+
+#: Protocol that compares a bench with its calibration.
+CHECK = "calibration_check"
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,7 @@ class Recording:
     rig_source: Path
     runs: Path
     plan: Plan
+    found: FoundCalibrations
 
     @classmethod
     def prepare(
@@ -64,11 +69,15 @@ class Recording:
         requested = read_protocol(protocol_path, changes)
         rig = with_frame_size(read_rig_file(rig_path), str(rig_path))
         planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
-        protocol = requested.suited_to(rig)
-        require_optics(rig)
-        run_plan = _planned(protocol, protocol_path, rig, rig_path)
+        found = find_calibrations(rig, runs, wall_at_start(rig, str(rig_path)))
+        if not requested.uses_calibrations:
+            found = FoundCalibrations(rig, {}, ())
+        found = found.without_apertures(requested.apertures())
+        protocol = requested.suited_to(found.rig)
+        require_optics(found.rig)
+        run_plan = _planned(protocol, protocol_path, found.rig, rig_path)
         _require_free_disk(runs, run_plan.size())
-        return cls(protocol, rig, rig_path, runs, run_plan)
+        return cls(protocol, found.rig, rig_path, runs, run_plan, found)
 
     def notes(self) -> tuple[str, ...]:
         """Return notes for the user before the run, one line each."""
@@ -78,7 +87,19 @@ class Recording:
             "--optics"
             for name in self.protocol.unmeasured(self.rig)
         )
-        return (*unmeasured, *self.protocol.notes(self.rig))
+        unchecked = (
+            "nothing in this run compares the bench with that calibration: labrig run "
+            "calibration_check does",
+        )
+        is_unchecked = self.found.kept and not any(
+            CHECK in (unit.rpartition("/")[0], self.protocol.protocol) for unit in self.plan.units
+        )
+        return (
+            *self.found.notes,
+            *(unchecked if is_unchecked else ()),
+            *unmeasured,
+            *self.protocol.notes(self.rig),
+        )
 
     def record(self, watch: Watch, created: Callable[[Path], None] = lambda folder: None) -> Path:
         """Create a run folder, record into it and return its path.
@@ -105,6 +126,7 @@ class Recording:
                         self.protocol.model_dump(mode="json", by_alias=True)
                     ),
                     "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
+                    **self._found_text(bench.clock.wall()),
                 },
                 bench.seed,
                 bench.disk,
@@ -118,6 +140,11 @@ class Recording:
                     folder.discard()
                 raise
         return folder.path
+
+    def _found_text(self, now_s: float) -> dict[str, str]:
+        """Return the record of the calibrations that were found, as a file of the run."""
+        record = self.found.record(now_s)
+        return {CALIBRATIONS_FILE: yaml_text(record)} if record else {}
 
 
 def resume_run(path: Path, watch: Watch) -> Path:

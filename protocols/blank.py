@@ -15,11 +15,8 @@ from labrig.acquire import (
     CAMERA,
     CameraOffers,
     ExposureSettings,
-    ManualStep,
-    ProtocolModel,
     Session,
     Shoot,
-    Unit,
     at,
 )
 from labrig.errors import ProtocolError
@@ -35,13 +32,10 @@ from .steps.camera_settings import (
 )
 from .steps.sample_pose import charge, face_camera, lights_out, visible_after_s
 from .steps.sanity_checks import SanityChecks
-from .steps.scenes import Arrangement, PutBackUnit
+from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
-BLANK = ManualStep(
-    "put a grey card in the sample's place (in the door, if there is one)",
-    "what the sequence shows without a glow is measured",
-    "blank",
-)
+#: Reason for the blank.
+WHY = "what the sequence shows without a glow is measured"
 #: Role of the frames of the sequence.
 BLANK_FRAMES = "blank"
 #: Begin of the first frame of a sequence without a door.
@@ -66,7 +60,7 @@ class Clean(BaseModel):
     fraction: Fraction = Field(1e-5, ge=0, lt=1)
 
 
-class Blank(ProtocolModel):
+class Blank(ScenesProtocol):
     """Settings of a blank; `blank.yaml` is the commented example.
 
     Attributes
@@ -117,10 +111,14 @@ class Blank(ProtocolModel):
             )
         return self
 
-    def units(self) -> Sequence[Unit]:
-        """Return dark frames, the sequences, and the bench put back."""
-        sequences = [SequenceUnit(self, number) for number in range(1, len(self.later_by) + 1)]
-        return [BlankDarkUnit(self), *sequences, PutBackUnit(Arrangement("grey card"))]
+    def scenes(self) -> Sequence[Scene]:
+        """Return dark frames, then the sequences."""
+        blank = Arrangement("blank")
+        sequences = (SequenceUnit(self, number) for number in range(1, len(self.later_by) + 1))
+        return [
+            Scene(BlankDarkUnit(self), blank, WHY, is_dark=True),
+            *(Scene(sequence, blank, WHY) for sequence in sequences),
+        ]
 
     def settings(self, exposure_s: float) -> ExposureSettings:
         """Return the camera settings with that shutter time."""
@@ -146,7 +144,6 @@ class BlankDarkUnit:
 
     def run(self, session: Session) -> None:
         """Photograph at the shortest shutter time and at the later ones; refuse a burning lamp."""
-        session.ask(BLANK)
         session.wait_until_warm("camera")
         face_camera(session)
         offers = session.rig[CAMERA].offers()

@@ -17,7 +17,6 @@ from labrig.acquire import (
     CAMERA,
     CameraOffers,
     ExposureSettings,
-    ProtocolModel,
     Session,
     Shoot,
     Unit,
@@ -27,9 +26,9 @@ from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import CameraSettings, FNumber, Iso
-from .steps.grey_card import GREY_CARD, CardLight, CardMeterUnit, card_light, light_card
+from .steps.grey_card import CARD_REASON, CardLight, CardMeterUnit, card_light, light_card
 from .steps.sanity_checks import SanityChecks
-from .steps.scenes import Arrangement, PutBackUnit
+from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
 
 class CardFrames(StrEnum):
@@ -70,7 +69,6 @@ class CardDarkUnit:
     card: Region
     iso: int
     longest_s: float
-    asks: bool
 
     @property
     def name(self) -> str:
@@ -79,8 +77,6 @@ class CardDarkUnit:
 
     def run(self, session: Session) -> None:
         """Photograph at the shortest and the longest exposure, and check that it is dark."""
-        if self.asks:
-            session.ask(GREY_CARD)
         session.wait_until_warm("camera")
         offers = session.rig[CAMERA].offers()
         longest_s = offers.exposure_at_most(self.longest_s)
@@ -259,7 +255,7 @@ def _overlap(first: Region, second: Region) -> bool:
     )
 
 
-class CameraCalibration(ProtocolModel):
+class CameraCalibration(ScenesProtocol):
     """Settings of a camera calibration; `camera_calibration.yaml` is the commented example.
 
     Attributes
@@ -295,6 +291,8 @@ class CameraCalibration(ProtocolModel):
         camera's shortest.
     """
 
+    uses_calibrations = False
+
     protocol: Literal["camera_calibration"] = "camera_calibration"
     camera: CameraSettings = CameraSettings(iso=100, f_number=4.0)
     isos: tuple[Iso, ...] = Field((100, 200, 400, 800, 1600), min_length=1)
@@ -328,8 +326,8 @@ class CameraCalibration(ProtocolModel):
         """Return the reference settings, whose shutter time is to be metered."""
         return ExposureSettings(1.0, self.camera.iso, self.camera.f_number)
 
-    def units(self) -> Sequence[Unit]:
-        """Return darks, metering, photon transfer, repeats, brackets, flats, the bench put back."""
+    def scenes(self) -> Sequence[Scene]:
+        """Return darks, metering, photon transfer, repeats, brackets, flats."""
         reference = self.settings()
         apertures: list[float | None] = [*self.f_numbers] or [None]
         brackets = {
@@ -338,11 +336,8 @@ class CameraCalibration(ProtocolModel):
             "iso": iso_bracket(self.isos),
             "aperture": aperture_bracket(apertures),
         }
-        return [
-            *(
-                CardDarkUnit(reference, self.card, iso, self.longest_dark, asks=number == 0)
-                for number, iso in enumerate(self.isos)
-            ),
+        darks = [CardDarkUnit(reference, self.card, iso, self.longest_dark) for iso in self.isos]
+        lit: list[Unit] = [
             CardMeterUnit(reference, self.card),
             *(PhotonUnit(reference, self.card, iso, self.levels) for iso in self.isos),
             RepeatUnit(reference, self.card, self.repeats),
@@ -351,5 +346,9 @@ class CameraCalibration(ProtocolModel):
                 for name, bracket in brackets.items()
             ),
             *(FlatUnit(reference, self.card, f_number) for f_number in apertures),
-            PutBackUnit(Arrangement("grey card")),
+        ]
+        card = Arrangement("grey card")
+        return [
+            *(Scene(dark, card, CARD_REASON, is_dark=True) for dark in darks),
+            *(Scene(unit, card, CARD_REASON) for unit in lit),
         ]

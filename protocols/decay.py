@@ -40,7 +40,7 @@ from .steps.camera_settings import (
     longest_exposure_s,
 )
 from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, glow, measure_frame
-from .steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
+from .steps.glow import METER_CHARGE_S, DarkUnit, MeterCharge, MeterUnit
 from .steps.patch_names import Patches
 from .steps.sample_pose import (
     charge,
@@ -51,6 +51,7 @@ from .steps.sample_pose import (
     visible_after_s,
 )
 from .steps.sanity_checks import SanityChecks
+from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
 #: Earliest first photograph after lamp off: a halogen lamp has gone dark by then.
 EARLIEST_S = 0.5
@@ -88,6 +89,10 @@ class DecaySettings(ProtocolModel):
         the glow stops growing.
     plateau
         Criterion by which `charge: plateau` ends.
+    meter
+        Time for which the lamp shines on the sample before the photographs by which exposures are
+        chosen, for example `5 min`. A longer charge must not glow more than twice as bright.
+        Default: as long as `charge`, at most 10 minutes.
     every
         Time between the begins of two photographs, for example `5 s`.
     duration
@@ -122,6 +127,7 @@ class DecaySettings(ProtocolModel):
     protocol: Literal["decay"] = "decay"
     charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
     plateau: Plateau = Plateau()
+    meter: MeterCharge = None
     every: DurationS = Field(5.0, gt=0)
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
@@ -283,6 +289,8 @@ class DecayFrames(StrEnum):
     PLATEAU = "plateau"
 
 
+#: Reason for the sample by itself.
+WHY = "its glow is photographed by itself"
 #: Shutter times of the daylight photograph: one of them is right whatever the lamp.
 DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
 LAMP_SETTLES_S = 5.0
@@ -396,18 +404,19 @@ class DaylightUnit:
         self.protocol.checks(session, self.name).switch_off(under_lamp)
 
 
-class Decay(DecaySettings):
+class Decay(DecaySettings, ScenesProtocol):
     """Decay protocol; `decay.yaml` is the commented example."""
 
-    def units(self) -> Sequence[Unit]:
+    def scenes(self) -> Sequence[Scene]:
         """Return darks, metering, decays and daylight, as far as needed."""
         units: list[Unit] = []
-        if self.dark == "frames":
-            units.append(DarkUnit(self))
         if isinstance(self.exposure, str):
             longest_s = self.charge if isinstance(self.charge, float) else METER_CHARGE_S
             units.append(MeterUnit(self, longest_s))
         units += [DecayUnit(self, f"decay-{number}") for number in range(1, self.repeats + 1)]
         if self.daylight:
             units.append(DaylightUnit(self))
-        return units
+        scenes = [Scene(unit, Arrangement(), WHY) for unit in units]
+        if self.dark != "frames":
+            return scenes
+        return [Scene(DarkUnit(self), Arrangement(), WHY, is_dark=True), *scenes]

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import CAMERA, LAMP_OFF, Session, Shoot, Unit, at
+from labrig.acquire import CAMERA, LAMP_OFF, Session, Shoot, at
 from labrig.calibration import LVF_KIND
 from labrig.quantity import DurationS, duration_text
 from labrig.region import Region
@@ -20,8 +20,8 @@ from .steps.camera_settings import CameraSettings
 from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from .steps.grey_card import light_card
 from .steps.patch_names import FilterPatches
-from .steps.sample_pose import check_visible, lights_out
-from .steps.scenes import Arranged, Arrangement, LampKind, PutBackUnit
+from .steps.sample_pose import charge, check_visible, lights_out
+from .steps.scenes import Arrangement, LampKind, Scene, ScenesProtocol
 
 #: Begin of the units' names, which end with the lamp.
 _AFTER = "spectrum-"
@@ -51,7 +51,7 @@ OTHER_LAMP = "the glow is to have the same colour whatever lamp charged it"
 WHITE = "it tells what the camera's curves are off by"
 
 
-class EmissionSpectrum(GlowSettings):
+class EmissionSpectrum(GlowSettings, ScenesProtocol):
     """Settings of an emission spectrum; `emission_spectrum.yaml` is the commented example.
 
     Attributes
@@ -111,21 +111,23 @@ class EmissionSpectrum(GlowSettings):
         """Return the region of the LVF, or every patch; the brightest decides."""
         return list(self.patches.values()) or [self.region]
 
-    def units(self) -> Sequence[Unit]:
-        """Return darks, metering and spectrum for each lamp, white card, the bench put back."""
-        previous, arrangement = Arrangement(), Arrangement(lvf="before camera")
-        units: list[Unit] = [Arranged(DarkUnit(self), arrangement, previous, THROUGH_IT)]
+    def charge_sample(self, session: Session, duration_s: float) -> None:
+        """Charge for that long: a spectrum does not depend on whether the lamp is warm."""
+        charge(session, duration_s)
+
+    def scenes(self) -> Sequence[Scene]:
+        """Return darks, metering and spectrum for each lamp, then the white card."""
+        through = Arrangement(lvf="before camera")
+        scenes = [Scene(DarkUnit(self), through, THROUGH_IT, is_dark=True)]
         for lamp in self.lamps:
-            previous, arrangement = arrangement, replace(arrangement, lamp=lamp)
-            metering = MeterUnit(self, self.charge, f"meter-{lamp}")
-            units += [
-                Arranged(metering, arrangement, previous, OTHER_LAMP),
-                SpectrumUnit(self, lamp),
+            arrangement = replace(through, lamp=lamp)
+            scenes += [
+                Scene(MeterUnit(self, self.charge, f"meter-{lamp}"), arrangement, OTHER_LAMP),
+                Scene(SpectrumUnit(self, lamp), arrangement, OTHER_LAMP),
             ]
         if self.white:
-            previous, arrangement = arrangement, Arrangement("grey card", "before camera")
-            units.append(Arranged(WhiteUnit(self), arrangement, previous, WHITE))
-        return [*units, PutBackUnit(arrangement)]
+            scenes.append(Scene(WhiteUnit(self), Arrangement("grey card", "before camera"), WHITE))
+        return scenes
 
 
 @dataclass(frozen=True)

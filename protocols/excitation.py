@@ -35,13 +35,14 @@ from .steps.camera_settings import (
     dark_exposures_s,
     longest_exposure_s,
 )
-from .steps.charge_times import FloatArray, most_informative_s, still_grows
+from .steps.charge_times import FloatArray, fades_below_s, most_informative_s, still_grows
 from .steps.darkness import levels
 from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
 from .steps.glow import dark_frames
 from .steps.patch_names import FilterPatches
 from .steps.sample_pose import charge, check_visible, face_camera, face_lamp, lights_out
 from .steps.sanity_checks import SanityChecks
+from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
 
 class ExcitationFrames(StrEnum):
@@ -74,7 +75,10 @@ PLACES = 12
 
 
 class Rest(BaseModel):
-    """Rest in the dark between two charges, until the sample hardly glows.
+    """Rest in the dark between two charges, until the sample should hardly glow.
+
+    How long that takes follows from how the glow faded after the last charge. What is left of it is
+    measured then, and accounted for.
 
     Attributes
     ----------
@@ -83,17 +87,14 @@ class Rest(BaseModel):
         for example `2 %`.
     at_least
         Shortest rest, for example `1 min`.
-    check_every
-        Time between two photographs that check the glow, for example `3 min`.
     at_most
-        Longest rest, for example `15 min`. The glow that is left is measured and accounted for.
+        Longest rest, for example `15 min`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     below: Fraction = Field(0.02, gt=0, lt=1)
     at_least: DurationS = Field(60.0, ge=0)
-    check_every: DurationS = Field(180.0, gt=0)
     at_most: DurationS = Field(900.0, ge=0)
 
     @model_validator(mode="after")
@@ -239,16 +240,12 @@ class ExcitationSettings(ProtocolModel):
         ]
 
 
-LVF_ON = ManualStep(
-    "lay the variable filter on the sample, between it and the lamp",
-    "every place is then charged by light of another wavelength",
-    "lvf on sample",
-)
-LVF_AWAY = ManualStep(
-    "take the variable filter away",
-    "the lamp by itself charges the sample now",
-    "lvf away",
-)
+#: Arrangements for the charges through the filter and by the lamp itself, and their reasons.
+LVF_ON = Arrangement(lvf="on sample")
+LVF_AWAY = Arrangement()
+THROUGH_IT = "every place is then charged by light of another wavelength"
+BY_ITSELF = "the lamp by itself charges the sample now"
+
 FRESH = ManualStep(
     "put in a fresh sample, one that has been in the dark for hours",
     "it takes the place of waiting until the glow is gone",
@@ -283,36 +280,35 @@ class ExcitationUnit:
         if self.protocol.samples > 1:
             session.ask(FRESH)
             return
-        session.wait(rule.at_least, "resting in the dark")
-        rested_s = rule.at_least
+        rest_s = session.choose("rest", lambda: self._rest_s(session), worst=rule.at_most)
+        session.wait(rest_s, "resting in the dark")
         exposure_s = max(
             self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
         )
-        look_now = Shoot(FrameRole.REST, self.protocol.settings(exposure_s))
-        while True:
-            face_camera(session)
-            session.perform(look_now)
-            face_lamp(session)
-            dark = session.choose("dark again", lambda: self._is_dark(session), worst=False)
-            remaining_s = rule.at_most - rested_s
-            if dark or remaining_s <= 0:
-                return
-            session.wait(min(rule.check_every, remaining_s), "resting in the dark")
-            rested_s += rule.check_every
+        face_camera(session)
+        session.perform(Shoot(FrameRole.REST, self.protocol.settings(exposure_s)))
+        face_lamp(session)
 
-    def _is_dark(self, session: Session) -> bool:
-        """Return whether the glow of every patch is low against that after the last charge."""
+    def _rest_s(self, session: Session) -> float:
+        """Return the time until the glow of every patch is low against that after the last charge.
+
+        It goes on fading as it did between the last two photographs.
+        """
         frames = [
             *session.frames(ExcitationFrames.STRIP),
             *session.frames(ExcitationFrames.DIRECT),
             *session.frames(FrameRole.METER),
         ]
-        darks = self.darks(session)
         last_unit = max(frames, key=lambda frame: frame.start_time).unit
-        last_frames = [frame for frame in frames if frame.unit == last_unit]
-        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in last_frames], axis=0)
-        present = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
-        return bool((present < self.protocol.rest.below * brightest).all())
+        last_frames = sorted(
+            (frame for frame in frames if frame.unit == last_unit),
+            key=lambda frame: frame.start_time,
+        )
+        darks, rule = self.darks(session), self.protocol.rest
+        glows = np.array([self.rates(frame, darks).max(axis=1) for frame in last_frames])
+        pause_s = last_frames[-1].start_time - last_frames[-2].start_time
+        until_s = fades_below_s(glows, pause_s, rule.below)
+        return min(max(until_s, rule.at_least), rule.at_most)
 
 
 @dataclass(frozen=True)
@@ -336,9 +332,8 @@ class DarkUnit(ExcitationUnit):
 class _MeterUnit(ExcitationUnit):
     """A charge whose glow determines the exposures."""
 
-    def _meter(self, session: Session, unit: str, hand: ManualStep, charge_s: float) -> None:
+    def _meter(self, session: Session, unit: str, charge_s: float) -> None:
         session.wait_until_warm("camera")
-        session.ask(hand)
         ladder = self.protocol.ladder(session.rig[CAMERA].offers())
         check_visible(session, ladder[0][0])
         charge(session, charge_s)
@@ -362,8 +357,8 @@ class StripMeter(_MeterUnit):
     name: str = "strip-meter"
 
     def run(self, session: Session) -> None:
-        """Lay the filter on, charge, take a ladder of exposures."""
-        self._meter(session, self.name, LVF_ON, self.protocol.first_charge)
+        """Charge, take a ladder of exposures."""
+        self._meter(session, self.name, self.protocol.first_charge)
 
 
 @dataclass(frozen=True)
@@ -373,9 +368,9 @@ class DirectMeter(_MeterUnit):
     name: str = "direct-meter"
 
     def run(self, session: Session) -> None:
-        """Take the filter away, charge, take a ladder of exposures."""
+        """Charge, take a ladder of exposures."""
         self.rest(session)
-        self._meter(session, self.name, LVF_AWAY, self.protocol.direct[0])
+        self._meter(session, self.name, self.protocol.direct[0])
 
 
 #: Largest expected ratio of the glow to that of the reference charge, for exposures.
@@ -533,16 +528,22 @@ class DirectUnit(_ChargeUnit):
         self._charge(session, ExcitationFrames.DIRECT, protocol.direct[self.number - 1], lasting_s)
 
 
-class Excitation(ExcitationSettings):
+class Excitation(ExcitationSettings, ScenesProtocol):
     """Excitation protocol; `excitation.yaml` is the commented example."""
 
-    def units(self) -> Sequence[Unit]:
+    def scenes(self) -> Sequence[Scene]:
         """Return darks, then metering and charges through the filter, then the same without it."""
-        return [
-            DarkUnit(self),
+        through: list[Unit] = [
             StripMeter(self),
             *(DoublingUnit(self, number) for number in range(1, self.at_most + 1)),
             *(RefiningUnit(self, number) for number in range(1, self.refine + 1)),
+        ]
+        direct: list[Unit] = [
             DirectMeter(self),
             *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
+        ]
+        return [
+            Scene(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
+            *(Scene(unit, LVF_ON, THROUGH_IT) for unit in through),
+            *(Scene(unit, LVF_AWAY, BY_ITSELF) for unit in direct),
         ]

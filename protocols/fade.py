@@ -19,8 +19,6 @@ from labrig.acquire import (
     LAMP_ON,
     CameraOffers,
     ExposureSettings,
-    ManualStep,
-    ProtocolModel,
     Session,
     Shoot,
     Unit,
@@ -31,8 +29,8 @@ from labrig.region import CENTRE, Region
 
 from .camera_calibration import HALF, CardDarkUnit
 from .steps.camera_settings import CameraSettings, frame_times_s
-from .steps.grey_card import CardLight, CardMeterUnit, card_light, light_card
-from .steps.scenes import Arrangement, PutBackUnit
+from .steps.grey_card import CARD_REASON, CardLight, CardMeterUnit, card_light, light_card
+from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
 
 class LampFrames(StrEnum):
@@ -47,11 +45,8 @@ class LampFrames(StrEnum):
 #: Roles of frames after a switch.
 SWITCHED = LampFrames.FADE, LampFrames.RISE
 
-LVF = ManualStep(
-    "put the variable filter before the camera", "the fade is measured band by band",
-    "lvf before camera",
-)  # fmt: skip
-LVF_AWAY = ManualStep("take the variable filter away", "it is not needed any more", "lvf away")
+#: Reason for laying the card, and the filter before the camera.
+BANDS_REASON = "the fade is measured band by band"
 #: Slowest fade of a lamp to 1/e, with which photographs clip at no delay.
 SLOWEST_S = 0.09
 #: Time after which a filament is steady, or cold.
@@ -63,7 +58,7 @@ WARMING_S = (4.0, 15.0, 30.0, 60.0, 100.0, 160.0, 250.0, 400.0, 600.0)
 WARMING_SHOTS, WARMING_EVERY_S = 4, 2.0
 
 
-class Fade(ProtocolModel):
+class Fade(ScenesProtocol):
     """Settings of a fade; `fade.yaml` is the commented example.
 
     Attributes
@@ -141,32 +136,21 @@ class Fade(ProtocolModel):
         filled_s = -SLOWEST_S * math.log1p(-steady_s / remaining_s)
         return offers.exposure_at_most(min(filled_s, self.longest))
 
-    def units(self) -> Sequence[Unit]:
-        """Return darks, metering, passes over all delays, and the bench put back."""
+    def scenes(self) -> Sequence[Scene]:
+        """Return darks, metering, the warm-up, and passes over all delays, in the warm lamp."""
         reference = self.settings()
-        filter_in = [ByHandUnit("lvf-in", LVF)] if self.through_lvf else []
-        filter_away = [ByHandUnit("lvf-away", LVF_AWAY)] if self.through_lvf else []
-        return [
-            CardDarkUnit(reference, self.card, self.camera.iso, self.longest, asks=True),
-            *filter_in,
+        card = Arrangement("grey card", "before camera" if self.through_lvf else "away")
+        dark = CardDarkUnit(reference, self.card, self.camera.iso, self.longest)
+        lit: list[Unit] = [
             CardMeterUnit(reference, self.card),
-            *(PassUnit(self, number) for number in range(self.passes)),
             *([WarmingUnit(self)] if self.warming else []),
-            *filter_away,
-            PutBackUnit(Arrangement("grey card")),
+            *(PassUnit(self, number) for number in range(self.passes)),
         ]
-
-
-@dataclass(frozen=True)
-class ByHandUnit:
-    """One manual step."""
-
-    name: str
-    step: ManualStep
-
-    def run(self, session: Session) -> None:
-        """Ask for the manual step."""
-        session.ask(self.step)
+        why = BANDS_REASON if self.through_lvf else CARD_REASON
+        return [
+            Scene(dark, card, why, is_dark=True),
+            *(Scene(unit, card, why) for unit in lit),
+        ]
 
 
 @dataclass(frozen=True)

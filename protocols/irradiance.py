@@ -11,13 +11,19 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import ProtocolModel, Unit
 from labrig.calibration import LVF_KIND
 from labrig.quantity import Count, DurationS
 
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings
-from .steps.scenes import Arrangement, Bracketing, PutBackUnit, SceneUnit, StillDarkUnit
+from .steps.scenes import (
+    Arrangement,
+    Bracketing,
+    Scene,
+    ScenesProtocol,
+    SceneUnit,
+    StillDarkUnit,
+)
 
 
 class CardFrames(StrEnum):
@@ -35,7 +41,7 @@ _DIRECT = Arrangement("grey card")
 _THROUGH = Arrangement("grey card", "on sample")
 
 
-class Irradiance(ProtocolModel):
+class Irradiance(ScenesProtocol):
     """Settings of an irradiance measurement; `irradiance.yaml` is the commented example.
 
     Attributes
@@ -95,31 +101,16 @@ class Irradiance(ProtocolModel):
         """Bracketing with which the card is photographed."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
-    def units(self) -> Sequence[Unit]:
+    def scenes(self) -> Sequence[Scene]:
         """Return darks, then the card by itself and through the LVF in turn, as the lamp drifts."""
-        units: list[SceneUnit] = []
-        for number in range(1, self.rounds + 1):
-            previous = units[-1].wanted if units else Arrangement()
-            reason = "how bright the lamp is by itself"
-            units.append(
-                SceneUnit(
-                    self.bracketing,
-                    f"direct-{number}",
-                    CardFrames.DIRECT,
-                    _DIRECT,
-                    previous,
-                    reason,
-                )
-            )
-            reason = "how much of it the variable filter leaves"
-            units.append(
-                StripUnit(
-                    self.bracketing,
-                    f"through-{number}",
-                    CardFrames.THROUGH,
-                    _THROUGH,
-                    _DIRECT,
-                    reason,
-                )
-            )
-        return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
+        dark = Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True)
+        rounds = (self._round(number) for number in range(1, self.rounds + 1))
+        return [dark, *(scene for scenes in rounds for scene in scenes)]
+
+    def _round(self, number: int) -> tuple[Scene, Scene]:
+        direct = SceneUnit(self.bracketing, f"direct-{number}", CardFrames.DIRECT)
+        through = StripUnit(self.bracketing, f"through-{number}", CardFrames.THROUGH)
+        return (
+            Scene(direct, _DIRECT, "how bright the lamp is by itself"),
+            Scene(through, _THROUGH, "how much of it the variable filter leaves"),
+        )

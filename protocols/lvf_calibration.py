@@ -13,14 +13,13 @@ from pydantic import Field, model_validator
 from labrig.acquire import (
     CAMERA,
     Optics,
-    ProtocolModel,
     RigFile,
     Session,
     Shoot,
     TimedAction,
-    Unit,
     at,
 )
+from labrig.optics import read_transmittance
 from labrig.quantity import Count, DurationS, WordOrDuration
 
 from .steps.camera_settings import MARGIN_S, CameraSettings
@@ -28,7 +27,8 @@ from .steps.sample_pose import charge, face_lamp, lights_out, visible_after_s
 from .steps.scenes import (
     Arrangement,
     Bracketing,
-    PutBackUnit,
+    Scene,
+    ScenesProtocol,
     SceneUnit,
     StillDarkUnit,
     frames_of,
@@ -100,7 +100,16 @@ class LinesUnit(SceneUnit):
 
 @dataclass(frozen=True)
 class FilterUnit(SceneUnit):
-    """A colour filter, seen through the strip."""
+    """A colour filter, seen through the strip.
+
+    Attributes
+    ----------
+    filter, previous
+        Names of the colour filter and of the one before it; None for none.
+    """
+
+    filter: str | None = None
+    previous: str | None = None
 
     def check(self, session: Session) -> None:
         """Warn of a filter that seems not to be in its place."""
@@ -108,14 +117,14 @@ class FilterUnit(SceneUnit):
             "like the picture before", lambda: self._is_like_previous(session), worst=False
         ):
             session.warn(
-                f"the picture with the colour filter {self.wanted.filter} is like the one before "
+                f"the picture with the colour filter {self.filter} is like the one before "
                 f"it ({self._unit_before}): take the last step back if the filter is not in its "
                 "place; if it was not, the calibration does without it"
             )
 
     @property
     def _unit_before(self) -> str:
-        return filter_unit(self.before.filter)
+        return filter_unit(self.previous)
 
     def _is_like_previous(self, session: Session) -> bool:
         from .steps.strip_checks import look_alike
@@ -141,7 +150,6 @@ class StripesUnit(SceneUnit):
 
     def run(self, session: Session) -> None:
         """Charge, turn the sample to the camera, photograph with rising shutter times."""
-        self.arrange(session)
         light(session, self.warm_up_s(session))
         charge(session, self.charge_s)
         offers, scene = session.rig[CAMERA].offers(), self.bracketing
@@ -154,6 +162,7 @@ class StripesUnit(SceneUnit):
         face_lamp(session)
 
 
+FilterCount = Annotated[int, Field(ge=6, strict=True)]
 FilterName = Annotated[str, Field(min_length=1, pattern=r"^[^/\\]+$")]
 
 _CARD = Arrangement("grey card")
@@ -169,11 +178,9 @@ _WHY: dict[str, str] = {
     LvfFrames.LINES_ON_SAMPLE: "mercury lines tell the wavelength of every place on the sample",
     LvfFrames.STRIPES: "the stripes glow where the camera will see the sample",
 }
-#: Kind and name of a unit, role of its frames, arrangement, and the kind's own keys.
-_Scene = tuple[type[SceneUnit], str, str, Arrangement, dict[str, Any]]
 
 
-class LvfCalibration(ProtocolModel):
+class LvfCalibration(ScenesProtocol):
     """Settings of the calibration of an LVF; `lvf_calibration.yaml` is the commented example.
 
     Attributes
@@ -187,7 +194,8 @@ class LvfCalibration(ProtocolModel):
     filters
         Colour filters by the names of their files, for example `[longpass-440, shortpass-620]`: six
         or more, with edges all over the spectrum. `all` takes those in the rig file's folder of
-        filters, or without one those that labrig ships.
+        filters, or without one those that labrig ships; a number, as many of them, those that tell
+        most of the strip's bands.
     camera
         Sensitivity and aperture of the camera.
     longest
@@ -207,7 +215,7 @@ class LvfCalibration(ProtocolModel):
     protocol: Literal["lvf_calibration"] = "lvf_calibration"
     rising: bool | None = None
     rising_on_sample: bool | None = None
-    filters: Literal["all"] | tuple[FilterName, ...] = "all"
+    filters: Literal["all"] | FilterCount | tuple[FilterName, ...] = "all"
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)
     repeats: Count = Field(2, ge=1)
@@ -229,45 +237,64 @@ class LvfCalibration(ProtocolModel):
         return Bracketing(self.camera, self.longest, self.repeats)
 
     def filter_names(self) -> tuple[str, ...]:
-        """Return the names of the colour filters; before `suited_to`, `all` are those shipped."""
-        return tuple(Optics().filter_files()) if self.filters == "all" else self.filters
+        """Return the names of the colour filters; before `suited_to`, of those that are shipped."""
+        return self.filters if isinstance(self.filters, tuple) else self._chosen(Optics())
 
     def suited_to(self, rig: RigFile) -> Self:
-        """Return the protocol with the names of all filters of which the rig file has curves."""
-        if self.filters != "all":
+        """Return the protocol with the names of the filters, of those in the rig file's folder."""
+        if isinstance(self.filters, tuple):
             return self
-        return self.model_copy(update={"filters": tuple(rig.optics.filter_files())})
+        return self.model_copy(update={"filters": self._chosen(rig.optics)})
 
-    def units(self) -> Sequence[Unit]:
+    def _chosen(self, optics: Optics) -> tuple[str, ...]:
+        """Return the names of all filters, or of as many as are asked for."""
+        files = optics.filter_files()
+        if not isinstance(self.filters, int):
+            return tuple(files)
+        # Takes a while to load, and most protocols do without.
+        from labrig.fit.lvf import most_informative_filters
+
+        curves = [read_transmittance(path) for path in files.values()]
+        return most_informative_filters(
+            [replace(curve, name=name) for name, curve in zip(files, curves, strict=True)],
+            self.filters,
+        )
+
+    def scenes(self) -> Sequence[Scene]:
         """Return first what can go wrong, the strip and its lines, then filter by filter."""
-        units: list[SceneUnit] = []
-        for kind, name, role, arrangement, keys in self._scenes():
-            previous = units[-1].wanted if units else Arrangement()
-            reason, mercury_s = _WHY[role], self.mercury_warm_up
-            units.append(
-                kind(self.bracketing, name, role, arrangement, previous, reason, mercury_s, **keys)
-            )
-        return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
+        return [
+            Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True),
+            *self._lit_scenes(),
+        ]
 
-    def _scenes(self) -> Iterator[_Scene]:
+    def _lit_scenes(self) -> Iterator[Scene]:
         none, strip = filter_unit(None), LvfFrames.STRIP_ON_SAMPLE
-        yield SceneUnit, "card", LvfFrames.CARD, _CARD, {}
-        yield StripUnit, "strip-on-sample", strip, _ON_SAMPLE, {}
-        yield StripUnit, none, LvfFrames.FILTER, _BEFORE_CAMERA, {}
+        yield self._scene(SceneUnit, "card", LvfFrames.CARD, _CARD)
+        yield self._scene(StripUnit, strip_unit := "strip-on-sample", strip, _ON_SAMPLE)
+        yield self._scene(StripUnit, none, LvfFrames.FILTER, _BEFORE_CAMERA)
         arrangement = replace(_BEFORE_CAMERA, lamp="mercury")
-        keys = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
-        yield LinesUnit, "lines", LvfFrames.LINES, arrangement, keys
+        keys: dict[str, Any] = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
+        yield self._scene(LinesUnit, "lines", LvfFrames.LINES, arrangement, **keys)
         arrangement = replace(_ON_SAMPLE, lamp="mercury")
-        keys = {"strip": (strip, "strip-on-sample"), "rising": self.rising_on_sample}
-        yield LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, arrangement, keys
+        keys = {"strip": (strip, strip_unit), "rising": self.rising_on_sample}
+        yield self._scene(
+            LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, arrangement, **keys
+        )
         if isinstance(self.stripes, float):
             arrangement = replace(arrangement, stage="sample")
-            yield StripesUnit, "stripes", LvfFrames.STRIPES, arrangement, {"charge_s": self.stripes}
-        for name in self.filter_names():
-            yield (
-                FilterUnit,
-                filter_unit(name),
-                LvfFrames.FILTER,
-                replace(_BEFORE_CAMERA, filter=name),
-                {},
+            yield self._scene(
+                StripesUnit, "stripes", LvfFrames.STRIPES, arrangement, charge_s=self.stripes
             )
+        previous = None
+        for name in self.filter_names():
+            arrangement = replace(_BEFORE_CAMERA, filter=name)
+            keys = {"filter": name, "previous": previous}
+            yield self._scene(FilterUnit, filter_unit(name), LvfFrames.FILTER, arrangement, **keys)
+            previous = name
+
+    def _scene(
+        self, kind: type[SceneUnit], name: str, role: str, arrangement: Arrangement, **keys: Any
+    ) -> Scene:
+        mercury_s = self.mercury_warm_up
+        unit = kind(self.bracketing, name, role, arrangement.lamp, mercury_s, **keys)
+        return Scene(unit, arrangement, _WHY[role])

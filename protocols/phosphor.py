@@ -4,24 +4,30 @@ After Nalbach et al., sections 4.2 to 4.7.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig import plugins
 from labrig.acquire import PartUnit, ProtocolModel, RigFile, Unit
-from labrig.record import unit_within
-from labrig.region import Region
-from labrig.yaml_file import validate
+from labrig.bench_optics import calibration
+from labrig.calibration import REFERENCE_KIND, kinds
 
 from .excitation import ExcitationFrames
+from .steps.chain import Chain, Part
 from .steps.patch_names import FilterPatches
+from .steps.scenes import Arrangement, Scene, in_turn
 
+#: Protocols that measure the bench and not the sample.
+BENCH = frozenset({"camera_calibration", "blank", "lvf_calibration", "fade", "irradiance"})
+#: Protocols that use the variable filter on a sample, and the one that checks the bench for them.
+THROUGH_THE_FILTER = frozenset({"emission_spectrum", "excitation"})
+CHECK = "calibration_check"
 #: Protocols that measure every patch of the chain.
 OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation", "reflectance")
 
 
-class Phosphor(ProtocolModel):
+class Phosphor(Chain):
     """Settings of a chain of protocols; `phosphor.yaml` is the commented example.
 
     Attributes
@@ -30,26 +36,20 @@ class Phosphor(ProtocolModel):
         Regions of several materials by name: `[x, y, width, height]` in pixels, or all four as
         fractions of the frame, one above the other, each as long as the filter. Their results lie
         in folders of these names. Default: one material.
-    parts
-        Protocols of the chain in order, each written as in a file of its own. `part: NAME` is a
-        name for one of two parts with the same protocol.
+    calibrate
+        Which parts that calibrate the bench are run: with `as needed` those whose result the rig
+        file does not name and no kept calibration has; with `always` all.
     """
 
     rate_frames = (*ProtocolModel.rate_frames, *ExcitationFrames)
 
     protocol: Literal["phosphor"] = "phosphor"
     patches: FilterPatches = Field(default_factory=dict)
-    parts: tuple[dict[str, Any], ...] = Field(min_length=1)
+    calibrate: Literal["as needed", "always"] = "as needed"
 
     @model_validator(mode="after")
-    def _parts_that_can_be_told_apart(self) -> Self:
-        names = [part.name for part in self.chain()]
-        if len(set(names)) < len(names):
-            raise ValueError(
-                f"expected every protocol once in 'parts', got {', '.join(names)}; give one of "
-                "two alike a 'part:' name of its own"
-            )
-        folders = {name.casefold() for name in names}
+    def _patches_beside_parts(self) -> Self:
+        folders = {part.name.casefold() for part in self.chain()}
         if clashes := [name for name in self.patches if name.casefold() in folders]:
             raise ValueError(
                 f"expected patches that are not called like a part, got '{clashes[0]}': both would "
@@ -57,88 +57,83 @@ class Phosphor(ProtocolModel):
             )
         return self
 
-    def chain(self) -> tuple["Part", ...]:
-        """Return the protocols in order, each with the sample and the patches of the chain."""
-        return tuple(Part.read(content, self) for content in self.parts)
-
-    def patches_of(self, unit: str) -> Mapping[str, Region]:
-        """Return the patches of the part to which the unit belongs."""
-        for part in self.chain():
-            if (part_unit := unit_within(part.name, unit)) is not None:
-                return part.protocol.patches_of(part_unit)
-        return self.patches
-
-    def named_regions(self) -> Mapping[str, Region]:
-        """Return the regions of all parts; those that a part shares with the chain stand once."""
-        regions = dict(super().named_regions())
-        for part in self.chain():
-            for key, region in part.protocol.named_regions().items():
-                if regions.get(key) != region:
-                    regions[f"{part.name}: {key}"] = region
-        return regions
-
-    def suited_to(self, rig: RigFile) -> Self:
-        """Return the chain with the keys filled in that its parts leave to the rig file."""
-        parts = [
-            content | _changed(part.protocol, part.protocol.suited_to(rig))
-            for content, part in zip(self.parts, self.chain(), strict=True)
-        ]
-        return self.model_copy(update={"parts": tuple(parts)})
-
-    def unmeasured(self, rig: RigFile) -> Sequence[str]:
-        """Return the protocols that neither the rig file names nor an earlier part measures."""
-        measured: set[str] = set()
-        missing: list[str] = []
-        for part in self.chain():
-            missing += [name for name in part.protocol.unmeasured(rig) if name not in measured]
-            measured.add(part.protocol.protocol)
-        return missing
-
-    def units(self) -> Sequence[Unit]:
-        """Return the units of all parts, in order."""
-        return [
-            PartUnit(part.name, unit) for part in self.chain() for unit in part.protocol.units()
-        ]
-
-
-class Part:
-    """One protocol of the chain."""
-
-    def __init__(self, name: str, protocol: ProtocolModel) -> None:
-        self.name = name
-        self.protocol = protocol
-
-    @classmethod
-    def read(cls, content: dict[str, Any], chain: Phosphor) -> Self:
-        """Return a protocol that is written as in a file of its own.
+    def _part_keys(self, content: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the keys of a part with the sample and the patches of the chain.
 
         Raises
         ------
         ValueError
-            The content names no protocol that may be a part, or other patches than the chain.
+            The part has other patches than the chain.
         """
-        keys = dict(content)
-        kind = keys.get("protocol")
-        if not isinstance(kind, str) or kind == chain.protocol:
-            raise ValueError("expected 'protocol: NAME' in every part, the name of another one")
-        name = str(keys.pop("part", kind))
-        keys.setdefault("sample", chain.sample.model_dump(exclude_none=True))
-        if chain.patches and kind in OF_PATCHES:
-            patches = keys.get("patches")
-            if patches is None:
-                keys["patches"] = chain.patches
-            elif isinstance(patches, dict) and set(map(str, patches)) != set(chain.patches):
-                raise ValueError(
-                    f"part {name}: expected the patches of the chain, {', '.join(chain.patches)}, "
-                    f"got {', '.join(map(str, patches)) or 'none'}; leave 'patches:' out of the "
-                    "part, or give them the same names"
-                )
-        model = plugins.load(plugins.PROTOCOLS, kind, f"part {name}")
-        return cls(name, validate(keys, model, f"part {name}"))
+        keys = super()._part_keys(content)
+        if not self.patches or keys.get("protocol") not in OF_PATCHES:
+            return keys
+        patches = keys.get("patches")
+        if isinstance(patches, dict) and set(map(str, patches)) != set(self.patches):
+            raise ValueError(
+                f"part {keys.get('part', keys['protocol'])}: expected the patches of the chain, "
+                f"{', '.join(self.patches)}, got {', '.join(map(str, patches)) or 'none'}; leave "
+                "'patches:' out of the part, or give them the same names"
+            )
+        return {"patches": self.patches} | keys
+
+    def suited_to(self, rig: RigFile) -> Self:
+        """Return the chain without the parts whose calibrations the rig has, beginning by a check.
+
+        The check compares the bench with that of the calibration; it needs the filter at hand.
+        """
+        if self.calibrate == "always":
+            return super().suited_to(rig)
+        known = {kind.protocol for kind in kinds() if rig.optics.named(kind) is not None}
+        chain = list(zip(self.parts, self.chain(), strict=True))
+        kept = [
+            (content, part.protocol.protocol)
+            for content, part in chain
+            if part.protocol.protocol not in BENCH & known
+        ]
+        if not kept:
+            return super().suited_to(rig)
+        parts = [content for content, _ in kept]
+        names = {name for _, name in kept}
+        reference = calibration(rig, REFERENCE_KIND)
+        can_be_checked = reference is not None and reference.picture is not None
+        if can_be_checked and names & THROUGH_THE_FILTER and CHECK not in names:
+            parts.insert(0, {"protocol": CHECK})
+        return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).suited_to(rig)
+
+    def units(self) -> Sequence[Unit]:
+        """Return the units of all parts in order; on a checked bench, by arrangement."""
+        chain = self.chain()
+        protocols = {part.protocol.protocol for part in chain}
+        if CHECK not in protocols or BENCH & protocols:
+            return [PartUnit(part.name, unit) for part in chain for unit in part.protocol.units()]
+        scenes = sorted(((part, scene) for part in chain for scene in part.scenes()), key=_turn)
+        return in_turn(_darks_as_next([scene for _, scene in scenes]))
 
 
-def _changed(original: ProtocolModel, completed: ProtocolModel) -> dict[str, Any]:
-    """Return the keys, as written in YAML, that differ between two protocols."""
-    original_keys = original.model_dump(mode="json", by_alias=True)
-    completed_keys = completed.model_dump(mode="json", by_alias=True)
-    return {key: value for key, value in completed_keys.items() if value != original_keys[key]}
+def _darks_as_next(scenes: Sequence[Scene]) -> list[Scene]:
+    """Return the scenes with dark frames taken in the arrangement of the scene after them."""
+    arranged: list[Scene] = []
+    for scene in reversed(scenes):
+        if scene.is_dark and arranged:
+            following = arranged[-1]
+            scene = replace(scene, arrangement=following.arrangement, why=following.why)
+        arranged.append(scene)
+    return arranged[::-1]
+
+
+def _turn(scene_of: tuple[Part, Scene]) -> int:
+    """Return the place of a part's scene in the order of the bench's arrangements.
+
+    The card comes first, while camera and lamp warm up, then dark frames. The sample's own longest
+    charge comes last: nothing has to wait until its glow is gone.
+    """
+    part, scene = scene_of
+    wanted = scene.arrangement
+    if wanted.stage != "sample":
+        return 0
+    if scene.is_dark and wanted == Arrangement():
+        return 1
+    if wanted.lvf != "away":
+        return 2 if wanted.lvf == "before camera" else 3
+    return 4 if part.protocol.protocol == "excitation" else 5

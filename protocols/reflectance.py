@@ -18,11 +18,9 @@ from labrig.acquire import (
     LAMP_OFF,
     SHIELD,
     SHIELD_COVER,
-    ProtocolModel,
     Session,
     Shoot,
     TimedAction,
-    Unit,
     at,
 )
 from labrig.calibration import LVF_KIND
@@ -31,7 +29,16 @@ from labrig.quantity import Count, DurationS
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import MARGIN_S, CameraSettings
 from .steps.patch_names import FilterPatches
-from .steps.scenes import LONGER, Arrangement, Bracketing, PutBackUnit, SceneUnit, StillDarkUnit
+from .steps.scenes import (
+    LONGER,
+    Arrangement,
+    Bracketing,
+    LvfPlace,
+    Scene,
+    ScenesProtocol,
+    SceneUnit,
+    StillDarkUnit,
+)
 
 
 class ReflectanceFrames(StrEnum):
@@ -55,7 +62,7 @@ _WHITE = "all light that comes back is seen at one wavelength after the other"
 _NARROW = "each place is lit by one wavelength, so that fluorescence shows as another colour"
 
 
-class Reflectance(ProtocolModel):
+class Reflectance(ScenesProtocol):
     """Settings of a measurement of reflectance; `reflectance.yaml` is the commented example.
 
     Attributes
@@ -90,31 +97,32 @@ class Reflectance(ProtocolModel):
         """Bracketing with which card and sample are photographed."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
-    def units(self) -> Sequence[Unit]:
+    def scenes(self) -> Sequence[Scene]:
         """Return darks, then the sample between two cards: by white light, by narrow light."""
-        units: list[SceneUnit] = []
-        for light, lvf, why, roles in (
-            ("white", "before camera", _WHITE,
-             (ReflectanceFrames.CARD_WHITE, ReflectanceFrames.SAMPLE_WHITE,
-              ReflectanceFrames.GLOW_WHITE)),
-            ("narrow", "on sample", _NARROW,
-             (ReflectanceFrames.CARD_NARROW, ReflectanceFrames.SAMPLE_NARROW,
-              ReflectanceFrames.GLOW_NARROW)),
-        ):  # fmt: skip
-            card, sample, glow = roles
-            on_card = Arrangement("grey card", lvf)  # type: ignore[arg-type]
-            lit = Arrangement("lit sample", lvf)  # type: ignore[arg-type]
-            before = units[-1].wanted if units else Arrangement()
-            scene = self.bracketing
-            units += [
-                StripUnit(scene, f"card-{light}-1", card, on_card, before, why),
-                LitSampleUnit(
-                    scene, f"sample-{light}", sample, lit, on_card, why,
-                    charge_s=self.charge, glow_role=glow,
-                ),
-                StripUnit(scene, f"card-{light}-2", card, on_card, lit, why),
-            ]  # fmt: skip
-        return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
+        dark = Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True)
+        white = self._lit(
+            "white", "before camera", _WHITE,
+            ReflectanceFrames.CARD_WHITE, ReflectanceFrames.SAMPLE_WHITE,
+            ReflectanceFrames.GLOW_WHITE,
+        )  # fmt: skip
+        narrow = self._lit(
+            "narrow", "on sample", _NARROW,
+            ReflectanceFrames.CARD_NARROW, ReflectanceFrames.SAMPLE_NARROW,
+            ReflectanceFrames.GLOW_NARROW,
+        )  # fmt: skip
+        return [dark, *white, *narrow]
+
+    def _lit(
+        self, light: str, lvf: LvfPlace, why: str, card: str, sample: str, glow: str
+    ) -> tuple[Scene, Scene, Scene]:
+        """Return the sample between two cards in one light."""
+        scene, on_card = self.bracketing, Arrangement("grey card", lvf)
+        lit = LitSampleUnit(scene, f"sample-{light}", sample, charge_s=self.charge, glow_role=glow)
+        return (
+            Scene(StripUnit(scene, f"card-{light}-1", card), on_card, why),
+            Scene(lit, Arrangement("lit sample", lvf), why),
+            Scene(StripUnit(scene, f"card-{light}-2", card), on_card, why),
+        )
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,9 @@ class Arrangement:
     faced
         Sample that the spectrometer faces, from 1 on, while the samples lie open; 0 is a white
         reference beside them.
+    chart_patch
+        Patch of the ColorChecker, from 1 on, that lies so near that it alone fills the frame; 0 is
+        the whole chart in its place.
     """
 
     card: Card = "sample"
@@ -57,6 +60,7 @@ class Arrangement:
     light_deg: int = USUAL_LIGHT_DEG
     placing: int = 0
     faced: int = 0
+    chart_patch: int = 0
 
 
 @dataclass(frozen=True)

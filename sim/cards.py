@@ -13,6 +13,7 @@ IntArray = NDArray[np.intp]
 
 #: Rows and columns of a ColorChecker; its patches leave this part of their distance to the frame.
 ROWS, COLUMNS = 4, 6
+PATCHES = ROWS * COLUMNS
 FRAME = 0.12
 FRAME_REFLECTANCE = 0.04
 
@@ -20,8 +21,16 @@ FRAME_REFLECTANCE = 0.04
 GREY_NM = (380.0, 420.0, 480.0, 560.0, 640.0, 700.0, 780.0)
 GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
 
-#: Optical brightener of paper: where it absorbs, and peak and width (1 σ) of what it emits, in nm.
-BRIGHTENER_BELOW_NM, BRIGHTENER_NM = 440.0, (490.0, 30.0)
+#: An optical brightener: light that it absorbs, and middle and width (1 σ) of what it re-radiates.
+BRIGHTENED = WAVELENGTH_NM < 430.0
+BRIGHTENER_NM, BRIGHTENER_SIGMA_NM = 440.0, 18.0
+
+
+def brightened(light: FloatArray, fraction: float) -> FloatArray:
+    """Return what a brightener re-radiates of light (…, wavelengths), as from a white card."""
+    shape = np.exp(-(((WAVELENGTH_NM - BRIGHTENER_NM) / BRIGHTENER_SIGMA_NM) ** 2) / 2)
+    absorbed = fraction * light[..., BRIGHTENED].sum(axis=-1, keepdims=True)
+    return np.asarray(absorbed * shape / shape.sum())
 
 
 def reflectances(card: Card, grey: float) -> FloatArray:
@@ -40,20 +49,18 @@ def reflectances(card: Card, grey: float) -> FloatArray:
     return np.concatenate([nothing, card_reflectance, nothing])
 
 
-def brightened(light: FloatArray, fraction: float) -> FloatArray:
-    """Return the light that a brightener re-radiates under light of shape (…, wavelengths)."""
-    middle_nm, wide_nm = BRIGHTENER_NM
-    emitted = np.exp(-(((WAVELENGTH_NM - middle_nm) / wide_nm) ** 2) / 2)
-    absorbed = light[..., WAVELENGTH_NM < BRIGHTENER_BELOW_NM].sum(axis=-1, keepdims=True)
-    return np.asarray(fraction * absorbed * emitted / emitted.sum())
-
-
 def surfaces(
-    card: Card, chart: Region, width: int, height: int, black_trap: Region | None = None
+    card: Card,
+    chart: Region,
+    width: int,
+    height: int,
+    black_trap: Region | None = None,
+    chart_patch: int = 0,
 ) -> IntArray:
     """Return the surface of a card on top in every pixel, shape (height, width).
 
-    A grey card fills the picture but for the trap, a ColorChecker its region. A blank lies below.
+    A grey card fills the picture but for the trap, a ColorChecker its region, or one of its patches
+    the picture. A blank lies below.
     """
     surface = np.zeros((height, width), dtype=np.intp)
     if card == "grey card":
@@ -61,6 +68,8 @@ def surfaces(
         if black_trap is not None:
             x, y, wide, high = region_pixels(black_trap, width, height)
             surface[y : y + high, x : x + wide] = 2
+    elif card == "colorchecker" and chart_patch:
+        surface[:] = chart_patch
     elif card == "colorchecker":
         x, y, wide, high = region_pixels(chart, width, height)
         row, in_row = np.divmod((np.arange(high) + 0.5) / high * ROWS, 1)

@@ -15,6 +15,7 @@ from .arrangement import (
     LampKind,
     LvfPlace,
 )
+from .cards import PATCHES
 from .faults import given
 from .filters import Filters
 from .simulation import Simulation
@@ -73,6 +74,7 @@ class Changer:
             "lit sample": lambda: self._lay("lit sample"),
             "grey card": lambda: self._lay("grey card"),
             "colorchecker": lambda: self._lay("colorchecker"),
+            "colorchecker NUMBER": self._lay_patch,
             "blank": lambda: self._lay("blank"),
             "lvf away": lambda: self._put_lvf("away"),
             "lvf before camera": lambda: self._put_lvf("before camera"),
@@ -99,7 +101,12 @@ class Changer:
         self._freshen()
 
     def _lay(self, card: Card) -> None:
-        self._change(card=card, faced=0)
+        self._change(card=card, faced=0, chart_patch=0)
+
+    def _lay_patch(self, number: str) -> None:
+        if not number.isdecimal() or not 1 <= int(number) <= PATCHES:
+            raise UsageError(f"expected a patch from 1 to {PATCHES}, got '{number}'")
+        self._change(card="colorchecker", faced=0, chart_patch=int(number))
 
     def _face(self, number: str) -> None:
         if not number.isdecimal() or not 1 <= int(number) <= self._samples:

@@ -1,4 +1,4 @@
-"""Size of a simulated camera's frames, before its room is opened."""
+"""Size of a simulated camera's frames, and the time, before its room is opened."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from .simulation import Simulation
 
 @dataclass(frozen=True)
 class RoomDescription:
-    """Frames of a simulated camera.
+    """Frames of a simulated camera, and the room's time.
 
     Attributes
     ----------
@@ -23,10 +23,13 @@ class RoomDescription:
         Width and height of a frame in pixels.
     frame_bytes
         Size of a frame's file in bytes.
+    epoch_s
+        Time in seconds since 1970 at which the room opens.
     """
 
     frame_pixels: tuple[int, int]
     frame_bytes: int
+    epoch_s: float
 
 
 def describe_room(content: Mapping[str, Any], source: str) -> RoomDescription:
@@ -42,7 +45,7 @@ def describe_room(content: Mapping[str, Any], source: str) -> RoomDescription:
     Returns
     -------
     RoomDescription
-        Size of the frames.
+        Size of the frames, and the room's epoch.
 
     Raises
     ------
@@ -53,7 +56,7 @@ def describe_room(content: Mapping[str, Any], source: str) -> RoomDescription:
     --------
     >>> from labrig.sim import describe_room
     >>> describe_room({"sample": "blue-paint", "sensor": {"width": 384, "height": 64}}, "rig.yaml")
-    RoomDescription(frame_pixels=(384, 64), frame_bytes=...)
+    RoomDescription(frame_pixels=(384, 64), frame_bytes=..., epoch_s=...)
     """
     simulation = validate(content, Simulation, f"{source}, simulation")
     for patch in simulation.patches:
@@ -61,4 +64,4 @@ def describe_room(content: Mapping[str, Any], source: str) -> RoomDescription:
     width, height = simulation.sensor.width, simulation.sensor.height
     lens = None if simulation.lens is None else simulation.lens.notes
     file = encode_dng(np.zeros((height, width), np.uint16), Shot(0.0, 1.0, 100, 4.0, lens))
-    return RoomDescription((width, height), len(file))
+    return RoomDescription((width, height), len(file), simulation.epoch.timestamp())

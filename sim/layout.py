@@ -78,12 +78,12 @@ class Layout:
         self._cells = np.searchsorted(cells, numbers)
         self.patch, self.piece = np.divmod(cells, PIECES + 1)
         self.pixels = pixels[cells]
-        self._places_by_arrangement: dict[tuple[Card, LvfPlace], Places] = {}
+        self._places_by_arrangement: dict[tuple[Card, int, LvfPlace], Places] = {}
 
     def places(self, arrangement: Arrangement) -> Places:
         """Return all places that look different in an arrangement."""
         through = self.looked_through(arrangement)
-        key = arrangement.card, through
+        key = arrangement.card, arrangement.chart_patch, through
         if key not in self._places_by_arrangement:
             self._places_by_arrangement[key] = self._places(*key)
         return self._places_by_arrangement[key]
@@ -97,9 +97,10 @@ class Layout:
             return "away"
         return arrangement.lvf
 
-    def _places(self, card: Card, through: LvfPlace) -> Places:
+    def _places(self, card: Card, chart_patch: int, through: LvfPlace) -> Places:
         width, height = self._size
-        surface = surfaces(card, self._simulation.chart, width, height, self._simulation.black_trap)
+        chart, black_trap = self._simulation.chart, self._simulation.black_trap
+        surface = surfaces(card, chart, width, height, black_trap, chart_patch)
         piece = self._strips.get(through, np.zeros_like(surface))
         numbers = (self._cells * (surface.max() + 1) + surface) * (PIECES + 1) + piece
         distinct = np.flatnonzero(np.bincount(numbers.ravel()))

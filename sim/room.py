@@ -32,6 +32,7 @@ from .layout import Layout
 from .led_circuit import LedCircuit
 from .leds import Leds
 from .lights import Lights, VisibleLight, leak, room_light_spectrum
+from .luminance import luminance_mcd_per_m2
 from .optics import (
     FOCAL_MM,
     CameraCurves,
@@ -333,6 +334,23 @@ class Room:
             pixels = self._layout.pixels[cells]
             means.append(np.average(electrons[cells], axis=0, weights=pixels))
         return np.array(means) / gain_electrons_per_dn(iso)
+
+    def true_luminance(self, start_s: float, exposure_s: float = 1e-3) -> FloatArray:
+        """Return the mean luminance of the glow of every patch in mcd/m², shape (patches,).
+
+        Parameters
+        ----------
+        start_s, exposure_s
+            Begin and duration on the room's clock, in seconds; with the lamp off.
+        """
+        arrangement, lights = self._changer.arrangements.at(start_s), self._lights()
+        level = self._samples.level_at(start_s, lights, self._changer.arrangements)
+        glow_s = self._samples.glow(level, start_s, start_s + exposure_s, arrangement, lights)
+        light = luminance_mcd_per_m2(glow_s / exposure_s, self._simulation.lamp)
+        cells = [self._layout.patch == n for n in range(1, len(self._simulation.patches) + 1)]
+        return np.array(
+            [np.average(light[cell], weights=self._layout.pixels[cell]) for cell in cells]
+        )
 
     def write_truth(self, path: Path) -> None:
         """Write `truth()` as a JSON file, next to a run, for tests."""

@@ -83,9 +83,13 @@ class Samples:
         self._state_of_cells = np.concatenate(states)
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
         self.cells = self._patches.of(self._state_of_cells, cell)
+        brightnesses = [patch.brightness for patch in simulation.patches]
         irradiance = simulation.lamp.irradiance
         emitted = np.concatenate(
-            [in_table_scale(material, irradiance) * emission(material) for material in phosphors]
+            [
+                brightness * in_table_scale(material, irradiance) * emission(material)
+                for brightness, material in zip(brightnesses, phosphors, strict=True)
+            ]
         )
         state, share = np.arange(len(emitted)), np.ones(len(emitted))
         if (traps := self._patches.traps) is not None:

@@ -66,6 +66,8 @@ class Patch(Part):
         one that follows from the excitation rates. Null: it follows from them, and is 0.5 for
         states without excitation rates. With `kinetics` it is that of traps of `depth_ev` at the
         surface.
+    brightness
+        Factor by which its glow is brighter than the material's file says.
     shape
         Shape of the sample: `flat`, or a `sphere` as large as fits into the region, lit from the
         left.
@@ -78,6 +80,7 @@ class Patch(Part):
 
     material: str
     region: Region = MIDDLE
+    brightness: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     shape: Literal["flat", "sphere"] = "flat"
     initial_charge: Charge | None = None
     kinetics: KineticsSettings | None = None
@@ -136,6 +139,9 @@ class LampSettings(Part):
         Irradiance of the warm lamp, in multiples of that to which a material's k_e belong (with
         Table 1's norm: the length of the 8-band vector E). 4 puts r∞ of Table 1's materials between
         0.2 and 0.6.
+    illuminance
+        Illuminance of the sample by the warm, new lamp in lx, which gives the room its absolute
+        scale: what a luxmeter would read there.
     warm_up
         Time constant with which housing and mirror become warm, and the light with them, for
         example `150 s`.
@@ -158,6 +164,7 @@ class LampSettings(Part):
     """
 
     irradiance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 4.0
+    illuminance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1000.0
     warm_up: Annotated[DurationS, Field(gt=0)] = 150.0
     warm_up_deficit: Annotated[Fraction, Field(ge=0, lt=1)] = 0.03
     drift_per_hour: Annotated[Fraction, Field(ge=0, lt=1)] = 0.002
@@ -251,6 +258,9 @@ class Simulation(Part):
         example `1 %`.
     grey_card
         Reflectance of the grey card, nearly the same at all wavelengths.
+    grey_card_fluorescence
+        Light below 430 nm that the grey card re-radiates about 440 nm, as a fraction of its power,
+        for example `30 %`: an optical brightener.
     chart
         Place in the frame of a ColorChecker that the changer lays down: `[x, y, width, height]` in
         pixels, or all four as fractions of the frame.
@@ -320,7 +330,7 @@ class Simulation(Part):
     filters: str | None = None
     filters_bent: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     grey_card: Annotated[Fraction, Field(gt=0, le=0.95)] = 0.18
-    grey_card_fluorescence: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.0
+    grey_card_fluorescence: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
     chart: Region = MIDDLE
     black_trap: Region | None = None
     ambient: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0

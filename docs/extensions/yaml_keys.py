@@ -27,7 +27,10 @@ class YamlKeys(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Parse the generated Markdown in place of the directive."""
-        text = "\n".join(_document(schema(self.arguments[0])))
+        kind = self.arguments[0]
+        text = "\n".join(_document(schema(kind)))
+        # Files of two kinds may have a block in common: a label stands once in the manual.
+        text = text.replace("(keys-", f"(keys-{kind}-").replace("(#keys-", f"(#keys-{kind}-")
         return self.parse_text_to_nodes(text, allow_section_headings=True)
 
 

@@ -2,6 +2,7 @@
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
+from labrig.acquire.calibration_rules import CalibrationRules
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.loading import (
     driver_and_settings,
@@ -10,6 +11,7 @@ from labrig.acquire.loading import (
     load_driver,
     read_protocol,
 )
+from labrig.acquire.luminance_reading import LampType, LuminanceReading
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -40,6 +42,7 @@ __all__ = [
     "MAX_STEPS",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
+    "CalibrationRules",
     "CameraOffers",
     "Connections",
     "DeviceEntry",
@@ -47,7 +50,9 @@ __all__ = [
     "Finding",
     "Frame",
     "FramePixels",
+    "LampType",
     "LateAction",
+    "LuminanceReading",
     "ManualStep",
     "Optics",
     "PartUnit",

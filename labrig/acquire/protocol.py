@@ -1,7 +1,7 @@
 """Base of all protocols: a YAML file as a frozen model that lists its units."""
 
 from abc import abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self
 
@@ -70,6 +70,8 @@ class ProtocolModel(BaseModel):
     rate_frames: ClassVar[Collection[str]] = (FrameRole.DECAY,)
     #: Kinds of calibrations on which the results depend.
     rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
+    #: Whether calibrations that are kept beside the runs are used; not by what measures them anew.
+    uses_calibrations: ClassVar[bool] = True
 
     protocol: str
     sample: Sample = Sample()
@@ -90,6 +92,11 @@ class ProtocolModel(BaseModel):
         """Return the regions of interest of a unit's frames by name; empty for most protocols."""
         patches: Mapping[str, Region] = getattr(self, "patches", {})
         return patches
+
+    def apertures(self) -> Set[float]:
+        """Return the f-numbers of the frames; empty for a lens that does not tell them."""
+        f_number = getattr(getattr(self, "camera", None), "f_number", None)
+        return set() if f_number is None else {f_number}
 
     def named_regions(self) -> Mapping[str, Region]:
         """Return all regions of the frame that the protocol names, by their keys."""

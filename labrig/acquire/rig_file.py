@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from labrig import resources
+from labrig.acquire.calibration_rules import CalibrationRules
+from labrig.acquire.luminance_reading import LuminanceReading
 from labrig.acquire.roles import ROLES
 from labrig.calibration import CalibrationKind, kinds
 from labrig.errors import UsageError
@@ -87,8 +89,9 @@ class Optics(BaseModel):
     ----------
     camera
         Spectral sensitivities of the camera: name of a shipped file, such as
-        `canon_eos_5d_mark_ii`, or path of a file. Default: the shipped file of the model that the
-        camera says it is, if there is one.
+        `canon_eos_5d_mark_ii`, path of a file, or folder of the run of protocol `camera_curves`
+        that estimated them. Default: the shipped file of the model that the camera says it is, if
+        there is one.
     lamp
         Spectrum of the lamp: name of a shipped file, such as `halogen_3000k`, or path of a file.
     grey_card
@@ -114,6 +117,10 @@ class Optics(BaseModel):
     emission_library
         Measured emissions that dyes of fluorescent samples may have: a folder of re-radiation
         matrices or of tables of spectra, or one such file.
+    luminance
+        Reading of a luxmeter at the sample or of a luminance meter on the card, under the bare
+        lamp, for example `{value: 312 lx, sigma: 3 %, at: sample plane, lamp: halogen}`. The
+        protocol `luminance` needs it.
     direct
         Run of the protocol `direct_bispectral` on samples of the same names, with which estimated
         re-radiation is compared.
@@ -135,6 +142,9 @@ class Optics(BaseModel):
     reflectance
         Albedo and total radiance factor of samples: their file `reflectance.yaml`, or the folder of
         the run of protocol `reflectance` that measured them.
+    reference
+        Bench to which calibrations belong: its file `reference.yaml`, or the folder of the run of
+        protocol `calibration` that measured it.
     blank
         Background and stray light of the bench after lamp off: its file `blank.yaml`, or the folder
         of the run of protocol `blank` that measured it.
@@ -187,6 +197,7 @@ class Optics(BaseModel):
 
     emission_library: str | None = None
     direct: str | None = None
+    luminance: LuminanceReading | None = None
 
     def filter_files(self) -> dict[str, Path]:
         """Return the files of the colour filters' transmittances by name.
@@ -225,6 +236,8 @@ class RigFile(BaseModel):
         Devices of the bench, each under the key of its role, such as `lamp` or `camera`.
     optics
         Spectral curves of the bench's parts, and its calibrations.
+    calibrations
+        Limits within which calibrations that are kept beside the runs still hold.
     on_finish
         What happens when a run has ended: `bell` rings the terminal's bell, a list of words is a
         command to start, for example `[notify-send, labrig]`. Default: nothing.
@@ -238,6 +251,7 @@ class RigFile(BaseModel):
     name: str
     devices: dict[str, DeviceEntry] = Field(min_length=1)
     optics: Optics = Optics()
+    calibrations: CalibrationRules = CalibrationRules()
     on_finish: Literal["bell"] | tuple[str, ...] | None = Field(
         None, description="when a run has ended: bell, or a command as a list of words"
     )

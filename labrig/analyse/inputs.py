@@ -17,6 +17,7 @@ from labrig.calibration import (
     IrradianceFile,
     LedsFile,
     LvfFile,
+    ReferenceFile,
     ReflectanceFile,
     kinds,
 )
@@ -33,7 +34,7 @@ class Inputs:
 
     Attributes
     ----------
-    camera, blank, fade, lvf, irradiance, leds, reflectance
+    camera, blank, fade, lvf, irradiance, leds, reference, reflectance
         Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
         in the same run.
     others
@@ -53,6 +54,7 @@ class Inputs:
     lvf: LvfFile | None = None
     irradiance: IrradianceFile | None = None
     leds: LedsFile | None = None
+    reference: ReferenceFile | None = None
     reflectance: ReflectanceFile | None = None
     others: Mapping[str, Any] = field(default_factory=dict)
     spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)

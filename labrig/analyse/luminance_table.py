@@ -8,18 +8,17 @@ import numpy as np
 
 from labrig.errors import FitError, UsageError
 from labrig.fit import fit_luminance
-from labrig.quantity import FRACTION, TIME_S, parse
+from labrig.quantity import FRACTION, parse
 from labrig.results import (
     LuminanceDecay,
     LuminanceRequirement,
     TableLayout,
+    luminance_requirement,
+    luminance_unit,
     read_described_series,
 )
 
-#: Units of luminance by their names, in mcd/m².
-UNITS = {"mcd/m2": 1.0, "cd/m2": 1000.0, "µcd/m2": 1e-3, "ucd/m2": 1e-3}
 _UNIT = re.compile(r"[mµu]?cd\s*/\s*m(2|²|\^2)")
-_REQUIREMENT = re.compile(r"\s*(?P<light>.*?)\s+at\s+(?P<time>.*?)\s*")
 
 
 @dataclass(frozen=True)
@@ -133,6 +132,7 @@ def evaluate_luminance_table(
             required=options.requirements,
             colours=options.colours,
             excitation=options.excitation,
+            origin=path.name,
         )
     except FitError as error:
         raise FitError(f"{path}: {error}") from None
@@ -141,27 +141,14 @@ def evaluate_luminance_table(
 
 def _factor(place: str, unit: str) -> float:
     """Return mcd/m² in a unit."""
-    name = re.sub(r"\s", "", unit).replace("²", "2").replace("^2", "2")
-    if name not in UNITS:
-        known = ", ".join(UNITS)
-        raise UsageError(f"{place}: expected one of {known}, got '{unit}'")
-    return UNITS[name]
+    try:
+        return luminance_unit(unit)
+    except ValueError as error:
+        raise UsageError(f"{place}: {error}") from None
 
 
 def _requirement(text: str) -> LuminanceRequirement:
-    """Return the requirement that a text such as `140 mcd/m2 at 10 min` states."""
-    match = _REQUIREMENT.fullmatch(text)
-    parts = match["light"].split(maxsplit=1) if match else []
     try:
-        if match is None or len(parts) != 2:
-            raise ValueError
-        least = float(parts[0]) * _factor("--require", parts[1])
-        t_s = parse(match["time"], TIME_S)
-        if not (least > 0 and t_s > 0):
-            raise ValueError
-    except ValueError:
-        raise UsageError(
-            "--require: expected a least luminance and a time, such as '140 mcd/m2 at 10 min', "
-            f"got '{text}'"
-        ) from None
-    return LuminanceRequirement(t_s, least)
+        return luminance_requirement(text)
+    except ValueError as error:
+        raise UsageError(f"--require: {error}") from None

@@ -23,6 +23,11 @@ from labrig.calibration.irradiance_file import (
     CardLight,
     IrradianceFile,
 )
+from labrig.calibration.kept import (
+    KeptCalibration,
+    keep_calibration,
+    kept_calibrations,
+)
 from labrig.calibration.kind import CalibrationKind, kinds
 from labrig.calibration.leds_file import (
     LEDS_KIND,
@@ -39,6 +44,11 @@ from labrig.calibration.lvf_file import (
     LvfFile,
     WavelengthColumns,
 )
+from labrig.calibration.reference_file import (
+    REFERENCE_KIND,
+    CardPicture,
+    ReferenceFile,
+)
 from labrig.calibration.reflectance_file import (
     REFLECTANCE_KIND,
     PatchReflectance,
@@ -52,6 +62,7 @@ __all__ = [
     "IRRADIANCE_KIND",
     "LEDS_KIND",
     "LVF_KIND",
+    "REFERENCE_KIND",
     "REFLECTANCE_KIND",
     "UV_NM",
     "BandColumns",
@@ -60,19 +71,24 @@ __all__ = [
     "CalibrationKind",
     "CameraFile",
     "CardLight",
+    "CardPicture",
     "Change",
     "CurveColumns",
     "FadeFile",
     "IrradianceFile",
+    "KeptCalibration",
     "LedSource",
     "LedsFile",
     "Linearity",
     "LvfFile",
     "Noise",
     "PatchReflectance",
+    "ReferenceFile",
     "ReflectanceFile",
     "UvScale",
     "Warming",
     "WavelengthColumns",
+    "keep_calibration",
+    "kept_calibrations",
     "kinds",
 ]

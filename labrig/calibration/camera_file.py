@@ -115,10 +115,11 @@ class CameraFile(CameraModel):
         DataError
             The frames are of another body or lens, or of an aperture that was not calibrated.
         """
-        if _body(camera) != _body(self.camera):
+        if camera_body(camera) != camera_body(self.camera):
             raise DataError(
-                f"calibration of another camera: expected '{_body(self.camera)}', the frames are "
-                f"of '{_body(camera)}'; calibrate this one, or leave optics.camera_file out"
+                f"calibration of another camera: expected '{camera_body(self.camera)}', the frames "
+                f"are of '{camera_body(camera)}'; calibrate this one, or leave optics.camera_file "
+                "out"
             )
         if lens is not None and self.lens is not None and lens != self.lens:
             raise DataError(
@@ -143,6 +144,6 @@ CAMERA_KIND = CalibrationKind(
 )
 
 
-def _body(identity: str) -> str:
+def camera_body(identity: str) -> str:
     """Return the identity without the firmware version, which may have been updated."""
     return identity.partition(", firmware")[0]

@@ -18,3 +18,6 @@ from .run_summary import (
 from .summarising import (
     summarise as summarise,
 )
+from .trap_depths import (
+    trap_depths as trap_depths,
+)

@@ -10,10 +10,12 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labrig.catalogue.reference import gain
-from labrig.errors import DataError
+from labrig.errors import DataError, DiskError
+from labrig.record import FrameRole, glow_temperature_c, read_run, relative_rate_change
 from labrig.results import (
     EXPONENTIALS,
     LAW_LABELS,
+    LAW_SYMBOLS,
     FittedDecay,
     FittedLaw,
     Measured,
@@ -23,14 +25,9 @@ from labrig.yaml_file import read_yaml
 
 #: Significance level below which rates differ.
 DIFFERENT_P = 0.01
+#: Difference of temperatures from which a comparison says so, in K: rates change by 18 %.
+SAME_TEMPERATURE_K = 2.0
 NO_GAIN = Measured(1.0, 0.0)
-#: Symbols and units of the parameters of laws; τ belongs to the charge.
-LAW_SYMBOLS = {
-    "decay_time_s": ("τ", "s"),
-    "exponent": ("exponent", ""),
-    "kinetic_order": ("b", ""),
-    "retrapping": ("retrapping", ""),
-}
 #: Smallest p-value that is reported as a number.
 MIN_P = 1e-9
 
@@ -119,11 +116,26 @@ class Comparison:
         Comparisons of the patches fitted in both runs.
     missing
         Patches fitted in only one of the runs.
+    temperatures_c
+        Temperatures of the glow in runs A and B in °C; None where not known.
     """
 
     protocol_differences: tuple[tuple[str, Any, Any], ...]
     patches: tuple[PatchComparison, ...]
     missing: tuple[str, ...]
+    temperatures_c: tuple[float | None, float | None]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Doubts, a sentence each."""
+        a, b = self.temperatures_c
+        if a is None or b is None or abs(b - a) <= SAME_TEMPERATURE_K:
+            return ()
+        change = 100 * relative_rate_change(a, b)
+        return (
+            f"run B was measured at {b:.1f} °C, run A at {a:.1f} °C: k_r changes by about "
+            f"{change:+.0f} % over that, if traps are 0.65 eV deep".replace("-", "−"),
+        )
 
 
 def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
@@ -185,14 +197,22 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
             _compare(name, results_a[name], results_b[name], gains[name]) for name in shared
         ),
         missing=tuple(sorted(set(results_a) ^ set(results_b))),
+        temperatures_c=(_temperature_c(a), _temperature_c(b)),
     )
+
+
+def _temperature_c(run: Path) -> float | None:
+    try:
+        return glow_temperature_c(read_run(run), [FrameRole.DECAY])
+    except (DataError, DiskError):  # a result that was copied without its journal
+        return None
 
 
 def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> PatchComparison:
     laws, counts = (a.law, b.law), (len(a.rates), len(b.rates))
     if a.law != b.law:
         return PatchComparison(name, laws, counts, (), math.nan, gain_b)
-    law_a, law_b = _chosen_law(a), _chosen_law(b)
+    law_a, law_b = a.chosen_law, b.chosen_law
     if law_a is not None and law_b is not None:
         differences, p_value = _differences_of_laws(law_a, law_b, a.brightest_channel, gain_b)
         return PatchComparison(name, laws, counts, differences, p_value, gain_b)
@@ -211,11 +231,6 @@ def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> Pat
     chi2 = sum(difference.pull**2 for difference in rates)
     p_value = float(chdtrc(len(rates), chi2))
     return PatchComparison(name, laws, counts, (*rates, *amplitudes), p_value, gain_b)
-
-
-def _chosen_law(fit: FittedDecay) -> FittedLaw | None:
-    """Return the law that describes the decay; None if it is a sum of exponentials."""
-    return next((law for law in fit.laws if law.name == fit.law), None)
 
 
 def _differences_of_laws(

@@ -63,9 +63,12 @@ class _Entry:
                 "done": summary.done,
                 "units": summary.units,
                 "frames": summary.frames,
-                "rates": {
-                    place: [[rate.value, rate.sigma, rate.unit] for rate in rates]
-                    for place, rates in summary.rates.items()
+                "parameters": {
+                    place: {
+                        name: [each.value, each.sigma, each.unit]
+                        for name, each in parameters.items()
+                    }
+                    for place, parameters in summary.parameters.items()
                 },
             },
         )
@@ -84,8 +87,8 @@ class _Entry:
         began = content["began"]
         content["made"] = datetime.fromisoformat(content["made"])
         content["began"] = None if began is None else datetime.fromisoformat(began)
-        if content["rates"]:
-            content["rates"] = _measured(content["rates"])
+        if content["parameters"]:
+            content["parameters"] = _measured(content["parameters"])
         return RunSummary(folder=run, **content)
 
 
@@ -117,10 +120,13 @@ def _stamp(path: str) -> Stamp:
     return [status.st_mtime_ns, status.st_ino, status.st_size]
 
 
-def _measured(rates: Mapping[str, Sequence[Sequence[Any]]]) -> dict[str, Any]:
+def _measured(parameters: Mapping[str, Mapping[str, Sequence[Any]]]) -> dict[str, Any]:
     from labrig.results import Measured
 
-    return {place: tuple(Measured(*rate) for rate in of_place) for place, of_place in rates.items()}
+    return {
+        place: {name: Measured(*each) for name, each in of_place.items()}
+        for place, of_place in parameters.items()
+    }
 
 
 def _read_index(runs: Path) -> dict[str, _Entry]:

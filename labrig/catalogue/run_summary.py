@@ -1,6 +1,6 @@
 """Summary of a run, and its status."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -46,9 +46,10 @@ class RunSummary:
         Number of all units; None if the protocol is not installed.
     frames
         Number of frames of completed units.
-    rates
-        Decay rates by the folder of their fit in the result, such as `decay/left-paint`; by "" if
-        the fit lies in the result itself.
+    parameters
+        What tells the course of each decay, by name: rates, or the parameters of the law that
+        describes it; by the folder of its fit in the result, such as `decay/left-paint`, which is
+        "" if the fit lies in the result itself.
     """
 
     folder: Path
@@ -60,7 +61,7 @@ class RunSummary:
     done: int
     units: int | None
     frames: int
-    rates: "Mapping[str, Sequence[Measured]]"
+    parameters: "Mapping[str, Mapping[str, Measured]]"
 
     def at_present(self) -> "RunSummary":
         """Return the summary with status `running` if a process records the missing units now."""

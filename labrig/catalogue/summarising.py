@@ -21,7 +21,7 @@ def summarise(folder: Path) -> RunSummary:
     Returns
     -------
     RunSummary
-        Sample, protocol, status, number of frames and fitted rates.
+        Sample, protocol, status, number of frames and what decays follow.
 
     Examples
     --------
@@ -43,9 +43,11 @@ def summarise(folder: Path) -> RunSummary:
     completed = record.completed()
     status = status_of(record, is_complete=units is not None and set(units) <= set(completed))
     try:
-        rates = {_place(path, folder): read_fitted_decay(path).rates for path in fit_files(folder)}
+        parameters = {
+            _place(path, folder): read_fitted_decay(path).parameters for path in fit_files(folder)
+        }
     except DataError:
-        status, rates = "damaged", {}
+        status, parameters = "damaged", {}
     return RunSummary(
         folder=folder,
         sample=sample,
@@ -56,7 +58,7 @@ def summarise(folder: Path) -> RunSummary:
         done=len(completed),
         units=number,
         frames=sum(len(attempt.frames) for attempt in completed.values()),
-        rates=rates,
+        parameters=parameters,
     )
 
 

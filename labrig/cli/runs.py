@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.wording import counted, measurement
+from labrig.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
@@ -27,7 +28,8 @@ class _ListsByDefault(TyperGroup):
 
 
 app = typer.Typer(
-    help="The runs in a folder: list (the default, with its options), show one, compare two.",
+    help="The runs in a folder: list (the default, with its options), show one, compare two, "
+    "depths of traps from several.",
     cls=_ListsByDefault,
 )
 
@@ -151,6 +153,67 @@ def compare(
         _print_comparison(comparison)
 
 
+@app.command("trap-depth")
+def trap_depth(
+    run: Annotated[
+        list[str],
+        typer.Argument(help="Runs of one sample at two temperatures or more."),
+    ],
+    runs: Runs = Path("runs"),
+    temperatures: Annotated[
+        str | None,
+        typer.Option(
+            help="Temperature of each run in °C, '15, 21, 30'; without it that of the thermometer."
+        ),
+    ] = None,
+    temperature_sigma: Annotated[
+        str, typer.Option(help="σ of each temperature, such as '0.1 K'.")
+    ] = "0.3 K",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for trap_depth.json, the page, its figure.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Depths of traps from decays at several temperatures, by Arrhenius' law."""
+    from labrig.catalogue import find_run, trap_depths
+    from labrig.process import report_trap_depths
+    from labrig.results import trap_depths_json
+
+    folders = [find_run(Path(each), runs) for each in run]
+    depths = trap_depths(
+        folders, _temperatures_c(temperatures), _temperature_sigma_k(temperature_sigma)
+    )
+    names = tuple(folder.name for folder in folders)
+    if json:
+        typer.echo(trap_depths_json(depths, names))
+    else:
+        for each in depths:
+            place = f"{each.patch}, state {each.number}" if each.patch else f"state {each.number}"
+            typer.echo(f"{place}\n{each.depth}\n")
+    if out is not None:
+        typer.echo(f"report: {report_trap_depths(depths, names, out)}", err=json)
+
+
+def _temperatures_c(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        return [float(part.strip().removesuffix("C").rstrip(" °")) for part in text.split(",")]
+    except ValueError:
+        raise UsageError(
+            f"--temperatures: expected numbers in °C such as '15, 21, 30', got '{text}'"
+        ) from None
+
+
+def _temperature_sigma_k(text: str) -> float:
+    from labrig.quantity import TEMPERATURE_STEP_K, parse
+
+    try:
+        return parse(text, TEMPERATURE_STEP_K)
+    except ValueError as error:
+        raise UsageError(f"--temperature-sigma: {error}") from None
+
+
 def note(
     run: Run,
     text: Annotated[str, typer.Argument(help="What there is to say; Markdown if you like.")],
@@ -168,6 +231,8 @@ def _print_runs(summaries: Sequence["RunSummary"]) -> None:
     """Print a table; never folded, so that every name can be copied."""
     from rich.cells import cell_len
 
+    from labrig.results import with_uncertainty
+
     def padded(text: str, width: int) -> str:
         return text + " " * (width - cell_len(text))
 
@@ -176,14 +241,16 @@ def _print_runs(summaries: Sequence["RunSummary"]) -> None:
     ]
     heading = ("run", "sample", "status")
     widths = [max(map(cell_len, column)) for column in zip(heading, *rows, strict=True)]
-    lines = ["  ".join([*map(padded, heading, widths), "k_r in 1/s"])]
+    lines = ["  ".join([*map(padded, heading, widths), "k_r in 1/s, or law"])]
     for run, (name, sample, status) in zip(summaries, rows, strict=True):
-        rates = [_printable(_short_rates(*patch)) for patch in run.rates.items()] or [""]
+        decays = [
+            _printable(_decay_text(*decay, with_uncertainty)) for decay in run.parameters.items()
+        ] or [""]
         cells = [padded(name, widths[0]), padded(sample, widths[1]), padded(status, widths[2])]
         if run.status in _COLOURS:
             cells[2] = typer.style(cells[2], fg=_COLOURS[run.status])
-        lines.append("  ".join([*cells, rates[0]]).rstrip())
-        lines += [" " * (sum(widths) + 6) + rate for rate in rates[1:]]
+        lines.append("  ".join([*cells, decays[0]]).rstrip())
+        lines += [" " * (sum(widths) + 6) + decay for decay in decays[1:]]
     typer.echo("\n".join(lines))
 
 
@@ -200,6 +267,8 @@ def _print_comparison(comparison: "Comparison") -> None:
 
     for key, value_a, value_b in comparison.protocol_differences:
         typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
+    for warning in comparison.warnings:
+        typer.echo(f"warning: {warning}")
     if comparison.missing:
         typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
     if not comparison.patches:
@@ -227,13 +296,15 @@ def _print_comparison(comparison: "Comparison") -> None:
 
 def _print_results(folder: Path) -> None:
     """Print each result and the settings in which it differs from the one before it."""
+    from labrig.number_format import plus_minus
     from labrig.process import other_settings
     from labrig.results import read_fitted_decays
 
     results = _result_folders(folder)
     for result, before in itertools.zip_longest(results, results[1:]):
         for patch, fit in read_fitted_decays(folder / result).items():
-            typer.echo(f"  {result}: {_rates(patch, fit.rates)} /s")
+            unit = " /s" if fit.chosen_law is None else ""
+            typer.echo(f"  {result}: {_decay_text(patch, fit.parameters, plus_minus)}{unit}")
             for warning in fit.warnings:
                 typer.echo(f"    warning: {warning}")
         if before is not None:
@@ -250,18 +321,18 @@ def _result_folders(folder: Path) -> list[str]:
     return ["result", *earlier]
 
 
-def _rates(patch: str, rates: Sequence["Measured"]) -> str:
-    from labrig.number_format import plus_minus
+def _decay_text(
+    patch: str,
+    parameters: Mapping[str, "Measured"],
+    number_text: Callable[[float, float], str],
+) -> str:
+    """Return the rates of a decay, or the parameters of its law with their symbols and units."""
+    from labrig.results import parameter_text
 
-    text = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in rates)
-    return f"{patch}: {text}" if patch else text
-
-
-def _short_rates(patch: str, rates: Sequence["Measured"]) -> str:
-    """Return the rates with σ in units of the last digits, so that they fit on a line."""
-    from labrig.results import with_uncertainty
-
-    text = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in rates)
+    text = ",  ".join(
+        parameter_text(name, number_text(each.value, each.sigma))
+        for name, each in parameters.items()
+    )
     return f"{patch}: {text}" if patch else text
 
 

@@ -25,6 +25,8 @@ from labrig.fit.mixture import (
     fit_mixture,
     fit_mixture_texture,
 )
+from labrig.fit.power_law import PowerLaw, fit_power_law
+from labrig.fit.trap_depth import fit_trap_depth
 
 __all__ = [
     "EPSILON",
@@ -41,6 +43,7 @@ __all__ = [
     "MixtureFit",
     "MixtureTexture",
     "OrderState",
+    "PowerLaw",
     "SeparatedColumns",
     "bispectral_columns",
     "fit_charge_and_decay",
@@ -48,6 +51,8 @@ __all__ = [
     "fit_luminance",
     "fit_mixture",
     "fit_mixture_texture",
+    "fit_power_law",
+    "fit_trap_depth",
     "least_squares",
     "separate_columns",
 ]

@@ -51,10 +51,11 @@ def fit_luminance(
     luminance_mcd_per_m2: ArrayLike,
     sigma_mcd_per_m2: ArrayLike | None = None,
     *,
-    scale_sigma: float = 0.0,
+    scale_sigma: ArrayLike = 0.0,
     required: Sequence[LuminanceRequirement] = (),
     colours: str = "",
     excitation: str = "",
+    origin: str = "",
 ) -> LuminanceDecay:
     """Find what trade standards ask of an afterglow from readings of a luminance meter.
 
@@ -68,11 +69,13 @@ def fit_luminance(
         Standard uncertainty of each reading, shape (n,) or a scalar; None takes it from the
         scatter of neighbours.
     scale_sigma
-        Relative σ of the scale, common to all readings.
+        Relative σ of errors that neighbouring readings have in common: of the scale for all, a
+        scalar, or with what comes on top later, such as that of a zero, shape (n,).
     required
         Least luminances at some times.
-    colours, excitation
-        Letters for the marking, and the excitation as the report shall state it.
+    colours, excitation, origin
+        Letters for the marking, the excitation as the report shall state it, and the file or run
+        with the readings.
 
     Returns
     -------
@@ -106,7 +109,7 @@ def fit_luminance(
         sigma_mcd_per_m2=np.full_like(readings.t_s, np.nan)
         if readings.sigma is None
         else readings.sigma,
-        scale_sigma=scale_sigma,
+        scale_sigma=float(readings.scale_sigma.max()),
         at=tuple(LuminanceAt(t, value) for t, value in at.items()),
         required=tuple(
             (each, LuminanceAt(each.t_s, readings.luminance_at(each.t_s))) for each in required
@@ -117,6 +120,7 @@ def fit_luminance(
         light_sum=readings.light_sum(),
         colours=colours,
         excitation=excitation,
+        origin=origin,
         warnings=(*warnings, *readings.slow_end()),
     )
 
@@ -135,11 +139,11 @@ class _Readings:
     t_s: FloatArray
     value: FloatArray
     sigma: FloatArray | None
-    scale_sigma: float
+    scale_sigma: FloatArray
 
     @staticmethod
     def checked(
-        t_s: ArrayLike, value: ArrayLike, sigma: ArrayLike | None, scale_sigma: float
+        t_s: ArrayLike, value: ArrayLike, sigma: ArrayLike | None, scale_sigma: ArrayLike
     ) -> "_Readings":
         t, light = np.asarray(t_s, np.float64), np.asarray(value, np.float64)
         known = None if sigma is None else np.broadcast_to(np.asarray(sigma, np.float64), t.shape)
@@ -152,7 +156,14 @@ class _Readings:
             raise FitError("expected σ above zero for every reading")
         if not (light > 0).any():
             raise FitError("expected luminances above zero, got none")
-        return _Readings(t, light, known, scale_sigma)
+        common = np.broadcast_to(np.asarray(scale_sigma, np.float64), t.shape)
+        if not ((common >= 0) & np.isfinite(common)).all():
+            raise FitError("expected finite relative σ of the scale, 0 or more")
+        return _Readings(t, light, known, common)
+
+    def common(self, at_s: float) -> float:
+        """Return the relative σ at a time of what neighbouring readings have in common."""
+        return float(np.interp(at_s, self.t_s, self.scale_sigma))
 
     def parabola(self, at_s: float, *, at_end: bool = False) -> _Parabola | None:
         """Fit the readings around a time; None if there are none around it."""
@@ -193,7 +204,7 @@ class _Readings:
         found = self.parabola(at_s)
         if found is None:
             return None
-        relative = math.hypot(found.relative_sigma, self.scale_sigma)
+        relative = math.hypot(found.relative_sigma, self.common(at_s))
         return Measured(found.luminance, relative * found.luminance, UNIT)
 
     def falls_below(self, limit: float) -> Measured | None:
@@ -212,17 +223,19 @@ class _Readings:
         t = float(brentq(height, self.t_s[above], self.t_s[below], rtol=1e-6))
         found = self.parabola(t)
         assert found is not None
-        relative = math.hypot(found.relative_sigma, self.scale_sigma)
+        relative = math.hypot(found.relative_sigma, self.common(t))
         return Measured(t, t * relative / max(-found.slope, LEAST_SLOPE), "s")
 
     def slope_between(self, early_s: float, late_s: float) -> Measured | None:
-        """Return −d ln L/d ln t between two times; the scale's error cancels."""
+        """Return −d ln L/d ln t between two times; what the scale has in common cancels."""
         early, late = self.parabola(early_s), self.parabola(late_s)
         if early is None or late is None:
             return None
         span = math.log(late_s / early_s)
         value = math.log(early.luminance / late.luminance) / span
-        return Measured(value, math.hypot(early.relative_sigma, late.relative_sigma) / span)
+        added = math.sqrt(abs(self.common(late_s) ** 2 - self.common(early_s) ** 2))
+        sigma = math.hypot(early.relative_sigma, late.relative_sigma, added) / span
+        return Measured(value, sigma)
 
     def light_sum(self) -> Measured:
         """Return the integral over all readings, a power law between two neighbours."""
@@ -243,7 +256,8 @@ class _Readings:
         sigma = self._scatter() if self.sigma is None else self.sigma
         total = float(sums.sum())
         scatter = math.sqrt(float(np.square(weights * sigma).sum()))
-        return Measured(total, math.hypot(scatter, self.scale_sigma * total), "mcd s/m²")
+        common = float(weights @ (self.scale_sigma * np.abs(light)))
+        return Measured(total, math.hypot(scatter, common), "mcd s/m²")
 
     def _scatter(self) -> FloatArray:
         """Return σ of every reading from the bends of ln L from one to the next."""

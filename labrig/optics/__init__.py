@@ -3,6 +3,7 @@
 from labrig.optics.absolute_irradiance import absolute_irradiance
 from labrig.optics.camera import (
     CHANNELS,
+    CURVES_FILE,
     CameraResponse,
     read_camera,
     read_checked_curves,
@@ -16,6 +17,7 @@ from labrig.optics.camera_model import (
     f_number_text,
     rho_squared,
 )
+from labrig.optics.chart import CHART_PATCHES, read_colour_chart
 from labrig.optics.colorimetry import (
     CIE_1931,
     CIE_2015,
@@ -44,6 +46,12 @@ from labrig.optics.lvf import (
     peak_shape,
     signal_through,
 )
+from labrig.optics.photometry import (
+    mesopic_adaptation,
+    mesopic_ratio,
+    photopic_efficacy,
+    scotopic_efficacy,
+)
 from labrig.optics.piecewise import (
     band_integrals,
     band_means,
@@ -63,8 +71,10 @@ from labrig.optics.strip import SLICES, Strip
 
 __all__ = [
     "CHANNELS",
+    "CHART_PATCHES",
     "CIE_1931",
     "CIE_2015",
+    "CURVES_FILE",
     "NOMINAL_FWHM_NM",
     "SLICES",
     "Bands",
@@ -96,12 +106,16 @@ __all__ = [
     "is_narrow",
     "lab",
     "lamp_calibration",
+    "mesopic_adaptation",
+    "mesopic_ratio",
     "nominal_lvf",
     "observer",
     "peak_shape",
+    "photopic_efficacy",
     "quadrature",
     "read_camera",
     "read_checked_curves",
+    "read_colour_chart",
     "read_curve_file",
     "read_hyperspectral_cube",
     "read_light",
@@ -110,6 +124,7 @@ __all__ = [
     "read_spectrum",
     "read_transmittance",
     "rho_squared",
+    "scotopic_efficacy",
     "shipped_camera",
     "shipped_cameras",
     "signal_through",

@@ -17,6 +17,8 @@ from labrig.optics.spectrum import check_curve
 
 CHANNELS = ("R", "G", "B")
 MONOCHROME = ("L",)
+#: File of curves in the result of a run of `camera_curves`.
+CURVES_FILE = "curves.csv"
 #: Lowest value of a measured curve, relative to its maximum, that counts as noise.
 _NOISE_BELOW_ZERO = -0.05
 #: Suffixes of tables; names of shipped cameras have none.
@@ -39,12 +41,16 @@ class CameraResponse:
         white balanced, to colours.
     channels
         Names of the channels.
+    sigma
+        One standard deviation of the sensitivities, shape (n, channels), where it is known; a
+        factor common to all is not in it.
     """
 
     name: str
     wavelength_nm: FloatArray
     sensitivity: FloatArray
     channels: tuple[str, ...] = CHANNELS
+    sigma: FloatArray | None = None
 
     @property
     def has_ratios(self) -> bool:
@@ -79,9 +85,10 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
     ----------
     name_or_path
         Name of a shipped camera such as `canon_eos_5d_mark_ii`, maker and model as the camera
-        states them, such as `Canon EOS 5D Mark II`, or the path of a file: JSON as rawtoaces writes
-        it, or a CSV table with the columns `wavelength_nm,R,G,B`, or those four
-        columns without a header (Jiang et al. 2013).
+        states them, such as `Canon EOS 5D Mark II`, or the folder of a run of `camera_curves`, or
+        the path of a file: JSON as rawtoaces writes
+        it, or a CSV table with the columns `wavelength_nm,R,G,B`, with σ in `R_sigma` … where it is
+        known, or the first four columns without a header (Jiang et al. 2013).
 
     Returns
     -------
@@ -190,8 +197,22 @@ def read_checked_curves(
 
 
 def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a shipped camera, by its name or its own, or the path as given."""
+    """Return the file of a shipped camera, by its name or its own, or that of a path.
+
+    Raises
+    ------
+    UsageError
+        There is no such camera, or a folder that is no processed run of `camera_curves`.
+    """
     path = Path(name_or_path)
+    if path.is_dir() and len(path.parts) > 1:
+        found = next(iter([*path.glob(f"result/{CURVES_FILE}"), *path.glob(CURVES_FILE)]), None)
+        if found is None:
+            raise UsageError(
+                f"{path}: expected a run of camera_curves with {CURVES_FILE} in its result, found "
+                "none; process it first, or name the file of the curves itself"
+            )
+        return found
     if path.suffix.lower() in _TABLES:
         return path
     if len(path.parts) == 1 and (shipped := shipped_camera(str(path))):
@@ -203,7 +224,9 @@ def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:
     """Check curves and scale them to a maximum of 1."""
     curves = [file.curves[name] for name in names]
     wavelength_nm, values = curves[0].wavelength_nm, np.stack([c.value for c in curves], axis=1)
-    check_curve(wavelength_nm, values, None)
+    sigmas = [curve.sigma for curve in curves if curve.sigma is not None]
+    sigma = np.stack(sigmas, axis=1) if len(sigmas) == len(curves) else None
+    check_curve(wavelength_nm, values, sigma)
     if len(wavelength_nm) < 3:
         raise ValueError("there are fewer than three wavelengths")
     if (values.max(axis=0) <= 0).any() or values.min() < _NOISE_BELOW_ZERO * values.max():
@@ -211,4 +234,6 @@ def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:
     if np.linalg.matrix_rank(values / values.max(axis=0), tol=1e-6) < len(names):
         raise ValueError("two channels are the same")
     channels = CHANNELS if names == CHANNELS else MONOCHROME
-    return CameraResponse(file.title, wavelength_nm, values / values.max(), channels)
+    scale = float(values.max())
+    relative = None if sigma is None else sigma / scale
+    return CameraResponse(file.title, wavelength_nm, values / scale, channels, relative)

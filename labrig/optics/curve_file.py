@@ -1,8 +1,9 @@
 """Files of measured curves in several formats: named curves over wavelength.
 
 Supported formats are JSON of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds), and
-text tables: `wavelength_nm` followed by one column per curve, `name,wavelength_nm,value` in long
-form, and without a header wavelength and R, G, B (Jiang et al. 2013) or wavelength and value.
+text tables: `wavelength_nm` followed by one column per curve, and σ of the curve NAME in
+`NAME_sigma`; `name,wavelength_nm,value` in long form; and without a header wavelength and R, G, B
+(Jiang et al. 2013) or wavelength and value.
 """
 
 import csv
@@ -27,6 +28,8 @@ Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray | None]
 Curves: TypeAlias = dict[str, Columns]
 
 WAVELENGTH = "wavelength_nm"
+#: End of the name of the column with σ of another one.
+SIGMA = "_sigma"
 _UNNAMED = {2: ("",), 4: ("R", "G", "B")}
 _EXPECTED_TEXT = (
     "expected a header that begins with wavelength_nm or name,wavelength_nm; or, without a header, "
@@ -92,7 +95,12 @@ def _from_columns(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
     if names in (("value",), ("value", "sigma")):
         sigma = values[:, 1] if len(names) == 2 else None
         return {"": (wavelength_nm, values[:, 0], sigma)}
-    return {name: (wavelength_nm, values[:, k], None) for k, name in enumerate(names)}
+    columns = dict(zip(names, values.T, strict=True))
+    return {
+        name: (wavelength_nm, column, columns.get(f"{name}{SIGMA}"))
+        for name, column in columns.items()
+        if name.removesuffix(SIGMA) == name or name.removesuffix(SIGMA) not in columns
+    }
 
 
 def _from_long_form(rows: list[list[str]]) -> Curves:

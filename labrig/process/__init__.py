@@ -6,6 +6,7 @@ from labrig.process.mixture import report_mixture
 from labrig.process.result_changes import other_settings
 from labrig.process.run import Processed, draw_figures, process_and_report, process_run
 from labrig.process.table import report_table
+from labrig.process.trap_depths import report_trap_depths
 from labrig.process.without_run import describe_without_run, write_with_report
 
 __all__ = [
@@ -20,5 +21,6 @@ __all__ = [
     "report_led_study",
     "report_mixture",
     "report_table",
+    "report_trap_depths",
     "write_with_report",
 ]

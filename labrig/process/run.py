@@ -8,7 +8,7 @@ from labrig import plugins
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, temperature_warnings
 from labrig.bench_optics import camera_curves, with_shipped_camera
-from labrig.calibration import LvfFile
+from labrig.calibration import LvfFile, keep_calibration
 from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
 from labrig.optics import CameraResponse
@@ -19,6 +19,7 @@ from labrig.report import (
     Rendered,
     Report,
     Source,
+    calibration_sections,
     lamp_sections,
     render,
     temperature_sections,
@@ -198,6 +199,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     report = Report(about, warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
     changes = put_in_place(result_folder)
+    keep_calibration(folder)
 
     page = folder / "result" / "report.html"
     if failures := result.failures():
@@ -256,7 +258,11 @@ def _render(result: RunResult, source: Source) -> Rendered:
     # After the parts of a chain, what is about all of them.
     part = "the_run" if any(section.part for section in rendered.sections) else ""
     rate_frames = source.protocol.rate_frames
-    about_run = (*lamp_sections(source.run), *temperature_sections(source.run, rate_frames))
+    about_run = (
+        *calibration_sections(source.run),
+        *lamp_sections(source.run),
+        *temperature_sections(source.run, rate_frames),
+    )
     more = tuple(replace(section, part=part) for section in about_run)
     return replace(rendered, sections=(*rendered.sections, *more))
 

@@ -1,3 +1,6 @@
+from .luminances import (
+    FoundLuminance as FoundLuminance,
+)
 from .queue_file import (
     Queue as Queue,
     QueuedRun as QueuedRun,

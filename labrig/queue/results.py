@@ -5,6 +5,7 @@ import io
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -14,17 +15,30 @@ import numpy as np
 
 from labrig.acquire import read_protocol
 from labrig.catalogue import RunSummary, summarise
-from labrig.errors import LabrigError
+from labrig.errors import FitError, LabrigError
+from labrig.fit import fit_power_law
 from labrig.process import describe_without_run, write_with_report
+from labrig.quantity import duration_text
+from labrig.queue.luminances import FoundLuminance, found_luminances
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
-from labrig.results import Measured, read_fitted_decay, read_result
+from labrig.results import MCD_PER_M2, Measured, read_fitted_decay, read_result
 
 #: Name of the figure, what it shows, label of its axis, and the quantity.
 SWEPT: tuple[tuple[str, str, str, Callable[["FoundState"], Measured]], ...] = (
     ("rates-{}", "Decay rates", "k_r / s⁻¹", lambda state: state.k_r_per_s),
     ("amplitudes-{}", "Amplitudes at lamp off", "Amplitude", lambda state: state.amplitude),
 )
+#: Caption of the figure of luminances.
+LUMINANCES = "Luminances at times after lamp off over {}. Bars are ± 1 σ, with the scale's."
+#: Heads of the table of slopes, and what it shows.
+SLOPE_HEAD = ("Quantity", "slope", "p")
+SLOPES = (
+    "Slopes with both axes logarithmic, d ln(quantity)/d ln(key), with σ in units of the last "
+    "places: 1 is proportional. p is the probability of values further from one slope."
+)
+#: Probability below which one slope does not describe the values.
+NO_SLOPE = 0.01
 #: Status before the run, beside those of runs.
 WAITING = "waiting"
 
@@ -77,7 +91,7 @@ class QueueEntry:
         """States of the decays that the run found."""
         if self.summary is None:
             return
-        for patch in self.summary.rates:
+        for patch in self.summary.parameters:
             fit = read_fitted_decay(self.summary.folder / "result" / patch / "fit.json")
             for number, state in enumerate(fit.states, 1):
                 yield FoundState(
@@ -86,6 +100,12 @@ class QueueEntry:
                     Measured(state.k_r_per_s, state.k_r_sigma_per_s),
                     Measured(state.amplitude, state.amplitude_sigma),
                 )
+
+    @property
+    def luminances(self) -> Iterator[FoundLuminance]:
+        """Luminances that the run found."""
+        if self.summary is not None and self.status == "processed":
+            yield from found_luminances(self.summary.folder)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -183,22 +203,30 @@ def write_results(folder: Path, name: str, listed: Sequence[QueueEntry]) -> Path
 
 
 def _csv(listed: Sequence[QueueEntry]) -> str:
-    """Return a line for each rate of each run, and one of a run that found none."""
+    """Return a line for each rate and luminance of each run, and one of a run that found none."""
     keys = _keys(listed)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    found = ("k_r_per_s", "k_r_sigma_per_s", "amplitude", "amplitude_sigma")
-    table.writerow(["number", "protocol", *keys, "status", "run", "patch", "state", *found])
+    found = ["k_r_per_s", "k_r_sigma_per_s", "amplitude", "amplitude_sigma"]
+    luminous = any(True for entry in listed for _ in entry.luminances)
+    light = ["t_s", "luminance_mcd_per_m2", "luminance_sigma_mcd_per_m2"] if luminous else []
+    head = ["number", "protocol", *keys, "status", "run", "patch", "state", *found, *light]
+    table.writerow(head)
     for entry in listed:
         queued = entry.queued
         start = [entry.number, queued.protocol, *(queued.changes.get(key, "") for key in keys)]
         start += [entry.status, queued.run or ""]
-        states = [
+        rows: list[list[object]] = [
             [state.patch, state.number, k_r.value, k_r.sigma, amplitude.value, amplitude.sigma]
             for state in entry.states
             for k_r, amplitude in [(state.k_r_per_s, state.amplitude)]
         ]
-        table.writerows([*start, *cells] for cells in states or [[""] * (2 + len(found))])
+        rows += [
+            [one.patch, *[""] * (1 + len(found)), one.t_s, one.luminance.value, one.luminance.sigma]
+            for one in entry.luminances
+        ]
+        for cells in rows or [[]]:
+            table.writerow([*start, *cells, *[""] * (len(head) - len(start) - len(cells))])
     return text.getvalue().rstrip("\n")
 
 
@@ -231,7 +259,7 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
     >>> listed = entries(Queue(runs=(QueuedRun(protocol="decay", run="decay"),)), Path("runs"))
     >>> report = queue_report("queue", listed)
     >>> report.sections[0].tables[0].rows[0][-1]
-    '0.2048(28), 0.01009(10)'
+    '0.2048(29), 0.01009(11)'
     """
     keys = _keys(listed)
     rows = [
@@ -254,13 +282,38 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
         Picture(name.format(n), chart, f"{what} over {key}. Bars are ± 1 σ.")
         for n, key in enumerate(keys, 1)
         for name, what, label, quantity in SWEPT
-        for texts, points in [_swept(listed, key, quantity)]
+        for texts, points in [_swept(listed, key, partial(_of_states, quantity))]
         if (chart := sweep_chart(key, texts, label, points)) is not None
     )
-    swept = (Section("Over what was changed", figures=figures),) if figures else ()
+    luminous = [(key, n, *_luminances_over(listed, key)) for n, key in enumerate(keys, 1)]
+    figures += tuple(
+        Picture(f"luminances-{n}", chart, LUMINANCES.format(key))
+        for key, n, texts, points in luminous
+        if (chart := sweep_chart(key, texts, f"L / {MCD_PER_M2}", points)) is not None
+    )
+    slopes = [row for key in keys for row in _slopes_of_states(listed, key)]
+    scale = max((one.scale_sigma for entry in listed for one in entry.luminances), default=0.0)
+    slopes += [
+        row for key, _, _, points in luminous for row in _slopes("Luminance", key, points, scale)
+    ]
+    tables = (Table(SLOPE_HEAD, tuple(slopes), SLOPES),) if slopes else ()
+    swept = (Section("Over what was changed", figures=figures, tables=tables),) if figures else ()
     about = describe_without_run(name, "queue", "", ())
     warnings = [f"no. {entry.number}: {text}" for entry in listed for text in entry.warnings]
     return Report(about, tuple(warnings), (runs, *swept))
+
+
+def _luminances_over(
+    listed: Sequence[QueueEntry], key: str
+) -> tuple[dict[float, str], list[SweptPoint]]:
+    """Return the values of a key, as `_swept` does, and luminances at the times of the table."""
+    return _swept(
+        listed,
+        key,
+        lambda entry: [
+            (one.patch, duration_text(one.t_s), one.luminance) for one in entry.luminances
+        ],
+    )
 
 
 def _report_of(entry: QueueEntry, folder: Path) -> str:
@@ -278,16 +331,55 @@ def _rates(entry: QueueEntry) -> list[str]:
     ]
 
 
+def _slopes_of_states(listed: Sequence[QueueEntry], key: str) -> Iterator[tuple[str, str, str]]:
+    for _, what, _, quantity in SWEPT:
+        _, points = _swept(listed, key, partial(_of_states, quantity))
+        yield from _slopes(what, key, points)
+
+
+def _slopes(
+    what: str, key: str, points: Sequence[SweptPoint], common_sigma: float = 0.0
+) -> Iterator[tuple[str, str, str]]:
+    """Iterate over the slopes of quantities over a key, in logarithms, where they are told."""
+    for patch, name in dict.fromkeys((point.patch, point.name) for point in points):
+        own = [point for point in points if (point.patch, point.name) == (patch, name)]
+        try:
+            law = fit_power_law(
+                [point.at for point in own], [point.measured for point in own], common_sigma
+            )
+        except FitError:
+            continue
+        slope = f"{law.exponent}{'' if law.p_value >= NO_SLOPE else ', not one slope'}"
+        quantity = ", ".join(filter(None, (what, name, patch, f"over {key}")))
+        yield quantity, slope, f"{law.p_value:.2g}"
+
+
+def _of_states(
+    quantity: Callable[[FoundState], Measured], entry: QueueEntry
+) -> list[tuple[str, str, Measured]]:
+    return [(state.patch, f"state {state.number}", quantity(state)) for state in entry.states]
+
+
 def _swept(
-    listed: Sequence[QueueEntry], key: str, quantity: Callable[[FoundState], Measured]
+    listed: Sequence[QueueEntry],
+    key: str,
+    quantities: Callable[[QueueEntry], Sequence[tuple[str, str, Measured]]],
 ) -> tuple[dict[float, str], list[SweptPoint]]:
-    """Return the values of a key, as typed by their numbers, and a quantity of all runs."""
+    """Return the values of a key, as typed by their numbers, and quantities of all runs.
+
+    Parameters
+    ----------
+    listed, key
+        Entries of the queue, and the key.
+    quantities
+        Function of an entry that returns patch, name and value of its quantities.
+    """
     of_key = [entry for entry in listed if key in entry.queued.changes]
     values = {entry.number: entry.value(key) for entry in of_key}
     known = [entry for entry in of_key if not np.isnan(values[entry.number])]
     texts = {values[entry.number]: str(entry.queued.changes[key]) for entry in known}
     return texts, [
-        SweptPoint(values[entry.number], state.patch, state.number, quantity(state))
+        SweptPoint(values[entry.number], patch, name, measured)
         for entry in known
-        for state in entry.states
+        for patch, name, measured in quantities(entry)
     ]

@@ -45,6 +45,7 @@ from .made import (
     time_made as time_made,
 )
 from .run_folder import (
+    CALIBRATIONS_FILE as CALIBRATIONS_FILE,
     RunFolder as RunFolder,
 )
 from .run_lock import (

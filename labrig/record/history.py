@@ -8,13 +8,14 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
 from labrig.record.frames import FrameRecord, FrameRole
 from labrig.record.run_record import Attempt, RunRecord
 
 FloatArray = NDArray[np.float64]
 
 #: Rates of traps 0.65 eV deep follow exp(−E / k_B T): 8.7 % per degree at 300 K; E / k_B in K.
-TRAP_K, ZERO_C_K = 0.65 / 8.617333e-5, 273.15
+TRAP_K = 0.65 / BOLTZMANN_EV_PER_K
 #: Window of the moving mean: readings scatter by 0.1 °C, rooms change slowly.
 SMOOTHED_S = 300.0
 #: Longest time before the first and after the last reading at which a temperature is known.

@@ -21,6 +21,8 @@ from labrig.record.run_record import RunRecord, run_record
 
 #: File by which a run folder is recognised.
 PROTOCOL = "protocol.yaml"
+#: File with the calibrations that were found beside the runs, and their ages.
+CALIBRATIONS_FILE = "calibrations.yaml"
 
 
 class RunFolder:

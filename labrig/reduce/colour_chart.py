@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DataError
+from labrig.optics import CHART_PATCHES
 from labrig.reduce.pictures import binned
 from labrig.reduce.raw import read_raw
 from labrig.region import Region
@@ -17,7 +18,6 @@ SEARCH_WIDTH = 1200
 WHITE_QUANTILE = 0.995
 #: Part of a found patch's sides that is measured.
 INNER = 0.6
-PATCHES = 24
 
 
 def find_colour_chart(path: Path) -> list[Region]:
@@ -56,10 +56,10 @@ def find_colour_chart(path: Path) -> list[Region]:
     if not detector.process(picture, 1):
         raise DataError(
             f"{path}: expected a ColorChecker, found none; lay it so that all of it is in the "
-            "frame, in focus and evenly lit, or set 'chart: false'"
+            "frame, in focus, evenly lit and not clipped"
         )
     corners = np.asarray(detector.getBestColorChecker().getColorCharts(), dtype=np.float64)
-    return [_inside(quad / (width, height)) for quad in corners.reshape(PATCHES, 4, 2)]
+    return [_inside(quad / (width, height)) for quad in corners.reshape(len(CHART_PATCHES), 4, 2)]
 
 
 def _shown(picture: NDArray[np.float32]) -> NDArray[np.uint8]:

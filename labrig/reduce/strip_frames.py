@@ -1,4 +1,4 @@
-"""The strip of a linear variable filter in frames on disk, several exposures of one scene."""
+"""Regions and a filter's strip in frames on disk, several exposures of one scene."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -195,7 +195,55 @@ def slice_values(
     >>> values["lit"].value.shape
     (31, 3)
     """
-    series = reduce_patches(frames, strip.slices(), darks, camera=camera)
+    return region_values(frames, strip.slices(), darks, camera)
+
+
+def region_values(
+    frames: Sequence[SeriesFrame],
+    regions: Mapping[str, Region],
+    darks: Sequence[SeriesFrame],
+    camera: CameraModel | None,
+) -> Mapping[str, SliceValues]:
+    """Measure the light in some regions, scene by scene.
+
+    Parameters
+    ----------
+    frames
+        Light frames; those of one unit show one scene at several exposures.
+    regions
+        Regions by name, in fractions of the frame.
+    darks
+        Dark frames at their exposure times.
+    camera
+        Calibration of the camera; None uses the values as they are.
+
+    Returns
+    -------
+    dict of str to SliceValues
+        Signal in DN/s and its standard uncertainty by unit, shape (regions, channels); NaN where
+        all exposures clip.
+
+    Raises
+    ------
+    DataError
+        ISO or f-number differ within a unit, no dark frames match, or the calibration is of another
+        camera or aperture.
+    FrameError, UsageError
+        A frame cannot be read, or a region leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import SeriesFrame, region_values
+    >>> run = labrig.read_run("runs/decay")
+    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
+    >>> first = run.frames("decay")[0]
+    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
+    >>> values = region_values(frames, {"middle": (0.4, 0.4, 0.2, 0.2)}, darks, camera=None)
+    >>> values["lit"].value.shape
+    (1, 3)
+    """
+    series = reduce_patches(frames, regions, darks, camera=camera)
     return {unit: _slice_values(series, unit) for unit in _units(frames)}
 
 

@@ -1,3 +1,6 @@
+from .calibrations_used import (
+    calibration_sections as calibration_sections,
+)
 from .charge import (
     charge_report as charge_report,
 )
@@ -84,4 +87,8 @@ from .sections import (
 from .sweep import (
     SweptPoint as SweptPoint,
     sweep_chart as sweep_chart,
+)
+from .trap_depth import (
+    trap_depth_chart as trap_depth_chart,
+    trap_depth_report as trap_depth_report,
 )

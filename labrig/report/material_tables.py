@@ -167,8 +167,8 @@ def comparison_table(comparison: MaterialComparison) -> Table:
     >>> reference = labrig.read_material("white-paint")
     >>> for row in comparison_table(compare_materials(measured, reference)).rows:
     ...     print("; ".join(row))
-    k_r 1 / s⁻¹; 0.2048 ± 0.0028; 0.047; +335.7; +55.5
-    k_r 2 / s⁻¹; 0.01009 ± 0.00010; –; –; –
+    k_r 1 / s⁻¹; 0.2048 ± 0.0029; 0.047; +335.7; +55.2
+    k_r 2 / s⁻¹; 0.01009 ± 0.00011; –; –; –
     """
     return Table(
         head=("", _measured_head(comparison), "reference", "apart / %", "apart / σ"),

@@ -1,6 +1,6 @@
 """Report of a phosphor: the material as measured with its photographs, then every part."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -9,12 +9,12 @@ import numpy as np
 from labrig import resources
 from labrig.material import Material, Spectrum, compare_materials, read_material
 from labrig.record import FrameRecord, FrameRole
+from labrig.report.chain import render_chain
 from labrig.report.colours import Screen, screen_for, spectrum_colour
 from labrig.report.decay_figures import logarithmic_decay
 from labrig.report.emission_spectrum import spectrum_figure
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
-from labrig.report.renderers import render as render_result
 from labrig.report.report_model import GlowPhotograph
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.results import DecayPatch, DecayResult, FloatArray, PhosphorResult
@@ -50,34 +50,12 @@ class _Overview:
 
 def render(result: PhosphorResult, source: Source) -> Rendered:
     """Render the material, every part of the chain, and the comparison with a reference."""
-    rendered = {
-        name: render_result(result.parts[name], part) for name, part in _parts(result, source)
-    }
-    sections = [_summary(result, source)]
-    for name, rendered_part in rendered.items():
-        sections += [replace(section, part=name) for section in rendered_part.sections]
-    for patch, material in result.materials.items():
-        sections += _comparison(patch, material)
-    return Rendered(
-        tuple(sections),
-        tuple(
-            f"{name}: {line}"
-            for name, rendered_part in rendered.items()
-            for line in rendered_part.lines
-        ),
-        tuple(section for rendered_part in rendered.values() for section in rendered_part.methods),
-    )
-
-
-def _parts(result: PhosphorResult, source: Source) -> Iterator[tuple[str, Source]]:
-    """Yield name and source of every part of the chain that has a result."""
-    for link in source.protocol.chain():
-        if link.name in result.parts:
-            run = source.run.part(link.name)
-            yield (
-                link.name,
-                replace(source, run=run, protocol=link.protocol, anchor=f"{link.name}-"),
-            )
+    comparisons = [
+        section
+        for patch, material in result.materials.items()
+        for section in _comparison(patch, material)
+    ]
+    return render_chain(result.parts, source, _summary(result, source), comparisons)
 
 
 def _summary(result: PhosphorResult, source: Source) -> Section:

@@ -35,15 +35,15 @@ class SweptPoint:
     ----------
     at
         Value of the key, in its unit.
-    patch, state
-        Patch, and number of the state from 1.
+    patch, name
+        Patch, and name of the quantity in it, such as `state 1`.
     measured
         The quantity.
     """
 
     at: float
     patch: str
-    state: int
+    name: str
     measured: Measured
 
 
@@ -66,14 +66,14 @@ def sweep_chart(
     Returns
     -------
     Chart or None
-        Points with bars of ± 1 σ, a colour for each state, a marker for each patch; None of fewer
+        Points with bars of ± 1 σ, a colour for each name, a marker for each patch; None of fewer
         than two values.
 
     Examples
     --------
     >>> from labrig.report import SweptPoint, sweep_chart
     >>> from labrig.results import Measured
-    >>> points = [SweptPoint(at, "", 1, Measured(0.03, 0.001)) for at in (60.0, 300.0)]
+    >>> points = [SweptPoint(at, "", "state 1", Measured(0.03, 0.001)) for at in (60.0, 300.0)]
     >>> chart = sweep_chart("charge", {60.0: "1 min", 300.0: "5 min"}, "k_r / s⁻¹", points)
     >>> chart.panels[0].x.ticks
     ((60.0, '1 min'), (300.0, '5 min'))
@@ -83,17 +83,18 @@ def sweep_chart(
     patches = list(dict.fromkeys(point.patch for point in points))
     marks: list[Mark] = []
     legend: list[tuple[str, Mark]] = []
-    for patch, state in dict.fromkeys((point.patch, point.state) for point in points):
-        of_state = [point for point in points if (point.patch, point.state) == (patch, state)]
-        at = np.array([point.at for point in of_state])
-        value = np.array([point.measured.value for point in of_state])
-        sigma = np.array([point.measured.sigma for point in of_state])
-        colour = COLOURS[(state - 1) % len(COLOURS)]
+    names = list(dict.fromkeys(point.name for point in points))
+    for patch, name in dict.fromkeys((point.patch, point.name) for point in points):
+        of_name = [point for point in points if (point.patch, point.name) == (patch, name)]
+        at = np.array([point.at for point in of_name])
+        value = np.array([point.measured.value for point in of_name])
+        sigma = np.array([point.measured.sigma for point in of_name])
+        colour = COLOURS[names.index(name) % len(COLOURS)]
         dots = Points(
             colour, at, value, marker=MARKERS[patches.index(patch) % len(MARKERS)], size_pt=5.0
         )
         marks += [ErrorBars(colour, at, value, np.where(np.isfinite(sigma), sigma, 0.0)), dots]
-        legend.append((f"state {state}{f', {patch}' if len(patches) > 1 else ''}", dots))
+        legend.append((f"{name}{f', {patch}' if len(patches) > 1 else ''}", dots))
     axis = _quantity_axis(label, [point.measured.value for point in points])
     panel = Panel(_key_axis(key, texts), axis, tuple(marks), Margins(top=30.0))
     return Chart((panel,), HEIGHT_PT, legend=tuple(legend), columns=min(len(legend), 4))

@@ -12,17 +12,31 @@ from .blank import (
     BlankResult as BlankResult,
     StrayLight as StrayLight,
 )
+from .calibration import CalibrationResult as CalibrationResult
+from .calibration_check import (
+    CalibrationCheckResult as CalibrationCheckResult,
+    PictureChange as PictureChange,
+)
 from .camera_calibration import (
     CameraCalibrationResult as CameraCalibrationResult,
     FittedFlat as FittedFlat,
     PairScatter as PairScatter,
     PhotonTransfer as PhotonTransfer,
 )
+from .camera_curves import (
+    CameraCurvesResult as CameraCurvesResult,
+)
 from .charging_series import (
     Charge as Charge,
     ChargingSeries as ChargingSeries,
     EarlierCharges as EarlierCharges,
     Transient as Transient,
+)
+from .colour_check import (
+    CheckedColour as CheckedColour,
+    CheckedPatch as CheckedPatch,
+    ColourCheckResult as ColourCheckResult,
+    ColourSummary as ColourSummary,
 )
 from .decay import (
     DecayPatch as DecayPatch,
@@ -85,10 +99,12 @@ from .fitted_law import (
     LAW_CHOICES as LAW_CHOICES,
     LAW_LABELS as LAW_LABELS,
     LAW_NAMES as LAW_NAMES,
+    LAW_SYMBOLS as LAW_SYMBOLS,
     RATE_SPECTRUM as RATE_SPECTRUM,
     DecayForecast as DecayForecast,
     FittedLaw as FittedLaw,
     FittedRateSpectrum as FittedRateSpectrum,
+    parameter_text as parameter_text,
     require_law as require_law,
 )
 from .irradiance import (
@@ -117,12 +133,21 @@ from .led_fluorescence import (
 )
 from .luminance import (
     MARKING_S as MARKING_S,
+    MCD_PER_M2 as MCD_PER_M2,
     TABLE_S as TABLE_S,
     VISIBLE_MCD_PER_M2 as VISIBLE_MCD_PER_M2,
     LuminanceAt as LuminanceAt,
     LuminanceDecay as LuminanceDecay,
     LuminanceRequirement as LuminanceRequirement,
     Verdict as Verdict,
+    luminance_requirement as luminance_requirement,
+    luminance_unit as luminance_unit,
+)
+from .luminance_run import (
+    ExcitationState as ExcitationState,
+    LuminanceResult as LuminanceResult,
+    PatchLuminance as PatchLuminance,
+    ScaleFactor as ScaleFactor,
 )
 from .lvf_calibration import (
     CameraCurves as CameraCurves,
@@ -189,6 +214,11 @@ from .series_table import (
 )
 from .table_columns import (
     TableLayout as TableLayout,
+)
+from .trap_depth import (
+    StateDepth as StateDepth,
+    TrapDepth as TrapDepth,
+    trap_depths_json as trap_depths_json,
 )
 from .validate_illuminants import (
     LampComparison as LampComparison,

@@ -233,6 +233,18 @@ class FittedDecay:
         return tuple(Measured(s.k_r_per_s, s.k_r_sigma_per_s, "1/s") for s in self.states)
 
     @property
+    def chosen_law(self) -> FittedLaw | None:
+        """Law that describes the decay; None if exponentials or a spectrum of rates do."""
+        return next((law for law in self.laws if law.name == self.law), None)
+
+    @property
+    def parameters(self) -> dict[str, Measured]:
+        """What tells the decay's course, by name: `k_r_per_s 1`, …, or the law's parameters."""
+        if self.chosen_law is not None:
+            return self.chosen_law.parameters
+        return {f"k_r_per_s {number}": rate for number, rate in enumerate(self.rates, start=1)}
+
+    @property
     def brightest_channel(self) -> str:
         """Name of the channel of weight 1, in whose DN/s the amplitudes are."""
         return self.channels[self.brightest]

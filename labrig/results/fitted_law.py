@@ -29,6 +29,42 @@ LAW_LABELS = {
 }
 
 
+#: Symbols and units of the parameters of laws; τ belongs to the charge.
+LAW_SYMBOLS = {
+    "decay_time_s": ("τ", "s"),
+    "exponent": ("exponent", ""),
+    "kinetic_order": ("b", ""),
+    "retrapping": ("retrapping", ""),
+}
+
+
+def parameter_text(name: str, number: str) -> str:
+    """Return the text of a parameter of `FittedDecay.parameters`, for a line of several.
+
+    Parameters
+    ----------
+    name
+        Name of the parameter.
+    number
+        Its value with σ, as text.
+
+    Returns
+    -------
+    str
+        Symbol, value and unit; of a rate the value.
+
+    Examples
+    --------
+    >>> from labrig.results import parameter_text
+    >>> parameter_text("decay_time_s", "12.3(4)"), parameter_text("k_r_per_s 1", "0.0500(3)")
+    ('τ = 12.3(4) s', '0.0500(3)')
+    """
+    if name not in LAW_SYMBOLS:
+        return number
+    symbol, unit = LAW_SYMBOLS[name]
+    return f"{symbol} = {number} {unit}".rstrip()
+
+
 def require_law(name: str) -> None:
     """Refuse what is no name of a law, nor `auto`.
 

@@ -1,6 +1,7 @@
 """Luminance of an afterglow at the times that trade standards name, and its marking."""
 
 import math
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 from scipy.special import ndtr
 
 from labrig.number_format import aligned
-from labrig.quantity import duration_text
+from labrig.quantity import TIME_S, duration_text, parse
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.text_files import finite, json_text
 
@@ -21,6 +22,79 @@ MARKING_S = (600.0, 3600.0)
 VISIBLE_MCD_PER_M2 = 0.3
 #: Probability from which a requirement counts as met, and its complement as missed.
 CONFIDENT = 0.95
+#: Units of luminance by their names, in mcd/m².
+LUMINANCE_UNITS = {"mcd/m2": 1.0, "cd/m2": 1000.0, "µcd/m2": 1e-3, "ucd/m2": 1e-3}
+_REQUIREMENT = re.compile(r"\s*(?P<light>.*?)\s+at\s+(?P<time>.*?)\s*")
+
+
+def luminance_unit(unit: str) -> float:
+    """Return the mcd/m² in a unit of luminance.
+
+    Parameters
+    ----------
+    unit
+        Name of the unit, such as `cd/m2` or `mcd/m²`.
+
+    Returns
+    -------
+    float
+        Its value in mcd/m².
+
+    Raises
+    ------
+    ValueError
+        There is no such unit.
+
+    Examples
+    --------
+    >>> from labrig.results import luminance_unit
+    >>> luminance_unit("cd / m²")
+    1000.0
+    """
+    name = re.sub(r"\s", "", unit).replace("²", "2").replace("^2", "2")
+    if name not in LUMINANCE_UNITS:
+        raise ValueError(f"expected one of {', '.join(LUMINANCE_UNITS)}, got '{unit}'")
+    return LUMINANCE_UNITS[name]
+
+
+def luminance_requirement(text: str) -> "LuminanceRequirement":
+    """Return the requirement that a text states.
+
+    Parameters
+    ----------
+    text
+        Least luminance and time, such as `140 mcd/m2 at 10 min`.
+
+    Returns
+    -------
+    LuminanceRequirement
+        The requirement.
+
+    Raises
+    ------
+    ValueError
+        The text states none.
+
+    Examples
+    --------
+    >>> from labrig.results import luminance_requirement
+    >>> luminance_requirement("0.14 cd/m2 at 10 min")
+    LuminanceRequirement(t_s=600.0, least_mcd_per_m2=140.0)
+    """
+    match = _REQUIREMENT.fullmatch(text)
+    parts = match["light"].split(maxsplit=1) if match else []
+    try:
+        if match is None or len(parts) != 2:
+            raise ValueError
+        least = float(parts[0]) * luminance_unit(parts[1])
+        t_s = parse(match["time"], TIME_S)
+        if not (0 < least < math.inf and t_s > 0):
+            raise ValueError
+    except ValueError:
+        raise ValueError(
+            f"expected a least luminance and a time, such as '140 mcd/m2 at 10 min', got '{text}'"
+        ) from None
+    return LuminanceRequirement(t_s, least)
 
 
 class Verdict(StrEnum):
@@ -84,7 +158,8 @@ class LuminanceDecay:
     t_s, luminance_mcd_per_m2, sigma_mcd_per_m2
         Readings: time after lamp off in seconds, luminance and its σ, NaN where not given, (n,).
     scale_sigma
-        Relative σ of the scale, common to all readings.
+        Relative σ that is common to all readings, the largest of them if it changes, as at the
+        dark end.
     at
         Luminance at the times of the table.
     required
@@ -103,6 +178,8 @@ class LuminanceDecay:
         Letters of the colours for the marking; empty if not given.
     excitation
         Excitation as the user states it; empty if not given.
+    origin
+        Origin of the readings, a file or a run; empty if not given.
     warnings
         Doubts, a sentence each.
     """
@@ -119,6 +196,7 @@ class LuminanceDecay:
     light_sum: Measured
     colours: str
     excitation: str
+    origin: str
     warnings: tuple[str, ...]
 
     @property
@@ -176,6 +254,7 @@ class LuminanceDecay:
         content: dict[str, Any] = finite(
             {
                 "schema_version": 1,
+                "origin": self.origin,
                 "at": [
                     {"t_s": entry.t_s, "luminance_mcd_per_m2": _number(entry.luminance)}
                     for entry in self.at

@@ -14,7 +14,7 @@ from labrig.number_format import plus_minus
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.region import Region
-from labrig.results import read_fitted_decays
+from labrig.results import parameter_text, read_fitted_decays
 from labrig.watch.planned_unit import PlannedUnit, planned_units
 from labrig.watch.preview import Preview, glance
 
@@ -220,7 +220,10 @@ class RunFollower:
             return {}
         only = next(iter(self._protocol.patches_of("")), "")
         return {
-            name or only: ", ".join(plus_minus(rate.value, rate.sigma) for rate in fit.rates)
+            name or only: ", ".join(
+                parameter_text(parameter, plus_minus(each.value, each.sigma))
+                for parameter, each in fit.parameters.items()
+            )
             for name, fit in results.items()
         }
 

@@ -144,9 +144,9 @@ function showProgress() {
 }
 
 function showResults() {
-  $("results").replaceChildren(...Object.entries(state.results).map(([patch, rates]) => {
+  $("results").replaceChildren(...Object.entries(state.results).map(([patch, parameters]) => {
     const row = tag("tr");
-    row.append(tag("td", patch), tag("td", `${rates} /s`));
+    row.append(tag("td", patch), tag("td", parameters));
     return row;
   }));
   $("results-section").hidden = !Object.keys(state.results).length;

@@ -4,6 +4,7 @@ y(t) = a (1 − e^(−s t)) is the glow of one state just after a charge of dura
 it is accurate enough to choose durations by. The final fit uses another model.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -56,6 +57,31 @@ def most_informative_s(charge_durations_s: Sequence[float], glows: FloatArray) -
         for row, slope in enumerate(_slopes(candidates_s, s)):
             gain[row] += np.log(np.linalg.det(information + np.outer(slope, slope)))
     return float(candidates_s[np.argmax(gain)])
+
+
+def fades_below_s(glows: FloatArray, pause_s: float, below: float) -> float:
+    """Return the time until every patch is below a fraction of its brightest glow, in seconds.
+
+    The glow goes on fading at the rate of the last two photographs; infinity if it does not fade.
+
+    Parameters
+    ----------
+    glows
+        Glow of the patches in the photographs after one charge, shape (photographs, patches).
+    pause_s
+        Time between the last two photographs in seconds.
+    below
+        Fraction of the brightest glow.
+    """
+    previous, last = glows[-2:]
+    wanted = below * glows.max(axis=0)
+    is_bright = last > wanted
+    if not is_bright.any():
+        return 0.0
+    fading_per_s = np.log(previous[is_bright] / last[is_bright]) / pause_s
+    if (fading_per_s <= 0).any():
+        return math.inf
+    return float((np.log(last[is_bright] / wanted[is_bright]) / fading_per_s).max())
 
 
 def _bright(glows: FloatArray) -> FloatArray:

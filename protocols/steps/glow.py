@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -27,6 +27,10 @@ LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
 LATER = (1 / 16, 1)
 
 
+#: Duration of the charge before metering; None leaves it to the protocol.
+MeterCharge = Annotated[DurationS, Field(gt=0)] | None
+
+
 class GlowSettings(ProtocolModel):
     """Settings of a protocol that photographs a glow, and the exposures that follow from them.
 
@@ -35,6 +39,10 @@ class GlowSettings(ProtocolModel):
     charge
         Time for which the lamp shines on the sample before each series of photographs, for example
         `10 min`. A strong glow is enough; it need not be saturated.
+    meter
+        Time for which the lamp shines on the sample before the photographs by which exposures are
+        chosen, for example `5 min`. A longer charge must not glow more than twice as bright.
+        Default: as long as `charge`, at most 10 minutes.
     longest
         Longest exposure, for example `30 s`.
     camera
@@ -42,6 +50,7 @@ class GlowSettings(ProtocolModel):
     """
 
     charge: DurationS = Field(600.0, gt=0)
+    meter: MeterCharge = None
     longest: DurationS = Field(30.0, gt=0)
     camera: CameraSettings = CameraSettings()
 
@@ -231,6 +240,10 @@ METER_CHARGE_S = 600.0
 class MeteredProtocol(Protocol):
     """Interface of a protocol that takes dark frames, then meters a glow."""
 
+    @property
+    def meter(self) -> float | None:
+        """Duration of the charge in seconds; None for as long as later ones, up to a limit."""
+
     def settings(self, exposure_s: float) -> ExposureSettings:
         """Return the camera settings with that shutter time."""
 
@@ -278,7 +291,10 @@ class MeterUnit:
     def run(self, session: Session) -> None:
         """Charge, switch the lamp off, take a ladder of exposures; for `grow`, along the decay."""
         session.wait_until_warm("camera")
-        self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
+        if self.protocol.meter is None:
+            self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
+        else:
+            charge(session, self.protocol.meter)
         ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
         check_visible(session, ladder[0][0])
         session.run_sequence(

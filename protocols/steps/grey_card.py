@@ -9,7 +9,6 @@ from labrig.acquire import (
     LAMP_ON,
     CameraOffers,
     ExposureSettings,
-    ManualStep,
     Session,
     Shoot,
 )
@@ -22,11 +21,10 @@ from .darkness import range_dn
 from .exposure_metering import SEEN_SIGMA, MeteringFrame, measure_frame
 from .sample_pose import face_lamp
 
-GREY_CARD = ManualStep(
-    "put a grey card where lamp and camera both see it (on the outside of the closed door; without "
-    "a door over the sample)",
-    "what is measured next is its light",
-    "grey card",
+#: Reason for laying the card.
+CARD_REASON = (
+    "what is measured next is its light; it lies on the outside of the closed door, without a door "
+    "over the sample"
 )
 
 #: Shutter times of the metering: one of them is right whatever the lamp.

@@ -1,7 +1,8 @@
 """Still scenes: arranged by a person, photographed in a bracket of exposures."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,13 +15,16 @@ from labrig.acquire import (
     CameraOffers,
     ExposureSettings,
     ManualStep,
+    PartUnit,
+    ProtocolModel,
     Session,
     Shoot,
     Unit,
 )
 from labrig.errors import DeviceError
+from labrig.optics import CHART_PATCHES
 from labrig.quantity import duration_text
-from labrig.record import FrameRecord, FrameRole
+from labrig.record import PERSON, FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw
 from labrig.region import CENTRE
 
@@ -29,7 +33,7 @@ from .exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET
 from .sample_pose import face_lamp
 from .sanity_checks import SanityChecks
 
-Stage = Literal["sample", "lit sample", "grey card", "colorchecker"]
+Stage = Literal["sample", "lit sample", "grey card", "colorchecker", "blank"]
 LvfPlace = Literal["away", "before camera", "on sample"]
 LampKind = Literal["halogen", "mercury"]
 
@@ -38,12 +42,15 @@ _STAGE = {
     "lit sample": "lay the sample in the grey card's place, where lamp and camera both see it",
     "grey card": "lay the grey card where lamp and camera both see it",
     "colorchecker": "lay the ColorChecker where lamp and camera see all of it",
+    "blank": "put a grey card in the sample's place (in the door, if there is one)",
 }
 _LVF = {
     "away": "take the variable filter out",
     "before camera": "put the variable filter before the camera",
     "on sample": "put the variable filter between lamp and sample",
 }
+#: What is arranged, in the order in which it is asked for.
+THINGS = "lamp", "laid", "lvf", "filter"
 
 
 @dataclass(frozen=True)
@@ -60,29 +67,41 @@ class Arrangement:
         Name of the colour filter before the lamp.
     lamp
         Lamp that the relay switches.
+    chart_patch
+        Patch of the ColorChecker, from 1 on, that alone is seen; 0 is the whole chart.
     """
 
     stage: Stage = "sample"
     lvf: LvfPlace = "away"
     filter: str | None = None
     lamp: LampKind = "halogen"
+    chart_patch: int = 0
 
-    def set_up(self, session: Session, before: "Arrangement | None", why: str) -> None:
+    @property
+    def laid(self) -> tuple[Stage, int]:
+        """Object that lamp and camera face, and its patch."""
+        return self.stage, self.chart_patch
+
+    def set_up(self, session: Session, before: "Arrangement", why: str) -> None:
         """Ask for the manual steps from `before`; the lamp is switched off for another one.
+
+        The bench may have been put to another use before a run is resumed: all that has been
+        arranged in it is asked for again.
 
         Parameters
         ----------
         session
             Session of the run.
         before
-            Arrangement of the bench; None if it is uncertain, and all steps are asked for.
+            Arrangement after the unit before.
         why
             Reason for the arrangement, for the person.
         """
-        if before is None or self.lamp != before.lamp:
+        again = _arranged_before_resuming(session)
+        if self.lamp != before.lamp or "lamp" in again:
             _lamp_off(session)
-        for name in ("lamp", "stage", "lvf", "filter"):
-            if before is None or getattr(self, name) != getattr(before, name):
+        for name in THINGS:
+            if getattr(self, name) != getattr(before, name) or name in again:
                 instruction, task = self._step(name)
                 session.ask(ManualStep(instruction, why, task))
 
@@ -91,7 +110,14 @@ class Arrangement:
         match name:
             case "lamp":
                 return f"connect the {self.lamp} lamp to the relay", f"lamp {self.lamp}"
-            case "stage":
+            case "laid" if self.chart_patch:
+                name = CHART_PATCHES[self.chart_patch - 1]
+                return (
+                    f"lay the ColorChecker so that its patch {self.chart_patch}, {name}, alone is "
+                    "seen, from end to end of the variable filter",
+                    f"{self.stage} {self.chart_patch}",
+                )
+            case "laid":
                 return _STAGE[self.stage], self.stage
             case "lvf":
                 return _LVF[self.lvf], f"lvf {self.lvf}"
@@ -115,19 +141,25 @@ def light(session: Session, warm_up_s: float) -> None:
         session.wait(warm_up_s, "the lamp warms up")
 
 
-def arrangement_after(before: Arrangement, session: Session) -> Arrangement | None:
-    """Return the arrangement after the unit before; None in a resumed run.
+def _arranged_before_resuming(session: Session) -> set[str]:
+    """Return what was arranged before the devices were connected, if nothing was done since."""
+    since = session.clock.wall(session.rig.connected_s)
+    steps = session.actions(PERSON)
+    frames = [*session.frames(FrameRole.DARK), *session.frames(FrameRole.LOOK)]
+    times = [step.start_time for step in steps] + [frame.start_time for frame in frames]
+    if any(time >= since for time in times):
+        return set()
+    return {thing for step in steps if (thing := _thing_of(step.task)) is not None}
 
-    The bench may have been put to another use before a run is resumed.
-    """
 
-    def decide() -> bool:
-        since = session.clock.wall(session.rig.connected_s)
-        frames = [*session.frames(FrameRole.DARK), *session.frames(FrameRole.LOOK)]
-        return any(frame.start_time >= since for frame in frames)
-
-    untouched = session.choose("bench as the unit before left it", decide, worst=True)
-    return before if untouched else None
+def _thing_of(task: str) -> str | None:
+    """Return what a changer's task arranges; None for one of another protocol's own."""
+    words = {"lamp halogen": "lamp", "lamp mercury": "lamp", "no filter": "filter"}
+    if task in _STAGE or task.startswith("colorchecker "):
+        return "laid"
+    if task.startswith(("lvf ", "filter ")):
+        return task.partition(" ")[0]
+    return words.get(task)
 
 
 @dataclass(frozen=True)
@@ -148,6 +180,54 @@ class Arranged:
         """Ask for the arrangement, then run the unit."""
         self.now.set_up(session, self.before, self.why)
         self.unit.run(session)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A unit and the arrangement of the bench in which it is run.
+
+    Attributes
+    ----------
+    unit
+        Unit, which asks for none of the arrangement's steps itself.
+    arrangement
+        Arrangement of the bench.
+    why
+        Reason for the arrangement, for the person.
+    is_dark
+        Whether it takes dark frames only, for which any arrangement without a glow will do.
+    """
+
+    unit: Unit
+    arrangement: Arrangement
+    why: str
+    is_dark: bool = False
+
+    def of_part(self, part: str) -> "Scene":
+        """Return the scene as one of a part of a chain."""
+        return replace(self, unit=PartUnit(part, self.unit))
+
+
+def in_turn(scenes: Sequence[Scene]) -> list[Unit]:
+    """Return the units of scenes, each asking for what changes, and at last the bench put back."""
+    units: list[Unit] = []
+    before = Arrangement()
+    for scene in scenes:
+        units.append(Arranged(scene.unit, scene.arrangement, before, scene.why))
+        before = scene.arrangement
+    return units if before == Arrangement() else [*units, PutBackUnit(before)]
+
+
+class ScenesProtocol(ProtocolModel):
+    """Base of protocols whose units are scenes, so that a chain can put them into another order."""
+
+    @abstractmethod
+    def scenes(self) -> Sequence[Scene]:
+        """Return all units with their arrangements, in the order in which they build on another."""
+
+    def units(self) -> Sequence[Unit]:
+        """Return the units of all scenes in order, and the bench put back."""
+        return in_turn(self.scenes())
 
 
 @dataclass(frozen=True)
@@ -178,8 +258,7 @@ class PutBackUnit:
     def run(self, session: Session) -> None:
         """Switch the lamp off, have filters and card taken away."""
         _lamp_off(session)
-        arrangement = arrangement_after(self.before, session)
-        Arrangement().set_up(session, arrangement, "the next measurement finds the bench as usual")
+        Arrangement().set_up(session, self.before, "the next measurement finds the bench as usual")
 
 
 #: Shutter times of metering, as fractions of the longest.
@@ -369,10 +448,8 @@ class SceneUnit:
         Bracketing of the scene's photographs.
     name, role
         Name of the unit, and role of its frames.
-    wanted, before
-        Arrangements of this unit and of the unit before.
-    why
-        Reason for the arrangement, for the person.
+    lamp
+        Lamp that the relay switches.
     mercury_warm_up_s
         Warm-up time in seconds of the mercury lamp, which the rig file does not have.
     """
@@ -380,22 +457,15 @@ class SceneUnit:
     bracketing: Bracketing
     name: str
     role: str
-    wanted: Arrangement
-    before: Arrangement
-    why: str
+    lamp: LampKind = "halogen"
     mercury_warm_up_s: float = 0.0
 
     def run(self, session: Session) -> None:
-        """Arrange, light, photograph, and check the photographs."""
-        session.wait_until_warm("camera")
-        self.arrange(session)
+        """Light, photograph, and check the photographs; lamp and camera warm up together."""
         self.light(session)
-        self.bracketing.photograph(session, self.name, self.role, self.wanted.lamp)
+        session.wait_until_warm("camera")
+        self.bracketing.photograph(session, self.name, self.role, self.lamp)
         self.check(session)
-
-    def arrange(self, session: Session) -> None:
-        """Ask for the arrangement."""
-        self.wanted.set_up(session, arrangement_after(self.before, session), self.why)
 
     def light(self, session: Session) -> None:
         """Switch the lamp on and wait until it is steady."""
@@ -403,7 +473,7 @@ class SceneUnit:
 
     def warm_up_s(self, session: Session) -> float:
         """Return the warm-up time of the lamp in use, in seconds."""
-        if self.wanted.lamp == "mercury":
+        if self.lamp == "mercury":
             return self.mercury_warm_up_s
         return session.rig.warm_up_s("lamp")
 

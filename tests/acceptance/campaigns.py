@@ -110,6 +110,7 @@ CAMPAIGNS = {
         ),
         _module("excitation_rates", "--seeds", "40"),
         _module("whole_phosphor"),
+        _module("reused_calibration"),
         _module("lvf_in_the_room", "--width", "402", "--seeds", "3"),
         _module("spectrum_through_lvf", "40"),
         _module("spectrum_lines", "8"),
@@ -119,6 +120,7 @@ CAMPAIGNS = {
         *(_module("manual_examples", page, called=f"manual_{page}") for page in EXAMPLES),
         _module("decay_fit_example"),
         _module("veiling_glare"),
+        _module("luminance_pulls", "--seeds", "50"),
         _module("law_confusion", "--seeds", "100"),
         *(
             _module(

@@ -1,11 +1,13 @@
 """The LVF calibrated in the simulated room, against what the room knows.
 
-    python -m tests.acceptance.lvf_in_the_room [--width 702] [--seeds 3] [--filters 40] [--shipped]
+    python -m tests.acceptance.lvf_in_the_room [--width 702] [--seeds 3] [--filters 40] [--chosen N]
+        [--shipped]
 
 Every seed is a run of `labrig run lvf_calibration` and one of `irradiance`, with another camera,
 whose curves are bent by as much as three laboratories disagree about one camera, and with filters
 that are not quite as their files. Filters are real ones, Roscolux and Supergel of the shared data,
-unless shipped ones are asked for. Of every position: the middle of its band and its width at half
+unless shipped ones are asked for; `--chosen` uses as many of them, those that tell
+most. Of every position: the middle of its band and its width at half
 maximum, read off the true and the calibrated curve alike; of irradiance, the sum over all bands.
 """
 
@@ -14,6 +16,7 @@ import contextlib
 import io
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -60,7 +63,9 @@ def labrig(*arguments: object) -> Path:
     return Path(out.getvalue().splitlines()[-1])
 
 
-def measured(folder: Path, seed: int, width: int, filters: int, real: bool) -> tuple[Path, Path]:
+def measured(
+    folder: Path, seed: int, width: int, filters: int, chosen: int | None, real: bool
+) -> tuple[Path, Path]:
     """Runs of both protocols."""
     rig = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
     rig["simulation"] |= {
@@ -69,10 +74,12 @@ def measured(folder: Path, seed: int, width: int, filters: int, real: bool) -> t
         "epoch": "2026-01-01T00:00:00Z",
         "initial": {"lamp": "off"},
     }
-    protocol = {"protocol": "lvf_calibration", "rising": True}
+    protocol: dict[str, Any] = {"protocol": "lvf_calibration", "rising": True}
     if real:
         protocol["filters"] = real_filters(folder / "gels", filters)
         rig["optics"]["filters"] = rig["simulation"]["filters"] = str(folder / "gels")
+    if chosen is not None:
+        protocol["filters"] = chosen
     rig_path, protocol_path = folder / f"rig-{seed}.yaml", folder / "protocol.yaml"
     rig_path.write_text(yaml.safe_dump(rig))
     protocol_path.write_text(yaml.safe_dump(protocol))
@@ -98,6 +105,7 @@ def main() -> None:
     parser.add_argument("--width", type=int, default=702)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--filters", type=int, default=40)
+    parser.add_argument("--chosen", type=int)
     parser.add_argument("--shipped", action="store_true")
     asked = parser.parse_args()
     low, high = INSIDE_NM
@@ -105,7 +113,7 @@ def main() -> None:
     for seed in range(1, asked.seeds + 1):
         with tempfile.TemporaryDirectory() as folder:
             calibration, irradiance = measured(
-                Path(folder), seed, asked.width, asked.filters, not asked.shipped
+                Path(folder), seed, asked.width, asked.filters, asked.chosen, not asked.shipped
             )
             lvf = LVF_KIND.read(calibration / "result" / "lvf.yaml")
             light = IRRADIANCE_KIND.read(irradiance / "result" / "irradiance.yaml")

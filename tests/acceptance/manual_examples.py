@@ -140,11 +140,20 @@ def autofocus(folder: Path) -> None:
 
 
 def luminances(folder: Path) -> None:
-    """Write the readings of a luminance meter, of general order 1.9, rounded as a meter does."""
+    """Write readings of a luminance meter, of general order 1.9 and rounded, and a protocol."""
     minutes = np.geomspace(1, 600, 60)
     noise = 1 + 0.005 * np.random.default_rng(1).standard_normal(len(minutes))
     readings = 290 * (1 + minutes) ** -1.1 * noise
     rows = (f"{t:.3g};{light:.4g}" for t, light in zip(minutes, readings, strict=True))
+    protocol = {
+        "protocol": "luminance",
+        "sample": {"name": "paint", "thickness": "0.4 mm"},
+        "excitation": {"preset": "DIN 67510-1", "rested": "50 h"},
+        "emission": "power-law",
+        "colours": "K-W",
+        "require": ["20 mcd/m2 at 10 min"],
+    }
+    _write(folder / "my-luminance.yaml", protocol)
     text = "\n".join(["time / min;L / mcd/m2", *rows])
     (folder / "log.csv").write_text(f"{text}\n", encoding="utf-8")
     print(*text.splitlines()[:3], sep="\n", end="\n\n")
@@ -203,6 +212,7 @@ EXAMPLES = {
         (
             "fit luminance log.csv --scale-sigma '4 %' --require '20 mcd/m2 at 10 min' "
             "--colours K-W --excitation 'xenon, 1000 lx, 5 min'",
+            "run ./my-luminance.yaml --rig sim-luminance --yes",
         ),
         luminances,
     ),

@@ -134,6 +134,11 @@ QUOTES = (
         lambda printed: part(printed, "time / min"),
     ),
     Quote(f"{HOW_TO}/luminance.md", "manual_luminance", _console("fit luminance")),
+    Quote(
+        f"{HOW_TO}/luminance.md",
+        "manual_luminance",
+        _lines("luminance  ", "at least ", "run ./my-luminance.yaml"),
+    ),
     *(
         Quote(FLUORESCENT, "manual_matrices", _console(command))
         for command in ("material show", "material compare", "fit mixture")

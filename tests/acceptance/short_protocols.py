@@ -42,13 +42,16 @@ SHORTER: dict[str, dict[str, Any]] = {
         "leds": ["430 nm", "530 nm"], "samples": ["yellow"], "repetitions": 4,
     },
     "emission_spectrum": {"charge": "2 min", "times": ["2 s", "10 s"], "longest": "4 s"},
+    "camera_curves": {"repeats": 1, "through": True},
+    "colour_check": {"through": [14, 19], "repeats": 1},
     "decay": {"charge": "5 min", "first": "1 s", "for": "60 s"},
     "decay-eleven": {"charge": "5 min", "for": "60 s"},
     "excitation": {
         "at_most": 3, "refine": 1, "direct": ["10 s", "4 min"], "for": "40 s", "last_decay": "60 s",
-        "rest": {"at_least": "1 min", "check_every": "2 min", "at_most": "4 min"},
+        "rest": {"at_least": "1 min", "at_most": "4 min"},
     },
     "isotropy": {"charge": "2 min", "angles": [20, 60], "frames": 2},
+    "luminance": {"until": "3 min", "longest": "10 s"},
     "reflectance": {"charge": "2 min", "longest": "4 s", "repeats": 1},
     "saturation": {"charges": ["2 min", "10 min"], "for": "60 s"},
     "phosphor": {},
@@ -58,6 +61,8 @@ KNOWN = {"lvf": "lvf_calibration", "irradiance": "irradiance", "fade": "fade"}
 NEEDED = {
     "irradiance": ("lvf",),
     "emission_spectrum": ("lvf",),
+    "camera_curves": ("lvf",),
+    "colour_check": ("lvf",),
     "excitation": ("lvf", "irradiance", "fade"),
     "reflectance": ("lvf",),
 }
@@ -68,8 +73,15 @@ RIGS = {
     "direct_bispectral": "sim-fluorescent",
     "led_brightness": "sim-fluorescent",
     "led_fluorescence": "sim-fluorescent",
+    "luminance": "sim-luminance",
     "validate_illuminants": "sim-fluorescent",
+    "camera_curves": "sim-chart",
+    "colour_check": "sim-chart",
 }
+#: Sensors on which a ColorChecker is found; all others are smaller.
+SMALL = {"width": 96, "height": 64}
+CHART_SENSOR = {"width": 288, "height": 192}
+SENSORS = dict.fromkeys(("camera_curves", "colour_check"), CHART_SENSOR)
 
 
 @dataclass(frozen=True)
@@ -88,7 +100,7 @@ class Case:
         if name == "phosphor":
             protocol["parts"] = [part | SHORTER[part["protocol"]] for part in protocol["parts"]]
         rig = read_yaml(resources.find("config", "rig", RIGS.get(name, "sim-phosphor")))
-        rig["simulation"]["sensor"] = {"width": 96, "height": 64}
+        rig["simulation"]["sensor"] = SENSORS.get(name, SMALL)
         rig["optics"] |= {key: str(known[KNOWN[key]]) for key in NEEDED.get(name, ())}
         case = cls(folder, folder / "protocol.yaml", folder / "rig.yaml")
         case.protocol.write_text(yaml_text(protocol))

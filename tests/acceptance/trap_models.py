@@ -52,7 +52,7 @@ PROTOCOL: dict[str, Any] = {
     "refine": 1,
     "direct": ["3 s", "10 s", "1 min", "15 min"],
     "last_decay": "180 s",
-    "rest": {"at_least": "1 min", "check_every": "3 min", "at_most": "10 min"},
+    "rest": {"at_least": "1 min", "at_most": "10 min"},
 }
 #: Brightness of the room's lamp in multiples of the irradiance to which a material's rates belong.
 LAMP = 4.0

@@ -53,7 +53,11 @@ def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path
 def true_lvf_file(width: int = WIDTH, height: int = HEIGHT) -> LvfFile:
     """What a calibration without error would find of the shipped rig's LVF before the camera."""
     content = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
-    settings = LvfSettings.model_validate(content["simulation"]["lvf"])
+    return true_lvf_of(LvfSettings.model_validate(content["simulation"]["lvf"]), width, height)
+
+
+def true_lvf_of(settings: LvfSettings, width: int, height: int) -> LvfFile:
+    """What a calibration without error would find of an LVF before the camera."""
     x, y, wide, high = settings.before_camera.region
     strip = Strip(
         left=(x, y + high / 2), right=(x + wide, y + high / 2), height=high * (1 - 2 * MARGIN),

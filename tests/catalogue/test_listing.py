@@ -185,7 +185,7 @@ def test_what_was_just_written_is_read_again(tmp_path: Path) -> None:
     fit.write_text(fit.read_text().replace("0.05", "0.06"))
     os.utime(fit, ns=(status.st_atime_ns, status.st_mtime_ns))
     (again,) = list_runs(tmp_path, RunFilter())
-    assert [rate.value for rate in again.rates[""]] == [0.06]
+    assert [rate.value for rate in again.parameters[""].values()] == [0.06]
 
 
 def test_a_folder_that_cannot_be_written_is_listed_as_well(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from labrig.cli.progress import progress
 from labrig.cli.prompt import Terminal
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
+from labrig.found_calibrations import FoundCalibrations
 from labrig.record import read_run
 from labrig.recording import Recording
 from tests.quick_yaml import read_quickly, write_quickly
@@ -121,7 +122,14 @@ def recording(make_rig: Callable[..., Path], tmp_path: Path) -> Callable[..., Re
         content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
         path.write_text(write_quickly(content))
         protocol, rig = Pieces(protocol="pieces"), read_rig_file(path)
-        return Recording(protocol, rig, path, tmp_path / "runs", plan(protocol, rig, str(path)))
+        return Recording(
+            protocol,
+            rig,
+            path,
+            tmp_path / "runs",
+            plan(protocol, rig, str(path)),
+            FoundCalibrations(rig, {}, ()),
+        )
 
     return make
 

@@ -2,7 +2,8 @@
 
 It holds what a bench has after its first measurements: `runs/decay`, a run of the simulated bench
 with its results; `material.yaml` and `series.csv` from it; `frame.dng`, one of its frames; the
-calibrations `camera.yaml`, `lvf.yaml`, `fade.yaml`, `blank.yaml` and `irradiance.yaml`; and
+calibrations `camera.yaml`, `lvf.yaml`, `fade.yaml`, `blank.yaml`, `irradiance.yaml` and
+`reference.yaml`; and
 `paper.csv`, the re-radiation matrix of a fluorescent paper.
 """
 
@@ -16,6 +17,7 @@ from tests.material.reradiation.formats.matrices import two_dyes
 TESTS = Path(__file__).parents[1]
 RUN = TESTS / "recordings/decay/run"
 CALIBRATIONS = TESTS / "acceptance/recorded_phosphor"
+REFERENCE = Path(__file__).with_name("reference.yaml")
 
 
 def make_examples(folder: Path) -> None:
@@ -29,4 +31,5 @@ def make_examples(folder: Path) -> None:
     for path in CALIBRATIONS.glob("*/*.yaml"):
         if path.stem in {"camera", "lvf", "fade", "blank", "irradiance"}:
             shutil.copy(path, folder)
+    shutil.copy(REFERENCE, folder)
     write_reradiation(folder / "paper.csv", two_dyes(noise=0.0))

@@ -67,6 +67,26 @@ def test_errors_are_as_large_as_their_sigma(known: bool) -> None:
     assert_sigma_is_right(pulls)
 
 
+def test_errors_in_common_may_grow_towards_the_end() -> None:
+    """As that of a zero does: a luminance has the σ of its time, a slope what comes on top."""
+    value, sigma = logged(becquerel, 3)
+    common = np.where(LOGGED_S < 1000, 0.02, 0.05)
+    found = fit_luminance(LOGGED_S, value, sigma, scale_sigma=common)
+    constant = fit_luminance(LOGGED_S, value, sigma, scale_sigma=0.02)
+    early, late = found.at[1].luminance, found.at[3].luminance
+    assert early is not None
+    assert late is not None
+    assert early.sigma / early.value == pytest.approx(0.02, rel=0.1)
+    assert late.sigma / late.value == pytest.approx(0.05, rel=0.1)
+    assert found.slope is not None
+    assert constant.slope is not None
+    added = np.sqrt(0.05**2 - 0.02**2) / np.log(6)
+    assert found.slope.sigma == pytest.approx(np.hypot(constant.slope.sigma, added))
+    assert found.scale_sigma == 0.05
+    with pytest.raises(FitError, match="relative σ of the scale"):
+        fit_luminance(LOGGED_S, value, sigma, scale_sigma=np.nan)
+
+
 def test_readings_by_hand_do() -> None:
     """A few readings at round times: the parabola's own misfit is in σ."""
     t_s = 60.0 * np.array([1, 2, 5, 10, 15, 20, 30, 45, 60, 90, 120])

@@ -85,3 +85,19 @@ def test_a_malformed_file_is_one_line(tmp_path: Path, content: str, said: str) -
 def test_a_missing_file_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such camera file"):
         read_camera(tmp_path / "none.json")
+
+
+def test_sigma_of_curves_is_read_beside_them(tmp_path: Path) -> None:
+    path = tmp_path / "curves.csv"
+    head = "wavelength_nm,R,G,B,R_sigma,G_sigma,B_sigma"
+    rows = ["450,0.0,0.2,1.0,0.01,0.02,0.1", "550,0.4,2.0,0.3,0.02,0.1,0.02", "600,0.8,0.5,0,0,0,0"]
+    path.write_text("\n".join(["#Camera: Acme One", head, *rows]), encoding="utf-8")
+    camera = read_camera(path)
+    assert camera.name == "Acme One"
+    assert camera.sigma is not None
+    np.testing.assert_allclose(camera.sigma[0], [0.005, 0.01, 0.05])
+    assert read_camera(NAME).sigma is None
+    path.write_text(path.read_text().replace("0.1,0.02\n", "-0.1,0.02\n"), encoding="utf-8")
+    with pytest.raises(UsageError, match="some σ is negative") as caught:
+        read_camera(path)
+    assert "\n" not in str(caught.value)

@@ -7,6 +7,7 @@ from hypothesis import given, strategies as st
 from labrig.protocols.steps.charge_times import (
     CANDIDATES,
     FloatArray,
+    fades_below_s,
     most_informative_s,
     still_grows,
 )
@@ -62,3 +63,16 @@ def test_dim_places_have_no_say() -> None:
     noise = np.random.default_rng(1).normal(0.0, 0.1, (len(DOUBLED_S), 1, 20))
     both = np.concatenate([noise, bright], axis=2)
     assert most_informative_s(list(DOUBLED_S), both) == most_informative_s(list(DOUBLED_S), bright)
+
+
+def test_a_rest_lasts_until_the_slowest_patch_has_faded() -> None:
+    t_s, rates_per_s = np.array([0.0, 60.0, 80.0]), np.array([0.1, 0.02])
+    glows = 100 * np.exp(-np.outer(t_s, rates_per_s))
+    assert fades_below_s(glows, 20.0, 0.02) == pytest.approx(np.log(50) / 0.02 - 80)
+    # What is dark already, or noise about nothing, is not waited for.
+    assert fades_below_s(glows[:, :1], 20.0, 0.02) == 0
+    assert fades_below_s(np.array([[100.0], [0.1], [-0.1]]), 20.0, 0.02) == 0
+
+
+def test_a_glow_that_does_not_fade_is_waited_for_as_long_as_may_be() -> None:
+    assert fades_below_s(np.array([[100.0], [50.0], [50.0]]), 20.0, 0.02) == np.inf

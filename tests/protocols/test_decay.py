@@ -15,7 +15,12 @@ from tests.conftest import Ended
 from tests.quick_yaml import write_quickly
 
 GOLDEN = Path(__file__).parent / "decay.timeline.txt"
-PROTOCOLS = sorted(path.stem for path in resources.folder("protocols").glob("*.yaml"))
+#: A calibration's check is planned where there is a calibration: `tests.test_found_calibrations`.
+PROTOCOLS = sorted(
+    path.stem
+    for path in resources.folder("protocols").glob("*.yaml")
+    if path.stem != "calibration_check"
+)
 
 
 def planned(protocol: Path, rig: str | Path = "sim") -> Plan:
@@ -34,6 +39,8 @@ def test_every_shipped_protocol_can_be_planned(name: str, rig: str) -> None:
     # One rig has a bank of LEDs.
     lit = ("led_", "direct_", "angular_", "validate_")
     rig = "sim-fluorescent" if name.startswith(lit) else rig
+    # And one the reading of a luxmeter.
+    rig = "sim-luminance" if name == "luminance" else rig
     laid_out = planned(resources.find("protocols", "protocol", name), rig)
     assert laid_out.duration_s > 1800
     # A direct measurement reads spectra only.

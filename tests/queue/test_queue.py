@@ -7,13 +7,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Plan, RigFile, RunObserver, read_protocol
+from labrig.acquire import Plan, RigFile, RunObserver, read_protocol, read_rig_file
 from labrig.clock import Clock, Interrupted
 from labrig.errors import DataError, UsageError
 from labrig.execution import Watch
+from labrig.fit import fit_power_law
 from labrig.queue import (
     Queue,
     QueuedRun,
@@ -25,8 +27,11 @@ from labrig.queue import (
 )
 from labrig.record import FrameRecord, read_run
 from labrig.recording import Recording
+from labrig.results import Measured
 from tests.acquire.fakes import Watching
+from tests.analyse.luminance_bench import luminance_after, write_rig
 from tests.conftest import Ended
+from tests.quick_yaml import write_quickly
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
@@ -84,7 +89,7 @@ def test_a_sweep_is_added_run_and_shown(
     rig, protocol = make_rig(), make_protocol()
     added = labrig(
         "queue", "add", protocol, "--rig", rig, "--set", "sample.name=paint", *queue,
-        "--sweep", "charge=[16 min, 30 min]",
+        "--sweep", "charge=[16 min, 20 min, 30 min]",
     )  # fmt: skip
     assert added.code == 0, added.err
     ended = labrig("queue", "run", *queue, *runs)
@@ -93,7 +98,7 @@ def test_a_sweep_is_added_run_and_shown(
     page = ended.run_folder.read_text("utf-8")
     with (tmp_path / "night-results/results.csv").open(encoding="utf-8", newline="") as table:
         rows = list(csv.DictReader(table))
-    assert [row["charge"] for row in rows] == ["16 min", "30 min"]
+    assert [row["charge"] for row in rows] == ["16 min", "20 min", "30 min"]
     for row in rows:
         k, sigma = float(row["k_r_per_s"]), float(row["k_r_sigma_per_s"])
         assert abs(k - 0.0322) < 4 * sigma
@@ -101,12 +106,46 @@ def test_a_sweep_is_added_run_and_shown(
     made: list[Any] = [
         read_protocol(tmp_path / "runs" / row["run"] / "protocol.yaml") for row in rows
     ]
-    assert [(one.charge, one.sample.name) for one in made] == [(960, "paint"), (1800, "paint")]
+    assert [(one.charge, one.sample.name) for one in made] == [
+        (960, "paint"), (1200, "paint"), (1800, "paint")
+    ]  # fmt: skip
     assert (tmp_path / "night-results/figures").is_dir()
+    assert "Amplitudes at lamp off, state 1, over charge" in page
     listed = json.loads(labrig("queue", "list", *queue, *runs, "--json").out)
-    assert [entry["status"] for entry in listed] == ["processed"] * 2
+    assert [entry["status"] for entry in listed] == ["processed"] * 3
     assert listed[1]["states"][0]["k_r_per_s"] == float(rows[1]["k_r_per_s"])
     assert labrig("queue", "run", *queue, *runs).err == "", "nothing is left to do"
+
+
+@pytest.mark.campaign
+def test_luminances_after_several_excitations_are_a_charge_dose_curve(
+    labrig: Labrig, tmp_path: Path
+) -> None:
+    protocol = tmp_path / "short.yaml"
+    keys = {"protocol": "luminance", "excitation": {"preset": "own", "time": "1 min"},
+            "until": "3 min", "longest": "10 s"}  # fmt: skip
+    protocol.write_text(write_quickly(keys))
+    rig = write_rig(tmp_path, sample=[{"material": "power-law", "brightness": 12.0}])
+    queue, runs = ("--queue", tmp_path / "dose.yaml"), ("--runs", tmp_path / "runs")
+    sweep = ("--sweep", "excitation.time=[4 s, 8 s, 16 s]")
+    assert labrig("queue", "add", protocol, "--rig", rig, *queue, *sweep).code == 0
+    ended = labrig("queue", "run", *queue, *runs, "--yes")
+    assert ended.code == 0, ended.err
+    assert "Luminances at times after lamp off over excitation.time" in ended.run_folder.read_text()
+    with (tmp_path / "dose-results/results.csv").open(encoding="utf-8", newline="") as table:
+        rows = [row for row in csv.DictReader(table) if row["t_s"] == "120.0"]
+    assert [row["excitation.time"] for row in rows] == ["4 s", "8 s", "16 s"]
+    light = [
+        Measured(float(row["luminance_mcd_per_m2"]), 0.01 * float(row["luminance_mcd_per_m2"]))
+        for row in rows
+    ]
+    slope = fit_power_law([4.0, 8.0, 16.0], light).exponent
+    room = [
+        luminance_after(read_rig_file(rig), [120.0], 300.0, 600.0, lit_s)[0, 0]
+        for lit_s in (4.0, 8.0, 16.0)
+    ]
+    true = np.log(room[2] / room[0]) / np.log(4)
+    assert slope.value == pytest.approx(true, abs=0.01)
 
 
 def test_what_was_interrupted_goes_on(make_rig: Make, make_protocol: Make, tmp_path: Path) -> None:

@@ -5,15 +5,17 @@ with them. A grey card under a known lamp, seen through the same filter, measure
 every position and channel, and constrains the model's errors.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.analyse.emission_spectrum.comparison import combined
+from labrig.analyse.emission_spectrum.comparison import CombinedFrame, combined
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, slice_strip, strip_regions
 from labrig.analyse.strip_model import (
+    ANY_BRIGHTNESS,
+    LAMP_SIGMA,
     channel_cameras,
     channel_positions,
     conditioned_on_white,
@@ -82,7 +84,7 @@ class ForwardModel:
 
 
 def forward_models(
-    part: Part, frame: SeriesFrame
+    part: Part, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
 ) -> tuple[dict[StripPatch, ForwardModel], tuple[str, ...]]:
     """Return the model of every patch of a part, and the reasons for patches without one.
 
@@ -92,6 +94,8 @@ def forward_models(
         Part of a run.
     frame
         Any of the part's frames, for the camera's pixels and channels.
+    patches
+        The patches; None for those of the part's protocol.
 
     Raises
     ------
@@ -109,9 +113,10 @@ def forward_models(
         )
     layout, strip, lvf = sensor_layout(frame), calibration.before_camera, calibration.lvf
     camera, holder = _camera_curves(part, layout.channels), _holder_regions(strip)
-    patches, refused = slice_strip(strip_regions(part), strip, layout)
+    asked = strip_regions(part) if patches is None else patches
+    sliced, refused = slice_strip(asked, strip, layout)
     models = {}
-    for patch, slices in patches.items():
+    for patch, slices in sliced.items():
         # At either end pixels reach a little beyond the places that were calibrated.
         seen = channel_positions(layout, strip, slices)
         places = np.clip(seen, lvf.position[0], lvf.position[-1])
@@ -139,7 +144,7 @@ def with_white_reference(
             "the white picture says nothing, since the spectra of lamp and grey card are not "
             "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
         )
-    light = _card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
+    light = card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
     white_frame = combined(white)
     if not white_frame.shows_light:
         return model, ("the white picture is dark or clips throughout; the spectrum does without",)
@@ -147,6 +152,30 @@ def with_white_reference(
         model.system, white_frame.value, white_frame.sigma, light, model.expected_of(light)
     )
     return replace(model, system=system, white_reference=True), ()
+
+
+def card_misfit(model: ForwardModel, frame: CombinedFrame, light: Spectrum) -> float:
+    """Return the root of χ² per degree of freedom of a frame of a known light, its brightness free.
+
+    Parameters
+    ----------
+    model
+        Model that is not conditioned on the frame.
+    frame
+        Frame of the light.
+    light
+        Spectrum of the light.
+    """
+    used = np.isfinite(frame.value) & np.isfinite(frame.sigma)
+    expected = model.expected_of(light)[used]
+    gain = float(expected @ frame.value[used] / (expected @ expected))
+    residual = frame.value[used] / gain - expected
+    modes = model.system.modes[:, used] @ light.at(model.system.knots_nm)
+    modes = np.vstack([modes, ANY_BRIGHTNESS * expected])
+    noise = np.square(frame.sigma[used] / gain) + np.square(LAMP_SIGMA * expected)
+    covariance = modes.T @ modes + np.diag(noise)
+    chi2 = float(residual @ np.linalg.solve(covariance, residual))
+    return float(np.sqrt(chi2 / max(int(used.sum()) - 1, 1)))
 
 
 def _holder_regions(strip: Strip) -> dict[str, Region]:
@@ -162,7 +191,7 @@ def _holder_regions(strip: Strip) -> dict[str, Region]:
     }
 
 
-def _card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
+def card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
     """Return the spectrum of the lamp's light that the card reflects."""
     inside = (card.wavelength_nm > lamp.wavelength_nm[0]) & (
         card.wavelength_nm < lamp.wavelength_nm[-1]

@@ -117,6 +117,7 @@ def _without_unseen(
     camera = replace(
         bank.camera,
         sensitivity=bank.camera.sensitivity[:, kept],
+        sigma=None if bank.camera.sigma is None else bank.camera.sigma[:, kept],
         channels=tuple(bank.camera.channels[n] for n in kept),
     )
     selected = {

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from labrig.analyse.colours import camera_matrix
 from labrig.analyse.inputs import Part
 from labrig.analyse.led_fluorescence.card_checks import UsableLights, usable_lights
 from labrig.analyse.led_fluorescence.lit_patches import LitPatch, lit_patches
@@ -14,7 +15,6 @@ from labrig.analyse.led_fluorescence.warnings import left_warnings
 from labrig.analyse.validate_illuminants.chart import ODD_CHART, chart_values
 from labrig.analyse.validate_illuminants.colours import (
     ColourScale,
-    camera_matrix,
     chart_matrix,
     difference,
 )

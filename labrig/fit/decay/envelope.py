@@ -85,6 +85,11 @@ class Envelope:
     shapes: FloatArray
 
     @property
+    def is_given(self) -> bool:
+        """Whether the flicker was given, and not told by the scatter."""
+        return len(self.likely_flickers) == 1
+
+    @property
     def typical_flicker(self) -> float:
         """Median of the likely values of ρ; unlike the likeliest one it is not zero by chance."""
         return float(np.median(self.likely_flickers))
@@ -252,7 +257,7 @@ def _flicker(
 
 
 def _likely_flickers(brightness2: FloatArray, along2: FloatArray, free: FloatArray) -> FloatArray:
-    """Return values of ρ at equal steps of its posterior probability.
+    """Return root mean squares of ρ in ranges of equal posterior probability.
 
     The arguments are named as in `_flicker`.
     """
@@ -262,6 +267,8 @@ def _likely_flickers(brightness2: FloatArray, along2: FloatArray, free: FloatArr
     log_likelihood = -0.5 * (np.log(variance) @ free + (along2 / variance).sum(axis=1))
     density = np.exp(log_likelihood - log_likelihood.max()) / (1 + (rho / USUAL_FLICKER) ** 2)
     fraction = density * np.gradient(rho)
-    below = np.cumsum(fraction) - fraction / 2
-    steps = (np.arange(LIKELY_FLICKERS) + 0.5) / LIKELY_FLICKERS
-    return np.interp(steps, below / fraction.sum(), rho)
+    # Their mean square is that of ρ, with the tail that middles of the ranges would leave out.
+    below = np.cumsum(fraction) / fraction.sum()
+    square_below = np.cumsum(fraction * rho**2) / fraction.sum()
+    squares = np.interp(np.linspace(0, 1, LIKELY_FLICKERS + 1), below, square_below)
+    return np.asarray(np.sqrt(LIKELY_FLICKERS * np.maximum(np.diff(squares), 0.0)))

@@ -91,6 +91,11 @@ class Evidence:
         return sorted(laws, key=lambda law: law.bic)
 
     @property
+    def chosen_law(self) -> LawFit | None:
+        """Law that describes the decay; None if exponentials or a spectrum of rates do."""
+        return next((each for each in self.laws if each.fitted.name == self.law), None)
+
+    @property
     def exponentials_bic(self) -> float:
         """Lowest BIC of the numbers of states that were tried."""
         return min(candidate.bic for candidate in self.candidates)
@@ -207,7 +212,7 @@ def warnings_about(
     # The order of residuals that are far smaller than any scatter is that of rounding errors.
     is_rounding = bool(closer) and evidence.scatter is not None
     if not is_rounding and evidence.law != RATE_SPECTRUM:
-        law = next((each for each in evidence.laws if each.fitted.name == evidence.law), None)
+        law = evidence.chosen_law
         judged = (data, joint) if law is None else (evidence.data, law.joint)
         number = "1 exponential does" if fit.n_states == 1 else f"{fit.n_states} exponentials do"
         warnings += misfit_warnings(
@@ -221,14 +226,14 @@ def warnings_about(
     if not free_offset:
         warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
-    if not is_exponential:
-        return warnings
     if correlation is not None and correlation.is_told and not is_rounding:
         warnings.append(
             f"the noise of neighbouring values correlates (by {correlation.correlation:.1f}): σ "
             f"allows for it, it is up to {correlation.factor:.2g} times as large as for "
             "independent values; find what drifts, or measure a steady light beside the sample"
         )
+    if not is_exponential:
+        return warnings
     if hidden is not None and hidden.is_likely:
         warnings.append(_hidden_warning(hidden, fit.n_states, series.span_s))
     low, high = series.log_rate_bounds

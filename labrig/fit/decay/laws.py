@@ -6,7 +6,7 @@ this (Nalbach et al., section 4.4).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
 #: Sizes of the grid of rates and shapes, and smallest shape above 0 on it.
 GRID = (20, 8)
 LEAST_SHAPE = 0.05
+#: Place of the rate among the parameters.
+LAW_RATE = slice(1, 2)
 MAX_ITERATIONS = 60
 TOLERANCE = 1e-5
 #: Gain in χ² of a step at which a fit ends: laws are compared by differences of several.
@@ -40,12 +42,26 @@ class LawFit:
     ----------
     joint
         Joint fit; its `shape` is [amplitude, log rate, shape of the law].
+    covariance
+        Covariance of all fitted parameters, shape (p, p).
     fitted
         The law in the user's units.
     """
 
     joint: JointFit
+    covariance: FloatArray
     fitted: FittedLaw
+
+    def signal(self, series: DecaySeries) -> FloatArray:
+        """Return the law without offset, shape (n, C)."""
+        h, _ = _shape(series, DECAY_LAWS[self.fitted.name])(self.joint.shape)
+        return np.multiply.outer(h, self.joint.weights)
+
+    def with_added(self, covariance: FloatArray, series: DecaySeries) -> "LawFit":
+        """Return the fit with a covariance (p, p) added to its own."""
+        total = self.covariance + covariance
+        fitted = replace(self.fitted, covariance=_own_covariance(self.joint, series, total))
+        return replace(self, covariance=total, fitted=fitted)
 
 
 def fit_law(
@@ -105,7 +121,7 @@ def fit_law(
     covariance = np.mean(covariances, axis=0)
     with np.errstate(invalid="ignore"):
         covariance = np.where(covariance == 0, 0.0, student * covariance)
-    return LawFit(fit, _in_units(law, fit, series, covariance, likelihood.bic(fit)))
+    return LawFit(fit, covariance, _in_units(law, fit, series, covariance, likelihood.bic(fit)))
 
 
 def fit_laws(
@@ -167,24 +183,28 @@ def _in_units(
 ) -> FittedLaw:
     """Return the fit in the user's units; `covariance` is that of all fitted parameters."""
     amplitude, log_rate, shape = (float(value) for value in fit.shape)
-    rate_per_s = float(np.exp(log_rate)) / series.span_s
-    units = np.array([series.peak, rate_per_s, 1.0, series.peak])
-    own = np.zeros((4, 4))
-    fitted = np.flatnonzero(series.fitted_offsets == fit.brightest)
-    rows = [0, 1, 2, *(3 + len(fit.weights) - 1 + fitted)]
-    own[: len(rows), : len(rows)] = covariance[np.ix_(rows, rows)]
     n_values = series.n_values + len(series.offset_prior)
     dof = n_values - fit.n_parameters - (len(series.repeats) - 1)
-    with np.errstate(invalid="ignore"):
-        in_units = np.where(own == 0, 0.0, own * np.outer(units, units))
     return FittedLaw(
         name=law.name,
         amplitude=amplitude * series.peak,
-        rate_per_s=rate_per_s,
+        rate_per_s=float(np.exp(log_rate)) / series.span_s,
         shape=shape,
-        covariance=in_units,
+        covariance=_own_covariance(fit, series, covariance),
         channel_weights=tuple(fit.weights.tolist()),
         offsets=tuple((fit.offsets * series.peak).tolist()),
         reduced_chi2=fit.chi2 / dof if dof > 0 else float("nan"),
         bic=fit_bic,
     )
+
+
+def _own_covariance(fit: JointFit, series: DecaySeries, covariance: FloatArray) -> FloatArray:
+    """Return the covariance of amplitude, rate, shape and offset in the user's units, (4, 4)."""
+    rate_per_s = float(np.exp(fit.shape[1])) / series.span_s
+    units = np.array([series.peak, rate_per_s, 1.0, series.peak])
+    own = np.zeros((4, 4))
+    fitted = np.flatnonzero(series.fitted_offsets == fit.brightest)
+    rows = [0, 1, 2, *(3 + len(fit.weights) - 1 + fitted)]
+    own[: len(rows), : len(rows)] = covariance[np.ix_(rows, rows)]
+    with np.errstate(invalid="ignore"):
+        return np.where(own == 0, 0.0, own * np.outer(units, units))

@@ -13,24 +13,25 @@ al., Statistical Science 14, 1999). A threshold would do worse: some dozens of v
 memory of one or two frames, which makes σ too small by a third, and σ would jump at it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solveh_banded
 
 from labrig.fit.decay.diagnostics import BELOW_ZERO_SIGMAS
 from labrig.fit.decay.envelope import USUAL_FLICKER, Envelope
-from labrig.fit.decay.states import StatesFit
+from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 
-#: Correlations of neighbouring values that are weighed, and the prior probability of none.
+#: Correlations of neighbouring values that are weighed, and the prior probability of none: who
+#: gives the flicker has measured it, and would have seen how a steady light drifts.
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92, 0.97])
-PRIOR_OF_NONE = 0.85
-#: Factor by which the data raise the odds of a correlation from which a warning says so: strong
-#: evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of 720 series with independent
-#: noise one has it.
-TOLD = 10.0
+PRIOR_OF_NONE, PRIOR_OF_NONE_IF_GIVEN = 0.85, 0.95
+#: Factor by which the data raise the odds of a correlation from which a warning says so:
+#: substantial evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of 1200 series
+#: with independent noise five have it.
+TOLD = 5.0
 #: Factors c that are weighed: noise that correlates is larger than its scatter about a curve that
 #: follows it. The flicker c ρ has half a Student's t distribution with 3 degrees of freedom before
 #: the data; half a Cauchy distribution, as for the independent flicker, has no mean square.
@@ -41,35 +42,8 @@ FEWEST_VALUES, MOST_VALUES = 12, 100
 TINY, INDEPENDENT = 1e-300, 1e-6
 #: Least estimate: a flicker that drifts with the decay leaves hardly any scatter about a curve.
 LEAST_FLICKER = 0.002
-#: Mean fraction of the variance from which flicker matters.
+#: Mean part of the variance from which it matters whether it correlates.
 LEAST_FRACTION = 0.1
-
-
-@dataclass(frozen=True)
-class NoiseCorrelation:
-    """Correlation of neighbouring values' noise, and what it does to the fit.
-
-    Attributes
-    ----------
-    evidence
-        Factor by which the data raise the odds that there is one.
-    correlation
-        Its mean if there is one.
-    covariance
-        Its part in the covariance of the fitted parameters, shape (p, p).
-    factor
-        Factor by which the largest σ of a rate grows with it.
-    """
-
-    evidence: float
-    correlation: float
-    covariance: FloatArray
-    factor: float
-
-    @property
-    def is_told(self) -> bool:
-        """Whether the data tell it clearly."""
-        return self.evidence > TOLD
 
 
 @dataclass(frozen=True)
@@ -111,8 +85,94 @@ def _correlated(phi: float, columns: FloatArray) -> FloatArray:
     return np.asarray(solveh_banded(bands / (1 - phi**2), columns))
 
 
+@dataclass(frozen=True)
+class _Deviations:
+    """What a fit leaves of the frames, and what it takes, along the signal; in units of the noise.
+
+    `brightness` is the signal of the frames that have one, `deviation` what lies above the fit,
+    shape (n,), and `jacobian` that of all fitted parameters, shape (n, p).
+    """
+
+    brightness: FloatArray
+    deviation: FloatArray
+    jacobian: FloatArray
+
+    @classmethod
+    def of(cls, data: WhitenedSeries, joint: JointFit, signal: FloatArray) -> "_Deviations":
+        """Return them for a fit and its signal without offsets (n, C)."""
+        along = np.einsum("fcd,fd->fc", data.matrices, signal)
+        brightness = np.linalg.norm(along, axis=1)
+        used = brightness > 0
+        direction = along[used] / brightness[used, None]
+        solution, shape = joint.least_squares, data.values.shape
+        residuals = solution.residuals[: data.values.size].reshape(shape)[used]
+        jacobian = solution.jacobian[: data.values.size].reshape(*shape, -1)[used]
+        return cls(
+            brightness[used],
+            -np.einsum("fc,fc->f", direction, residuals),
+            np.einsum("fc,fcp->fp", direction, jacobian),
+        )
+
+    def parts(self, data: WhitenedSeries, noise: Envelope, n_parameters: int) -> dict[str, _Part]:
+        """Return what of the noise may correlate, by its name, about a fit of `n_parameters`."""
+        n_free = max(len(self.deviation) - n_parameters, 1)
+        # The scatter of a σ that is too large is smaller, which is no correlation.
+        scatter = float(np.linalg.norm(self.deviation)) / n_free**0.5
+        return _parts(data, noise, self.brightness, scatter)
+
+
+@dataclass(frozen=True)
+class NoiseCorrelation:
+    """Correlation of neighbouring values' noise.
+
+    Attributes
+    ----------
+    evidence
+        Factor by which the data raise the odds that there is one.
+    correlation
+        Its mean if there is one.
+    factor
+        Factor by which the largest σ of a rate of the fit that told it grows with it.
+    noise
+        The flicker.
+    probabilities
+        Probability of all φ > 0 and c, shape (k − 1, m), by the name of the part of the noise
+        that may correlate.
+    """
+
+    evidence: float
+    correlation: float
+    factor: float
+    noise: Envelope
+    probabilities: dict[str, FloatArray]
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the data tell it clearly."""
+        return self.evidence > TOLD
+
+    def added_covariance(
+        self, data: WhitenedSeries, joint: JointFit, signal: FloatArray
+    ) -> FloatArray:
+        """Return its part in the covariance (p, p) of a fit's parameters.
+
+        The first arguments of `noise_correlation`, of any fit to the series.
+        """
+        solution = joint.least_squares
+        if not np.isfinite(solution.covariance).all():
+            return np.zeros_like(solution.covariance)
+        left = _Deviations.of(data, joint, signal)
+        effect = solution.covariance @ left.jacobian.T
+        parts = left.parts(data, self.noise, len(_kept(data, joint)))
+        total = sum(float(each.sum()) for each in self.probabilities.values())
+        added = -total * (effect @ effect.T)
+        for name, probabilities in self.probabilities.items():
+            added += parts[name].effect_of(effect, probabilities)
+        return _positive(added, solution.covariance)
+
+
 def noise_correlation(
-    data: WhitenedSeries, fit: StatesFit, noise: Envelope
+    data: WhitenedSeries, joint: JointFit, signal: FloatArray, rates: slice, noise: Envelope
 ) -> NoiseCorrelation | None:
     """Return how the noise correlates; None if no part of it may, or if too few values tell.
 
@@ -120,61 +180,69 @@ def noise_correlation(
     ----------
     data
         The series in units of its noise, flicker included.
-    fit
-        The fit at its minimum.
+    joint
+        A fit that describes it, at its minimum.
+    signal
+        What it says without offsets, shape (n, C).
+    rates
+        Places of its rates among the parameters.
     noise
         The flicker.
     """
-    series, solution = data.series, fit.joint.least_squares
-    along = np.einsum("fcd,fd->fc", data.matrices, fit.signal(series))
-    brightness = np.linalg.norm(along, axis=1)
-    used = brightness > 0
+    solution = joint.least_squares
     if not (
         np.isfinite(solution.covariance).all()
-        and used.sum() >= FEWEST_VALUES
-        and len(series.repeats) == 1
+        and len(data.series.repeats) == 1
         and noise.shapes.size
     ):
         return None
-    direction = along[used] / brightness[used, None]
-    deviation, jacobian = _along(direction, used, data, fit)
-    kept = [*range(len(fit.joint.shape)), *range(-len(series.fitted_offsets), 0)]
-    design = jacobian[:, kept]
+    left = _Deviations.of(data, joint, signal)
+    if len(left.deviation) < FEWEST_VALUES:
+        return None
+    kept = _kept(data, joint)
     n_values = data.values.size
     known = np.column_stack([solution.jacobian[n_values:, kept], -solution.residuals[n_values:]])
-    # The scatter of a σ that is too large is smaller, which is no correlation.
-    scatter = float(np.linalg.norm(deviation)) / max(len(deviation) - design.shape[1], 1) ** 0.5
-    parts = _parts(data, noise, brightness[used], scatter)
-    if not parts or _ends_below_zero(deviation + brightness[used]):
+    parts = {
+        name: part
+        for name, part in left.parts(data, noise, len(kept)).items()
+        if (part.size**2).mean() > LEAST_FRACTION
+    }
+    if not parts or _ends_below_zero(left.deviation + left.brightness):
         return None
     told = slice(0, MOST_VALUES)
-    n_told = len(deviation[told])
-    log_posteriors = [
-        _log_restricted_likelihoods(deviation[told], design[told], known, part.covariances(n_told))
+    deviation, design = left.deviation[told], left.jacobian[told][:, kept]
+    log_posteriors = {
+        name: _log_restricted_likelihoods(
+            deviation, design, known, part.covariances(len(deviation))
+        )
         + part.log_prior
-        for part in parts
-    ]
-    priors = _priors()
-    highest = max(float(each.max()) for each in log_posteriors)
-    posteriors = [np.exp(each - highest) * priors[:, None] for each in log_posteriors]
-    total = sum(float(each.sum()) for each in posteriors)
-    none = sum(float(each[0].sum()) for each in posteriors) / total
-    correlated = [each[1:] / total for each in posteriors]
-    effect = solution.covariance @ jacobian.T
-    added = -(1 - none) * (effect @ effect.T)
-    for weights, part in zip(correlated, parts, strict=True):
-        added += part.effect_of(effect, weights)
-    covariance = _positive(added, solution.covariance)
-    rates = slice(0, 2 * fit.n_free, 2)
-    independent = np.diag(solution.covariance)[rates]
-    ratio = np.diag(covariance)[rates] / np.where(independent > 0, independent, np.inf)
-    return NoiseCorrelation(
+        for name, part in parts.items()
+    }
+    priors = _priors(noise)
+    highest = max(float(each.max()) for each in log_posteriors.values())
+    posteriors = {
+        name: np.exp(each - highest) * priors[:, None] for name, each in log_posteriors.items()
+    }
+    total = sum(float(each.sum()) for each in posteriors.values())
+    none = sum(float(each[0].sum()) for each in posteriors.values()) / total
+    correlated = {name: each[1:] / total for name, each in posteriors.items()}
+    found = NoiseCorrelation(
         evidence=(1 - none) / max(none, TINY) * priors[0] / (1 - priors[0]),
-        correlation=sum(float(each.sum(axis=1) @ CORRELATIONS[1:]) for each in correlated)
+        correlation=sum(float(each.sum(axis=1) @ CORRELATIONS[1:]) for each in correlated.values())
         / max(1 - none, TINY),
-        covariance=covariance,
-        factor=float(np.sqrt(1 + ratio.max(initial=0.0))),
+        factor=1.0,
+        noise=noise,
+        probabilities=correlated,
     )
+    independent = np.diag(solution.covariance)[rates]
+    added = np.diag(found.added_covariance(data, joint, signal))[rates]
+    ratio = added / np.where(independent > 0, independent, np.inf)
+    return replace(found, factor=float(np.sqrt(1 + ratio.max(initial=0.0))))
+
+
+def _kept(data: WhitenedSeries, joint: JointFit) -> list[int]:
+    """Return the places of the parameters that the signal along time depends on."""
+    return [*range(len(joint.shape)), *range(-len(data.series.fitted_offsets), 0)]
 
 
 def _ends_below_zero(signal: FloatArray) -> bool:
@@ -185,39 +253,25 @@ def _ends_below_zero(signal: FloatArray) -> bool:
 
 def _parts(
     data: WhitenedSeries, noise: Envelope, brightness: FloatArray, scatter: float
-) -> list[_Part]:
-    """Return what may correlate: the flicker, and all noise of a single channel.
+) -> dict[str, _Part]:
+    """Return what may correlate, by name: the flicker, and all noise of a single channel.
 
     Photons and readings of a camera's channels are independent from frame to frame; what the σ of
     another instrument's table consists of is not known.
     """
-    parts = []
-    if len(noise.likely_flickers) > 1 or noise.flicker > 0:
+    parts = {}
+    if not noise.is_given or noise.flicker > 0:
         # A flicker that was given may be wrong, too: a scatter that is small is no long memory.
         flicker = max(noise.flicker, LEAST_FLICKER)
         size = flicker * brightness
         log_prior = -2 * np.log1p((flicker * FACTORS / USUAL_FLICKER) ** 2)
-        if (size**2).mean() > LEAST_FRACTION:
-            rest = np.maximum(1 - (noise.flicker * brightness) ** 2, 0.0)
-            parts.append(_Part(size, rest, FACTORS, log_prior - np.log(len(FACTORS))))
+        rest = np.maximum(1 - (noise.flicker * brightness) ** 2, 0.0)
+        parts["flicker"] = _Part(size, rest, FACTORS, log_prior - np.log(len(FACTORS)))
     if len(data.series.channels) == 1:
         ones = np.ones_like(brightness)
         log_prior = np.full_like(FACTORS, -np.log(len(FACTORS)))
-        parts.append(_Part(ones, np.zeros_like(ones), scatter * FACTORS, log_prior))
+        parts["all"] = _Part(ones, np.zeros_like(ones), scatter * FACTORS, log_prior)
     return parts
-
-
-def _along(
-    direction: FloatArray, used: FloatArray, data: WhitenedSeries, fit: StatesFit
-) -> tuple[FloatArray, FloatArray]:
-    """Return deviations from the fit (n,) and its Jacobian (n, p) along the signal (n, C)."""
-    solution, shape = fit.joint.least_squares, data.values.shape
-    residuals = solution.residuals[: data.values.size].reshape(shape)[used]
-    jacobian = solution.jacobian[: data.values.size].reshape(*shape, -1)[used]
-    return (
-        -np.einsum("fc,fc->f", direction, residuals),
-        np.einsum("fc,fcp->fp", direction, jacobian),
-    )
 
 
 def _log_restricted_likelihoods(
@@ -247,7 +301,8 @@ def _positive(added: FloatArray, covariance: FloatArray) -> FloatArray:
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 
 
-def _priors() -> FloatArray:
+def _priors(noise: Envelope) -> FloatArray:
     """Return the prior probability of every correlation, shape (k,)."""
     reference = (1 - CORRELATIONS[1:] ** 2) ** -0.5
-    return np.append(PRIOR_OF_NONE, (1 - PRIOR_OF_NONE) * reference / reference.sum())
+    of_none = PRIOR_OF_NONE_IF_GIVEN if noise.is_given else PRIOR_OF_NONE
+    return np.append(of_none, (1 - of_none) * reference / reference.sum())

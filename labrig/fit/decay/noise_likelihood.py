@@ -46,8 +46,7 @@ class NoiseLikelihood:
         signal = np.einsum("fcd,fd->fc", data.matrices, noise.signal)
         brightness2 = np.einsum("fc,fc->f", signal, signal)
         length = np.sqrt(np.where(brightness2 > 0, brightness2, 1.0))
-        is_given = len(noise.likely_flickers) == 1
-        flickers = noise.likely_flickers if is_given else FLICKERS
+        flickers = noise.likely_flickers if noise.is_given else FLICKERS
         added = flickers**2 - noise.typical_flicker**2
         return cls(
             data,

@@ -9,8 +9,9 @@ from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.further_state import hidden_state
 from labrig.fit.decay.joint import weight_sigma
+from labrig.fit.decay.laws import LAW_RATE, LawFit
 from labrig.fit.decay.misfit_covariance import with_misfit
-from labrig.fit.decay.noise_correlation import noise_correlation
+from labrig.fit.decay.noise_correlation import NoiseCorrelation, noise_correlation
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
 from labrig.fit.least_squares import FloatArray
@@ -42,10 +43,15 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     series, joint = data.series, fit.joint
     fitted_covariance = _fitted_covariance(fit, data, evidence)
     hidden = hidden_state(data, fit)
-    correlation = noise_correlation(data, fit, evidence.noise)
-    for source in (hidden, correlation):
-        if source is not None:
-            fitted_covariance = fitted_covariance + source.covariance
+    if hidden is not None:
+        fitted_covariance = fitted_covariance + hidden.covariance
+    correlation = _noise_correlation(data, fit, evidence)
+    laws = evidence.laws
+    if correlation is not None:
+        fitted_covariance = fitted_covariance + correlation.added_covariance(
+            data, joint, fit.signal(series)
+        )
+        laws = tuple(_with_correlation(each, evidence.data, correlation) for each in laws)
     covariance, log_rate_covariance = _covariances(fit, data, fitted_covariance)
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates[order]) / series.span_s
@@ -101,7 +107,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         ),
         candidates=evidence.candidates,
         law=evidence.law,
-        laws=tuple(each.fitted for each in evidence.laws),
+        laws=tuple(each.fitted for each in laws),
         rate_spectrum=evidence.rate_spectrum,
         measured_until_s=float((series.t + series.exposure + series.start).max()) * series.span_s,
         scatter=evidence.scatter,
@@ -110,6 +116,23 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
     )
+
+
+def _noise_correlation(
+    data: WhitenedSeries, fit: StatesFit, evidence: Evidence
+) -> NoiseCorrelation | None:
+    """Return how the noise correlates about the law that describes the decay."""
+    law, noise = evidence.chosen_law, evidence.noise
+    if law is None:
+        rates = slice(0, 2 * fit.n_free, 2)
+        return noise_correlation(data, fit.joint, fit.signal(data.series), rates, noise)
+    signal = law.signal(evidence.data.series)
+    return noise_correlation(evidence.data, law.joint, signal, LAW_RATE, noise)
+
+
+def _with_correlation(law: LawFit, data: WhitenedSeries, correlation: NoiseCorrelation) -> LawFit:
+    added = correlation.added_covariance(data, law.joint, law.signal(data.series))
+    return law.with_added(added, data.series)
 
 
 def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> FloatArray:
@@ -125,7 +148,7 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
         return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter.dof)
     if evidence.sigma_scale is not None:
         return covariance * student_factor(evidence.sigma_scale.dof)
-    if len(noise.likely_flickers) == 1:
+    if noise.is_given:
         return covariance
     matrices = noise_matrices(data, fit.signal(data.series), noise)
     return np.asarray(np.mean(fit.covariances_under(data.series, matrices), axis=0))
@@ -140,7 +163,7 @@ def student_factor(dof: float) -> float:
 
 def noise_matrices(data: WhitenedSeries, signal: FloatArray, noise: Envelope) -> list[FloatArray]:
     """Return the whitening matrices (n, C, C) of every likely flicker of a signal (n, C)."""
-    if len(noise.likely_flickers) == 1:
+    if noise.is_given:
         return [data.matrices]
     return [whitening_matrices(data.series, signal, rho) for rho in noise.likely_flickers]
 

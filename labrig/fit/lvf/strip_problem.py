@@ -136,7 +136,7 @@ class StripProblem:
             for change in changes.T
         ]
         sensitivity = np.maximum(self._camera.sensitivity + np.stack(columns, axis=1), 0.0)
-        return replace(self._camera, sensitivity=sensitivity / sensitivity.max())
+        return replace(self._camera, sensitivity=sensitivity / sensitivity.max(), sigma=None)
 
     def misfit(self, solution: StripSolution) -> FloatArray:
         """Return the root mean square of the residuals in σ, shape (p,)."""

@@ -8,7 +8,13 @@ from labrig.fit.spectrum.fit import (
 from labrig.fit.spectrum.line import LineFit, fit_line
 from labrig.fit.spectrum.lines import DECISIVE
 from labrig.fit.spectrum.minimum import nonnegative_minimum
-from labrig.fit.spectrum.system import CurveError, SpectralSystem, curve_modes, system_through_lvf
+from labrig.fit.spectrum.system import (
+    CurveError,
+    SpectralSystem,
+    curve_modes,
+    smooth_modes,
+    system_through_lvf,
+)
 
 __all__ = [
     "DECISIVE",
@@ -21,5 +27,6 @@ __all__ = [
     "fit_line",
     "fit_spectrum",
     "nonnegative_minimum",
+    "smooth_modes",
     "system_through_lvf",
 ]

@@ -124,21 +124,21 @@ def curve_modes(
     """
     if error is None:
         return []
-    smooth_modes = _smooth_modes(nodes, error.correlation_nm)
+    smooth = smooth_modes(nodes, error.correlation_nm)
     modes = []
     for channel, peak in enumerate(peaks):
         for fraction, shape in (
             (error.relative, sensitivity[:, channel]),
             (error.added * peak, 1.0),
         ):
-            for mode in smooth_modes if fraction > 0 else ():
+            for mode in smooth if fraction > 0 else ():
                 change = np.zeros_like(sensitivity)
                 change[:, channel] = fraction * mode * shape
                 modes.append(change)
     return modes
 
 
-def _smooth_modes(nodes: FloatArray, distance_nm: float) -> FloatArray:
+def smooth_modes(nodes: FloatArray, distance_nm: float) -> FloatArray:
     """Return (k, q) functions whose sum with unit normal weights is smooth and of unit variance."""
     knots = np.arange(nodes[0] - distance_nm, nodes[-1] + 2 * distance_nm, distance_nm)
     fraction = np.clip(hat_functions(knots, nodes), 0.0, 1.0)

@@ -42,7 +42,7 @@ QUICK: dict[str, Any] = {
     "direct": ["10 s", "1 min", "4 min"],
     "for": "40 s",
     "last_decay": "60 s",
-    "rest": {"at_least": "1 min", "check_every": "3 min", "at_most": "4 min"},
+    "rest": {"at_least": "1 min", "at_most": "4 min"},
 }
 TILT = np.radians(1.0)
 
@@ -150,7 +150,7 @@ def test_charges_double_until_the_glow_stops_growing(run: Path) -> None:
         for action in attempt.actions
         if action.is_manual
     ]
-    assert asked == [("strip-meter", "lvf on sample"), ("direct-meter", "lvf away")]
+    assert asked == [("dark", "lvf on sample"), ("direct-meter", "lvf away")]
 
 
 @pytest.mark.campaign

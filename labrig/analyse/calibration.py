@@ -1,0 +1,83 @@
+"""Analysis of a bench's calibration, to the results of its parts and the bench they belong to."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+
+from labrig.analyse.chain import analyse_parts
+from labrig.analyse.inputs import Part
+from labrig.analyse.strip import StripFrames
+from labrig.calibration import CardPicture, LvfFile, ReferenceFile
+from labrig.fit.lvf import place_means
+from labrig.optics import SLICES
+from labrig.protocols.lvf_calibration import LvfFrames, filter_unit
+from labrig.reduce import read_exif, read_raw, strip_profile_in
+from labrig.results import CalibrationResult
+
+
+def analyse(part: Part) -> CalibrationResult:
+    """Analyse every part, and describe the bench by which later runs know it again.
+
+    Raises
+    ------
+    DataError, FitError
+        No part can be analysed.
+    """
+    analysed = analyse_parts(part)
+    return CalibrationResult(
+        parts=analysed.results,
+        failed=analysed.failed,
+        reference=_reference(part, analysed.inputs.lvf, set(analysed.results)),
+        warnings=analysed.warnings,
+    )
+
+
+def _reference(part: Part, lvf: LvfFile | None, measured: set[str]) -> ReferenceFile:
+    run, optics = part.run, part.rig.optics
+    frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
+    temperatures_c = [reading.temperature_c for reading in run.temperatures()]
+    pictures = [
+        _picture(_part_of(part, link.name, link.protocol), lvf)
+        for link in part.protocol.chain()
+        if link.protocol.protocol == "lvf_calibration" and link.name in measured and lvf is not None
+    ]
+    last_s = round(max(frame.end_time for frame in frames))
+    return ReferenceFile(
+        bench=part.rig.name,
+        camera=run.camera_identity or None,
+        lens=read_exif(frames[-1].path.read_bytes()).lens,
+        lamp=optics.lamp,
+        grey_card=optics.grey_card,
+        curves=optics.camera,
+        made=datetime.fromtimestamp(last_s, UTC),
+        temperature_c=round(float(np.mean(temperatures_c)), 2) if temperatures_c else None,
+        picture=pictures[-1] if pictures else None,
+        source=f"{', '.join(sorted(measured))}, measured with labrig",
+        run=run.folder.resolve().name,
+    )
+
+
+def _part_of(part: Part, name: str, protocol: object) -> Part:
+    return Part(part.run.part(name), protocol, part.rig, part.overrides, part.inputs)
+
+
+def _picture(part: Part, lvf: LvfFile) -> CardPicture:
+    """Return the picture of the card through the filter, without a colour filter."""
+    frames = StripFrames(part)
+    shown = frames.of(LvfFrames.FILTER, filter_unit(None))
+    strip = frames.find_strip(LvfFrames.FILTER, filter_unit(None)).strip(rising=True)
+    assert lvf.before_camera is not None, "a calibration tells where the filter was"
+    rising = lvf.before_camera.rising
+    middles = (np.arange(SLICES) + 0.5) / SLICES
+    nm = lvf.wavelengths.map().wavelength_nm(middles if rising else 1 - middles)
+    raw = read_raw(shown[0].path)
+    rates = np.maximum(place_means(strip_profile_in(shown, strip), SLICES), 0.0)
+    return CardPicture(
+        strip=strip.model_copy(update={"rising": rising}),
+        iso=part.protocol.camera.iso,
+        f_number=part.protocol.camera.f_number,
+        channels=raw.channels,
+        wavelength_nm=tuple(np.round(nm, 3).tolist()),
+        rate_dn_per_s=tuple(tuple(row) for row in rates.tolist()),
+        width=frames.size[0],
+    )

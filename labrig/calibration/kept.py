@@ -1,0 +1,104 @@
+"""Calibrations that are kept beside the runs: a folder `calibrations`, one folder in it a run."""
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from labrig.calibration.kind import kinds
+from labrig.calibration.reference_file import REFERENCE_KIND, ReferenceFile
+
+#: Name of the folder beside the run folders.
+FOLDER = "calibrations"
+
+
+@dataclass(frozen=True)
+class KeptCalibration:
+    """The files of one calibration run.
+
+    Attributes
+    ----------
+    folder
+        Folder of the files.
+    reference
+        The bench to which they belong.
+    """
+
+    folder: Path
+    reference: ReferenceFile
+
+    def files(self) -> dict[str, Path]:
+        """Return the calibration files that there are, by the names of their kinds."""
+        paths = {kind.name: self.folder / kind.file_name for kind in kinds()}
+        return {name: path for name, path in paths.items() if path.is_file()}
+
+
+def keep_calibration(run: Path) -> Path | None:
+    """Copy the calibration files of a run's result to the calibrations beside the run.
+
+    Parameters
+    ----------
+    run
+        Folder of a run that has a result.
+
+    Returns
+    -------
+    Path or None
+        Folder of the copies, of the run's name; None if the result is not that of a calibration.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import keep_calibration
+    >>> keep_calibration(Path("runs/decay")) is None
+    True
+    """
+    result = run / "result"
+    if not (result / REFERENCE_KIND.file_name).is_file():
+        return None
+    folder = run.resolve().parent / FOLDER / run.resolve().name
+    new = folder.with_name(f"{folder.name}.part")
+    shutil.rmtree(new, ignore_errors=True)
+    new.mkdir(parents=True)
+    for kind in kinds():
+        for path in [*result.glob(kind.file_name), *result.glob(f"*/{kind.file_name}")]:
+            shutil.copyfile(path, new / kind.file_name)
+    if folder.exists():
+        shutil.rmtree(folder)
+    new.rename(folder)
+    return folder
+
+
+def kept_calibrations(runs: Path) -> list[KeptCalibration]:
+    """Return the calibrations that are kept beside the runs in a folder, the newest first.
+
+    Parameters
+    ----------
+    runs
+        Folder of the run folders.
+
+    Returns
+    -------
+    list of KeptCalibration
+        The calibrations of all benches; empty if there are none.
+
+    Raises
+    ------
+    UsageError
+        A reference file is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import kept_calibrations
+    >>> kept_calibrations(Path("runs"))
+    []
+    """
+    kept = (KeptCalibration(path.parent, REFERENCE_KIND.read(path)) for path in _references(runs))
+    return sorted(kept, key=lambda each: (each.reference.made, each.folder.name), reverse=True)
+
+
+def _references(runs: Path) -> Iterator[Path]:
+    for path in sorted((runs / FOLDER).glob(f"*/{REFERENCE_KIND.file_name}")):
+        if path.parent.suffix != ".part":
+            yield path

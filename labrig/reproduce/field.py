@@ -1,0 +1,261 @@
+"""Levels of a material's states on many samples, stepped through a changing light.
+
+A sample is a texel, a point of a mesh or a particle; the field knows neither where it is nor how it
+moves, only which light falls on it (Nalbach et al., section 5). A step takes the same time however
+long the history.
+"""
+
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from labrig.errors import UsageError
+from labrig.material import steady_concentration
+from labrig.reproduce.field_parameters import FieldParameters
+from labrig.reproduce.order_table import LONGEST, order_table
+
+Float32Array = NDArray[np.float32]
+
+IMPROPER = "expected an irradiance that is finite and ≥ 0, got a negative or infinite one, or NaN"
+#: Samples below which several threads cost more than they gain.
+FEW_SAMPLES = 65_536
+
+
+class Field:
+    """Levels of a material's states on samples.
+
+    Parameters
+    ----------
+    parameters
+        Parameters of the states, one for all samples or textures.
+    n_samples
+        Number of samples; that of the textures if there are any.
+    levels
+        Levels to begin with, 0 to 1, broadcast to (states, samples). Without it all are empty.
+
+    Raises
+    ------
+    UsageError
+        Sizes disagree, levels lie outside of 0 to 1, or the extra `labrig[render]` is missing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.material import read_material
+    >>> from labrig.reproduce import Field, FieldParameters
+    >>> field = Field(FieldParameters.of(read_material("blue-paint")), n_samples=2)
+    >>> light = np.zeros((8, 2))
+    >>> light[0] = [20.0, 0.0]  # violet light on the first sample only
+    >>> field.step(light, duration_s=60.0)
+    >>> field.levels.round(2).tolist()
+    [[0.9100000262260437, 0.0]]
+    """
+
+    def __init__(
+        self, parameters: FieldParameters, n_samples: int | None = None, levels: ArrayLike = 0.0
+    ) -> None:
+        _kernels()
+        of_textures = parameters.n_samples
+        if n_samples is None:
+            n_samples = of_textures
+        if n_samples is None or n_samples < 1 or of_textures not in (None, n_samples):
+            raise UsageError(
+                f"expected the number of samples{f', {of_textures}' if of_textures else ''}, got "
+                f"{n_samples}"
+            )
+        self._parameters = parameters
+        given = np.asarray(levels, dtype=np.float32)
+        if not (given.min(initial=0.0) >= 0 and given.max(initial=0.0) <= 1):
+            raise UsageError(f"expected levels from 0 to 1, got {given.min():g} to {given.max():g}")
+        try:
+            self._levels = np.array(np.broadcast_to(given, (parameters.n_states, n_samples)))
+        except ValueError:
+            raise UsageError(
+                f"expected levels of shape ({parameters.n_states}, {n_samples}), got {given.shape}"
+            ) from None
+        self._k_e = np.atleast_3d(parameters.k_e_per_s)
+        self._k_r = np.atleast_2d(parameters.k_r_per_s.T).T
+
+    @property
+    def parameters(self) -> FieldParameters:
+        """Parameters of the states."""
+        return self._parameters
+
+    @property
+    def levels(self) -> Float32Array:
+        """Levels from 0 to 1, shape (states, samples); a view that steps change."""
+        return self._levels
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return int(self._levels.shape[1])
+
+    def step(
+        self,
+        irradiance: ArrayLike,
+        duration_s: float,
+        method: Literal["exact", "euler"] = "exact",
+    ) -> None:
+        """Advance all levels through a time of constant light.
+
+        Parameters
+        ----------
+        irradiance
+            Irradiance in the bands of the excitation rates and in their unit, ≥ 0: shape (bands,)
+            or (bands, samples).
+        duration_s
+            Length of the step in seconds, ≥ 0.
+        method
+            `exact`: the solution of the rate equation, of orders above 1 from a table of it;
+            `euler`: one step of Euler's method, which Nalbach et al. take, for comparison.
+
+        Raises
+        ------
+        UsageError
+            The shape does not fit, the duration is negative or not finite, or the light excites a
+            sample at a rate that is; levels are then not to be used.
+        """
+        if not 0 <= duration_s < math.inf:
+            raise UsageError(f"expected a duration ≥ 0 s, got {duration_s:g} s")
+        light, base = self._light(irradiance)
+        if method == "euler":
+            self._euler(light, base, duration_s)
+            return
+        kernels, order = _kernels(), self._parameters.order
+        if (order == 1).all():
+            self._in_threads(
+                kernels.step_first_order,
+                self._levels, light, self._k_e, base, self._k_r, np.float32(duration_s),
+            )  # fmt: skip
+            return
+        for state in range(self._parameters.n_states):
+            if order[state] == 1:
+                own = slice(state, state + 1)
+                self._in_threads(
+                    kernels.step_first_order,
+                    self._levels[own], light, self._k_e[own], base[own], self._k_r[own],
+                    np.float32(duration_s),
+                )  # fmt: skip
+                continue
+            phase = float(self._k_r[state, 0]) * duration_s
+            parts = max(1, math.ceil(phase / LONGEST))
+            table = order_table(float(order[state]), phase / parts)
+            for _ in range(parts):
+                self._in_threads(
+                    kernels.step_by_table,
+                    self._levels, light, self._k_e, base, state, table.values,
+                    np.float32(table.compression), np.float32(table.root),
+                    np.float32(duration_s / parts),
+                )  # fmt: skip
+
+    def charge_to_equilibrium(self, irradiance: ArrayLike) -> None:
+        """Set all levels to those that the light reaches after a long time.
+
+        Parameters
+        ----------
+        irradiance
+            Irradiance as `step` takes it; without light a level is 0.
+        """
+        light, base = self._light(irradiance)
+        for state, order in enumerate(self._parameters.order):
+            kappa = self._kappa(light, base, state).astype(np.float64)
+            is_lit = kappa > 0
+            k_r = np.broadcast_to(self._k_r[state], kappa.shape)
+            self._levels[state] = 0.0
+            self._levels[state, is_lit] = steady_concentration(kappa[is_lit], k_r[is_lit], order)
+
+    def radiance(self, irradiance: ArrayLike | None = None) -> Float32Array:
+        """Return the radiance that the samples emit, Σ Λ (k rᵇ + η κ r).
+
+        Parameters
+        ----------
+        irradiance
+            Irradiance as `step` takes it, for the captures that emit at once; None is darkness.
+
+        Returns
+        -------
+        ndarray
+            Radiance in the bands and the unit of the re-radiation Λ, shape (bands, samples).
+        """
+        parameters = self._parameters
+        emitted = np.empty_like(self._levels)
+        for state, order in enumerate(parameters.order):
+            emitted[state] = self._k_r[state] * self._levels[state] ** np.float32(order)
+            if irradiance is not None and parameters.prompt:
+                kappa = self._kappa(*self._light(irradiance), state)
+                emitted[state] += np.float32(parameters.prompt) * kappa * self._levels[state]
+        if parameters.reradiation.ndim == 2:
+            return np.asarray(parameters.reradiation.T @ emitted)
+        return np.asarray(np.einsum("ibs,is->bs", parameters.reradiation, emitted))
+
+    def _light(self, irradiance: ArrayLike) -> tuple[Float32Array, Float32Array]:
+        """Return the light (bands, samples) that varies, and κ of that which does not (states,)."""
+        light = np.ascontiguousarray(irradiance, dtype=np.float32)
+        bands, parameters = self._parameters.n_bands, self._parameters
+        if light.shape not in ((bands,), (bands, self.n_samples)):
+            raise UsageError(
+                f"expected an irradiance of shape ({bands},) or ({bands}, {self.n_samples}), got "
+                f"{light.shape}"
+            )
+        if light.ndim == 2:
+            return light, np.zeros(parameters.n_states, np.float32)
+        if parameters.k_e_per_s.ndim == 2:
+            if not (np.isfinite(light).all() and light.min(initial=0.0) >= 0):
+                raise UsageError(IMPROPER)
+            none = np.zeros((0, self.n_samples), np.float32)
+            return none, np.asarray(parameters.k_e_per_s @ light)
+        return np.repeat(light[:, None], self.n_samples, axis=1), np.zeros(
+            parameters.n_states, np.float32
+        )
+
+    def _kappa(self, light: Float32Array, base: Float32Array, state: int) -> Float32Array:
+        """Return κ of a state in 1/s (samples,)."""
+        kappa = np.empty(self.n_samples, np.float32)
+        self._in_threads(_kernels().excitation, kappa, light, self._k_e, base, state)
+        return kappa
+
+    def _euler(self, light: Float32Array, base: Float32Array, duration_s: float) -> None:
+        duration = np.float32(duration_s)
+        for state, order in enumerate(self._parameters.order):
+            level, kappa = self._levels[state], self._kappa(light, base, state)
+            emitted = self._k_r[state] * level ** np.float32(order)
+            level += duration * ((1 - level) * kappa - emitted)
+
+    def _in_threads(self, kernel: Callable[..., bool], *arguments: Any) -> None:
+        """Run a kernel on parts of the samples at the same time."""
+        threads = 1 if self.n_samples < FEW_SAMPLES else _n_threads()
+        edges = np.linspace(0, self.n_samples, threads + 1).astype(int)
+        parts = list(pairwise(edges.tolist()))
+        run = map if len(parts) == 1 else _pool().map
+        if not all(list(run(lambda part: kernel(*arguments, *part), parts))):
+            raise UsageError(IMPROPER)
+
+
+def _kernels() -> Any:
+    """Return the compiled functions; compiled, or read from the cache, when first used."""
+    try:
+        from labrig.reproduce import kernels
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"labrig.reproduce needs an extra ({error.name} is missing): pip install "
+            "'labrig[render]'"
+        ) from None
+    return kernels
+
+
+@cache
+def _n_threads() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(_n_threads(), thread_name_prefix="field")

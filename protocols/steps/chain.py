@@ -1,0 +1,126 @@
+"""A chain of protocols in one run, whose parts are written as in files of their own."""
+
+from collections.abc import Mapping, Sequence, Set
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from labrig import plugins
+from labrig.acquire import PartUnit, ProtocolModel, RigFile
+from labrig.record import unit_within
+from labrig.region import Region
+from labrig.yaml_file import validate
+
+from .scenes import Arrangement, Scene, ScenesProtocol
+
+
+class Chain(ProtocolModel):
+    """Base of protocols that run others one after the other.
+
+    Attributes
+    ----------
+    parts
+        Protocols of the chain in order, each written as in a file of its own. `part: NAME` is a
+        name for one of two parts with the same protocol.
+    """
+
+    parts: tuple[dict[str, Any], ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _parts_that_can_be_told_apart(self) -> Self:
+        names = [part.name for part in self.chain()]
+        if len(set(names)) < len(names):
+            raise ValueError(
+                f"expected every protocol once in 'parts', got {', '.join(names)}; give one of "
+                "two alike a 'part:' name of its own"
+            )
+        return self
+
+    def chain(self) -> tuple["Part", ...]:
+        """Return the protocols in order, each with the sample of the chain."""
+        return tuple(Part.read(self._part_keys(content), self.protocol) for content in self.parts)
+
+    def _part_keys(self, content: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the keys of a part with those that it takes from the chain."""
+        sample = self.sample.model_dump(exclude_none=True)
+        return {"sample": sample} | dict(content)
+
+    def patches_of(self, unit: str) -> Mapping[str, Region]:
+        """Return the patches of the part to which the unit belongs."""
+        for part in self.chain():
+            if (part_unit := unit_within(part.name, unit)) is not None:
+                return part.protocol.patches_of(part_unit)
+        return super().patches_of(unit)
+
+    def apertures(self) -> Set[float]:
+        """Return the f-numbers of the frames of all parts."""
+        return {f_number for part in self.chain() for f_number in part.protocol.apertures()}
+
+    def named_regions(self) -> Mapping[str, Region]:
+        """Return the regions of all parts; those that a part shares with the chain stand once."""
+        regions = dict(super().named_regions())
+        for part in self.chain():
+            for key, region in part.protocol.named_regions().items():
+                if regions.get(key) != region:
+                    regions[f"{part.name}: {key}"] = region
+        return regions
+
+    def suited_to(self, rig: RigFile) -> Self:
+        """Return the chain with the keys filled in that its parts leave to the rig file."""
+        parts = [
+            content | _changed(part.protocol, part.protocol.suited_to(rig))
+            for content, part in zip(self.parts, self.chain(), strict=True)
+        ]
+        return self.model_copy(update={"parts": tuple(parts)})
+
+    def unmeasured(self, rig: RigFile) -> Sequence[str]:
+        """Return the protocols that neither the rig file names nor an earlier part measures."""
+        measured: set[str] = set()
+        missing: list[str] = []
+        for part in self.chain():
+            missing += [name for name in part.protocol.unmeasured(rig) if name not in measured]
+            measured.add(part.protocol.protocol)
+        return missing
+
+
+class Part:
+    """One protocol of a chain."""
+
+    def __init__(self, name: str, protocol: ProtocolModel) -> None:
+        self.name = name
+        self.protocol = protocol
+
+    @classmethod
+    def read(cls, content: Mapping[str, Any], chain: str) -> Self:
+        """Return a protocol that is written as in a file of its own.
+
+        Raises
+        ------
+        ValueError
+            The content names no protocol that may be a part of the chain of that name.
+        """
+        keys = dict(content)
+        kind = keys.get("protocol")
+        if not isinstance(kind, str) or kind in (chain, "phosphor", "calibration"):
+            raise ValueError("expected 'protocol: NAME' in every part, the name of another one")
+        name = str(keys.pop("part", kind))
+        model = plugins.load(plugins.PROTOCOLS, kind, f"part {name}")
+        return cls(name, validate(keys, model, f"part {name}"))
+
+    def scenes(self) -> list[Scene]:
+        """Return the part's scenes, with the names that its units have in the chain.
+
+        Of a protocol without scenes all units want the bench as usual, and put it back.
+        """
+        protocol = self.protocol
+        if isinstance(protocol, ScenesProtocol):
+            return [scene.of_part(self.name) for scene in protocol.scenes()]
+        why = f"{self.name} begins so"
+        return [Scene(PartUnit(self.name, unit), Arrangement(), why) for unit in protocol.units()]
+
+
+def _changed(original: ProtocolModel, completed: ProtocolModel) -> dict[str, Any]:
+    """Return the keys, as written in YAML, that differ between two protocols."""
+    original_keys = original.model_dump(mode="json", by_alias=True)
+    completed_keys = completed.model_dump(mode="json", by_alias=True)
+    return {key: value for key, value in completed_keys.items() if value != original_keys[key]}

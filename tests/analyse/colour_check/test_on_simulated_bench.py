@@ -1,0 +1,126 @@
+"""A ColorChecker on the simulated bench: right colours, and what a wrong bench does to them."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from labrig.analyse import Part
+from labrig.analyse.camera_curves import analyse as analyse_curves
+from labrig.analyse.colour_check import analyse
+from labrig.errors import UsageError
+from labrig.optics import CURVES_FILE
+from labrig.process import process_and_report
+from labrig.results import ColourCheckResult
+from tests.analyse.chart_bench import record, with_camera
+from tests.analyse.recorded import part_of
+from tests.results.made import assert_read_back
+
+#: Green and white.
+SOME: dict[str, Any] = {"protocol": "colour_check", "through": [14, 19], "repeats": 1}
+#: The curves that labrig has of the room's camera, as its own body calls itself.
+CAMERA = "canon_eos_5d_mark_ii"
+
+
+def with_known_camera(rig: dict[str, Any]) -> None:
+    rig["optics"]["camera"] = CAMERA
+
+
+def with_optics(part: Part, **changed: str) -> Part:
+    """The run as if its rig file had named other curves."""
+    optics = part.rig.optics.model_copy(update=changed)
+    return replace(part, rig=part.rig.model_copy(update={"optics": optics}))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("check"), SOME, with_known_camera)
+
+
+def test_colours_are_right_end_to_end(run: Path) -> None:
+    done = process_and_report(run)
+    result = done.result
+    assert isinstance(result, ColourCheckResult)
+    assert result.plain.mean < 2
+    assert result.through is not None
+    assert result.through.mean < 0.5
+    assert (result.plain.verdict, result.through.verdict) == ("agrees", "agrees")
+    assert result.plain.mean < result.plain.allowed < 8
+    assert result.through.allowed < 3
+    assert not result.warnings
+    seen = [name for name, patch in result.patches.items() if patch.through is not None]
+    assert seen == ["green", "white"]
+    assert_read_back(result)
+    rows = (done.report.parent / "colour_check.csv").read_text().splitlines()
+    assert len(rows) == 1 + 24
+    page = done.report.read_text()
+    assert page.count("background:#") >= 24 + 24 + 2
+
+
+@pytest.mark.parametrize(
+    ("optics", "said"),
+    [
+        ({"lamp": "xenon_projector"}, "the lamp's spectrum or the camera's curves are not"),
+        pytest.param(
+            {"camera": "nikon_d850"},
+            "or the filter is not as it was calibrated",
+            marks=pytest.mark.campaign,
+        ),
+    ],
+)
+def test_a_wrong_lamp_and_wrong_curves_are_noticed(
+    run: Path, optics: dict[str, str], said: str
+) -> None:
+    result = analyse(with_optics(part_of(run), **optics))
+    assert any(said in line for line in result.warnings)
+    assert result.card_misfit is not None
+    assert result.card_misfit > 2
+
+
+def test_a_filter_that_was_moved_is_noticed(run: Path) -> None:
+    part = part_of(run)
+    calibrated = part.inputs.lvf
+    assert calibrated is not None
+    strip = calibrated.before_camera
+    assert strip is not None
+    # The filter now lies to the right of where its calibration had it.
+    ends = {side: (x - 0.02, y) for side, (x, y) in (("left", strip.left), ("right", strip.right))}
+    before = calibrated.model_copy(update={"before_camera": strip.model_copy(update=ends)})
+    result = analyse(replace(part, inputs=replace(part.inputs, lvf=before)))
+    assert result.filter_shift_nm == pytest.approx(0.02 / 0.88 * 324, abs=2)
+    assert any("nm along itself from where it was calibrated" in line for line in result.warnings)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", ["nikon_d850", "sony_ilce_7m3", "fujifilm_x_t3"])
+def test_curves_told_by_the_chart_make_right_colours(tmp_path: Path, name: str) -> None:
+    asked = {"protocol": "camera_curves", "leave_out": [name], "through": True}
+    curves = record(tmp_path / "curves", asked, with_camera(name))
+    result = analyse_curves(part_of(curves))
+    result.write_files(tmp_path)
+
+    def with_curves(rig: dict[str, Any]) -> None:
+        with_camera(name)(rig)
+        rig["optics"]["camera"] = str(tmp_path / CURVES_FILE)
+
+    every = SOME | {"through": "all"}
+    checked = analyse(part_of(record(tmp_path / "check", every, with_curves)))
+    assert checked.plain.mean < 2
+    assert checked.through is not None
+    assert checked.through.mean < 2
+    assert not checked.warnings
+    pulls = (checked.card_balance - 1) / checked.card_balance_sigma
+    assert np.abs(pulls).max() < 3
+
+
+def test_what_is_missing_is_one_clear_line(run: Path) -> None:
+    part = part_of(run)
+    without = replace(part, inputs=replace(part.inputs, lvf=None))
+    with pytest.raises(UsageError, match="needs the LVF calibrated before the camera") as caught:
+        analyse(without)
+    assert "\n" not in str(caught.value)
+    protocol = part.protocol.model_copy(update={"chart": "grey_card_18"})
+    with pytest.raises(UsageError, match="expected the 24 patches of a ColorChecker, a column"):
+        analyse(replace(part, protocol=protocol))
