@@ -295,9 +295,6 @@ class Simulation(Part):
     inter_reflection
         Irradiance of every surface by the light of all surfaces in the frame, over that of a dome
         as bright as they are on average, for example `2 %`.
-    grey_card_fluorescence
-        Fraction of the violet light below 440 nm that the grey card re-radiates about 490 nm, as
-        the brightener in paper does, for example `5 %`.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
