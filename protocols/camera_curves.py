@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from labrig.acquire import ProtocolModel, RigFile, Unit
+from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
 from labrig.quantity import Count, DurationS
 
@@ -25,7 +25,14 @@ from .steps.chart_scenes import (
     WHY_THROUGH,
     ChartUnit,
 )
-from .steps.scenes import Arrangement, Bracketing, PutBackUnit, SceneUnit, StillDarkUnit
+from .steps.scenes import (
+    Arrangement,
+    Bracketing,
+    Scene,
+    ScenesProtocol,
+    SceneUnit,
+    StillDarkUnit,
+)
 
 
 class CurvesFrames(StrEnum):
@@ -41,7 +48,7 @@ _CARD, _CHART = Arrangement("grey card"), Arrangement("colorchecker")
 _THROUGH = Arrangement("grey card", "before camera")
 
 
-class CameraCurves(ProtocolModel):
+class CameraCurves(ScenesProtocol):
     """Settings of a measurement of camera curves; `camera_curves.yaml` is the commented example.
 
     Attributes
@@ -85,17 +92,15 @@ class CameraCurves(ProtocolModel):
         missing = self.through and rig.optics.named(LVF_KIND) is None
         return [LVF_KIND.protocol] if missing else []
 
-    def units(self) -> Sequence[Unit]:
-        """Return darks, card and chart, the card through the filter, the bench put back."""
-        units: list[SceneUnit] = []
-
-        def add(kind: type[SceneUnit], name: str, role: str, wanted: Arrangement, why: str) -> None:
-            before = units[-1].wanted if units else Arrangement()
-            units.append(kind(self.bracketing, name, role, wanted, before, why))
-
+    def scenes(self) -> Sequence[Scene]:
+        """Return darks, card and chart, and the card through the filter."""
+        scenes = [Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True)]
         if self.card:
-            add(SceneUnit, CARD_UNIT, CurvesFrames.CARD, _CARD, WHY_CARD)
-        add(ChartUnit, CHART_UNIT, CurvesFrames.CHART, _CHART, WHY_CHART)
+            card = SceneUnit(self.bracketing, CARD_UNIT, CurvesFrames.CARD)
+            scenes.append(Scene(card, _CARD, WHY_CARD))
+        chart = ChartUnit(self.bracketing, CHART_UNIT, CurvesFrames.CHART)
+        scenes.append(Scene(chart, _CHART, WHY_CHART))
         if self.through:
-            add(StripUnit, THROUGH_UNIT, CurvesFrames.THROUGH, _THROUGH, WHY_THROUGH)
-        return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
+            through = StripUnit(self.bracketing, THROUGH_UNIT, CurvesFrames.THROUGH)
+            scenes.append(Scene(through, _THROUGH, WHY_THROUGH))
+        return scenes

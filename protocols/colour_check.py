@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import ProtocolModel, RigFile, Unit
+from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
 from labrig.optics import CHART_PATCHES
 from labrig.quantity import Count, DurationS
@@ -27,7 +27,14 @@ from .steps.chart_scenes import (
     WHY_THROUGH,
     ChartUnit,
 )
-from .steps.scenes import Arrangement, Bracketing, PutBackUnit, SceneUnit, StillDarkUnit
+from .steps.scenes import (
+    Arrangement,
+    Bracketing,
+    Scene,
+    ScenesProtocol,
+    SceneUnit,
+    StillDarkUnit,
+)
 
 
 class CheckFrames(StrEnum):
@@ -50,7 +57,7 @@ def patch_unit(number: int) -> str:
     return f"patch-{number:02d}"
 
 
-class ColourCheck(ProtocolModel):
+class ColourCheck(ScenesProtocol):
     """Settings of a check of colours; `colour_check.yaml` is the commented example.
 
     Attributes
@@ -99,21 +106,19 @@ class ColourCheck(ProtocolModel):
         missing = bool(self.numbers) and rig.optics.named(LVF_KIND) is None
         return [LVF_KIND.protocol] if missing else []
 
-    def units(self) -> Sequence[Unit]:
-        """Return darks, card and chart plainly, card and patches through the LVF, put back."""
-        scenes: list[tuple[type[SceneUnit], str, str, Arrangement, str]] = [
-            (SceneUnit, CARD_UNIT, CheckFrames.CARD, _CARD, WHY_CARD),
-            (ChartUnit, CHART_UNIT, CheckFrames.CHART, _CHART, WHY_CHART),
+    def scenes(self) -> Sequence[Scene]:
+        """Return darks, card and chart plainly, card and patches through the LVF."""
+        taken = self.bracketing
+        scenes = [
+            Scene(StillDarkUnit(taken), Arrangement(), "", is_dark=True),
+            Scene(SceneUnit(taken, CARD_UNIT, CheckFrames.CARD), _CARD, WHY_CARD),
+            Scene(ChartUnit(taken, CHART_UNIT, CheckFrames.CHART), _CHART, WHY_CHART),
         ]
         if self.numbers:
-            scenes.append(
-                (StripUnit, THROUGH_UNIT, CheckFrames.CARD_THROUGH, _CARD_THROUGH, WHY_THROUGH)
-            )
+            card = StripUnit(taken, THROUGH_UNIT, CheckFrames.CARD_THROUGH)
+            scenes.append(Scene(card, _CARD_THROUGH, WHY_THROUGH))
         for number in self.numbers:
-            wanted = replace(_CARD_THROUGH, stage="colorchecker", chart_patch=number)
-            scenes.append((SceneUnit, patch_unit(number), CheckFrames.PATCH, wanted, WHY_PATCH))
-        units: list[SceneUnit] = []
-        for kind, name, role, wanted, why in scenes:
-            before = units[-1].wanted if units else Arrangement()
-            units.append(kind(self.bracketing, name, role, wanted, before, why))
-        return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
+            patch = SceneUnit(taken, patch_unit(number), CheckFrames.PATCH)
+            arrangement = replace(_CARD_THROUGH, stage="colorchecker", chart_patch=number)
+            scenes.append(Scene(patch, arrangement, WHY_PATCH))
+        return scenes

@@ -51,7 +51,7 @@ from .steps.glow import dark_frames
 from .steps.patch_names import Patches
 from .steps.sample_pose import check_visible, face_camera, face_lamp, has_door, lights_out
 from .steps.sanity_checks import SanityChecks
-from .steps.scenes import Arrangement, Bracketing, PutBackUnit, arrangement_after, light
+from .steps.scenes import Arranged, Arrangement, Bracketing, PutBackUnit, light
 
 Preset = Literal["DIN 67510-1", "JIS Z 9107", "ASTM E2073", "own"]
 Class = Literal["JA", "JB", "JC", "JD"]
@@ -83,6 +83,9 @@ AT_EITHER = 2
 FADES_BY_S, FADED = 60.0, 0.02
 #: Part of 0.3 mcd/m² at which the run may end, by an estimate of the luminance.
 ENOUGH = 0.5
+#: Arrangement of the bench for the card, and its reason.
+CARD = Arrangement("grey card")
+WHY_CARD = "its light under the lamp is the scale of luminances"
 #: Frames of the card, and the longest exposure of it in seconds.
 CARD_FRAMES, CARD_LONGEST_S = 6, 2.0
 
@@ -358,10 +361,10 @@ class Luminance(ProtocolModel):
     def units(self) -> Sequence[Unit]:
         """Return darks at every ISO, card and glow, the bench put back."""
         darks = [LuminanceDarkUnit(self, iso) for iso in self.isos()]
+        card = Arranged(CardUnit(self), CARD, Arrangement(), WHY_CARD)
         if self.card == "after":
-            after = CardUnit(self)
-            return [*darks, GlowUnit(self), after, PutBackUnit(after.wanted)]
-        return [*darks, CardUnit(self), GlowUnit(self)]
+            return [*darks, GlowUnit(self), card, PutBackUnit(CARD)]
+        return [*darks, card, GlowUnit(self)]
 
     def isos(self) -> list[int]:
         """Return the sensitivities, rising."""
@@ -447,16 +450,9 @@ class CardUnit:
     protocol: Luminance
     name: str = "card"
 
-    @property
-    def wanted(self) -> Arrangement:
-        """Arrangement of the bench."""
-        return Arrangement("grey card")
-
     def run(self, session: Session) -> None:
-        """Lay the card down, light it, photograph it."""
+        """Light the card and photograph it."""
         session.wait_until_warm("camera")
-        before = arrangement_after(Arrangement(), session)
-        self.wanted.set_up(session, before, "its light under the lamp is the scale of luminances")
         light(session, session.rig.warm_up_s("lamp"))
         bracketing = Bracketing(self.protocol.camera, CARD_LONGEST_S, CARD_FRAMES, exposures=1)
         bracketing.photograph(session, self.name, LuminanceFrames.CARD, "bare")
@@ -535,16 +531,16 @@ class GlowUnit:
     def _excite(self, session: Session) -> None:
         """Light the rested sample with the warm lamp for the time of the excitation."""
         protocol = self.protocol
-        if arrangement_after(Arrangement(), session) is None:
+        if session.choose("first in its session", lambda: _is_first(session), worst=False):
             session.warn(
                 "the run was resumed: if the lamp has shone on the sample since, let it rest as "
                 "long as before and begin a new run"
             )
         if protocol.card == "before":
             if not session.rig[LAMP].is_on():  # as in a resumed run
-                CardUnit(protocol).wanted.set_up(session, None, "it covers the sample meanwhile")
+                CARD.set_up(session, Arrangement(), "it covers the sample meanwhile")
                 light(session, session.rig.warm_up_s("lamp"))
-            Arrangement().set_up(session, CardUnit(protocol).wanted, "the excitation begins")
+            Arrangement().set_up(session, CARD, "the excitation begins")
         else:
             if has_door(session):
                 face_camera(session)
@@ -648,3 +644,14 @@ class GlowUnit:
         ratio = (per_s / np.mean(lit, axis=0)).max(axis=1)
         limit = ENOUGH * VISIBLE_MCD_PER_M2 / (1000 * self.protocol.card_cd_per_m2)
         return bool((ratio < limit).all())
+
+
+def _is_first(session: Session) -> bool:
+    """Return whether no frame was taken since the devices were connected, as in a resumed run."""
+    since = session.clock.wall(session.rig.connected_s)
+    frames = [
+        frame
+        for role in (FrameRole.DARK, FrameRole.LOOK, LuminanceFrames.CARD)
+        for frame in session.frames(role)
+    ]
+    return all(frame.start_time < since for frame in frames)
