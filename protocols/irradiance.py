@@ -51,6 +51,13 @@ class Irradiance(ScenesProtocol):
     vector_length
         Euclidean length to which the lamp's irradiance, one number for each band, is scaled;
         excitation rates belong to it. Table 1 of the paper has 1.
+    illuminance_lux
+        Illuminance by the lamp itself at the sample, read from a lux meter in the card's place.
+        With it radiances of the material are absolute. Default: not read, and they are relative to
+        the lamp.
+    illuminance_sigma_lux
+        Standard uncertainty of that reading in lux, with the meter's mismatch to the eye (f1′).
+        Default: 5 % of it.
     camera
         Sensitivity and aperture of the camera.
     longest
@@ -68,6 +75,8 @@ class Irradiance(ScenesProtocol):
     protocol: Literal["irradiance"] = "irradiance"
     bands_nm: tuple[Nanometres, ...] = BANDS_NM
     vector_length: float = Field(1.0, gt=0, allow_inf_nan=False)
+    illuminance_lux: float | None = Field(None, gt=0, allow_inf_nan=False)
+    illuminance_sigma_lux: float | None = Field(None, ge=0, allow_inf_nan=False)
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)
     repeats: Count = Field(2, ge=1)
@@ -79,6 +88,12 @@ class Irradiance(ScenesProtocol):
             raise ValueError(
                 f"expected two or more rising wavelengths in 'bands_nm', got {list(self.bands_nm)}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _sigma_of_a_reading(self) -> Self:
+        if self.illuminance_sigma_lux is not None and self.illuminance_lux is None:
+            raise ValueError("expected 'illuminance_lux' beside its σ, got nothing")
         return self
 
     @property

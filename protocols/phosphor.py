@@ -24,7 +24,7 @@ BENCH = frozenset({"camera_calibration", "blank", "lvf_calibration", "fade", "ir
 THROUGH_THE_FILTER = frozenset({"emission_spectrum", "excitation"})
 CHECK = "calibration_check"
 #: Protocols that measure every patch of the chain.
-OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation")
+OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation", "reflectance")
 
 
 class Phosphor(Chain):

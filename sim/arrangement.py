@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
-Card = Literal["sample", "grey card", "colorchecker", "blank"]
+Card = Literal["sample", "lit sample", "grey card", "colorchecker", "blank"]
 LvfPlace = Literal["away", "before camera", "on sample"]
 LampKind = Literal["halogen", "mercury"]
 
@@ -24,7 +24,8 @@ class Arrangement:
     ----------
     card
         Object that is laid out. `blank` is in the samples' place; grey card and ColorChecker lie on
-        the closed door's outside, or without a door on the samples.
+        the closed door's outside, or without a door on the samples. `lit sample` are the samples
+        themselves on the closed door's outside, where lamp and camera both see them.
     lvf
         Place of the linear variable filter.
     turned

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from labrig.region import Region, region_pixels
 
 from .arrangement import Card
-from .lamp import CELL_NM, WAVELENGTH_NM
+from .lamp import WAVELENGTH_NM
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -27,10 +27,10 @@ BRIGHTENER_NM, BRIGHTENER_SIGMA_NM = 440.0, 18.0
 
 
 def brightened(light: FloatArray, fraction: float) -> FloatArray:
-    """Return what a brightener re-radiates of a light (wavelengths,), as from a white card."""
+    """Return what a brightener re-radiates of light (…, wavelengths), as from a white card."""
     shape = np.exp(-(((WAVELENGTH_NM - BRIGHTENER_NM) / BRIGHTENER_SIGMA_NM) ** 2) / 2)
-    absorbed = fraction * CELL_NM * light[BRIGHTENED].sum()
-    return np.asarray(absorbed * shape / (CELL_NM * shape.sum()))
+    absorbed = fraction * light[..., BRIGHTENED].sum(axis=-1, keepdims=True)
+    return np.asarray(absorbed * shape / shape.sum())
 
 
 def reflectances(card: Card, grey: float) -> FloatArray:
@@ -40,7 +40,7 @@ def reflectances(card: Card, grey: float) -> FloatArray:
     the black trap in it 2; of a ColorChecker, row by row, 1 to 24, its frame is 25.
     """
     nothing = np.zeros((1, len(WAVELENGTH_NM)))
-    if card == "sample":
+    if card in ("sample", "lit sample"):
         return nothing
     if card == "colorchecker":
         frame = np.full((1, len(WAVELENGTH_NM)), FRAME_REFLECTANCE)

@@ -71,6 +71,7 @@ class Changer:
         return {
             "fresh sample": self._fresh_sample,
             "sample": lambda: self._lay("sample"),
+            "lit sample": lambda: self._lay("lit sample"),
             "grey card": lambda: self._lay("grey card"),
             "colorchecker": lambda: self._lay("colorchecker"),
             "colorchecker NUMBER": self._lay_patch,

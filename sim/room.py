@@ -85,7 +85,8 @@ class Room:
         self._clock = clock
         self._layout = Layout(simulation)
         self._samples = Samples(simulation, self._layout)
-        self._surfaces = Surfaces(self._samples.materials, simulation.gloss)
+        prompt = [patch.prompt for patch in simulation.patches]
+        self._surfaces = Surfaces(self._samples.materials, simulation.gloss, prompt)
         self._view = View(simulation, self._layout, self._surfaces)
         has_sphere = any(patch.shape == "sphere" for patch in simulation.patches)
         self._spheres = Spheres(simulation) if has_sphere else None
@@ -204,7 +205,7 @@ class Room:
             rgb = self._electrons(begin_s, stop_s, arrangement, lights, reflected, f_number)
             painted = self._layout.places(arrangement).painted
             part = rgb[:, BAYER_RGGB].reshape(-1)[painted]
-            if self._spheres is not None and arrangement.card == "sample":
+            if self._spheres is not None and arrangement.card in ("sample", "lit sample"):
                 part = self._shaded(part, self._spheres, arrangement, reflected, f_number)
             part = self._imaging.textured(part, arrangement)
             light = part if light is None else light + part

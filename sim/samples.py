@@ -11,17 +11,19 @@ from labrig.errors import UsageError
 from labrig.material import Material, State, read_any_material
 
 from .arrangement import Arrangement, Arrangements
-from .lamp import SETTLED_S
+from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .layout import Layout
 from .lights import Lights
 from .lvf import Lvf
-from .optics import emission
+from .optics import REFLECTED, emission
 from .phosphor import Light, Phosphor, phosphor
 from .simulation import Simulation
 from .temperature import rate_factor
 
 FloatArray = NDArray[np.float64]
 
+#: Unit of the lamp's mean spectral irradiance among the factors of an absolute scale.
+IRRADIANCE_UNIT = "W/m²/nm"
 #: What a sample that does not glow is among those that do.
 DARK = Material(
     name="dark",
@@ -82,9 +84,10 @@ class Samples:
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
         self.cells = self._patches.of(self._state_of_cells, cell)
         brightnesses = [patch.brightness for patch in simulation.patches]
+        irradiance = simulation.lamp.irradiance
         emitted = np.concatenate(
             [
-                brightness * emission(material)
+                brightness * in_table_scale(material, irradiance) * emission(material)
                 for brightness, material in zip(brightnesses, phosphors, strict=True)
             ]
         )
@@ -189,7 +192,13 @@ class Samples:
         arrangement
             Arrangement of the bench until `end_s`.
         """
-        _, exposure_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
+        visible = lights.openness
+        if arrangement.card == "lit sample" and self._has_door:
+
+            def visible(time_s: float) -> float:
+                return 1 - lights.openness(time_s)
+
+        _, exposure_s = self.evolve(level, start_s, end_s, arrangement, lights, visible)
         radiance_s = self.of_cells(exposure_s)[:, None] * self.radiance_at_one
         # States are in the order of their cells, and every cell but the cloth has some.
         first_states = np.searchsorted(self.cells.patch, np.arange(1, self.cells.patch[-1] + 1))
@@ -203,6 +212,38 @@ class Samples:
             passed = Lvf(self._lvf).below(self._lvf.on_sample, turned)[self._piece]
             self._below_lvf[turned] = replace(self.cells, excitation=self.cells.excitation * passed)
         return self._below_lvf[turned]
+
+
+def in_table_scale(material: Material, irradiance: float) -> float:
+    """Return the factor from a file's Λ to the room's radiance, 1 without a scale.
+
+    Parameters
+    ----------
+    material
+        Material of a sample.
+    irradiance
+        Irradiance of the warm lamp in multiples of the norm of a material's excitation rates.
+
+    Raises
+    ------
+    UsageError
+        Λ is absolute, and the file does not say how bright the lamp was.
+    """
+    if material.scale is None or material.bands_nm is None:
+        return 1.0
+    low_nm, high_nm = material.bands_nm[0], material.bands_nm[-1]
+    inside = (low_nm < WAVELENGTH_NM) & (high_nm > WAVELENGTH_NM)
+    # A diffuse white has the radiance E/π.
+    lamp = np.pi * REFLECTED * irradiance * float(filament_spectrum(BURNING_K)[inside].mean())
+    if material.scale == "relative":
+        return lamp
+    for factor in material.scale_factors:
+        if factor.unit == IRRADIANCE_UNIT:
+            return lamp / factor.value
+    raise UsageError(
+        f"{material.name}: expected the lamp's mean spectral irradiance among 'scale_factors' of a "
+        f"material with 'scale: absolute' (unit: {IRRADIANCE_UNIT}), got none"
+    )
 
 
 def _refuse_two_laws(material: object, model: str) -> None:

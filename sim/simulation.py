@@ -73,6 +73,9 @@ class Patch(Part):
         left.
     kinetics
         How its traps fill and empty; null: by the rate equation of first order in a thin layer.
+    prompt
+        Fraction of the light absorbed where the sample is excited best that it re-radiates at once,
+        in the colour of its glow, for example `5 %`; elsewhere in proportion to its excitation.
     """
 
     material: str
@@ -81,6 +84,7 @@ class Patch(Part):
     shape: Literal["flat", "sphere"] = "flat"
     initial_charge: Charge | None = None
     kinetics: KineticsSettings | None = None
+    prompt: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
 
 
 class SensorSettings(Part):

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
+from labrig.errors import UsageError
 from labrig.material import Material, ReradiationMatrix
 
 from .lamp import CELL_NM, WAVELENGTH_NM
+from .optics import emission
 
 FloatArray = NDArray[np.float64]
 
-#: Reflectance of a sample of which only the glow is known.
+#: Reflectance of a sample whose material file has no albedo.
 SAMPLE_REFLECTANCE = 0.5
 
 
@@ -29,9 +31,17 @@ class Surfaces:
         Material of every sample.
     gloss
         Fraction of the light that they mirror, in the middle of the lobe.
+    prompt
+        Fraction of the absorbed light that every phosphor re-radiates at once where it is excited
+        best; empty: none does.
     """
 
-    def __init__(self, materials: Sequence[Material | ReradiationMatrix], gloss: float) -> None:
+    def __init__(
+        self,
+        materials: Sequence[Material | ReradiationMatrix],
+        gloss: float,
+        prompt: Sequence[float] = (),
+    ) -> None:
         self._gloss = gloss
         self._reflectance = np.array([_reflectance(material) for material in materials])
         self._reradiation = {
@@ -39,6 +49,11 @@ class Surfaces:
             for number, material in enumerate(materials, start=1)
             if isinstance(material, ReradiationMatrix)
         }
+        for number, fraction in enumerate(prompt, start=1):
+            material = materials[number - 1]
+            if fraction and isinstance(material, Material):
+                absorbed = fraction * (1 - self._reflectance[number - 1])
+                self._reradiation[number] = _prompt_on_grid(material, absorbed)
 
     def thrown_back(self, light: FloatArray, patch: NDArray[np.intp]) -> FloatArray:
         """Return the diffuse light that comes back, as from a white of reflectance 1.
@@ -92,9 +107,36 @@ def reradiation_on_grid(matrix: ReradiationMatrix) -> FloatArray:
     return np.asarray(np.where(is_stokes, CELL_NM * per_nm, 0.0))
 
 
+def _prompt_on_grid(material: Material, absorbed: FloatArray) -> FloatArray:
+    """Return prompt fluorescence in each cell of the grid per light in each, (out, in).
+
+    Whatever excites it, it has the spectrum of the glow (Kasha); light within that spectrum excites
+    as much less as there is less of it at longer wavelengths.
+
+    Raises
+    ------
+    UsageError
+        The file has no excitation rates.
+    """
+    rates = [state.k_e_per_s for state in material.states if state.k_e_per_s is not None]
+    if material.bands_nm is None or not rates:
+        raise UsageError(
+            f"{material.name}: expected excitation rates of a sample with 'prompt', got none"
+        )
+    edges = np.array(material.bands_nm)
+    excited = np.interp(WAVELENGTH_NM, (edges[1:] + edges[:-1]) / 2, np.sum(rates, axis=0))
+    emitted = emission(material).sum(axis=0)
+    emitted /= emitted.sum()
+    absorbed = absorbed * excited / excited.max() * (1 - np.cumsum(emitted))
+    return np.asarray(np.outer(emitted, absorbed))
+
+
 def _reflectance(material: Material | ReradiationMatrix) -> FloatArray:
     if isinstance(material, Material):
-        return np.full_like(WAVELENGTH_NM, SAMPLE_REFLECTANCE)
+        if material.albedo is None:
+            return np.full_like(WAVELENGTH_NM, SAMPLE_REFLECTANCE)
+        known = material.albedo
+        return np.interp(WAVELENGTH_NM, known.wavelength_nm, known.value)
     measured = ~np.isnan(material.reflectance)
     if not measured.any():
         return np.zeros_like(WAVELENGTH_NM)

@@ -77,8 +77,8 @@ class View:
 
     def reradiated_s(self, arrangement: Arrangement, reflected: VisibleLight) -> FloatArray:
         """Return the part of `radiance_s` that uncovered samples re-radiate at once."""
-        light = reflected.sample + reflected.sample_stray
-        reradiated = self._surfaces.reradiated(light, self._layout.patch)
+        from_lamp, stray, _ = self._on_samples(arrangement, reflected)
+        reradiated = self._surfaces.reradiated(from_lamp + stray, self._layout.patch)
         seen: FloatArray = self._reflected * self._angles.reradiated(arrangement) * reradiated
         return seen[self._layout.places(arrangement).cell]
 
@@ -100,10 +100,11 @@ class View:
         self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
     ) -> FloatArray:
         """Return the radiance of uncovered cells, shape (cells, wavelengths); cell 0 is cloth."""
-        light = reflected.sample + reflected.sample_stray
+        from_lamp, stray, door = self._on_samples(arrangement, reflected)
+        light = from_lamp + stray
         if arrangement.lvf == "on sample":
             passed = self._below_lvf(arrangement.turned)[self._layout.piece]
-            light = passed * reflected.sample + reflected.sample_stray
+            light = passed * from_lamp + stray
         if arrangement.card == "blank":
             glow_s = np.zeros_like(glow_s)
             thrown_back = reflectances("blank", self._simulation.grey_card)[1] * light
@@ -116,10 +117,18 @@ class View:
             thrown_back += self._angles.mirrored(arrangement) * by_gloss
             thrown_back = np.maximum(thrown_back, 0.0)
             glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
-        thrown_back = thrown_back + CLOTH_REFLECTANCE * reflected.door
+        thrown_back = thrown_back + CLOTH_REFLECTANCE * door
         radiance: FloatArray = glow_s + self._reflected * thrown_back
         radiance[0] = self._reflected * CLOTH_REFLECTANCE * reflected.cloth
         return radiance
+
+    def _on_samples(
+        self, arrangement: Arrangement, reflected: VisibleLight
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the light from lamp and room on the samples, and that on the door over them."""
+        if arrangement.card == "lit sample" and self._simulation.door is not None:
+            return reflected.door, np.zeros_like(reflected.door), np.zeros_like(reflected.door)
+        return reflected.sample, reflected.sample_stray, reflected.door
 
     def _cover(
         self,
@@ -133,19 +142,22 @@ class View:
         if not covered.any():
             return
         card = reflectances(arrangement.card, self._simulation.grey_card)[places.surface[covered]]
+        light = reflected.cloth if self._simulation.door is None else reflected.door
+        on_card = np.broadcast_to(light, card.shape)
         if arrangement.lvf == "on sample":
             # The filter lies on the card as it would on the sample.
             piece = self._layout.piece[places.cell[covered]]
-            card = self._below_lvf(arrangement.turned)[piece] * card
-        light = reflected.cloth if self._simulation.door is None else reflected.door
-        glow = np.zeros_like(light)
-        if arrangement.card == "grey card":
-            glow = brightened(light, self._simulation.grey_card_fluorescence)
+            on_card = self._below_lvf(arrangement.turned)[piece] * light
+        thrown_back = card * on_card
+        if arrangement.card == "grey card" and self._simulation.grey_card_fluorescence:
+            glowing = brightened(on_card, self._simulation.grey_card_fluorescence)
+            is_card = np.asarray(places.surface[covered] == 1)
+            thrown_back += np.where(is_card[:, np.newaxis], glowing, 0.0)
         if self._simulation.door is None:
-            radiance[covered] = self._reflected * (card * light + glow)
+            radiance[covered] = self._reflected * thrown_back
         else:
             # What the closed door hides is what the card hides, and the door's own outside.
-            radiance[covered] += self._reflected * ((card - CLOTH_REFLECTANCE) * light + glow)
+            radiance[covered] += self._reflected * (thrown_back - CLOTH_REFLECTANCE * light)
 
     def _turned_away(self, tilt_deg: int) -> float:
         """Return the radiance of a sample relative to one that faces the camera."""

@@ -139,6 +139,9 @@ class Optics(BaseModel):
     leds
         Spectra and brightnesses of the LEDs: their file `leds.yaml`, or the folder of the run of
         protocol `led_brightness` that measured them.
+    reflectance
+        Albedo and total radiance factor of samples: their file `reflectance.yaml`, or the folder of
+        the run of protocol `reflectance` that measured them.
     reference
         Bench to which calibrations belong: its file `reference.yaml`, or the folder of the run of
         protocol `calibration` that measured it.

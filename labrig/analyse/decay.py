@@ -15,6 +15,7 @@ from labrig.analyse.frames import (
 from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
+from labrig.analyse.surface import with_reflectance
 from labrig.analyse.temperature import drift_warnings
 from labrig.errors import FitError
 from labrig.fit import DecayFit
@@ -133,7 +134,15 @@ def analyse(part: Part) -> DecayResult:
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(
         patches={
-            name: _decay_patch(regions[name], series[name], fit, only or name, part, temperature_c)
+            name: _decay_patch(
+                regions[name],
+                series[name],
+                fit,
+                only or name,
+                part,
+                temperature_c,
+                "" if only else name,
+            )
             for name, fit in fits.items()
         },
         background=background,
@@ -188,6 +197,7 @@ def _decay_patch(
     name: str,
     part: Part,
     temperature_c: float | None,
+    patch: str,
 ) -> DecayPatch:
     if isinstance(fit, str):
         return DecayPatch(region=region, series=series, failure=fit)
@@ -197,7 +207,11 @@ def _decay_patch(
         fit=fit,
         normalised_residuals=fit.normalised_residuals,
         noise=noise_budget(series, fit),
-        material=_material(series, fit, name, part.run.name, temperature_c),
+        material=with_reflectance(
+            _material(series, fit, name, part.run.name, temperature_c),
+            patch,
+            part.inputs.reflectance,
+        ),
     )
 
 

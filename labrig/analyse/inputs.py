@@ -18,6 +18,7 @@ from labrig.calibration import (
     LedsFile,
     LvfFile,
     ReferenceFile,
+    ReflectanceFile,
     kinds,
 )
 from labrig.material import Material
@@ -33,7 +34,7 @@ class Inputs:
 
     Attributes
     ----------
-    camera, blank, fade, lvf, irradiance, leds, reference
+    camera, blank, fade, lvf, irradiance, leds, reference, reflectance
         Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
         in the same run.
     others
@@ -54,6 +55,7 @@ class Inputs:
     irradiance: IrradianceFile | None = None
     leds: LedsFile | None = None
     reference: ReferenceFile | None = None
+    reflectance: ReflectanceFile | None = None
     others: Mapping[str, Any] = field(default_factory=dict)
     spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
     decays: Mapping[str, FittedDecay] = field(default_factory=dict)

@@ -1,6 +1,6 @@
 """Irradiance of the lamp on the sample, directly and through the LVF, from frames of a card."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,7 +9,7 @@ import numpy as np
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.calibration import IrradianceFile
+from labrig.calibration import CardLight, IrradianceFile
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError, curve_modes
 from labrig.optics import (
@@ -21,8 +21,8 @@ from labrig.optics import (
     band_integrals,
     quadrature,
 )
-from labrig.protocols.irradiance import CardFrames
-from labrig.reduce import FLICKER, slice_values
+from labrig.protocols.irradiance import CardFrames, Irradiance
+from labrig.reduce import FLICKER, sensor_layout, slice_values
 from labrig.results import CardRatio, FloatArray, IrradianceResult, SliceValues, StripScale
 
 #: Relative change of the lamp between rounds that causes a warning.
@@ -37,6 +37,8 @@ PARABOLA = (0.2, 0.3, 10.0)
 ROUGH = 0.02
 #: Least factor, for its logarithm.
 LEAST = 1e-6
+#: Relative σ of a lux meter's reading, with its mismatch to the eye.
+LUX_SIGMA = 0.05
 #: Step of derivatives by a band's parameters, in their σ.
 _STEP = 0.5
 
@@ -58,13 +60,16 @@ def analyse(part: Part) -> IrradianceResult:
             "and name its run in the rig file (optics: {lvf: …}) or to labrig process --optics"
         )
     frames, lamp, strip = StripFrames(part), lamp_spectrum(part.rig), calibrated.on_sample
-    ratio = _card_ratio(part, frames, strip)
+    values = _card_values(part, frames, strip)
+    ratio = _card_ratio(part, values)
     position = np.array(strip.positions(*frames.size))
     lvf = calibrated.lvf.at(np.clip(position, calibrated.position[0], calibrated.position[-1]))
     camera = camera_curves(part.rig, part.overrides.camera, calibrated)
     scale = strip_scale(ratio, lvf, lamp, card_reflectance(part.rig), camera)
     return IrradianceResult(
-        calibration=_file(part, strip, lvf, lamp, ratio, scale),
+        calibration=_file(part, strip, lvf, lamp, ratio, scale).model_copy(
+            update={"card": _card_light(frames, values)}
+        ),
         centre_nm=lvf.bands.centre_nm,
         card_ratio=ratio,
         scale=scale,
@@ -72,9 +77,31 @@ def analyse(part: Part) -> IrradianceResult:
     )
 
 
-def _card_ratio(part: Part, frames: StripFrames, strip: Strip) -> CardRatio:
+def _card_values(part: Part, frames: StripFrames, strip: Strip) -> Mapping[str, SliceValues]:
+    """Return the light of the card along the strip's place, scene by scene."""
     lit = [*frames.of(CardFrames.DIRECT), *frames.of(CardFrames.THROUGH)]
-    values = slice_values(lit, strip, frames.dark, part.inputs.camera)
+    return slice_values(lit, strip, frames.dark, part.inputs.camera)
+
+
+def _card_light(frames: StripFrames, values: Mapping[str, SliceValues]) -> CardLight | None:
+    """Return the mean light of the card under the lamp itself; None where it clips."""
+    direct = [one for unit, one in values.items() if unit.startswith("direct-")]
+    value = np.mean([one.value.mean(axis=0) for one in direct], axis=0)
+    first = frames.of(CardFrames.DIRECT)[0]
+    if not np.isfinite(value).all() or first.iso is None:
+        return None
+    noise = np.mean([np.hypot.reduce(one.sigma, axis=0) for one in direct], axis=0)
+    sigma = np.hypot(noise / len(direct[0].value), FLICKER * value) / np.sqrt(len(direct))
+    return CardLight(
+        iso=first.iso,
+        f_number=first.f_number,
+        channels=sensor_layout(frames.dark[0]).channels,
+        dn_per_s=tuple(value.tolist()),
+        sigma_dn_per_s=tuple(sigma.tolist()),
+    )
+
+
+def _card_ratio(part: Part, values: Mapping[str, SliceValues]) -> CardRatio:
     return mean_ratio(
         [
             (values[f"direct-{number}"], values[f"through-{number}"])
@@ -132,9 +159,18 @@ def _file(
         ratio=tuple(ratio.tolist()),
         ratio_sigma=tuple((ratio * np.hypot(relative, card.common_sigma)).tolist()),
         strip=strip,
+        illuminance_lux=part.protocol.illuminance_lux,
+        illuminance_sigma_lux=_lux_sigma(part.protocol),
         source=f"grey card by itself and through the LVF in {card.rounds} rounds, with labrig",
         run=part.run.folder.resolve().name,
     )
+
+
+def _lux_sigma(protocol: Irradiance) -> float | None:
+    """Return σ of the lux meter's reading; None without one."""
+    if protocol.illuminance_lux is None or protocol.illuminance_sigma_lux is not None:
+        return protocol.illuminance_sigma_lux
+    return LUX_SIGMA * protocol.illuminance_lux
 
 
 def _direct_sigma(lamp: Spectrum, edges: FloatArray, norm: float) -> FloatArray:

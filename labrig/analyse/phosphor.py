@@ -2,6 +2,7 @@
 
 from labrig.analyse.chain import analyse_parts
 from labrig.analyse.inputs import Part
+from labrig.analyse.surface import with_reflectances
 from labrig.results import PhosphorResult
 
 
@@ -17,6 +18,6 @@ def analyse(part: Part) -> PhosphorResult:
     return PhosphorResult(
         parts=analysed.results,
         failed=analysed.failed,
-        materials=analysed.inputs.materials,
+        materials=with_reflectances(analysed.inputs.materials, analysed.inputs.reflectance),
         warnings=analysed.warnings,
     )

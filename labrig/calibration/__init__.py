@@ -20,6 +20,7 @@ from labrig.calibration.fade_file import (
 )
 from labrig.calibration.irradiance_file import (
     IRRADIANCE_KIND,
+    CardLight,
     IrradianceFile,
 )
 from labrig.calibration.kept import (
@@ -48,6 +49,11 @@ from labrig.calibration.reference_file import (
     CardPicture,
     ReferenceFile,
 )
+from labrig.calibration.reflectance_file import (
+    REFLECTANCE_KIND,
+    PatchReflectance,
+    ReflectanceFile,
+)
 
 __all__ = [
     "BLANK_KIND",
@@ -57,12 +63,14 @@ __all__ = [
     "LEDS_KIND",
     "LVF_KIND",
     "REFERENCE_KIND",
+    "REFLECTANCE_KIND",
     "UV_NM",
     "BandColumns",
     "BlankFile",
     "CalibratedLed",
     "CalibrationKind",
     "CameraFile",
+    "CardLight",
     "CardPicture",
     "Change",
     "CurveColumns",
@@ -74,7 +82,9 @@ __all__ = [
     "Linearity",
     "LvfFile",
     "Noise",
+    "PatchReflectance",
     "ReferenceFile",
+    "ReflectanceFile",
     "UvScale",
     "Warming",
     "WavelengthColumns",

@@ -12,6 +12,36 @@ from labrig.optics import Strip
 Numbers = tuple[NotNegative, ...]
 
 
+class CardLight(BaseModel):
+    """The camera's signal of the grey card under the lamp itself, which links counts to radiance.
+
+    Attributes
+    ----------
+    iso, f_number
+        Settings of the camera; `f_number` is null for a lens that does not report it.
+    channels
+        Names of the channels.
+    dn_per_s, sigma_dn_per_s
+        Mean signal along the strip's place in DN/s, one number for each channel, and σ.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    iso: Positive
+    f_number: Positive | None
+    channels: tuple[str, ...]
+    dn_per_s: tuple[Positive, ...]
+    sigma_dn_per_s: Numbers
+
+    @model_validator(mode="after")
+    def _one_number_each(self) -> Self:
+        if {len(self.dn_per_s), len(self.sigma_dn_per_s)} != {len(self.channels)}:
+            raise ValueError(
+                f"expected {len(self.channels)} numbers, one a channel, in 'dn_per_s' and its σ"
+            )
+        return self
+
+
 class IrradianceFile(BaseModel):
     """Irradiance E per band on one scale, directly under the lamp and through the LVF.
 
@@ -35,6 +65,11 @@ class IrradianceFile(BaseModel):
         Ratio Σ `direct` over Σ `through` of each position, and σ.
     strip
         Position of the LVF on the sample, as the camera sees the sample.
+    card
+        Signal of the grey card under the lamp itself; null if it was not kept.
+    illuminance_lux, illuminance_sigma_lux
+        Illuminance by the lamp itself at the sample in lux, read from a meter, and σ; null if it
+        was not read.
     source, run
         Origin of the numbers.
 
@@ -65,6 +100,9 @@ class IrradianceFile(BaseModel):
     ratio: tuple[Positive, ...]
     ratio_sigma: Numbers
     strip: Strip
+    card: CardLight | None = None
+    illuminance_lux: Positive | None = None
+    illuminance_sigma_lux: NotNegative | None = None
     source: str = ""
     run: str | None = None
 

@@ -88,7 +88,7 @@ def kinds() -> tuple[CalibrationKind[Any], ...]:
     --------
     >>> from labrig.calibration import kinds
     >>> [kind.name for kind in kinds()]
-    ['blank', 'camera', 'fade', 'irradiance', 'leds', 'lvf']
+    ['blank', 'camera', 'fade', 'irradiance', 'leds', 'lvf', 'reference', 'reflectance']
     """
     names = plugins.names(plugins.CALIBRATIONS)
     return tuple(plugins.load(plugins.CALIBRATIONS, name, "calibrations") for name in names)

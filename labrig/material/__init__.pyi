@@ -13,9 +13,12 @@ from .decay_laws import (
 )
 from .file import (
     MAX_ORDER as MAX_ORDER,
+    Albedo as Albedo,
     IrradianceNorm as IrradianceNorm,
     Material as Material,
     Provenance as Provenance,
+    RadianceFactor as RadianceFactor,
+    ScaleFactor as ScaleFactor,
     Spectrum as Spectrum,
     State as State,
     read_material as read_material,

@@ -6,6 +6,7 @@ dr/dt = (1 − r) Σ_j k_e,j E_j − k_r rᵇ, and radiance L_j = Σ_i Λ_i,j k_
 
 import os
 from itertools import pairwise
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -28,6 +29,8 @@ MAX_ORDER = 4.0
 Order = Annotated[float, Field(ge=1, le=MAX_ORDER)]
 Concentration = Annotated[float, Field(ge=0, le=1)]
 Series = tuple[NotNegative, ...]
+#: A surface that does not fluoresce may look brighter than a white by its gloss, but not by much.
+Reflectance = Annotated[float, Field(ge=0, le=1.2)]
 
 #: Fields of a state that may have an uncertainty.
 MEASURED = (
@@ -41,6 +44,15 @@ MEASURED = (
 )
 #: Fields that are written where the kinetic order is not 1.
 OF_ORDER = ("kinetic_order", "kinetic_order_sigma", "decay_time_s", "decay_time_s_sigma")
+#: Fields of a material that are written where they are known.
+WHERE_KNOWN = (
+    "scale",
+    "scale_factors",
+    "albedo",
+    "radiance_factor",
+    "thickness_mm",
+    "mass_per_area_g_per_m2",
+)
 #: What only the level of charge tells of a state of an order other than 1.
 OF_LEVEL = ("k_r_per_s", "r0", "k_e_per_s", "reradiation")
 #: Relative σ of r(0) from which a state of an order other than 1 was not seen to saturate.
@@ -215,14 +227,85 @@ class Spectrum(_Part):
 
     @model_validator(mode="after")
     def _same_lengths(self) -> Self:
-        _rising(self.wavelength_nm, "wavelength_nm")
-        for name, series in (("value", self.value), ("sigma", self.sigma)):
-            if series is not None and len(series) != len(self.wavelength_nm):
-                raise ValueError(
-                    f"expected {len(self.wavelength_nm)} numbers in '{name}' as in "
-                    f"'wavelength_nm', got {len(series)}"
-                )
+        _one_each(self.wavelength_nm, self.value, self.sigma)
         return self
+
+
+class Albedo(_Part):
+    """Reflectance R of eq. 2 of Nalbach et al.: light that comes back at its own wavelength.
+
+    Attributes
+    ----------
+    wavelength_nm
+        Wavelengths in nm, rising; between them the albedo is linear, beyond them constant.
+    value
+        Fraction of the light at each wavelength that a diffuse white of reflectance 1 would return
+        and this surface does, in the geometry of the measurement.
+    sigma
+        Standard deviation of each number of `value`, with what they have in common. Default: not
+        measured.
+    common_sigma
+        Relative standard deviation that all numbers have in common, by the grey card and the lamp.
+        Default: not measured.
+    """
+
+    wavelength_nm: tuple[Rate, ...]
+    value: Annotated[tuple[Reflectance, ...], Field(min_length=2)]
+    sigma: Series | None = None
+    common_sigma: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _same_lengths(self) -> Self:
+        _one_each(self.wavelength_nm, self.value, self.sigma)
+        return self
+
+
+class RadianceFactor(_Part):
+    """All light that comes back under a lamp: reflection, prompt fluorescence and steady glow.
+
+    Attributes
+    ----------
+    lamp
+        Name of the lamp, to whose spectrum the numbers belong.
+    wavelength_nm
+        Wavelengths in nm, rising.
+    value
+        Spectral radiance at each wavelength over that of a diffuse white of reflectance 1 beside
+        it; more than 1 is possible where the sample fluoresces.
+    sigma
+        Standard deviation of each number of `value`. Default: not measured.
+    """
+
+    lamp: Annotated[str, Field(min_length=1)]
+    wavelength_nm: tuple[Rate, ...]
+    value: Annotated[Series, Field(min_length=2)]
+    sigma: Series | None = None
+
+    @model_validator(mode="after")
+    def _same_lengths(self) -> Self:
+        _one_each(self.wavelength_nm, self.value, self.sigma)
+        return self
+
+
+class ScaleFactor(_Part):
+    """One factor of the chain from the camera's counts to `reradiation` and `amplitude`.
+
+    Attributes
+    ----------
+    name
+        What the factor is, for example `card's radiance over irradiance`.
+    value
+        The factor.
+    sigma
+        Standard deviation of `value`. Default: not known.
+    unit
+        Unit of the factor, `1` for none.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    value: Rate
+    sigma: NotNegative | None = None
+    unit: str = "1"
 
 
 class Provenance(_Part):
@@ -271,6 +354,20 @@ class Material(_Part):
         Excited states of the material, at least one.
     spectrum
         Emission spectrum on a finer grid than the bands. Default: not measured.
+    scale
+        What `amplitude` and `reradiation` are measured in: `relative`, by the lamp's mean spectral
+        irradiance over the bands, in sr⁻¹ and s sr⁻¹; or `absolute`, in W m⁻² sr⁻¹ nm⁻¹ and
+        W s m⁻² sr⁻¹ nm⁻¹. Default: in a unit of their own.
+    scale_factors
+        Factors by which counts became numbers on that scale, in order. Default: not recorded.
+    albedo
+        Reflectance over wavelength. Default: not measured.
+    radiance_factor
+        All light that comes back under a lamp. Default: not measured.
+    thickness_mm
+        Thickness of the layer, in mm. Default: not known.
+    mass_per_area_g_per_m2
+        Mass of the layer per area, in g/m². Default: not known.
     provenance
         Origin of the numbers. Default: not recorded.
     """
@@ -281,7 +378,32 @@ class Material(_Part):
     irradiance_norm: IrradianceNorm | None = None
     states: Annotated[tuple[State, ...], Field(min_length=1)]
     spectrum: Spectrum | None = None
+    scale: Literal["relative", "absolute"] | None = None
+    scale_factors: tuple[ScaleFactor, ...] = ()
+    albedo: Albedo | None = None
+    radiance_factor: RadianceFactor | None = None
+    thickness_mm: Rate | None = None
+    mass_per_area_g_per_m2: Rate | None = None
     provenance: Provenance | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_unknown(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content: dict[str, Any] = handler(self)
+        for name in WHERE_KNOWN:
+            if not getattr(self, name):
+                content.pop(name, None)
+        return content
+
+    @property
+    def scale_per_count(self) -> float:
+        """Product of all scale factors: radiance per count; 1 without a scale."""
+        return prod(factor.value for factor in self.scale_factors)
+
+    @model_validator(mode="after")
+    def _scale_has_its_factors(self) -> Self:
+        if self.scale_factors and self.scale is None:
+            raise ValueError("expected 'scale' beside 'scale_factors', got nothing")
+        return self
 
     @property
     def is_first_order(self) -> bool:
@@ -358,6 +480,21 @@ def write_material(path: Path, material: Material) -> None:
     'mine'
     """
     write_yaml(path, material)
+
+
+def _one_each(
+    wavelength_nm: tuple[float, ...],
+    value: tuple[float, ...],
+    sigma: tuple[float, ...] | None,
+) -> None:
+    """Refuse columns of different lengths, or wavelengths that do not rise."""
+    _rising(wavelength_nm, "wavelength_nm")
+    for name, series in (("value", value), ("sigma", sigma)):
+        if series is not None and len(series) != len(wavelength_nm):
+            raise ValueError(
+                f"expected {len(wavelength_nm)} numbers in '{name}' as in "
+                f"'wavelength_nm', got {len(series)}"
+            )
 
 
 def _rising(values: tuple[float, ...], name: str) -> None:

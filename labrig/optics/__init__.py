@@ -1,5 +1,6 @@
 """Spectra and the optical elements between light and camera signal."""
 
+from labrig.optics.absolute_irradiance import absolute_irradiance
 from labrig.optics.camera import (
     CHANNELS,
     CURVES_FILE,
@@ -94,6 +95,7 @@ __all__ = [
     "Strip",
     "Transmittance",
     "WavelengthMap",
+    "absolute_irradiance",
     "band_integrals",
     "band_means",
     "delta_e",

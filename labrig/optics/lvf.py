@@ -193,6 +193,9 @@ class WavelengthMap:
         return slope
 
 
+#: Wavelengths in nm of the remainder of a filter that has none of its own.
+_REMAINDER_NM: FloatArray = np.arange(300.0, 901.0, 5.0)
+
 #: Full width at half maximum of an LVF without a calibration, in nm (paper, section 4.1).
 NOMINAL_FWHM_NM = 25.0
 
@@ -242,6 +245,31 @@ class Lvf:
                 transmission + self.remainder @ hat_functions(self.remainder_nm, wavelength_nm).T
             )
         return np.maximum(transmission, 0.0)
+
+    def twice(self) -> "Lvf":
+        """Return the filter that light passes twice in the same place, of transmission T².
+
+        The square of the bands' shape is one of the same kind; what it leaves is the remainder.
+        """
+        bands, root = self.bands, np.sqrt(2.0)
+        skew = bands.skew / root
+        width = np.divide(bands.skew, np.sinh(bands.skew), where=np.abs(bands.skew) > _GAUSSIAN,
+                          out=np.ones_like(bands.skew))  # fmt: skip
+        narrower = np.divide(np.sinh(skew), skew, where=np.abs(skew) > _GAUSSIAN,
+                             out=np.ones_like(skew))  # fmt: skip
+        squared = Bands(
+            bands.centre_nm, bands.fwhm_nm * width / root * narrower, skew,
+            bands.peak**2, bands.leakage**2,
+        )  # fmt: skip
+        grid = self.remainder_nm if len(self.remainder_nm) else _REMAINDER_NM
+        remainder = self.transmission(grid) ** 2 - squared.transmission(grid)
+        sigma = self.sigma
+        if sigma is not None:
+            sigma = Bands(
+                sigma.centre_nm, sigma.fwhm_nm / root, sigma.skew / root,
+                2 * bands.peak * sigma.peak, 2 * bands.leakage * sigma.leakage,
+            )  # fmt: skip
+        return Lvf(self.position, squared, sigma, grid, remainder)
 
     def at(self, position: ArrayLike) -> "Lvf":
         """Return the filter at other rising positions within its own, linearly interpolated."""

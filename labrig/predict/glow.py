@@ -90,11 +90,11 @@ def check_states(material: Material) -> None:
 
 
 def measured_amplitudes(material: Material) -> FloatArray | None:
-    """Return the amplitudes by descending rate in the file's unit, (m,); None if one is missing."""
+    """Return the amplitudes by descending rate in counts, (m,); None if one is missing."""
     amplitudes = [state.amplitude for state in by_falling_rate(material)]
     if any(amplitude is None for amplitude in amplitudes):
         return None
-    return np.array(amplitudes, dtype=np.float64)
+    return np.array(amplitudes, dtype=np.float64) / material.scale_per_count
 
 
 def by_falling_rate(material: Material) -> Sequence[State]:

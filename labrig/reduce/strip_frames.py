@@ -1,9 +1,10 @@
 """Regions and a filter's strip in frames on disk, several exposures of one scene."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labrig.optics import CameraModel, Strip
 from labrig.reduce.frame_reduction import Exposure, reduce_groups
@@ -14,10 +15,12 @@ from labrig.reduce.raw import RawFrame
 from labrig.reduce.series import reduce_patches
 from labrig.reduce.strip import FoundStrip, find_strip, strip_profile
 from labrig.region import Region
-from labrig.results import FloatArray, SliceValues, StripProfile
+from labrig.results import FloatArray, Series, SliceValues, StripProfile
 
 #: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
 FLICKER = 0.005
+#: Significance from which a value in a frame tells the frame's brightness.
+SEEN = 20.0
 #: Relative independent error of a place: the sensor's pattern, dust.
 PATTERN = 0.002
 
@@ -241,21 +244,111 @@ def region_values(
     (1, 3)
     """
     series = reduce_patches(frames, regions, darks, camera=camera)
-    units = dict.fromkeys(frame.unit for frame in frames)
-    values_by_unit = {}
-    for unit in units:
-        pairs = []
-        for slice_series in series.values():
-            rows = np.array(slice_series.unit) == unit
-            usable = rows & slice_series.usable & np.isfinite(slice_series.sigma).all(axis=1)
-            pairs.append(
-                _weighted_mean(
-                    slice_series.values[usable], slice_series.sigma[usable], slice_series.dark_sigma
-                )
-            )
-        value, sigma = np.moveaxis(np.array(pairs), 1, 0)
-        values_by_unit[unit] = SliceValues(value, sigma)
-    return values_by_unit
+    return {unit: _slice_values(series, unit) for unit in _units(frames)}
+
+
+def evened_values(
+    frames: Sequence[SeriesFrame],
+    regions: Mapping[str, Region],
+    darks: Sequence[SeriesFrame],
+    camera: CameraModel | None,
+) -> Mapping[str, SliceValues]:
+    """Measure the light in every region, scene by scene, without the flicker between its frames.
+
+    Bright regions clip in the long exposures, and dim ones are seen in those only. What is seen in
+    several frames tells how bright each is, and all are brought to one brightness.
+
+    Parameters
+    ----------
+    frames
+        Light frames; those of one unit show one scene at several exposures.
+    regions
+        Regions by name, as (x, y, width, height) in fractions of the frame.
+    darks
+        Dark frames at their exposure times.
+    camera
+        Calibration of the camera; None uses the values as they are.
+
+    Returns
+    -------
+    dict of str to SliceValues
+        Signal in DN/s and its standard uncertainty by unit, shape (regions, channels).
+
+    Raises
+    ------
+    DataError
+        ISO or f-number differ within a unit, no dark frames match, or the calibration is of another
+        camera or aperture.
+    FrameError, UsageError
+        A frame cannot be read, or a region leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import SeriesFrame, evened_values
+    >>> run = labrig.read_run("runs/decay")
+    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
+    >>> first = run.frames("decay")[0]
+    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
+    >>> halves = {"left": (0.25, 0.25, 0.25, 0.5), "right": (0.5, 0.25, 0.25, 0.5)}
+    >>> evened_values(frames, halves, darks, camera=None)["lit"].value.shape
+    (2, 3)
+    """
+    series = reduce_patches(frames, regions, darks, camera=camera)
+    return {unit: _slice_values(_evened(series, unit), unit) for unit in _units(frames)}
+
+
+def _units(frames: Sequence[SeriesFrame]) -> Sequence[str]:
+    return list(dict.fromkeys(frame.unit for frame in frames))
+
+
+def _usable(series: Series, unit: str) -> NDArray[np.bool_]:
+    """Return which frames of a unit a region is usable in, shape (frames,)."""
+    rows = np.array(series.unit) == unit
+    usable: NDArray[np.bool_] = rows & series.usable & np.isfinite(series.sigma).all(axis=1)
+    return usable
+
+
+def _slice_values(series: Mapping[str, Series], unit: str) -> SliceValues:
+    """Return the means over the frames of a unit, all regions together."""
+    pairs = []
+    for region in series.values():
+        usable = _usable(region, unit)
+        pairs.append(_weighted_mean(region.values[usable], region.sigma[usable], region.dark_sigma))
+    value, sigma = np.moveaxis(np.array(pairs), 1, 0)
+    return SliceValues(value, sigma)
+
+
+def _evened(series: Mapping[str, Series], unit: str) -> Mapping[str, Series]:
+    """Return the series with the frames of a unit brought to one brightness."""
+    usable = np.array([_usable(region, unit) for region in series.values()])
+    value = np.array([region.values for region in series.values()])
+    sigma = np.array([region.sigma for region in series.values()])
+    shown = usable[:, :, np.newaxis] & (value > SEEN * sigma)
+    frames = np.flatnonzero(shown.any(axis=(0, 2)))
+    if len(frames) < 2:
+        return series
+    # (frames, places · channels)
+    shown = np.moveaxis(shown[:, frames], 1, 0).reshape(len(frames), -1)
+    value_of = np.moveaxis(value[:, frames], 1, 0).reshape(len(frames), -1)
+    sigma_of = np.moveaxis(sigma[:, frames], 1, 0).reshape(len(frames), -1)
+    weight = np.where(shown, (value_of / np.where(shown, sigma_of, 1.0)) ** 2, 0.0)
+    log = np.log(np.where(shown, value_of, 1.0))
+    total = np.maximum(weight.sum(axis=0), 1e-300)
+    # Least squares of log = place + frame; the places are eliminated, the frames have mean 0.
+    normal = np.diag(weight.sum(axis=1)) - (weight / total) @ weight.T
+    right = (weight * (log - (weight * log).sum(axis=0) / total)).sum(axis=1)
+    gain = np.linalg.lstsq(normal, right, rcond=1e-9)[0]
+    factor = np.ones(len(next(iter(series.values())).values))
+    factor[frames] = np.exp(gain - gain.mean())
+    return {
+        name: replace(
+            region,
+            values=region.values / factor[:, np.newaxis],
+            sigma=region.sigma / factor[:, np.newaxis],
+        )
+        for name, region in series.items()
+    }
 
 
 def _weighted_mean(

@@ -48,6 +48,7 @@ from .led_study import (
 from .material_tables import (
     comparison_table as comparison_table,
     describe_phosphor as describe_phosphor,
+    surface_lines as surface_lines,
 )
 from .mixture import (
     FittedMatrix as FittedMatrix,

@@ -4,25 +4,42 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from labrig.material import Material, MaterialComparison, State
+import numpy as np
+
+from labrig.material import Albedo, Material, MaterialComparison, RadianceFactor, State
 from labrig.number_format import aligned, plus_minus, rounded
 from labrig.report.sections import Table
 
 UNKNOWN = "–"
+#: Units of amplitude and Λ by the scale of a material.
+UNITS = {
+    None: ("", ""),
+    "relative": (" / sr⁻¹", " / s sr⁻¹"),
+    "absolute": (" / W m⁻² sr⁻¹ nm⁻¹", " / W s m⁻² sr⁻¹ nm⁻¹"),
+}
+#: What the caption says of a scale.
+SCALES = {
+    "relative": " Λ is relative to the lamp's mean spectral irradiance over the bands.",
+    "absolute": " Λ is absolute, by a reading in lux.",
+}
+#: Wavelengths in nm at which the albedo is told.
+ALBEDO_NM = (450.0, 500.0, 550.0, 600.0, 650.0)
 
 
 def measured_table(material: Material) -> Table:
     """Return the table of all values of a material with their σ, in one column a state."""
     states = sorted(material.states, key=lambda state: -state.k_r_per_s)
     head = ("",) if len(states) == 1 else ("", *(f"State {n + 1}" for n in range(len(states))))
-    rows = tuple(_rows(states, material.bands_nm or ()))
+    rows = tuple(_rows(states, material.bands_nm or (), material.scale))
     caption = "Value ± standard uncertainty (1 σ)."
     if material.irradiance_norm is not None:
         length = material.irradiance_norm.value
         caption += (
             " k_e is per unit of the lamp's irradiance, whose values in the bands are scaled so "
-            f"that the root of the sum of their squares is {length:g}; Λ is relative radiance."
+            f"that the root of the sum of their squares is {length:g}"
+            + ("; Λ is relative radiance." if material.scale is None else ".")
         )
+    caption += SCALES.get(material.scale or "", "")
     if any(state.decay_time_of_rate_s is not None for state in states):
         caption += (
             " The glow of a kinetic order b decays as a (1 + t/τ)^(−p), after the charge to which "
@@ -67,7 +84,64 @@ def describe_phosphor(material: Material) -> str:
         lines.append(f"  source: {material.provenance.source}")
     rows = [table.head, *table.rows] if len(material.states) > 1 else list(table.rows)
     lines += [f"  {line}" for line in aligned(rows)]
-    return "\n".join([*lines, table.caption])
+    return "\n".join([*lines, *surface_lines(material), table.caption])
+
+
+def surface_lines(material: Material) -> tuple[str, ...]:
+    """Describe scale, albedo, total radiance factor and layer, as far as they are known.
+
+    Parameters
+    ----------
+    material
+        A phosphor.
+
+    Returns
+    -------
+    tuple of str
+        A line for each; none of a material of which only the glow is known.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.material import Albedo
+    >>> from labrig.report import surface_lines
+    >>> grey = Albedo(wavelength_nm=(400.0, 700.0), value=(0.2, 0.2), sigma=(0.01, 0.01))
+    >>> material = labrig.read_material("blue-paint").model_copy(update={"albedo": grey})
+    >>> for line in surface_lines(material):
+    ...     print(line.partition(",")[0])
+      albedo 0.200 ± 0.010 (450 nm)
+    """
+    return tuple(_surface_lines(material))
+
+
+def _surface_lines(material: Material) -> Iterator[str]:
+    if material.scale is not None:
+        yield f"  scale: {material.scale}"
+    for factor in material.scale_factors:
+        value = _value_text(factor.value, math.nan if factor.sigma is None else factor.sigma)
+        yield f"    × {value}{'' if factor.unit == '1' else ' ' + factor.unit}: {factor.name}"
+    if material.albedo is not None:
+        yield f"  albedo {_curve_text(material.albedo)}"
+    if material.radiance_factor is not None:
+        lamp = material.radiance_factor.lamp
+        yield f"  radiance factor under {lamp} {_curve_text(material.radiance_factor)}"
+    if material.thickness_mm is not None:
+        yield f"  thickness {rounded(material.thickness_mm)} mm"
+    if material.mass_per_area_g_per_m2 is not None:
+        yield f"  mass per area {rounded(material.mass_per_area_g_per_m2)} g/m²"
+
+
+def _curve_text(curve: Albedo | RadianceFactor) -> str:
+    """Return a curve at some wavelengths as text."""
+    parts = []
+    for nm in ALBEDO_NM:
+        if curve.wavelength_nm[0] <= nm <= curve.wavelength_nm[-1]:
+            value = float(np.interp(nm, curve.wavelength_nm, curve.value))
+            sigma = math.nan
+            if curve.sigma is not None:
+                sigma = float(np.interp(nm, curve.wavelength_nm, curve.sigma))
+            parts.append(f"{_value_text(value, sigma)} ({nm:g} nm)")
+    return ", ".join(parts)
 
 
 def comparison_table(comparison: MaterialComparison) -> Table:
@@ -130,8 +204,11 @@ def _measured_head(comparison: MaterialComparison) -> str:
     return "measured" if factors == (1.0, 1.0) else "measured, rescaled"
 
 
-def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[str, ...]]:
+def _rows(
+    states: Sequence[State], bands_nm: Sequence[float], scale: str | None
+) -> Iterator[tuple[str, ...]]:
     """Yield the rows of k_r, kinetic order, r(0), and k_e and Λ by band."""
+    amplitude_unit, reradiation_unit = UNITS[scale]
     own = [("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")]
     if any(state.kinetic_order != 1 for state in states):
         own.insert(1, ("kinetic order b", "kinetic_order"))
@@ -139,10 +216,13 @@ def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[
         if any(getattr(state, name) is not None for state in states):
             yield (quantity, *(_quantity_text(state, name) for state in states))
     if any(state.decay_time_of_rate_s is not None for state in states):
-        for quantity, name in (("a", "amplitude"), ("τ / s", "decay_time_s")):
+        for quantity, name in ((f"a{amplitude_unit}", "amplitude"), ("τ / s", "decay_time_s")):
             yield (quantity, *(_quantity_text(state, name) for state in states))
         yield ("p", *map(_exponent_text, states))
-    for symbol, unit, name in (("k_e", " / s⁻¹", "k_e_per_s"), ("Λ", "", "reradiation")):
+    for symbol, unit, name in (
+        ("k_e", " / s⁻¹", "k_e_per_s"),
+        ("Λ", reradiation_unit, "reradiation"),
+    ):
         if any(getattr(state, name) is not None for state in states):
             for band, (low, high) in enumerate(pairwise(bands_nm)):
                 quantity = f"{symbol} {low:g}–{high:g} nm{unit}"

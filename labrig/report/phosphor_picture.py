@@ -9,7 +9,11 @@ from labrig.errors import UsageError
 from labrig.material import Material, State
 from labrig.number_format import rounded
 from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
+from labrig.report.material_tables import UNITS
 from labrig.report.picture_file import require_picture, save_picture
+
+#: Name of the panel of the albedo among those of the states' quantities.
+ALBEDO = "albedo"
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -47,14 +51,16 @@ def draw_phosphor(material: Material, path: Path) -> None:
         (name, label)
         for name, label in (
             ("k_e_per_s", "excitation rate k_e / s⁻¹"),
-            ("reradiation", "re-radiation Λ, relative"),
+            ("reradiation", f"re-radiation Λ{UNITS[material.scale][1] or ', relative'}"),
         )
         if any(getattr(state, name) is not None for state in material.states)
     ]
+    if material.albedo is not None:
+        panels.append((ALBEDO, "albedo"))
     if not panels:
         raise UsageError(
-            f"{material.name}: expected excitation rates or re-radiation to draw, got decay rates "
-            "only"
+            f"{material.name}: expected excitation rates, re-radiation or an albedo to draw, got "
+            "decay rates only"
         )
     with figure_style():
         figure = Figure(figsize=(4.5 * len(panels), 3.4), layout="constrained")
@@ -62,7 +68,10 @@ def draw_phosphor(material: Material, path: Path) -> None:
         for axes, (name, label) in zip(
             np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True
         ):
-            _draw_bands(axes, material, name)
+            if name == ALBEDO:
+                _draw_albedo(axes, material)
+            else:
+                _draw_bands(axes, material, name)
             axes.set(xlabel="wavelength / nm")
             axes.set_title(label, fontsize="medium", color=INK)
         save_picture(figure, path)
@@ -75,6 +84,22 @@ def _label(state: State) -> str:
     order = f"b = {rounded(state.kinetic_order, 3)}"
     time_s = state.decay_time_of_rate_s
     return order if time_s is None else f"{order}, τ = {rounded(time_s, 3)} s"
+
+
+def _draw_albedo(axes: "Axes", material: Material) -> None:
+    """Draw albedo and total radiance factor with ± 1 σ."""
+    curves = (
+        (material.albedo, INK, "albedo"),
+        (material.radiance_factor, OTHER_CHANNELS[0], "radiance factor under the lamp"),
+    )
+    for curve, colour, label in curves:
+        if curve is not None:
+            axes.errorbar(
+                curve.wavelength_nm, curve.value, curve.sigma, color=colour, linewidth=1.4,
+                capsize=2, label=label,
+            )  # fmt: skip
+    axes.set_ylim(bottom=0)
+    axes.legend(frameon=False, fontsize="small")
 
 
 def _draw_bands(axes: "Axes", material: Material, name: str) -> None:

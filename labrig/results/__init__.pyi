@@ -172,6 +172,10 @@ from .measured import (
 from .phosphor import (
     PhosphorResult as PhosphorResult,
 )
+from .reflectance import (
+    MeasuredReflectance as MeasuredReflectance,
+    ReflectanceResult as ReflectanceResult,
+)
 from .reradiation_methods import (
     EstimateMethod as EstimateMethod,
     MeasuringMethod as MeasuringMethod,

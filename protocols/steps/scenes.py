@@ -33,12 +33,13 @@ from .exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET
 from .sample_pose import face_lamp
 from .sanity_checks import SanityChecks
 
-Stage = Literal["sample", "grey card", "colorchecker", "blank"]
+Stage = Literal["sample", "lit sample", "grey card", "colorchecker", "blank"]
 LvfPlace = Literal["away", "before camera", "on sample"]
 LampKind = Literal["halogen", "mercury"]
 
 _STAGE = {
     "sample": "take the card away, so that the sample lies in its place",
+    "lit sample": "lay the sample in the grey card's place, where lamp and camera both see it",
     "grey card": "lay the grey card where lamp and camera both see it",
     "colorchecker": "lay the ColorChecker where lamp and camera see all of it",
     "blank": "put a grey card in the sample's place (in the door, if there is one)",
@@ -461,10 +462,14 @@ class SceneUnit:
 
     def run(self, session: Session) -> None:
         """Light, photograph, and check the photographs; lamp and camera warm up together."""
-        light(session, self.warm_up_s(session))
+        self.light(session)
         session.wait_until_warm("camera")
         self.bracketing.photograph(session, self.name, self.role, self.lamp)
         self.check(session)
+
+    def light(self, session: Session) -> None:
+        """Switch the lamp on and wait until it is steady."""
+        light(session, self.warm_up_s(session))
 
     def warm_up_s(self, session: Session) -> float:
         """Return the warm-up time of the lamp in use, in seconds."""

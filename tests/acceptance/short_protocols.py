@@ -52,6 +52,7 @@ SHORTER: dict[str, dict[str, Any]] = {
     },
     "isotropy": {"charge": "2 min", "angles": [20, 60], "frames": 2},
     "luminance": {"until": "3 min", "longest": "10 s"},
+    "reflectance": {"charge": "2 min", "longest": "4 s", "repeats": 1},
     "saturation": {"charges": ["2 min", "10 min"], "for": "60 s"},
     "phosphor": {},
 }  # fmt: skip
@@ -63,6 +64,7 @@ NEEDED = {
     "camera_curves": ("lvf",),
     "colour_check": ("lvf",),
     "excitation": ("lvf", "irradiance", "fade"),
+    "reflectance": ("lvf",),
 }
 ANOTHER_DAY = "2026-01-02T00:02:00Z"
 RIGS = {

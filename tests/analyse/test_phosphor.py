@@ -6,7 +6,12 @@ from pathlib import Path
 import pytest
 
 from labrig.acquire import read_protocol
-from labrig.calibration import IRRADIANCE_KIND
+from labrig.calibration import (
+    IRRADIANCE_KIND,
+    REFLECTANCE_KIND,
+    PatchReflectance,
+    ReflectanceFile,
+)
 from labrig.errors import UsageError
 from labrig.material import read_material
 from labrig.number_format import plus_minus
@@ -28,13 +33,21 @@ SHORT = {key: value for key, value in QUICK.items() if key != "sample"} | {
 }  # fmt: skip
 
 
+GREY = PatchReflectance(
+    wavelength_nm=(400, 700), albedo=(0.3, 0.4), albedo_sigma=(0.01, 0.01),
+    radiance_factor=(0.3, 0.4), radiance_factor_sigma=(0.01, 0.01), common_sigma=0.01,
+)  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("phosphor")
     IRRADIANCE_KIND.write(folder, true_irradiance(WIDTH, HEIGHT))
+    REFLECTANCE_KIND.write(folder, ReflectanceFile(lamp="halogen", patches={"": GREY}))
 
     def change(rig: dict[str, dict[str, object]]) -> None:
         rig["optics"]["irradiance"] = str(folder / "irradiance.yaml")
+        rig["optics"]["reflectance"] = str(folder / "reflectance.yaml")
         rig["simulation"]["sensor"] = {"width": WIDTH, "height": HEIGHT}
 
     chain = {"protocol": "phosphor", "sample": {"name": "blue-paint"}, "parts": [DECAY, SHORT]}
@@ -55,6 +68,11 @@ def test_a_chain_that_was_killed_and_resumed_ends_in_one_material(run: Path) -> 
     assert material.provenance is not None
     assert material.provenance.temperature_c == pytest.approx(21, abs=1)
     assert state.k_r_per_s == pytest.approx(0.032, rel=0.02)
+    # Each part's material has the albedo that the rig file names, and so has the chain's.
+    for name in ("material.yaml", "decay/material.yaml", "excitation/material.yaml"):
+        albedo = read_material(run / "result" / name).albedo
+        assert albedo is not None
+        assert albedo.value == GREY.albedo
     assert state.k_e_per_s is not None
     assert state.k_e_per_s_sigma is not None
     assert state.k_e_per_s[1] / 4 == pytest.approx(0.05, rel=0.2)

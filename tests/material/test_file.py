@@ -9,9 +9,12 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from labrig import resources
 from labrig.errors import UsageError
 from labrig.material.file import (
+    Albedo,
     IrradianceNorm,
     Material,
     Provenance,
+    RadianceFactor,
+    ScaleFactor,
     Spectrum,
     State,
     read_material,
@@ -54,6 +57,16 @@ def materials(draw: st.DrawFn) -> Material:
             )
         )
     wavelength_nm = draw(rising(2))
+    count = len(wavelength_nm)
+    fractions = st.lists(st.floats(0, 1.2), min_size=count, max_size=count).map(tuple)
+    factor = st.builds(
+        ScaleFactor,
+        name=st.just("card's radiance over irradiance"),
+        value=positive,
+        sigma=st.none() | not_negative,
+        unit=st.sampled_from(["1", "1/sr"]),
+    )
+    scale = draw(st.none() | st.sampled_from(["relative", "absolute"]))
     return Material(
         name=draw(st.text(min_size=1).filter(lambda name: name.isprintable())),
         kind="phosphor",
@@ -66,6 +79,30 @@ def materials(draw: st.DrawFn) -> Material:
                 lambda value: Spectrum(wavelength_nm=wavelength_nm, value=value)
             )
         ),
+        scale=scale,
+        scale_factors=() if scale is None else draw(st.lists(factor, max_size=3).map(tuple)),
+        albedo=draw(
+            st.none()
+            | st.builds(
+                Albedo,
+                wavelength_nm=st.just(wavelength_nm),
+                value=fractions,
+                sigma=st.none() | series(count),
+                common_sigma=st.none() | not_negative,
+            )
+        ),
+        radiance_factor=draw(
+            st.none()
+            | st.builds(
+                RadianceFactor,
+                lamp=st.just("halogen"),
+                wavelength_nm=st.just(wavelength_nm),
+                value=series(count),
+                sigma=st.none() | series(count),
+            )
+        ),
+        thickness_mm=draw(st.none() | positive),
+        mass_per_area_g_per_m2=draw(st.none() | positive),
         provenance=draw(st.none() | st.builds(Provenance, source=st.text("αb: #'\n-9"))),
     )
 
@@ -150,6 +187,19 @@ WHOLE = {
         ("irradiance_norm: null", "expected 'irradiance_norm' beside states.0.k_e_per_s"),
         ("spectrum: {wavelength_nm: [400, 500], value: [1]}", "expected 2 numbers in 'value'"),
         ("kind: fluorescent", "'phosphor', got 'fluorescent'"),
+        ("albedo: {wavelength_nm: [400, 500], value: [1]}", "at least 2"),
+        ("albedo: {wavelength_nm: [500, 400], value: [1, 1]}", "rising wavelengths"),
+        (
+            "albedo: {wavelength_nm: [400, 500], value: [1, 2]}",
+            "of at most 1.2, got '2'",
+        ),
+        (
+            "radiance_factor: {lamp: x, wavelength_nm: [400, 500], value: [1, 1], sigma: [1]}",
+            "expected 2 numbers in 'sigma'",
+        ),
+        ("scale: lux", "scale"),
+        ("scale_factors: [{name: x, value: 2}]", "expected 'scale' beside 'scale_factors'"),
+        ("thickness_mm: 0", "greater than 0"),
     ],
 )
 def test_refusals_say_what_was_expected(change: str, said: str, tmp_path: Path) -> None:

@@ -73,3 +73,16 @@ def test_a_filter_that_goes_to_and_fro_is_refused() -> None:
     centres = np.array([400.0, 500.0, 450.0])
     with pytest.raises(ValueError, match="rise or fall along the filter"):
         Lvf(np.arange(3.0), Bands(centres, 25 * three, 0 * three, three, 0 * three))
+
+
+@pytest.mark.parametrize("skew", [0.0, 0.3])
+def test_light_that_passes_twice_is_squared(skew: float) -> None:
+    one = np.ones(3)
+    bands = Bands(np.array([450.0, 550.0, 650.0]), 25 * one, skew * one, 0.5 * one, 1e-3 * one)
+    lvf = Lvf(np.array([0.0, 0.5, 1.0]), bands)
+    nm = np.arange(400.0, 701.0, 5.0)
+    np.testing.assert_allclose(lvf.twice().transmission(nm), lvf.transmission(nm) ** 2, atol=1e-12)
+    # The bands alone are already the square, but for what leaks beside them.
+    np.testing.assert_allclose(
+        lvf.twice().bands.transmission(nm), lvf.transmission(nm) ** 2, atol=2e-3
+    )

@@ -1,8 +1,12 @@
 """Samples that are warmer, or turned away."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from labrig.errors import UsageError
+from labrig.material import ScaleFactor, read_material, write_material
 from labrig.sim.bench_settings import TemperatureSettings
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.phosphor import Phosphor
@@ -99,3 +103,55 @@ def test_a_room_that_is_opened_later_is_as_warm_as_it_has_become() -> None:
     later = room.opened_at(room.epoch.timestamp() + 5400.0)
     assert later.temperature is not None
     assert later.temperature.celsius(1800.0) == pytest.approx(24.0)
+
+
+def test_a_material_on_the_lamps_scale_glows_as_its_lamp_lets_expect(tmp_path: Path) -> None:
+    """Λ in s sr⁻¹: as many times the radiance of a white as its π Λ k_r r, both by one lamp."""
+    paint = read_material("blue-paint")
+    table = Darkroom().room.truth().patches[0].states[0].emission
+    (state,) = paint.states
+    scaled = paint.model_copy(update={"scale": "relative", "states": (
+        state.model_copy(update={"reradiation": tuple(1e-3 * x for x in state.reradiation or ())}),
+    )})  # fmt: skip
+    sample = tmp_path / "sample.yaml"
+    write_material(sample, scaled)
+    patch = {"material": str(sample), "region": [0.0, 0.1, 1.0, 0.8]}
+    bench = Darkroom(sample=[patch])
+    emission = np.array(bench.room.truth().patches[0].states[0].emission)
+    factor = emission.max() / max(table)
+    np.testing.assert_allclose(emission, factor * np.array(table), rtol=1e-6)
+    white = Darkroom(sample=[patch], lamp={"irradiance": 8.0})
+    twice = np.array(white.room.truth().patches[0].states[0].emission)
+    np.testing.assert_allclose(twice, 2 * emission)
+    lit = ScaleFactor(name="by a reading in lux", value=0.5, unit="W/m²/nm")
+    absolute = scaled.model_copy(update={"scale": "absolute", "scale_factors": (lit,)})
+    write_material(sample, absolute)
+    emission_absolute = np.array(
+        Darkroom(sample=[patch]).room.truth().patches[0].states[0].emission
+    )
+    np.testing.assert_allclose(emission_absolute, 2 * emission)
+    write_material(sample, absolute.model_copy(update={"scale_factors": ()}))
+    with pytest.raises(UsageError, match="expected the lamp's mean spectral irradiance"):
+        Darkroom(sample=[patch])
+
+
+def test_lambda_of_a_white_that_glows_as_bright_as_it_reflects(tmp_path: Path) -> None:
+    """Photographs: a glow of Λ k_r r = 1/π by the lamp's mean is as bright as a white there."""
+    paint = read_material("blue-paint")
+    (state,) = paint.states
+    flat = state.model_copy(update={
+        "reradiation": (1 / (np.pi * state.k_r_per_s * 0.5),) * 8, "k_e_per_s": None,
+    })  # fmt: skip
+    material = paint.model_copy(update={"scale": "relative", "states": (flat,)})
+    write_material(tmp_path / "sample.yaml", material)
+    bench = Darkroom(
+        sample=[{"material": str(tmp_path / "sample.yaml"), "region": [0.0, 0.1, 1.0, 0.8]}],
+        initial={"concentration": 0.5}, grey_card=0.9, lamp={"warm_up_deficit": 0.0},
+    )  # fmt: skip
+    glow = bench.shoot(1 / 2000, 100)[20:44].mean()
+    bench.do("grey card")
+    bench.room.switch_lamp(True)
+    bench.clock.spend(60)
+    card = bench.shoot(1 / 2000, 100)[20:44].mean()
+    # The lamp is redder than the flat glow, and a camera sees its middle.
+    assert glow / card * 0.9 == pytest.approx(1.0, abs=0.25)

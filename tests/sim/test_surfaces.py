@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from labrig.material import ReradiationMatrix, read_material, write_reradiation
+from labrig.material import Albedo, ReradiationMatrix, read_material, write_reradiation
 from labrig.sim.bench_settings import LedSettings
 from labrig.sim.lamp import CELL_NM, WAVELENGTH_NM
 from labrig.sim.leds import Leds, led_spectrum
-from labrig.sim.optics import film, glass
+from labrig.sim.optics import emission, film, glass
 from labrig.sim.surfaces import Surfaces, reradiation_on_grid
 from tests.sim.darkroom import Darkroom, colours
 
@@ -60,6 +60,39 @@ def test_gloss_mirrors_and_a_phosphor_reflects_half() -> None:
     assert_allclose(back, np.array([[0.3], [0.5]]) * light)
     mirrored = surfaces.mirrored(light, np.array([0, 1, 2]))
     assert_allclose(mirrored, np.array([[0.0], [0.04], [0.04]]) * light)
+
+
+def test_a_phosphor_reflects_its_albedo_and_fluoresces_in_the_colour_of_its_glow() -> None:
+    albedo = Albedo(wavelength_nm=(400.0, 600.0), value=(0.2, 0.6))
+    paint = read_material("blue-paint").model_copy(update={"albedo": albedo})
+    light, patch = narrow(440), np.array([1])
+    plain = Surfaces([paint], 0.0).thrown_back(light, patch)
+    assert_allclose(plain[0], np.interp(WAVELENGTH_NM, [400, 600], [0.2, 0.6]) * light)
+    surfaces = Surfaces([paint], 0.0, [0.1])
+    assert_allclose(surfaces.reflected(light, patch), plain)
+    prompt = surfaces.reradiated(light, patch)[0]
+    glow = emission(paint)[0]
+    assert_allclose(prompt / prompt.sum(), glow / glow.sum(), atol=1e-9)
+    # Excited nearly as well as it can be, by the light that is not reflected.
+    assert 0.04 < prompt.sum() / light.sum() < 0.1 * (1 - 0.28)
+    assert surfaces.reradiated(narrow(600), patch).sum() < 1e-3 * prompt.sum()
+
+
+def test_a_lit_sample_shows_itself_on_the_closed_door() -> None:
+    bench = Darkroom(door={"channel": 0})
+    bench.do("grey card")
+    bench.room.switch_lamp(True)
+    bench.clock.spend(600)
+    card = colours(bench.shoot(1 / 500, 100))[16, 24]
+    bench.do("lit sample")
+    bench.clock.spend(600)
+    sample = colours(bench.shoot(1 / 500, 100))[16, 24]
+    assert_allclose(sample / card, 0.5 / 0.18, rtol=0.05)
+    bench.room.switch_lamp(False)
+    bench.clock.spend(0.6)
+    assert colours(bench.shoot(1.0, 400))[16, 24].max() > 500
+    bench.do("sample")
+    assert colours(bench.shoot(1.0, 400))[16, 24].max() < 20
 
 
 @pytest.mark.parametrize(

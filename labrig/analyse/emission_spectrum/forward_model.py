@@ -6,18 +6,25 @@ every position and channel, and constrains the model's errors.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from labrig.analyse.emission_spectrum.comparison import CombinedFrame, combined
 from labrig.analyse.inputs import Part
-from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
+from labrig.analyse.strip import StripPatch, slice_strip, strip_regions
+from labrig.analyse.strip_model import (
+    ANY_BRIGHTNESS,
+    LAMP_SIGMA,
+    channel_cameras,
+    channel_positions,
+    conditioned_on_white,
+    strip_system,
+)
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.errors import DataError, UsageError
-from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
+from labrig.fit.spectrum import SpectralSystem
 from labrig.optics import (
-    Bands,
     CameraResponse,
     Lvf,
     Spectrum,
@@ -26,7 +33,7 @@ from labrig.optics import (
     read_monochrome_camera,
     signal_through,
 )
-from labrig.reduce import SensorLayout, SeriesFrame, sensor_layout
+from labrig.reduce import SeriesFrame, sensor_layout
 from labrig.region import Region
 from labrig.results import FilterFrames, FloatArray
 
@@ -35,10 +42,6 @@ from labrig.results import FilterFrames, FloatArray
 HOLDER = (0.8, 1.1)
 #: Knots of the fitted spectrum: finer than the filter's 25 nm, and beyond the grid of results.
 KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
-#: Relative uncertainty of a lamp's spectrum whose file has none.
-LAMP_SIGMA = 0.01
-#: Prior σ of the frame's relative brightness, uninformative.
-ANY_BRIGHTNESS = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +78,7 @@ class ForwardModel:
         """Return the values of a light by the model, shape (positions · channels,)."""
         columns = [
             signal_through(lvf, channel, light)[:, 0]
-            for lvf, channel in zip(self.lvfs, _channel_cameras(self.camera), strict=True)
+            for lvf, channel in zip(self.lvfs, channel_cameras(self.camera), strict=True)
         ]
         return np.stack(columns, axis=1).ravel()
 
@@ -115,9 +118,11 @@ def forward_models(
     models = {}
     for patch, slices in sliced.items():
         # At either end pixels reach a little beyond the places that were calibrated.
-        places = np.clip(_positions(layout, strip, slices), lvf.position[0], lvf.position[-1])
-        lvfs = tuple(lvf.at(channel_positions) for channel_positions in places)
-        models[patch] = ForwardModel(slices, holder, lvfs, camera, _system(lvfs, camera))
+        seen = channel_positions(layout, strip, slices)
+        places = np.clip(seen, lvf.position[0], lvf.position[-1])
+        lvfs = tuple(lvf.at(positions) for positions in places)
+        system = strip_system(lvfs, camera, KNOTS_NM)
+        models[patch] = ForwardModel(slices, holder, lvfs, camera, system)
     return models, refused
 
 
@@ -173,49 +178,6 @@ def card_misfit(model: ForwardModel, frame: CombinedFrame, light: Spectrum) -> f
     return float(np.sqrt(chi2 / max(int(used.sum()) - 1, 1)))
 
 
-def conditioned_on_white(
-    system: SpectralSystem,
-    value: FloatArray,
-    sigma: FloatArray,
-    light: Spectrum,
-    expected: FloatArray,
-) -> SpectralSystem:
-    """Condition the system on a frame of a known light.
-
-    With value = g (expected + Σ_k z_k modes_k · light) + noise, z and g normal, this is the mean
-    and covariance of z given the frame.
-
-    Parameters
-    ----------
-    system
-        Linear model with error modes.
-    value, sigma
-        Values of the frame in any unit and their standard uncertainties, shape (m,); NaN where it
-        clips.
-    light
-        Spectrum of the light that was photographed.
-    expected
-        Values by the system's own curves, wavelengths beyond its knots included, shape (m,).
-    """
-    is_finite = np.isfinite(value) & np.isfinite(sigma)
-    gain = float(
-        expected[is_finite] @ value[is_finite] / (expected[is_finite] @ expected[is_finite])
-    )
-    y, s = value[is_finite] / gain, sigma[is_finite] / gain
-    mode_values = system.modes[:, is_finite] @ light.at(system.knots_nm)
-    levers = np.vstack([mode_values, ANY_BRIGHTNESS * expected[is_finite]])
-    noise = np.hypot(s, LAMP_SIGMA * expected[is_finite])
-    whitened = levers / noise
-    precision = np.eye(len(levers)) + whitened @ whitened.T
-    mean = np.linalg.solve(precision, whitened @ ((y - expected[is_finite]) / noise))
-    # Rows of the root of the covariance: independent again, each of unit variance.
-    root = np.linalg.inv(np.linalg.cholesky(precision))[:, :-1]
-    design = system.design + np.tensordot(mean[:-1], system.modes, axes=1)
-    return SpectralSystem(
-        system.knots_nm, np.maximum(design, 0.0), np.tensordot(root, system.modes, axes=1)
-    )
-
-
 def _holder_regions(strip: Strip) -> dict[str, Region]:
     """Return dark stripes above and below the strip, as far as they lie in the frame."""
     (left, left_y), (right, right_y) = strip.left, strip.right
@@ -227,56 +189,6 @@ def _holder_regions(strip: Strip) -> dict[str, Region]:
         for name, (top, bottom) in stripes.items()
         if top >= 0 and bottom <= 1
     }
-
-
-def _positions(layout: SensorLayout, strip: Strip, slices: Slices) -> FloatArray:
-    """Return the middle of each channel's own pixels in every slice, shape (channels, positions).
-
-    Pixels of one colour are two apart: where slices are few pixels wide, that is some nanometres.
-    """
-    middles = np.array([layout.middle_columns(region) for region in slices.values()]).T
-    across = (strip.right[0] - strip.left[0]) * layout.width
-    fraction = (middles - strip.left[0] * layout.width) / across + tilt_offset(
-        strip, slices, layout
-    )
-    return fraction if strip.rising else 1 - fraction
-
-
-def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:
-    """Return the system whose channels each see the filter in a place of their own.
-
-    An error of the filter is common to the channels of a slice, one of a curve is the channel's.
-    """
-    error = CurveError()
-    parts = [
-        system_through_lvf(lvf, channel, KNOTS_NM, error)
-        for lvf, channel in zip(lvfs, _channel_cameras(camera), strict=True)
-    ]
-    filter_modes = sum(
-        int(np.count_nonzero(getattr(lvfs[0].sigma, parameter.name))) for parameter in fields(Bands)
-    )
-    curves = len(parts[0].modes) - filter_modes
-    count, knots = len(parts), len(KNOTS_NM)
-    shape = (len(parts[0].design), count, knots)
-    design = np.stack([part.design for part in parts], axis=1)
-    modes = []
-    for number, part in enumerate(parts):
-        channel_modes = np.zeros((curves, *shape))
-        channel_modes[:, :, number] = part.modes[:curves]
-        modes.append(channel_modes)
-    modes.append(np.stack([part.modes[curves:] for part in parts], axis=2))
-    rows = shape[0] * count
-    return SpectralSystem(
-        KNOTS_NM, design.reshape(rows, knots), np.concatenate(modes).reshape(-1, rows, knots)
-    )
-
-
-def _channel_cameras(camera: CameraResponse) -> list[CameraResponse]:
-    """Return each channel as a camera of its own."""
-    return [
-        CameraResponse(camera.name, camera.wavelength_nm, column[:, np.newaxis], (name,))
-        for column, name in zip(camera.sensitivity.T, camera.channels, strict=True)
-    ]
 
 
 def card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:

@@ -21,8 +21,10 @@ from labrig.analyse.excitation.material import excited_material
 from labrig.analyse.excitation.orders import OrderFits
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
+from labrig.analyse.radiometric_scale import RadiometricScale, radiometric_scale
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
+from labrig.analyse.surface import with_reflectance
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
@@ -31,6 +33,7 @@ from labrig.record import FrameRole
 from labrig.results import (
     ChargingSeries,
     Closure,
+    EmissionSpectrum,
     ExcitationResult,
     FittedDecay,
     FittedExcitation,
@@ -127,6 +130,9 @@ def _patch_excitation(
         if spectra and spectrum is None
         else ()
     )
+    if spectrum is not None and (scale := _scale(part, charging, fit, irradiance, spectrum)):
+        material = scale.of(material)
+    material = with_reflectance(material, patch.folder, part.inputs.reflectance)
     material = at_temperature(material, run, part.protocol.rate_frames)
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
@@ -139,6 +145,21 @@ def _patch_excitation(
             *no_spectrum,
         ),
     )
+
+
+def _scale(
+    part: Part,
+    charging: PatchCharging,
+    fit: FittedExcitation,
+    irradiance: IrradianceFile,
+    spectrum: EmissionSpectrum,
+) -> RadiometricScale | None:
+    """Return the radiometric scale of the patch's amplitudes, where the bench tells it."""
+    whole = charging.whole
+    channel = whole.channels[int(np.argmax(fit.channel_weights))]
+    iso, f_number = float(whole.iso[0]), float(whole.f_number[0])
+    aperture = None if np.isnan(f_number) else f_number
+    return radiometric_scale(part, irradiance, spectrum, channel, iso, aperture)
 
 
 def _light_warnings(fit: FittedExcitation) -> Iterator[str]:

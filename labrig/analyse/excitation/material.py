@@ -9,9 +9,9 @@ from labrig.material import IrradianceNorm, Material, Provenance, State
 from labrig.results import EmissionSpectrum, ExcitedState, FittedExcitation, FloatArray
 
 SOURCE = (
-    "decay and excitation measured with labrig; amplitudes in DN/s of the brightest channel, Λ = "
-    "Λ* amplitude(r = 1) / k_r relative to the spectrum's peak, r(0) after the longest charge by "
-    "the lamp itself"
+    "decay and excitation measured with labrig; amplitudes are those of the brightest channel, in "
+    "DN/s unless 'scale' says otherwise, Λ = Λ* amplitude(r = 1) / k_r by the spectrum's peak, "
+    "r(0) after the longest charge by the lamp itself"
 )
 
 

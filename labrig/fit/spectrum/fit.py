@@ -100,6 +100,7 @@ def fit_spectrum(
     samples: int = SAMPLES,
     seed: int = 0,
     decisive: float = DECISIVE,
+    stiffest: float = np.inf,
 ) -> SpectrumFit:
     """Fit the spectrum that explains some values.
 
@@ -117,6 +118,9 @@ def fit_spectrum(
     decisive
         Evidence of a narrow line over that of none from which the spectrum has lines; inf where
         there can be none, as in the sensitivity of a channel.
+    stiffest
+        Largest weight of the smoothness prior, for a spectrum of about 1. Where most of a curve is
+        straight, its evidence would be for a prior that is too stiff for a bend elsewhere.
 
     Raises
     ------
@@ -129,12 +133,16 @@ def fit_spectrum(
     prior = Prior.on(len(part.knots_nm))
     flat = np.full(len(part.knots_nm), scale)
 
+    def weighed(problem: Problem) -> FloatArray:
+        """Return the log evidence of each of `WEIGHTS`, −inf of those that are too large."""
+        return np.where(stiffest >= WEIGHTS, prior.log_evidence(problem.values), -np.inf)
+
     def settled(x: FloatArray, lines: WithLines | None) -> tuple[Problem, FloatArray, float]:
         """Return the problem with the errors of a spectrum that it yields, that, and the misfit."""
         misfit = 1.0
         for _ in range(ROUNDS):
             problem = Problem(Whitened.of(part, y, misfit * s, x / scale, scale), part, prior)
-            log_evidence = prior.log_evidence(problem.values)
+            log_evidence = weighed(problem)
             smoothest = smooth(float(WEIGHTS[np.argmax(log_evidence)]))
             basis = smoothest if lines is None else lines.dense
             x, ratio = _likeliest(problem, basis)
@@ -142,7 +150,7 @@ def fit_spectrum(
         return problem, x, misfit
 
     problem, x, misfit = settled(flat, None)
-    log_evidence = prior.log_evidence(problem.values)
+    log_evidence = weighed(problem)
     lines = None if np.isinf(decisive) else lines_of(problem, log_evidence, decisive)
     if lines is not None:
         problem, x, misfit = settled(x, lines)

@@ -1,0 +1,62 @@
+"""What a reflectance run and the protocol tell of a material's surface and layer."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from labrig.calibration import PatchReflectance, ReflectanceFile
+from labrig.material import Albedo, Material, RadianceFactor
+
+
+def with_reflectance(
+    material: Material, patch: str, reflectance: ReflectanceFile | None
+) -> Material:
+    """Return the material with albedo and radiance factor, if its patch was measured.
+
+    Parameters
+    ----------
+    material
+        Material of the patch.
+    patch
+        Name of the patch; "" of the only one, which takes the only entry whatever its name.
+    reflectance
+        Reflectance file; None leaves the material as it is.
+    """
+    measured = None if reflectance is None else _own(patch, reflectance.patches)
+    if measured is None or reflectance is None:
+        return material
+    return material.model_copy(
+        update={
+            "albedo": Albedo(
+                wavelength_nm=measured.wavelength_nm,
+                value=tuple(min(value, MAX_ALBEDO) for value in measured.albedo),
+                sigma=measured.albedo_sigma,
+                common_sigma=measured.common_sigma,
+            ),
+            "radiance_factor": RadianceFactor(
+                lamp=reflectance.lamp,
+                wavelength_nm=measured.wavelength_nm,
+                value=measured.radiance_factor,
+                sigma=measured.radiance_factor_sigma,
+            ),
+        }
+    )
+
+
+#: Largest albedo that a material file may have.
+MAX_ALBEDO = 1.2
+
+
+def with_reflectances(
+    materials: Mapping[str, Material], reflectance: ReflectanceFile | None
+) -> dict[str, Any]:
+    """Return the materials by patch, each with its albedo, if it was measured."""
+    return {
+        name: with_reflectance(material, name if len(materials) > 1 else "", reflectance)
+        for name, material in materials.items()
+    }
+
+
+def _own(patch: str, entries: Mapping[str, PatchReflectance]) -> PatchReflectance | None:
+    if not patch and len(entries) == 1:
+        return next(iter(entries.values()))
+    return entries.get(patch)
