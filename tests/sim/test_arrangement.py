@@ -51,7 +51,7 @@ def test_every_task_and_back(task: str, found: Arrangement) -> None:
     ("task", "said"),
     [
         ("filter longpas-570", "did you mean 'longpass-570'"),
-        ("filter", "known: fresh sample, sample, grey card"),
+        ("filter", "known: fresh sample, sample, lit sample, grey card"),
         ("tilt -5", "whole degrees from 0 to 85"),
         ("tilt 90", "whole degrees from 0 to 85"),
         ("lamp at 2 km", "expected 0.2 m or more"),
