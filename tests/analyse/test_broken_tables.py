@@ -38,6 +38,7 @@ def test_noise_that_correlates_is_in_sigma_and_named() -> None:
     assert said >= 0.7
 
 
+@pytest.mark.campaign
 def test_counts_with_the_root_of_their_number_are_not_biased() -> None:
     """The mean pull was 1.8 and more."""
     pulls, said = broken_pulls(root_of_counts(100, 1), range(7))

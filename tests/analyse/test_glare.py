@@ -60,6 +60,7 @@ def test_the_trap_shows_the_lens_glare(camera: CameraFile) -> None:
     assert camera.glare.sigma < 0.1 * GLARE
 
 
+@pytest.mark.campaign
 def test_calibrated_it_is_subtracted(camera: CameraFile, tmp_path: Path) -> None:
     """Without it the dim patch decays too fast, by three of its σ."""
 

@@ -35,6 +35,7 @@ def test_the_shift_of_the_rate_tells_the_order(order: float, verdict: str) -> No
     assert found.order.sigma < 0.05
 
 
+@pytest.mark.campaign
 def test_the_sigma_of_the_shift_is_right() -> None:
     pulls = []
     for seed in range(80):

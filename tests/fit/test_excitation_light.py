@@ -52,6 +52,7 @@ def charged(bench: Bench, scatter: float, lamp: float) -> ChargingSeries:
     )
 
 
+@pytest.mark.campaign
 def test_sigma_of_rates_is_their_errors_whatever_the_lights_errors_are() -> None:
     pulls, sizes = [], []
     for scatter, lamp in ((0.01, 0.003), (0.04, 0.01)):

@@ -61,6 +61,7 @@ def thrown_back(strip: LitStrip, albedo: FloatArray, part: float) -> LitStrip:
     return replace(strip, value=strip.value * (1 + part * np.repeat(excess, 2)))
 
 
+@pytest.mark.campaign
 def test_the_sigma_is_right() -> None:
     pulls = []
     for seed in range(10):

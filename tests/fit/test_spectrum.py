@@ -68,6 +68,7 @@ def test_a_smooth_spectrum_comes_back() -> None:
     assert 1e-4 < sigma.max() < 0.02
 
 
+@pytest.mark.campaign
 def test_the_band_covers_what_it_says() -> None:
     rng = np.random.default_rng(5)
     lights = [broad(rng.uniform(450, 640), rng.uniform(35, 110)) for _ in range(8)]

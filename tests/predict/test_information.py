@@ -137,6 +137,7 @@ def test_fits_of_noisy_data_scatter_by_them() -> None:
     np.testing.assert_allclose(np.std(rates, axis=0), information(expected).sigma[0::2], rtol=0.25)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("k_r_per_s", [0.02, 0.12])
 def test_fits_that_have_to_measure_their_flicker_report_them(k_r_per_s: float) -> None:
     truth = ((k_r_per_s, 1.0),)

@@ -141,6 +141,7 @@ class Person(Watching):
         yield self
 
 
+@pytest.mark.campaign
 def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     write: Make, make_rig: Make, labrig: Labrig, tmp_path: Path
 ) -> None:

@@ -425,6 +425,7 @@ class Written:
         self._event("frames", **kept, **settings, **self._happens())
 
 
+@pytest.mark.campaign
 def test_what_is_sent_for_a_frame_does_not_grow_with_the_run(
     finished: Path, tmp_path: Path
 ) -> None:

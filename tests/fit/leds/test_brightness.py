@@ -89,6 +89,7 @@ def pulls(fit: BrightnessFit, log_b: FloatArray) -> FloatArray:
     return np.asarray((error / fit.sigma)[known])
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("response", "seeds"),
     [
