@@ -47,6 +47,7 @@ def check(fit: dict[str, Any], name: str) -> None:
         assert state["k_r_sigma_per_s"] < 0.1 * k_r_per_s, "a σ of nothing proves nothing"
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "name",
     ["double-close-uneven", pytest.param("double-medium-faint", marks=pytest.mark.campaign)],

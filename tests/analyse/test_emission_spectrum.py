@@ -224,6 +224,7 @@ def test_a_white_picture_mends_the_curves_of_another_laboratory(tmp_path: Path) 
     assert errors[0] < errors[1]
 
 
+@pytest.mark.campaign
 def test_what_is_narrower_than_the_band_comes_out_in_its_place() -> None:
     light = made.lines({532.0: 30.0}, 1e-6)
     lvf, camera = made.curved_lvf(), made.of_the_house()

@@ -112,6 +112,7 @@ def test_order_rates_and_level_of_a_sample() -> None:
     assert off.decay_time_s[0] == pytest.approx(1 / (law.shape * law.rate_per_s))
 
 
+@pytest.mark.campaign
 def test_what_a_weak_charge_does_not_tell_is_not_known() -> None:
     """κ, k_r and r(0) scale each other; the decay of the charge is known for all that."""
     sample = bench(B, irradiance=0.05)
@@ -186,6 +187,7 @@ def test_charges_of_the_series_before_are_not_forgotten(order: FloatArray | None
     assert (forgotten < 0.9 * levels(later, *rates).value)[..., 1].all()
 
 
+@pytest.mark.campaign
 def test_closure_knows_what_earlier_charges_left() -> None:
     """A sample that was charged for long two minutes before the first charge that is predicted."""
     sample = bench(B, seed=4)

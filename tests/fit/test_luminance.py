@@ -159,6 +159,7 @@ def test_a_requirement_is_met_with_a_probability_of_95_percent(
     assert entry.verdict(entry.luminance.value + 1.0) is opposite
 
 
+@pytest.mark.campaign
 @pytest.mark.shared_data
 @pytest.mark.skipif(not SAO.exists(), reason="no ../shared/data beside the checkout")
 def test_halves_of_a_real_decay_agree() -> None:

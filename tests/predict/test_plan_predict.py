@@ -147,6 +147,7 @@ def test_a_glow_too_dim_for_the_time_between_frames_is_known_less_well(labrig: L
     assert sigma(dimmer) > 1.5 * sigma(dim)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("columns", [80, 120])
 def test_the_tables_fit_the_terminal(
     labrig: Labrig, monkeypatch: pytest.MonkeyPatch, columns: int, tmp_path: Path

@@ -586,6 +586,7 @@ def test_the_page_shows_a_chain_by_its_parts(long_chain: Watching, chromium: Chr
     assert parts[0].get_property("open")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("width", [320, 400, 800, 1280])
 def test_no_label_covers_another(
     long_chain: Watching, chromium: Chrome, width: int, tmp_path: Path

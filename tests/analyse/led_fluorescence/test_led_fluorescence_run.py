@@ -226,6 +226,7 @@ def _is_felt(result: LedFluorescenceResult) -> bool:
     return not felt.dyes and bool((np.abs(off) < 4 * np.array(colour.lab_sigma)).all())
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("begin", "seen_on"), [("0 s", "card"), ("2 min", "samples")], ids=["card", "samples"]
 )

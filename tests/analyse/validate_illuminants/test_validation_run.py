@@ -153,6 +153,7 @@ def test_no_chart_where_one_is_expected_is_one_clear_line(run: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.campaign
 def test_a_chart_is_found_in_the_frame_and_tells_the_colours(tmp_path: Path) -> None:
     def larger(rig: dict[str, Any]) -> None:
         rig["simulation"]["sensor"] = {"width": 384, "height": 256}

@@ -81,6 +81,7 @@ def test_sigma_is_asked_for() -> None:
         without_offset(measurement(0).measured)
 
 
+@pytest.mark.campaign
 @pytest.mark.shared_data
 @pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
 @pytest.mark.parametrize("repeats", [False, True])
