@@ -230,9 +230,13 @@ def _is_requirement(text: str) -> str:
     return text
 
 
-def _is_luminance(text: str) -> str:
+def _mcd_per_m2(text: str) -> float:
     number, _, unit = text.strip().partition(" ")
-    if not 0 < float(number) * luminance_unit(unit) < math.inf:
+    return float(number) * luminance_unit(unit)
+
+
+def _is_luminance(text: str) -> str:
+    if not 0 < _mcd_per_m2(text) < math.inf:
         raise ValueError(f"expected a luminance above 0, such as '50 mcd/m2', got '{text}'")
     return text
 
@@ -322,10 +326,7 @@ class Luminance(ProtocolModel):
     @property
     def adaptation_mcd_per_m2(self) -> float | None:
         """Luminance to which eyes are adapted in mcd/m²."""
-        if self.adaptation is None:
-            return None
-        number, _, unit = self.adaptation.strip().partition(" ")
-        return float(number) * luminance_unit(unit)
+        return None if self.adaptation is None else _mcd_per_m2(self.adaptation)
 
     def suited_to(self, rig: RigFile) -> Self:
         """Return the protocol with the card's luminance by the rig file's reading.

@@ -6,7 +6,7 @@ from pathlib import Path
 from labrig.errors import FitError, UsageError
 from labrig.fit import fit_trap_depth
 from labrig.record import FrameRole, glow_temperature_c, read_run
-from labrig.results import EXPONENTIALS, FittedDecay, StateDepth, read_fitted_decays
+from labrig.results import EXPONENTIALS, FittedDecay, StateDepth, read_fitted_decays, state_name
 
 #: σ of the temperature of a run: that of a semiconductor thermometer.
 TEMPERATURE_SIGMA_K = 0.3
@@ -67,13 +67,12 @@ def trap_depths(
             continue
         rates = _rates([fit for fit in of_patch if fit is not None], patch, runs)
         for number, (value, sigma) in enumerate(rates, start=1):
-            place = f"{patch}, state {number}" if patch else f"state {number}"
             try:
                 depth = fit_trap_depth(
                     celsius, value, sigma, temperature_sigma_k=temperature_sigma_k
                 )
             except FitError as error:
-                raise FitError(f"{place}: {error}") from None
+                raise FitError(f"{state_name(patch, number)}: {error}") from None
             depths.append(StateDepth(patch, number, depth))
     if not depths:
         raise FitError(

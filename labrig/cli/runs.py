@@ -188,8 +188,7 @@ def trap_depth(
         typer.echo(trap_depths_json(depths, names))
     else:
         for each in depths:
-            place = f"{each.patch}, state {each.number}" if each.patch else f"state {each.number}"
-            typer.echo(f"{place}\n{each.depth}\n")
+            typer.echo(f"{each.name}\n{each.depth}\n")
     if out is not None:
         typer.echo(f"report: {report_trap_depths(depths, names, out)}", err=json)
 

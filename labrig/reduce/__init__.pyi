@@ -84,7 +84,6 @@ from .strip import (
 )
 from .strip_frames import (
     FLICKER as FLICKER,
-    evened_values as evened_values,
     find_strip_in as find_strip_in,
     region_values as region_values,
     slice_values as slice_values,

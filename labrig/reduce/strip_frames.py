@@ -203,8 +203,13 @@ def region_values(
     regions: Mapping[str, Region],
     darks: Sequence[SeriesFrame],
     camera: CameraModel | None,
+    *,
+    is_evened: bool = False,
 ) -> Mapping[str, SliceValues]:
     """Measure the light in some regions, scene by scene.
+
+    Bright regions clip in the long exposures, and dim ones are seen in those only. What is seen in
+    several frames tells how bright each is, by which the flicker between them can be taken out.
 
     Parameters
     ----------
@@ -216,6 +221,8 @@ def region_values(
         Dark frames at their exposure times.
     camera
         Calibration of the camera; None uses the values as they are.
+    is_evened
+        Whether the frames of a scene are brought to one brightness.
 
     Returns
     -------
@@ -244,62 +251,10 @@ def region_values(
     (1, 3)
     """
     series = reduce_patches(frames, regions, darks, camera=camera)
-    return {unit: _slice_values(series, unit) for unit in _units(frames)}
-
-
-def evened_values(
-    frames: Sequence[SeriesFrame],
-    regions: Mapping[str, Region],
-    darks: Sequence[SeriesFrame],
-    camera: CameraModel | None,
-) -> Mapping[str, SliceValues]:
-    """Measure the light in every region, scene by scene, without the flicker between its frames.
-
-    Bright regions clip in the long exposures, and dim ones are seen in those only. What is seen in
-    several frames tells how bright each is, and all are brought to one brightness.
-
-    Parameters
-    ----------
-    frames
-        Light frames; those of one unit show one scene at several exposures.
-    regions
-        Regions by name, as (x, y, width, height) in fractions of the frame.
-    darks
-        Dark frames at their exposure times.
-    camera
-        Calibration of the camera; None uses the values as they are.
-
-    Returns
-    -------
-    dict of str to SliceValues
-        Signal in DN/s and its standard uncertainty by unit, shape (regions, channels).
-
-    Raises
-    ------
-    DataError
-        ISO or f-number differ within a unit, no dark frames match, or the calibration is of another
-        camera or aperture.
-    FrameError, UsageError
-        A frame cannot be read, or a region leaves it.
-
-    Examples
-    --------
-    >>> import labrig
-    >>> from labrig.reduce import SeriesFrame, evened_values
-    >>> run = labrig.read_run("runs/decay")
-    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
-    >>> first = run.frames("decay")[0]
-    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
-    >>> halves = {"left": (0.25, 0.25, 0.25, 0.5), "right": (0.5, 0.25, 0.25, 0.5)}
-    >>> evened_values(frames, halves, darks, camera=None)["lit"].value.shape
-    (2, 3)
-    """
-    series = reduce_patches(frames, regions, darks, camera=camera)
-    return {unit: _slice_values(_evened(series, unit), unit) for unit in _units(frames)}
-
-
-def _units(frames: Sequence[SeriesFrame]) -> Sequence[str]:
-    return list(dict.fromkeys(frame.unit for frame in frames))
+    return {
+        unit: _slice_values(_evened(series, unit) if is_evened else series, unit)
+        for unit in dict.fromkeys(frame.unit for frame in frames)
+    }
 
 
 def _usable(series: Series, unit: str) -> NDArray[np.bool_]:

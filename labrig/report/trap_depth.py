@@ -77,7 +77,7 @@ def trap_depth_chart(depths: Sequence[StateDepth]) -> Chart:
             ErrorBars(colour, at, depth.rate_per_s, depth.rate_sigma_per_s),
             dots,
         ]
-        legend.append((f"{_name(each)}, E = {depth.depth_ev}", dots))
+        legend.append((f"{each.name}, E = {depth.depth_ev}", dots))
     rates = np.concatenate([each.depth.rate_per_s for each in depths])
     ticks = tuple((_inverse_of(t_c), text) for t_c, text in linear_ticks(low, high, 8))
     x = Axis("Temperature / °C", _inverse_of(low), _inverse_of(high), ticks)
@@ -115,7 +115,7 @@ def trap_depth_report(depths: Sequence[StateDepth], about: RunDescription) -> Re
     head = ("state", "E / eV", "log₁₀(s / s⁻¹)", "k_r / s⁻¹", "at / °C", "p")
     rows = tuple(
         (
-            _name(each),
+            each.name,
             str(each.depth.depth_ev).removesuffix(" eV"),
             str(each.depth.log10_frequency),
             str(each.depth.rate_at(each.depth.reference_c)).removesuffix(" 1/s"),
@@ -130,12 +130,8 @@ def trap_depth_report(depths: Sequence[StateDepth], about: RunDescription) -> Re
         figures=(Picture("rates-over-temperature", trap_depth_chart(depths), CAPTION),),
         tables=(Table(head, rows, "σ in units of the last places; p of the misfit."),),
     )
-    warnings = tuple(f"{_name(each)}: {line}" for each in depths for line in each.depth.warnings)
+    warnings = tuple(f"{each.name}: {line}" for each in depths for line in each.depth.warnings)
     return Report(about, warnings, (section,))
-
-
-def _name(each: StateDepth) -> str:
-    return f"{each.patch}, state {each.number}" if each.patch else f"state {each.number}"
 
 
 def _inverse_of(celsius: float) -> float:

@@ -70,11 +70,7 @@ class FieldParameters:
                     f"expected {name} of shape ({n_states}, bands) or ({n_states}, bands, "
                     f"samples), got {each.shape}"
                 )
-        samples = {
-            each.shape[-1]
-            for each, plain in ((k_r, 1), (k_e, 2), (emitted, 2))
-            if each.ndim > plain
-        }
+        samples = _sizes(k_r, k_e, emitted)
         if len(samples) > 1:
             raise UsageError(
                 f"expected textures of one size, got {', '.join(map(str, sorted(samples)))} samples"
@@ -141,5 +137,10 @@ class FieldParameters:
     @property
     def n_samples(self) -> int | None:
         """Number of samples of textures; None if all samples have the same parameters."""
-        textures = ((self.k_r_per_s, 1), (self.k_e_per_s, 2), (self.reradiation, 2))
-        return next((each.shape[-1] for each, plain in textures if each.ndim > plain), None)
+        return next(iter(_sizes(self.k_r_per_s, self.k_e_per_s, self.reradiation)), None)
+
+
+def _sizes(k_r: Float32Array, k_e: Float32Array, reradiation: Float32Array) -> set[int]:
+    """Return the numbers of samples of what is a texture."""
+    parameters = ((k_r, 1), (k_e, 2), (reradiation, 2))
+    return {each.shape[-1] for each, plain in parameters if each.ndim > plain}

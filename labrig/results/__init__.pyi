@@ -218,6 +218,7 @@ from .table_columns import (
 from .trap_depth import (
     StateDepth as StateDepth,
     TrapDepth as TrapDepth,
+    state_name as state_name,
     trap_depths_json as trap_depths_json,
 )
 from .validate_illuminants import (

@@ -239,7 +239,7 @@ class FittedDecay:
 
     @property
     def parameters(self) -> dict[str, Measured]:
-        """What tells the decay's course, by name: `k_r_per_s 1`, …, or the law's parameters."""
+        """Parameters that tell the decay's course, by name: `k_r_per_s 1`, …, or the law's own."""
         if self.chosen_law is not None:
             return self.chosen_law.parameters
         return {f"k_r_per_s {number}": rate for number, rate in enumerate(self.rates, start=1)}

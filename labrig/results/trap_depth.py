@@ -116,6 +116,35 @@ class StateDepth:
     number: int
     depth: TrapDepth
 
+    @property
+    def name(self) -> str:
+        """Name of the state, with its patch where there are several."""
+        return state_name(self.patch, self.number)
+
+
+def state_name(patch: str, number: int) -> str:
+    """Return the name of a state: `state 1`, or `left, state 1` of a patch.
+
+    Parameters
+    ----------
+    patch
+        Name of the patch; empty of the only one.
+    number
+        Number of the state from 1.
+
+    Returns
+    -------
+    str
+        The name.
+
+    Examples
+    --------
+    >>> from labrig.results import state_name
+    >>> state_name("", 1), state_name("left", 2)
+    ('state 1', 'left, state 2')
+    """
+    return f"{patch}, state {number}" if patch else f"state {number}"
+
 
 def trap_depths_json(depths: tuple[StateDepth, ...], runs: tuple[str, ...]) -> str:
     """Return the text of `trap_depth.json`.

@@ -16,7 +16,7 @@ from labrig.fit.reflectance import LitStrip, relative_to_card
 from labrig.fit.spectrum import SpectralSystem
 from labrig.optics import CameraResponse, Lvf, Spectrum, Strip, Transmittance
 from labrig.protocols.reflectance import ReflectanceFrames
-from labrig.reduce import FLICKER, SensorLayout, SeriesFrame, evened_values, sensor_layout
+from labrig.reduce import FLICKER, SensorLayout, SeriesFrame, region_values, sensor_layout
 from labrig.results import FloatArray, Measured, SliceValues
 
 #: Knots of the fitted reflectance: finer than the filter's band, and beyond the grid of results.
@@ -237,7 +237,9 @@ class _Scenes:
         glow_frames = intact_frames(part.run, part.overrides, names.glow).decay
         each = [replace(frame, unit=f"glow-{n}") for n, frame in enumerate(glow_frames)]
         lit: list[SeriesFrame] = [*frames.of(names.card), *frames.of(names.sample)]
-        values = evened_values([*lit, *each], regions, frames.dark, part.inputs.camera)
+        values = region_values(
+            [*lit, *each], regions, frames.dark, part.inputs.camera, is_evened=True
+        )
         cards = [values[f"card-{names.name}-{n}"] for n in (1, 2)
                  if f"card-{names.name}-{n}" in values]  # fmt: skip
         return cls(

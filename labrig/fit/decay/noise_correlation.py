@@ -132,7 +132,8 @@ class NoiseCorrelation:
     correlation
         Its mean if there is one.
     factor
-        Factor by which the largest σ of a rate of the fit that told it grows with it.
+        Factor by which the largest σ of a rate of the fit that told it grows with it; 1 where it is
+        not told.
     noise
         The flicker.
     probabilities
@@ -234,6 +235,8 @@ def noise_correlation(
         noise=noise,
         probabilities=correlated,
     )
+    if not found.is_told:
+        return found
     independent = np.diag(solution.covariance)[rates]
     added = np.diag(found.added_covariance(data, joint, signal))[rates]
     ratio = added / np.where(independent > 0, independent, np.inf)
