@@ -1,4 +1,4 @@
-"""What a reflectance run and the protocol tell of a material's surface and layer."""
+"""Surface and layer of a material, by a reflectance run and the protocol."""
 
 from collections.abc import Mapping
 from typing import Any

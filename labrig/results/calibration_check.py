@@ -41,7 +41,7 @@ class PictureChange:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CalibrationCheckResult(RunResult):
-    """Whether the calibration that a run uses still holds.
+    """Comparison of the bench with the calibration that a run uses.
 
     Attributes
     ----------

@@ -49,7 +49,7 @@ def protocol_file(folder: Path, material: str, part: str, keys: dict[str, Any]) 
 
 
 def planned(protocol: object, rig: Path, runs: Path) -> str:
-    """What `labrig plan` says, with frames of 21 megapixels."""
+    """Return what `labrig plan` says, with frames of 21 megapixels."""
     ended = labrig("plan", protocol, "--rig", rig, "--runs", runs, "--json")
     plan = json.loads(ended.stdout)
     size_bytes = plan["size_bytes"] - plan["frames_bytes"] + plan["frames"] * FRAME_BYTES

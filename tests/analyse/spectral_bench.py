@@ -57,7 +57,7 @@ def true_lvf_file(width: int = WIDTH, height: int = HEIGHT) -> LvfFile:
 
 
 def true_lvf_of(settings: LvfSettings, width: int, height: int) -> LvfFile:
-    """What a calibration without error would find of an LVF before the camera."""
+    """Return what a calibration without error would find of an LVF before the camera."""
     x, y, wide, high = settings.before_camera.region
     strip = Strip(
         left=(x, y + high / 2), right=(x + wide, y + high / 2), height=high * (1 - 2 * MARGIN),

@@ -36,7 +36,7 @@ def rig() -> RigFile:
 
 @dataclass(frozen=True)
 class Found:
-    """What was found, over the truth, and what is true."""
+    """Scale that the colour gave, and luminance and card relative to the true ones."""
 
     scale: ColourScale
     luminance: float

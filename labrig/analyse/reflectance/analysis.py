@@ -33,7 +33,7 @@ CONTRADICTION = 1.5
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """What all patches share: two arrangements, the card's curve, and its σ at the results."""
+    """Values that all patches share: two arrangements, the card's curve, its σ at the results."""
 
     white: Arranged
     narrow: Arranged

@@ -87,7 +87,7 @@ def _correlated(phi: float, columns: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Deviations:
-    """What a fit leaves of the frames, and what it takes, along the signal; in units of the noise.
+    """Deviations of the frames from a fit, and its Jacobian, along the signal; in units of noise.
 
     `brightness` is the signal of the frames that have one, `deviation` what lies above the fit,
     shape (n,), and `jacobian` that of all fitted parameters, shape (n, p).
