@@ -1,0 +1,109 @@
+"""Light along kept paths: from the far end of each, L = glow + M (direct · lamps + L of the next)."""
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.reproduce.surface_material import SurfaceMaterial
+from labrig.reproduce.tracing import Paths
+
+Float32Array = NDArray[np.float32]
+IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """Matrices of all materials of a scene, as the compiled function takes them.
+
+    Attributes
+    ----------
+    values
+        Matrices, transposed so that what one band gives to all others lies side by side, shape
+        (materials, bands in, bands out).
+    first, last
+        Range of the bands out that each band in gives to, shape (materials, bands in).
+    is_diagonal
+        Whether light keeps its wavelength, shape (materials,).
+    """
+
+    values: Float32Array
+    first: IntArray
+    last: IntArray
+    is_diagonal: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, materials: Sequence[SurfaceMaterial]) -> Self:
+        """Put the matrices of materials together."""
+        values = np.stack([material.matrix.T for material in materials]).astype(np.float32)
+        given = values != 0
+        any_given = given.any(axis=2)
+        last = np.where(any_given, values.shape[2] - np.argmax(given[:, :, ::-1], axis=2), 0)
+        return cls(
+            np.ascontiguousarray(values),
+            np.where(any_given, np.argmax(given, axis=2), 0).astype(np.int32),
+            last.astype(np.int32),
+            np.array([material.is_diagonal for material in materials]),
+        )
+
+
+def fold(
+    paths: Iterable[Paths],
+    matrices: Matrices,
+    material_of_place: IntArray,
+    glow: Float32Array,
+    lamps: Float32Array,
+    threads: int,
+    *,
+    incident: bool = False,
+) -> Float32Array:
+    """Return the light of kept paths, the mean for each pixel or place.
+
+    Parameters
+    ----------
+    paths
+        Paths, of consecutive pixels or places.
+    matrices
+        Matrices of the materials.
+    material_of_place
+        Number of the material of each place, -1 for black (places,).
+    glow
+        Radiance that each place emits by itself, shape (places, bands).
+    lamps
+        Light of each lamp, see `Lamp`, shape (lamps, bands).
+    threads
+        Threads that fold at the same time.
+    incident
+        Whether the irradiance at the first vertices is wanted, in W m⁻² nm⁻¹, instead of the
+        radiance from them in W m⁻² sr⁻¹ nm⁻¹.
+
+    Returns
+    -------
+    ndarray
+        Light of each pixel or place (targets, bands).
+    """
+    from labrig.reproduce.folding_kernels import fold_paths
+
+    arguments = (
+        matrices.values, matrices.first, matrices.last, matrices.is_diagonal,
+        np.ascontiguousarray(material_of_place, dtype=np.int32),
+        np.ascontiguousarray(glow, dtype=np.float32),
+        np.ascontiguousarray(lamps, dtype=np.float32), incident,
+    )  # fmt: skip
+
+    def part(own: Paths) -> Float32Array:
+        light = np.empty((own.n_targets, glow.shape[1]), np.float32)
+        fold_paths(
+            own.per_target, own.first, own.place, own.weight, own.light, own.seen_lamp,
+            *arguments, light,
+        )  # fmt: skip
+        return light
+
+    run: Callable[..., Any] = map
+    if threads < 2:
+        return np.concatenate(list(run(part, paths)))
+    with ThreadPoolExecutor(threads, thread_name_prefix="fold") as pool:
+        return np.concatenate(list(pool.map(part, paths)))

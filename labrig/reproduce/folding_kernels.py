@@ -1,0 +1,100 @@
+"""The compiled fold of paths."""
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Float32Array = NDArray[np.float32]
+IntArray = NDArray[np.int32]
+
+COMPILED: dict[str, Any] = {
+    "nogil": True,
+    "cache": True,
+    "error_model": "numpy",
+    "fastmath": {"nsz", "contract", "reassoc"},
+}
+
+
+@numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
+def fold_paths(
+    per_target: int,
+    first: NDArray[np.int64],
+    place: IntArray,
+    weight: Float32Array,
+    light: Float32Array,
+    seen_lamp: NDArray[np.int16],
+    matrices: Float32Array,
+    row_first: IntArray,
+    row_last: IntArray,
+    is_diagonal: NDArray[np.bool_],
+    material_of_place: IntArray,
+    glow: Float32Array,
+    lamps: Float32Array,
+    incident: bool,
+    result: Float32Array,
+) -> None:
+    """Write the mean light of the paths of each target; see `folding.fold` for the arguments.
+
+    Parameters
+    ----------
+    per_target, first, place, weight, light, seen_lamp
+        The paths.
+    matrices, row_first, row_last, is_diagonal, material_of_place
+        Matrices (materials, bands in, bands out), and of which place each is.
+    glow, lamps
+        Glow (places, bands) and lamps (lamps, bands).
+    incident
+        Whether the irradiance at the first vertex is wanted.
+    result
+        What is written (targets, bands).
+    """
+    bands, n_lamps = glow.shape[1], lamps.shape[0]
+    radiance = np.empty(bands, np.float32)
+    coming = np.empty(bands, np.float32)
+    total = np.empty(bands, np.float64)
+    for target in range(result.shape[0]):
+        total[:] = 0.0
+        for path in range(target * per_target, (target + 1) * per_target):
+            radiance[:] = np.float32(0)
+            begin = first[path]
+            for vertex in range(first[path + 1] - 1, begin - 1, -1):
+                own_weight = weight[vertex]
+                for band in range(bands):
+                    coming[band] = own_weight * radiance[band]
+                for lamp in range(n_lamps):
+                    factor = light[vertex, lamp]
+                    if factor != 0:
+                        for band in range(bands):
+                            coming[band] += factor * lamps[lamp, band]
+                if incident and vertex == begin:
+                    for band in range(bands):
+                        radiance[band] = np.float32(math.pi) * coming[band]
+                    break
+                here = place[vertex]
+                material = material_of_place[here]
+                for band in range(bands):
+                    radiance[band] = glow[here, band]
+                if material < 0:
+                    continue
+                if is_diagonal[material]:
+                    for band in range(bands):
+                        radiance[band] += matrices[material, band, band] * coming[band]
+                    continue
+                for source in range(bands):
+                    strength = coming[source]
+                    if strength == 0:
+                        continue
+                    low, high = row_first[material, source], row_last[material, source]
+                    column = matrices[material, source]
+                    for band in range(low, high):
+                        radiance[band] += column[band] * strength
+            if seen_lamp[path] >= 0:
+                for band in range(bands):
+                    radiance[band] += lamps[seen_lamp[path], band]
+            for band in range(bands):
+                total[band] += radiance[band]
+        for band in range(bands):
+            result[target, band] = total[band] / per_target

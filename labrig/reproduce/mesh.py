@@ -1,0 +1,294 @@
+"""Triangle meshes: shapes that a scene file names, and files."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from labrig.errors import UsageError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+#: Formats of meshes that are read.
+FORMATS = (".obj", ".ply", ".glb", ".gltf", ".stl")
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles, counter-clockwise as seen from their front.
+
+    Attributes
+    ----------
+    vertices_m
+        Places of the vertices in m, shape (n, 3).
+    faces
+        Three vertices of each triangle, shape (m, 3).
+    uv
+        Texture coordinates of the vertices, 0 to 1, shape (n, 2); None if there are none.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import Mesh
+    >>> wall = Mesh.rectangle((0, 0, 0), (2, 0, 0), (0, 3, 0))
+    >>> wall.area_m2, wall.normals[0].tolist()
+    (6.0, [0.0, 0.0, 1.0])
+    >>> round(Mesh.sphere((0, 0, 0), 1.0).volume_m3, 1)
+    4.2
+    """
+
+    vertices_m: FloatArray
+    faces: IntArray
+    uv: FloatArray | None = None
+
+    @classmethod
+    def rectangle(cls, corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike) -> Self:
+        """Return a parallelogram, whose front is where edge_u × edge_v points to.
+
+        Parameters
+        ----------
+        corner_m
+            One corner in m.
+        edge_u_m, edge_v_m
+            Edges from it in m; texture coordinates rise along them.
+        """
+        corner, u, v = (np.asarray(each, dtype=np.float64) for each in (corner_m, edge_u_m, edge_v_m))
+        vertices = np.array([corner, corner + u, corner + u + v, corner + v])
+        faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+        return cls(vertices, faces, np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64))
+
+    @classmethod
+    def disk(cls, centre_m: ArrayLike, normal: ArrayLike, radius_m: float, parts: int = 96) -> Self:
+        """Return a disk, as a polygon of the same area.
+
+        Parameters
+        ----------
+        centre_m
+            Centre in m.
+        normal
+            Direction of its front.
+        radius_m
+            Radius in m.
+        parts
+            Corners of the polygon.
+        """
+        first, second, _ = frame(np.asarray(normal, dtype=np.float64))
+        angle = np.arange(parts) * 2 * np.pi / parts
+        ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        radius = radius_m * np.sqrt(2 * np.pi / parts / np.sin(2 * np.pi / parts))
+        centre = np.asarray(centre_m, dtype=np.float64)
+        vertices = np.vstack([centre, centre + radius * ring @ np.array([first, second])])
+        around = np.arange(parts) + 1
+        faces = np.stack([np.zeros(parts, int), around, np.roll(around, -1)], axis=1)
+        uv = np.vstack([[0.5, 0.5], 0.5 + 0.5 * ring])
+        return cls(vertices, faces.astype(np.int32), uv)
+
+    @classmethod
+    def box(
+        cls, centre_m: ArrayLike, size_m: ArrayLike, turned_deg: float = 0.0, inward: bool = False
+    ) -> Self:
+        """Return a box, whose sides lie side by side in the texture, three by two.
+
+        Parameters
+        ----------
+        centre_m
+            Centre in m.
+        size_m
+            Lengths of its edges in m.
+        turned_deg
+            Turn about the vertical, in degrees.
+        inward
+            Whether its front is inside, as of a room.
+        """
+        half = np.asarray(size_m, dtype=np.float64) / 2
+        turn = rotation(np.array([0.0, 0.0, 1.0]), turned_deg)
+        vertices, faces, uv = [], [], []
+        for number, (axis, side) in enumerate((axis, side) for axis in range(3) for side in (1, -1)):
+            u, v = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
+            if side < 0:
+                u, v = v, u
+            normal = side * np.eye(3)[axis]
+            corners = [normal - u - v, normal + u - v, normal + u + v, normal - u + v]
+            column, row = number % 3, number // 3
+            vertices += [turn @ (half * corner) for corner in corners]
+            uv += [
+                ((column + s) / 3, (row + t) / 2) for s, t in ((0, 0), (1, 0), (1, 1), (0, 1))
+            ]
+            faces += [[4 * number + k for k in triangle] for triangle in ((0, 1, 2), (0, 2, 3))]
+        mesh = cls(
+            np.array(vertices) + np.asarray(centre_m, dtype=np.float64),
+            np.array(faces, dtype=np.int32),
+            np.array(uv),
+        )
+        return mesh.turned_over() if inward else mesh
+
+    @classmethod
+    def sphere(
+        cls, centre_m: ArrayLike, radius_m: float, rows: int = 48, inward: bool = False
+    ) -> Self:
+        """Return a sphere of rows of triangles.
+
+        Parameters
+        ----------
+        centre_m
+            Centre in m.
+        radius_m
+            Radius in m.
+        rows
+            Number of rows from pole to pole; there are twice as many columns.
+        inward
+            Whether its front is inside.
+        """
+        polar, around = np.linspace(0, np.pi, rows + 1), np.linspace(0, 2 * np.pi, 2 * rows + 1)
+        polar, around = (each.ravel() for each in np.meshgrid(polar, around, indexing="ij"))
+        unit = np.stack(
+            [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=1
+        )
+        columns = 2 * rows + 1
+        at = np.arange(rows * 2 * rows) // (2 * rows) * columns + np.arange(rows * 2 * rows) % (
+            2 * rows
+        )
+        below = at + columns
+        first = np.stack([at, below, below + 1], axis=1)
+        second = np.stack([at, below + 1, at + 1], axis=1)
+        is_pole = at // columns
+        faces = np.vstack([first[is_pole < rows - 1], second[is_pole > 0]]).astype(np.int32)
+        uv = np.stack([around / (2 * np.pi), 1 - polar / np.pi], axis=1)
+        mesh = cls(np.asarray(centre_m, dtype=np.float64) + radius_m * unit, faces, uv)
+        return mesh.turned_over() if inward else mesh
+
+    @classmethod
+    def grid(cls, corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, parts: int) -> Self:
+        """Return a parallelogram of many triangles, which can be deformed.
+
+        Parameters
+        ----------
+        corner_m, edge_u_m, edge_v_m
+            As of `rectangle`.
+        parts
+            Number of parts along each edge.
+        """
+        corner, u, v = (np.asarray(each, dtype=np.float64) for each in (corner_m, edge_u_m, edge_v_m))
+        row, column = np.divmod(np.arange((parts + 1) ** 2), parts + 1)
+        uv = np.stack([column, row], axis=1) / parts
+        corners = np.arange((parts + 1) ** 2)[(row < parts) & (column < parts)]
+        across = corners + parts + 2
+        faces = np.vstack(
+            [
+                np.stack([corners, corners + 1, across], axis=1),
+                np.stack([corners, across, across - 1], axis=1),
+            ]
+        )
+        return cls(corner + uv @ np.array([u, v]), faces.astype(np.int32), uv)
+
+    @property
+    def normals(self) -> FloatArray:
+        """Unit normals of the triangles, zero of those without area, shape (m, 3)."""
+        twice = self._twice_area_vectors()
+        length = np.linalg.norm(twice, axis=1, keepdims=True)
+        return np.asarray(twice / np.where(length > 0, length, 1.0))
+
+    @property
+    def areas_m2(self) -> FloatArray:
+        """Areas of the triangles in m², shape (m,)."""
+        return np.asarray(np.linalg.norm(self._twice_area_vectors(), axis=1) / 2)
+
+    @property
+    def area_m2(self) -> float:
+        """Area of all triangles in m²."""
+        return float(self.areas_m2.sum())
+
+    @property
+    def volume_m3(self) -> float:
+        """Volume that a closed mesh encloses in m³, negative if its front is inside."""
+        a, b, c = self.vertices_m[self.faces].swapaxes(0, 1)
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether each edge has a triangle on both of its sides, vertices at one place being one."""
+        _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
+        faces = same.reshape(-1)[self.faces]
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+        edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        there = {tuple(edge) for edge in edges.tolist()}
+        return all((second, first) in there for first, second in there)
+
+    def turned_over(self) -> Self:
+        """Return the mesh with its front on the other side."""
+        return replace(self, faces=np.ascontiguousarray(self.faces[:, ::-1]))
+
+    def _twice_area_vectors(self) -> FloatArray:
+        a, b, c = self.vertices_m[self.faces].swapaxes(0, 1)
+        return np.cross(b - a, c - a)
+
+
+def read_mesh(path: Path) -> Mesh:
+    """Read a mesh from a file.
+
+    Parameters
+    ----------
+    path
+        File in a format of `FORMATS`; parts of a scene in it are joined.
+
+    Raises
+    ------
+    UsageError
+        There is no such file, its format is another, or it has no triangles of finite size.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.reproduce import read_mesh
+    >>> _ = Path("triangle.obj").write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\n")
+    >>> read_mesh(Path("triangle.obj")).area_m2
+    0.5
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UsageError(f"{path}: expected a mesh as {', '.join(FORMATS)}, got '{path.suffix}'")
+    if not path.is_file():
+        raise UsageError(f"{path}: expected a file with a mesh, got no such file")
+    trimesh = _trimesh()
+    try:
+        loaded = trimesh.load(path, force="mesh", process=False)
+        vertices = np.asarray(loaded.vertices, dtype=np.float64)
+        faces = np.asarray(loaded.faces, dtype=np.int32)
+    except (ValueError, KeyError, IndexError, AttributeError, TypeError, OSError) as error:
+        raise UsageError(f"{path}: expected a mesh, got a file that cannot be read ({error})") from None
+    if not len(faces) or not np.isfinite(vertices).all():
+        raise UsageError(f"{path}: expected triangles with finite vertices, got {len(faces)} triangles")
+    uv = getattr(loaded.visual, "uv", None)
+    mesh = Mesh(vertices, faces, None if uv is None else np.asarray(uv, dtype=np.float64))
+    if not mesh.area_m2 > 0:
+        raise UsageError(f"{path}: expected triangles with an area, got none")
+    return mesh
+
+
+def frame(normal: FloatArray) -> FloatArray:
+    """Return two directions across a direction, and the direction, as rows of length 1."""
+    unit = normal / np.linalg.norm(normal)
+    other = np.eye(3)[int(np.argmin(np.abs(unit)))]
+    first = np.cross(other, unit)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(unit, first), unit])
+
+
+def rotation(axis: FloatArray, angle_deg: float) -> FloatArray:
+    """Return the matrix of a turn about an axis of length 1 (Rodrigues)."""
+    angle = np.deg2rad(angle_deg)
+    across = np.cross(np.eye(3), axis)
+    return np.asarray(
+        np.eye(3) - np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
+    )
+
+
+def _trimesh():  # type: ignore[no-untyped-def]
+    try:
+        import trimesh
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"labrig render needs an extra ({error.name} is missing): pip install 'labrig[render]'"
+        ) from None
+    return trimesh

@@ -1,0 +1,310 @@
+"""Pictures of a scene over time: states are charged by the light that falls on them, and glow.
+
+Between pictures the levels of all phosphors are stepped through the light of the lamps and of each
+other's glow; the picture is then the fold of the camera's paths.
+"""
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.reproduce.field import Field
+from labrig.reproduce.folding import Matrices, fold
+from labrig.reproduce.geometry import Geometry
+from labrig.reproduce.lamp import LampTable
+from labrig.reproduce.scene import Scene
+from labrig.reproduce.tracing import Paths, Tracer
+
+Float32Array = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+#: First step after a change of light, as a part of the fastest relaxation; later ones grow.
+FIRST_STEP, GROWTH = 0.25, 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A picture.
+
+    Attributes
+    ----------
+    t_s
+        Its time in s.
+    radiance
+        Spectral radiance in W m⁻² sr⁻¹ nm⁻¹, shape (height, width, bands).
+    """
+
+    t_s: float
+    radiance: Float32Array
+
+
+class Renderer:
+    """Renders a scene, frame after frame.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    threads
+        Threads that trace and fold. Default: one for each processor.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import Assumptions, Renderer, load_scene
+    >>> scene = load_scene("cornell-box").resized(width_px=8, height_px=8, paths=4)
+    >>> renderer = Renderer(scene)
+    >>> frame = renderer.frame(-1.0)
+    >>> frame.radiance.shape, bool(frame.radiance.min() >= 0)
+    ((8, 8, 24), True)
+    """
+
+    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+        self._scene = scene
+        self._threads = threads or _n_processors()
+        self._matrices = Matrices.of(scene.materials)
+        self._t_s = scene.file.programme[0].at_s
+        geometry = scene.geometry(self._t_s)
+        self._material_of_place = geometry.material_of_place
+        self._states = _states(scene, geometry)
+        self._view: _View | None = None
+        self._charge_at_first()
+
+    @property
+    def t_s(self) -> float:
+        """Time that has been reached, in s."""
+        return self._t_s
+
+    @property
+    def levels(self) -> dict[str, Float32Array]:
+        """Levels of each phosphor at all its places, by its name: (states, places)."""
+        return {state.name: state.field.levels.copy() for state in self._states}
+
+    def restore(self, t_s: float, levels: dict[str, Float32Array]) -> None:
+        """Go on from the levels of an earlier rendering at a time in s."""
+        for state in self._states:
+            state.field.levels[:] = levels[state.name]
+        self._t_s = t_s
+
+    @property
+    def memory_bytes(self) -> int:
+        """Memory of the kept paths in bytes."""
+        return 0 if self._view is None else self._view.nbytes
+
+    @property
+    def n_escaped(self) -> int:
+        """Rays that left a closed room between its triangles, and were traced again."""
+        return 0 if self._view is None else self._view.n_escaped
+
+    def frame(self, t_s: float) -> Frame:
+        """Advance to a time and return its picture.
+
+        Parameters
+        ----------
+        t_s
+            Time in s, not before the time that has been reached.
+        """
+        self._advance(t_s)
+        view = self._view_at(t_s)
+        camera = self._scene.camera
+        light = fold(
+            view.of_camera(),
+            self._matrices,
+            self._material_of_place,
+            self._glow(view, t_s),
+            self._lamps(t_s),
+            self._threads,
+        )
+        return Frame(t_s, light.reshape(camera.height_px, camera.width_px, -1))
+
+    def frames(self) -> Iterator[Frame]:
+        """Return the pictures at all times of the scene that were not passed yet."""
+        for t_s in self._scene.file.frames_s:
+            if t_s >= self._t_s:
+                yield self.frame(t_s)
+
+    def _view_at(self, t_s: float) -> "_View":
+        """Return paths; they are traced anew only where something moves."""
+        if self._view is None or (self._scene.is_moving and self._view.t_s != t_s):
+            self._view = _View(self._scene, t_s, self._threads)
+        return self._view
+
+    def _lamps(self, t_s: float) -> Float32Array:
+        lamps = self._scene.lamps(t_s)
+        light = np.array([lamp.light for lamp in lamps]).reshape(len(lamps), len(self._scene.bands))
+        return (self._scene.levels(t_s)[:, None] * light).astype(np.float32)
+
+    def _emitted(self, irradiance: FloatArray | None = None) -> Float32Array:
+        """Return the radiance that each place emits by itself, shape (places, bands)."""
+        glow = np.zeros((len(self._material_of_place), len(self._scene.bands)), np.float32)
+        for state in self._states:
+            light = None if irradiance is None else irradiance[state.places].T
+            glow[state.places] = state.field.radiance(light).T
+        return glow
+
+    def _glow(self, view: "_View", t_s: float) -> Float32Array:
+        """Return the emitted radiance with what the light makes emit at once."""
+        if not any(state.field.parameters.prompt for state in self._states):
+            return self._emitted()
+        return self._emitted(self._irradiance(view, t_s, self._emitted()))
+
+    def _irradiance(self, view: "_View", t_s: float, glow: Float32Array) -> FloatArray:
+        """Return the irradiance at all places, zero where it is not needed (places, bands)."""
+        return view.irradiance(self._matrices, self._material_of_place, glow, self._lamps(t_s))
+
+    def _charge_at_first(self) -> None:
+        charged = [state for state in self._states if state.is_charged]
+        if not charged:
+            return
+        view = self._view_at(self._t_s)
+        light = self._irradiance(view, self._t_s, self._emitted())
+        for state in charged:
+            state.field.charge_to_equilibrium(light[state.places].T)
+
+    def _advance(self, to_s: float) -> None:
+        """Step all levels to a time."""
+        if not self._states or to_s <= self._t_s:
+            self._t_s = max(self._t_s, to_s)
+            return
+        changes = [part.at_s for part in self._scene.file.programme]
+        edges = [self._t_s, *(t for t in changes if self._t_s < t < to_s), to_s]
+        for begin, end in pairwise(edges):
+            if self._scene.is_moving:
+                self._follow(begin, end)
+            else:
+                self._settle(begin, end)
+        self._t_s = to_s
+
+    def _settle(self, begin_s: float, end_s: float) -> None:
+        """Step through a time in which the lamps are constant, and only the glow changes."""
+        view = self._view_at(begin_s)
+        t_s, step_s = begin_s, 0.0
+        while t_s < end_s:
+            light = self._irradiance(view, begin_s, self._emitted())
+            step_s = max(step_s * GROWTH, FIRST_STEP / self._fastest(light))
+            if end_s - t_s < 1.2 * step_s:
+                step_s = end_s - t_s
+            before = [state.field.levels.copy() for state in self._states]
+            self._step(light, step_s)
+            # The glow at the end of the step counts as much as that at its beginning.
+            light = (light + self._irradiance(view, begin_s, self._emitted())) / 2
+            for state, levels in zip(self._states, before, strict=True):
+                state.field.levels[:] = levels
+            self._step(light, step_s)
+            t_s = end_s if step_s == end_s - t_s else t_s + step_s
+
+    def _follow(self, begin_s: float, end_s: float) -> None:
+        """Step through a time in which something moves, which is where it is in mid-step."""
+        longest = self._scene.file.step_s or math.inf
+        parts = max(1, math.ceil((end_s - begin_s) / longest - 1e-9))
+        for low, high in pairwise(np.linspace(begin_s, end_s, parts + 1).tolist()):
+            middle = (low + high) / 2
+            view = _View(self._scene, middle, self._threads)
+            light = view.irradiance(
+                self._matrices, self._material_of_place, self._emitted(), self._lamps(middle)
+            )
+            self._step(light, high - low)
+
+    def _step(self, light: FloatArray, step_s: float) -> None:
+        for state in self._states:
+            state.field.step(light[state.places].T, step_s)
+
+    def _fastest(self, light: FloatArray) -> float:
+        """Return the fastest rate at which a level relaxes, in 1/s."""
+        rates = []
+        for state in self._states:
+            parameters = state.field.parameters
+            kappa = parameters.k_e_per_s @ light[state.places].T
+            rates.append(float(np.max(kappa.max(axis=1) + parameters.k_r_per_s)))
+        return max(rates)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Levels of one phosphor, at all places that are made of it."""
+
+    name: str
+    places: IntArray
+    field: Field
+    is_charged: bool
+
+
+class _View:
+    """Paths in the arrangement at one time; the camera's are traced when they are first needed."""
+
+    def __init__(self, scene: Scene, t_s: float, threads: int) -> None:
+        self.t_s = t_s
+        self._scene, self._threads = scene, threads
+        self._geometry = scene.geometry(t_s)
+        lamps = LampTable.of(scene.lamps(t_s), self._geometry)
+        paths = scene.file.paths
+        self._tracer = Tracer(self._geometry, lamps, scene.path_length, paths.seed)
+        self._of_places: list[Paths] = []
+        for number, surface in enumerate(self._geometry.surfaces):
+            if surface.samples is not None:
+                self._of_places += self._tracer.from_surface(number, paths.per_place, threads)
+        self._of_camera: list[Paths] = []
+
+    def of_camera(self) -> list[Paths]:
+        """Return the paths of all pixels."""
+        if not self._of_camera:
+            per_pixel = self._scene.file.paths.per_pixel
+            self._of_camera = list(
+                self._tracer.from_camera(self._scene.camera, per_pixel, self._threads)
+            )
+        return self._of_camera
+
+    @property
+    def nbytes(self) -> int:
+        return sum(each.nbytes for each in (*self._of_places, *self._of_camera))
+
+    @property
+    def n_escaped(self) -> int:
+        return sum(each.n_escaped for each in (*self._of_places, *self._of_camera))
+
+    def irradiance(
+        self,
+        matrices: Matrices,
+        material_of_place: IntArray,
+        glow: Float32Array,
+        lamps: Float32Array,
+    ) -> FloatArray:
+        """Return the irradiance at all places from which paths begin (places, bands)."""
+        light = np.zeros((self._geometry.n_places, glow.shape[1]))
+        if self._of_places:
+            places = np.concatenate(
+                [each.place[each.first[: -1 : each.per_target]] for each in self._of_places]
+            )
+            light[places] = fold(
+                self._of_places, matrices, material_of_place, glow, lamps, self._threads,
+                incident=True,
+            )  # fmt: skip
+        return light
+
+
+def _states(scene: Scene, geometry: Geometry) -> list[_State]:
+    """Return the phosphors that are somewhere in the scene."""
+    has_samples = np.concatenate(
+        [np.full(surface.n_places, surface.samples is not None) for surface in geometry.surfaces]
+    )
+    entries = list(scene.file.materials.values())
+    states = []
+    for number, material in enumerate(scene.materials):
+        places = np.flatnonzero((geometry.material_of_place == number) & has_samples)
+        if material.parameters is None or not len(places):
+            continue
+        given = entries[number].levels
+        is_charged = given == "charged"
+        field = Field(material.parameters, len(places), 0.0 if given == "charged" else given)
+        name = list(scene.file.materials)[number]
+        states.append(_State(name, places.astype(np.int32), field, is_charged))
+    return states
+
+
+def _n_processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

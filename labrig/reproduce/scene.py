@@ -1,0 +1,439 @@
+"""A scene ready to be rendered: its file with materials, meshes and lamps in place."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import UsageError
+from labrig.material import Albedo, Material, read_any_material
+from labrig.optics import absolute_irradiance, read_colour_chart, read_light, read_transmittance
+from labrig.reproduce.bands import Bands
+from labrig.reproduce.geometry import Geometry, Samples, Surface
+from labrig.reproduce.lamp import Lamp
+from labrig.reproduce.mesh import Mesh, read_mesh, rotation
+from labrig.reproduce.scene_file import (
+    STRENGTHS,
+    AlbedoCurve,
+    LampEntry,
+    MaterialEntry,
+    MaterialMap,
+    ObjectEntry,
+    SceneFile,
+    read_scene,
+)
+from labrig.reproduce.surface_material import (
+    BenchLight,
+    SurfaceMaterial,
+    of_albedo,
+    of_matrix,
+    of_phosphor,
+)
+from labrig.reproduce.tracing import PathLength, Pinhole
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+#: Texels of a phosphor where nobody says otherwise.
+TEXELS = (64, 64)
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """What is taken for true where a measurement is missing.
+
+    Attributes
+    ----------
+    albedo
+        Albedo of phosphors whose file has none.
+    scale
+        Factor from Λ to s sr⁻¹ of phosphors whose file has none.
+    """
+
+    albedo: float | None = None
+    scale: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene.
+
+    Attributes
+    ----------
+    file
+        Content of the scene file.
+    bands
+        Bands of the rendering.
+    materials
+        Materials by the numbers that surfaces name.
+    is_moving
+        Whether an object or a lamp moves.
+    """
+
+    file: SceneFile
+    bands: Bands
+    materials: tuple[SurfaceMaterial, ...]
+    is_moving: bool
+    _surfaces: tuple[Callable[[float], Surface], ...] = field(repr=False)
+    _folder: Path = field(repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed or is missing, one sentence each."""
+        return tuple(dict.fromkeys(note for each in self.materials for note in each.notes))
+
+    @property
+    def camera(self) -> Pinhole:
+        """The camera."""
+        return Pinhole(**self.file.camera.model_dump())
+
+    @property
+    def path_length(self) -> PathLength:
+        """How paths end."""
+        return PathLength(self.file.paths.vertices, self.file.paths.survival)
+
+    def resized(
+        self, width_px: int | None = None, height_px: int | None = None, paths: int | None = None
+    ) -> Self:
+        """Return the scene with a picture of another size, or another number of paths.
+
+        Parameters
+        ----------
+        width_px, height_px
+            Size of the picture; None keeps it.
+        paths
+            Paths for each pixel and for each place of a phosphor; None keeps them.
+        """
+        size = {"width_px": width_px, "height_px": height_px}
+        fineness = {"per_pixel": paths, "per_place": paths}
+        changed = {
+            name: getattr(self.file, name).model_copy(
+                update={key: value for key, value in new.items() if value is not None}
+            )
+            for name, new in (("camera", size), ("paths", fineness))
+        }
+        return replace(self, file=self.file.model_copy(update=changed))
+
+    def geometry(self, t_s: float) -> Geometry:
+        """Return the surfaces at a time in s."""
+        return Geometry.of([surface(t_s) for surface in self._surfaces])
+
+    def lamps(self, t_s: float) -> tuple[Lamp, ...]:
+        """Return the lamps at a time in s, at their full strength."""
+        return tuple(
+            _lamp(name, entry, self.bands, self._folder, t_s) for name, entry in self.file.lamps.items()
+        )
+
+    def levels(self, t_s: float) -> FloatArray:
+        """Return the level of each lamp from a time in s on, shape (lamps,)."""
+        levels = dict.fromkeys(self.file.lamps, 0.0)
+        for part in self.file.programme:
+            if part.at_s <= t_s:
+                levels.update(part.lamps)
+        return np.array(list(levels.values()))
+
+
+def load_scene(
+    name_or_path: str | Path,
+    replaced: Mapping[str, str] | None = None,
+    assumptions: Assumptions = Assumptions(),
+) -> Scene:
+    """Read a scene and all that it names.
+
+    Parameters
+    ----------
+    name_or_path
+        Scene file, or the name of a shipped scene.
+    replaced
+        Files of materials that take the place of the scene's, by the names of the materials;
+        relative to the current folder.
+    assumptions
+        What is taken for true where a measurement is missing and the scene says nothing.
+
+    Raises
+    ------
+    UsageError, DataError
+        A file is missing or malformed, or does not fit.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import Assumptions, load_scene
+    >>> scene = load_scene("cornell-box", assumptions=Assumptions(albedo=0.8, scale=1.0))
+    >>> len(scene.bands), scene.is_moving
+    (24, False)
+    """
+    file, folder = read_scene(name_or_path)
+    return build_scene(file, folder, replaced, assumptions)
+
+
+def build_scene(
+    file: SceneFile,
+    folder: Path,
+    replaced: Mapping[str, str] | None = None,
+    assumptions: Assumptions = Assumptions(),
+) -> Scene:
+    """Return the scene of a file's content; see `load_scene`.
+
+    Parameters
+    ----------
+    file
+        Content of the scene file.
+    folder
+        Folder to which its paths are relative.
+    replaced, assumptions
+        As of `load_scene`.
+    """
+    bands = Bands.even(file.bands.first_nm, file.bands.last_nm, file.bands.count)
+    light = file.bench_light
+    bench = BenchLight(
+        absolute_irradiance(light.illuminance_lux, read_light(_beside(light.spectrum, folder)))
+    )
+    entries = _replaced(file.materials, replaced or {}, folder)
+    materials = tuple(
+        _material(name, entry, place, bands, bench, assumptions)
+        for name, (entry, place) in entries.items()
+    )
+    numbers = {name: number for number, name in enumerate(entries)}
+    lamps = {name: number for number, name in enumerate(file.lamps)}
+    surfaces = tuple(
+        _surface(name, entry, folder, numbers, lamps, materials)
+        for name, entry in file.objects.items()
+    )
+    is_moving = any(
+        entry.wave is not None or entry.vertices_over_time is not None
+        for entry in file.objects.values()
+    ) or any(lamp.path is not None for lamp in file.lamps.values())
+    return Scene(file, bands, materials, is_moving, surfaces, folder)
+
+
+def _replaced(
+    entries: Mapping[str, MaterialEntry], replaced: Mapping[str, str], folder: Path
+) -> dict[str, tuple[MaterialEntry, Path]]:
+    """Return entries with the folders of their files, those replaced by the user's."""
+    if unknown := set(replaced) - set(entries):
+        raise UsageError(
+            f"expected a material of the scene ({', '.join(entries)}), got '{min(unknown)}'"
+        )
+    return {
+        name: (
+            (
+                entry.model_copy(
+                    update={"file": replaced[name], "albedo": None, "chart_patch": None}
+                ),
+                Path(),
+            )
+            if name in replaced
+            else (entry, folder)
+        )
+        for name, entry in entries.items()
+    }
+
+
+def _beside(named: str, folder: Path) -> str:
+    """Return a file's path beside the scene's, or the name of something shipped as it is."""
+    beside = folder / named
+    return str(beside) if Path(named).suffix and beside.is_file() else named
+
+
+def _material(
+    name: str,
+    entry: MaterialEntry,
+    folder: Path,
+    bands: Bands,
+    bench: BenchLight,
+    assumptions: Assumptions,
+) -> SurfaceMaterial:
+    if entry.chart_patch is not None:
+        patch = read_colour_chart("colorchecker")[entry.chart_patch - 1]
+        return of_albedo(name, patch, bands)
+    if isinstance(entry.albedo, str):
+        return of_albedo(name, read_transmittance(_beside(entry.albedo, folder)), bands)
+    if isinstance(entry.albedo, AlbedoCurve):
+        return of_albedo(name, Albedo(**entry.albedo.model_dump()), bands)
+    if entry.albedo is not None:
+        return of_albedo(name, entry.albedo, bands)
+    assert entry.file is not None
+    material = read_any_material(_beside(entry.file, folder))
+    if not isinstance(material, Material):
+        return of_matrix(material, bands)
+    albedo, scale = entry.assume_albedo, entry.assume_scale
+    return of_phosphor(
+        material,
+        bands,
+        bench,
+        assumptions.albedo if albedo is None else albedo,
+        assumptions.scale if scale is None else scale,
+        entry.prompt,
+    )
+
+
+def _lamp(name: str, entry: LampEntry, bands: Bands, folder: Path, t_s: float) -> Lamp:
+    spectrum = read_light(_beside(entry.spectrum, folder))
+    of_eye, of_watt = STRENGTHS[entry.kind]
+    strength = getattr(entry, of_eye)
+    if strength is not None:
+        light = absolute_irradiance(1.0, spectrum).in_bands(bands.edges_nm) * strength
+    else:
+        whole = float(np.trapezoid(spectrum.value, spectrum.wavelength_nm))
+        light = bands.means(spectrum) * getattr(entry, of_watt) / whole
+    if not light.any() and strength != 0:
+        raise UsageError(
+            f"lamp {name}: expected light between {bands.edges_nm[0]:g} and "
+            f"{bands.edges_nm[-1]:g} nm, got none in '{entry.spectrum}'"
+        )
+    vector = entry.position_m or (0.0, 0.0, 1.0)
+    if entry.path is not None:
+        times = [point.at_s for point in entry.path]
+        places = np.array([point.position_m for point in entry.path])
+        x, y, z = (float(np.interp(t_s, times, column)) for column in places.T)
+        vector = x, y, z
+    if entry.towards is not None:
+        x, y, z = (np.array(entry.towards) / np.linalg.norm(entry.towards)).tolist()
+        vector = x, y, z
+    return Lamp(name, entry.kind, light, vector)
+
+
+def _surface(
+    name: str,
+    entry: ObjectEntry,
+    folder: Path,
+    numbers: Mapping[str, int],
+    lamps: Mapping[str, int],
+    materials: tuple[SurfaceMaterial, ...],
+) -> Callable[[float], Surface]:
+    """Return a function that gives an object at a time in s."""
+    mesh = _mesh(name, entry, folder)
+    lamp = -1 if entry.lamp is None else lamps[entry.lamp]
+    used = [numbers[entry.material]] if entry.material is not None else []
+    if entry.material_map is not None:
+        used = [numbers[each] for each in entry.material_map.materials.values()]
+    glows = any(materials[number].parameters is not None for number in used)
+    samples = _samples(name, entry, mesh, glows)
+    of_texel = None
+    if entry.material_map is not None:
+        if not isinstance(samples, tuple):
+            raise UsageError(f"{name}: expected texels with 'material_map', got {samples}")
+        of_texel = _mapped(name, entry.material_map, folder, samples, numbers)
+    place = _motion(name, entry, mesh, folder)
+
+    def at(t_s: float) -> Surface:
+        return Surface(
+            name, place(t_s), used[0] if used else -1, samples, lamp, entry.two_sided, of_texel
+        )
+
+    return at
+
+
+def _samples(name: str, entry: ObjectEntry, mesh: Mesh, glows: bool) -> Samples:
+    if entry.material_map is not None:
+        return entry.samples or TEXELS
+    if not glows:
+        return None
+    return entry.samples or ("vertices" if mesh.uv is None else TEXELS)
+
+
+def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
+    if (flat := entry.rectangle) is not None:
+        return Mesh.grid(flat.corner_m, flat.edge_u_m, flat.edge_v_m, flat.parts)
+    if entry.disk is not None:
+        return Mesh.disk(**entry.disk.model_dump())
+    if entry.box is not None:
+        return Mesh.box(**entry.box.model_dump())
+    if entry.sphere is not None:
+        return Mesh.sphere(**entry.sphere.model_dump())
+    assert entry.mesh is not None
+    mesh = read_mesh(folder / entry.mesh.file)
+    turn = np.eye(3)
+    for axis, angle_deg in zip(np.eye(3), entry.mesh.turned_deg, strict=True):
+        turn = rotation(axis, angle_deg) @ turn
+    placed = mesh.vertices_m @ turn.T * entry.mesh.size_m + np.array(entry.mesh.position_m)
+    mesh = Mesh(placed, mesh.faces, mesh.uv)
+    if entry.mesh.inward:
+        mesh = mesh.turned_over()
+    if not entry.two_sided and not mesh.is_closed and entry.lamp is None:
+        raise UsageError(
+            f"{name}: expected a closed mesh, got one with holes in {entry.mesh.file}; its back "
+            "would be black: close it, or give 'two_sided: true'"
+        )
+    if not entry.two_sided and mesh.is_closed and (mesh.volume_m3 < 0) != entry.mesh.inward:
+        raise UsageError(
+            f"{name}: expected triangles whose front is {'in' if entry.mesh.inward else 'out'}side, "
+            f"got inverted ones in {entry.mesh.file}; turn its normals over, or give "
+            f"'inward: {str(not entry.mesh.inward).lower()}'"
+        )
+    return mesh
+
+
+def _motion(
+    name: str, entry: ObjectEntry, mesh: Mesh, folder: Path
+) -> Callable[[float], Mesh]:
+    """Return a function that gives the mesh at a time in s."""
+    if (wave := entry.wave) is not None:
+        assert mesh.uv is not None
+        front, along = mesh.normals[0], mesh.uv[:, 0] / wave.wavelength
+
+        def waved(t_s: float) -> Mesh:
+            height = wave.amplitude_m * np.sin(2 * np.pi * (along - t_s / wave.period_s))
+            return Mesh(mesh.vertices_m + height[:, None] * front, mesh.faces, mesh.uv)
+
+        return waved
+    if entry.vertices_over_time is None:
+        return lambda _: mesh
+    times_s, vertices_m = _vertices_over_time(name, folder / entry.vertices_over_time, mesh)
+
+    def moved(t_s: float) -> Mesh:
+        at = float(np.interp(t_s, times_s, np.arange(len(times_s))))
+        before = min(int(at), len(times_s) - 2) if len(times_s) > 1 else 0
+        after = min(before + 1, len(times_s) - 1)
+        part = at - before
+        return Mesh(
+            (1 - part) * vertices_m[before] + part * vertices_m[after], mesh.faces, mesh.uv
+        )
+
+    return moved
+
+
+def _vertices_over_time(name: str, path: Path, mesh: Mesh) -> tuple[FloatArray, FloatArray]:
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            times_s, vertices_m = content["t_s"], content["vertices_m"]
+    except (OSError, KeyError, ValueError) as error:
+        raise UsageError(
+            f"{path}: expected a .npz file with 't_s' and 'vertices_m' ({error})"
+        ) from None
+    expected = (len(times_s), *mesh.vertices_m.shape)
+    if vertices_m.shape != expected or not np.isfinite(vertices_m).all():
+        raise UsageError(
+            f"{path}: expected finite 'vertices_m' of shape {expected} for {name}, got "
+            f"{vertices_m.shape}"
+        )
+    if times_s.ndim != 1 or not len(times_s) or (np.diff(times_s) <= 0).any():
+        raise UsageError(f"{path}: expected times 't_s' that rise")
+    return times_s.astype(np.float64), vertices_m.astype(np.float64)
+
+
+def _mapped(
+    name: str, entry: MaterialMap, folder: Path, samples: tuple[int, int], numbers: Mapping[str, int]
+) -> IntArray:
+    """Return the number of the material of each texel, by the nearest colour (rows, columns)."""
+    import cv2
+
+    path = folder / entry.file
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None
+    if picture is None:
+        raise UsageError(f"{path}: expected a picture for the material_map of {name}, got none")
+    resized = cv2.resize(picture, samples, interpolation=cv2.INTER_NEAREST)[::-1, :, ::-1]
+    colours = []
+    for text in entry.materials:
+        digits = text.removeprefix("#")
+        if len(digits) != 6 or not all(digit in "0123456789abcdefABCDEF" for digit in digits):
+            raise UsageError(f"{name}: expected colours such as '#ff8000', got '{text}'")
+        colours.append([int(digits[k : k + 2], 16) for k in (0, 2, 4)])
+    distance = np.abs(resized[:, :, None, :].astype(float) - np.array(colours)).sum(axis=3)
+    chosen = np.array([numbers[material] for material in entry.materials.values()])
+    return np.asarray(chosen[np.argmin(distance, axis=2)], dtype=np.int32)
+
+

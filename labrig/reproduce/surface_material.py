@@ -1,0 +1,277 @@
+"""What a surface does with light, in the bands of a rendering: return it at once, and glow later."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import UsageError
+from labrig.material import (
+    Albedo,
+    Material,
+    ReradiationMatrix,
+    physical_warnings,
+)
+from labrig.optics import Spectrum, Transmittance
+from labrig.reproduce.bands import Bands
+from labrig.reproduce.field_parameters import FieldParameters
+
+Float32Array = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
+
+#: Relative difference up to which Λ of all states has the shape of the finer spectrum.
+SAME_SHAPE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class BenchLight:
+    """Light by which materials were charged when they were measured: their rates are relative to it.
+
+    Attributes
+    ----------
+    spectrum
+        Spectral irradiance at the sample in W m⁻² nm⁻¹.
+    """
+
+    spectrum: Spectrum
+
+    def vector_length(self, edges_nm: Sequence[float]) -> float:
+        """Return the length of E, the vector of its irradiance in W m⁻² in each band of some."""
+        edges = np.asarray(edges_nm, dtype=np.float64)
+        return float(np.linalg.norm(self.spectrum.in_bands(edges) * np.diff(edges)))
+
+    def mean(self, edges_nm: Sequence[float]) -> float:
+        """Return its mean over all bands together, in W m⁻² nm⁻¹."""
+        return float(self.spectrum.in_bands([edges_nm[0], edges_nm[-1]])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMaterial:
+    """A Lambertian surface: L = M E/π + glow, in bands.
+
+    Attributes
+    ----------
+    name
+        Name of the material.
+    matrix
+        Matrix M of what comes back at once: the albedo on its diagonal, re-radiation off it; shape
+        (bands out, bands in).
+    parameters
+        Parameters of the glow in the scene's units; None of a material that does not glow.
+    notes
+        What was assumed or is missing, one sentence each.
+    """
+
+    name: str
+    matrix: Float32Array
+    parameters: FieldParameters | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether light keeps its wavelength."""
+        return bool(np.count_nonzero(self.matrix - np.diag(np.diagonal(self.matrix))) == 0)
+
+
+def of_albedo(
+    name: str, albedo: Albedo | Transmittance | float, bands: Bands, notes: tuple[str, ...] = ()
+) -> SurfaceMaterial:
+    """Return a surface that reflects and does nothing else.
+
+    Parameters
+    ----------
+    name
+        Name of the material.
+    albedo
+        Fraction of the light that comes back, 0 to below 1; between its wavelengths linear, beyond
+        them constant.
+    bands
+        Bands of the rendering.
+    notes
+        What was assumed.
+
+    Raises
+    ------
+    UsageError
+        Some albedo is 1 or more: light would never be lost.
+    """
+    diagonal = _albedo_in_bands(albedo, bands)
+    return SurfaceMaterial(name, _checked(name, np.diag(diagonal)), None, notes)
+
+
+def of_matrix(matrix: ReradiationMatrix, bands: Bands) -> SurfaceMaterial:
+    """Return a fluorescent surface.
+
+    The matrix is brought into the bands so that light which is constant in each of them comes back
+    as it does by the matrix; the reflectance is continued as a constant beyond its wavelengths.
+
+    Parameters
+    ----------
+    matrix
+        Measured reflectance and re-radiation.
+    bands
+        Bands of the rendering.
+
+    Raises
+    ------
+    UsageError
+        Its unit is relative, no band overlaps, or its largest eigenvalue reaches 1.
+    DataError
+        It returns more light than any surface does, see `physical_warnings`.
+    """
+    if matrix.unit == "relative":
+        raise UsageError(
+            f"{matrix.name}: expected a re-radiation in 1/nm, got a relative one; measure the "
+            "brightness of the lights that excite it"
+        )
+    notes = physical_warnings(matrix)
+    low, high = max(matrix.output_edges_nm[0], bands.edges_nm[0]), min(
+        matrix.output_edges_nm[-1], bands.edges_nm[-1]
+    )
+    if low >= high:
+        raise UsageError(
+            f"{matrix.name}: expected bands that overlap those of the rendering, "
+            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got "
+            f"{matrix.output_edges_nm[0]:g} to {matrix.output_edges_nm[-1]:g} nm"
+        )
+    into = bands.overlap_nm(matrix.output_edges_nm) / bands.width_nm
+    absorbed = bands.overlap_nm(matrix.input_edges_nm)
+    reradiated = into.T @ np.nan_to_num(matrix.reradiation) @ absorbed
+    known = ~np.isnan(matrix.reflectance)
+    if not known.any():
+        raise UsageError(f"{matrix.name}: expected a reflectance, got none in its file")
+    reflectance = _in_bands(matrix.output_nm[known], matrix.reflectance[known], bands)
+    return SurfaceMaterial(
+        matrix.name, _checked(matrix.name, np.diag(reflectance) + reradiated), None, notes
+    )
+
+
+def of_phosphor(
+    material: Material,
+    bands: Bands,
+    bench: BenchLight,
+    albedo: float | None = None,
+    reradiation_scale: float | None = None,
+    prompt: float = 0.0,
+) -> SurfaceMaterial:
+    """Return a phosphorescent surface, with rates in the units of the scene.
+
+    Excitation rates belong to a light E of stated length in the material's own bands: here to the
+    bench's light; outside of the measured bands they are zero. Λ is spread in its bands as the
+    finer emission spectrum where all states have its shape, else evenly.
+
+    Parameters
+    ----------
+    material
+        Measured phosphor.
+    bands
+        Bands of the rendering.
+    bench
+        Light by which it was measured.
+    albedo
+        Albedo to assume where the material has none.
+    reradiation_scale
+        Factor from Λ to s sr⁻¹ relative to the bench's mean spectral irradiance, to assume where
+        the material has no scale.
+    prompt
+        Part η of captures that emit at once.
+
+    Raises
+    ------
+    UsageError
+        Λ, albedo or scale is missing, no band overlaps, or an albedo reaches 1.
+    """
+    rates = FieldParameters.of(material, prompt)
+    assert material.bands_nm is not None
+    edges = material.bands_nm
+    overlap = bands.overlap_nm(edges)
+    if not overlap.any():
+        raise UsageError(
+            f"{material.name}: expected bands that overlap those of the rendering, "
+            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got {edges[0]:g} to "
+            f"{edges[-1]:g} nm"
+        )
+    notes = []
+    if (surface := material.albedo or albedo) is None:
+        raise UsageError(
+            f"{material.name}: its file has no albedo, so the light that it reflects is not known; "
+            "measure it (labrig run reflectance) or assume one (--assume-albedo 0.8)"
+        )
+    if material.albedo is None:
+        notes.append(f"the albedo of {material.name} is assumed: {albedo:g} at all wavelengths")
+    factor = 1.0 if material.scale == "absolute" else bench.mean(edges)
+    if material.scale is None:
+        if reradiation_scale is None:
+            raise UsageError(
+                f"{material.name}: its file has no scale, so the brightness of its glow beside "
+                "reflected light is not known; measure it (labrig run phosphor with the grey card) "
+                "or assume one (--assume-scale 1)"
+            )
+        factor *= reradiation_scale
+        notes.append(
+            f"the scale of {material.name}'s glow is assumed: {reradiation_scale:g} s/sr for Λ of 1"
+        )
+    if all(state.k_e_per_s is None for state in material.states):
+        notes.append(f"{material.name} has no excitation rates: light does not charge it")
+    k_e = rates.k_e_per_s.astype(np.float64)
+    if material.irradiance_norm is not None:
+        k_e *= material.irradiance_norm.value / bench.vector_length(edges)
+    reflected = _checked(material.name, np.diag(_albedo_in_bands(surface, bands)))
+    parameters = FieldParameters.checked(
+        rates.k_r_per_s,
+        k_e @ overlap,
+        factor * _spread(material, rates.reradiation.astype(np.float64), bands),
+        rates.order,
+        prompt,
+    )
+    return SurfaceMaterial(material.name, reflected, parameters, tuple(notes))
+
+
+def _spread(material: Material, reradiation: FloatArray, bands: Bands) -> FloatArray:
+    """Return Λ of each state in the bands of the rendering, shape (states, bands)."""
+    assert material.bands_nm is not None
+    edges = np.array(material.bands_nm)
+    flat = reradiation @ bands.overlap_nm(edges) / bands.width_nm
+    if material.spectrum is None:
+        return np.asarray(flat)
+    fine = Spectrum(
+        "glow", np.array(material.spectrum.wavelength_nm), np.array(material.spectrum.value)
+    )
+    coarse = fine.in_bands(edges)
+    strength = reradiation @ coarse / (coarse @ coarse)
+    differs = np.abs(reradiation - np.outer(strength, coarse)).max(axis=1)
+    if (differs > SAME_SHAPE * reradiation.max(axis=1)).any():
+        return np.asarray(flat)
+    return np.outer(strength, bands.means(fine))
+
+
+def _albedo_in_bands(albedo: Albedo | Transmittance | float, bands: Bands) -> FloatArray:
+    if isinstance(albedo, float | int):
+        return np.full(len(bands), float(albedo))
+    return _in_bands(np.array(albedo.wavelength_nm), np.array(albedo.value), bands)
+
+
+def _in_bands(wavelength_nm: FloatArray, values: FloatArray, bands: Bands) -> FloatArray:
+    """Return means in bands of a curve that goes on as a constant beyond its ends."""
+    ends = np.array([bands.edges_nm[0] - 1, bands.edges_nm[-1] + 1])
+    low, high = min(ends[0], wavelength_nm[0] - 1), max(ends[1], wavelength_nm[-1] + 1)
+    curve = Spectrum(
+        "", np.r_[low, wavelength_nm, high], np.r_[values[0], values, values[-1]]
+    )
+    return bands.means(curve)
+
+
+def _checked(name: str, matrix: FloatArray) -> Float32Array:
+    """Return a matrix of which light is lost at every bounce."""
+    if not np.isfinite(matrix).all() or matrix.min() < -0.05:
+        raise UsageError(f"{name}: expected an albedo and re-radiation that are finite and ≥ 0")
+    largest = float(np.abs(np.linalg.eigvals(matrix)).max())
+    if largest >= 1:
+        raise UsageError(
+            f"{name}: expected a surface that loses light, got {largest:.3f} as the largest "
+            "eigenvalue of its matrix (its albedo, if it is not fluorescent); below 1 is needed"
+        )
+    return matrix.astype(np.float32)
+
+
