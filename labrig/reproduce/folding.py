@@ -1,4 +1,4 @@
-"""Light along kept paths: from the far end of each, L = glow + M (direct · lamps + L of the next)."""
+"""Light along kept paths, from the far end: L = glow + M (direct · lamps + L of the next)."""
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -84,6 +84,24 @@ def fold(
     -------
     ndarray
         Light of each pixel or place (targets, bands).
+
+    Examples
+    --------
+    A room whose walls glow and return half of the light is twice as bright as its glow.
+
+    >>> import numpy as np
+    >>> from labrig.reproduce import (
+    ...     Bands, Geometry, LampTable, Matrices, Mesh, PathLength, Pinhole, Surface, Tracer, fold,
+    ...     of_albedo,
+    ... )
+    >>> room = Geometry.of([Surface("room", Mesh.box((0, 0, 0), (2, 3, 2), inward=True), 0)])
+    >>> tracer = Tracer(room, LampTable.of([], room), PathLength(40, survival=0.0))
+    >>> camera = Pinhole((0, 0, 0), (1, 0, 0), width_px=2, height_px=2)
+    >>> paths = list(tracer.from_camera(camera, per_pixel=1, threads=1))
+    >>> walls = Matrices.of([of_albedo("grey", 0.5, Bands.even(400, 700, 3))])
+    >>> no_lamps = np.zeros((0, 3), np.float32)
+    >>> fold(paths, walls, room.material_of_place, np.ones((1, 3), np.float32), no_lamps, 1)[0]
+    array([2., 2., 2.], dtype=float32)
     """
     from labrig.reproduce.folding_kernels import fold_paths
 

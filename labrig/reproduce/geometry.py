@@ -1,4 +1,4 @@
-"""Surfaces of a scene as one list of triangles, and the places on them that have a state of their own."""
+"""Surfaces of a scene as one list of triangles, and the places on them that have states."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -137,7 +137,9 @@ class Geometry:
             kind = (
                 TEXELS
                 if isinstance(surface.samples, tuple)
-                else VERTICES if surface.samples else ONE_PLACE
+                else VERTICES
+                if surface.samples
+                else ONE_PLACE
             )
             rows.append((kind, first, columns, height, surface.lamp, surface.is_two_sided))
             own = surface.material_of_texel
@@ -275,13 +277,16 @@ def _on_texels(
     """Return triangles, weights of their corners, and texels, for points on each texel."""
     from labrig.reproduce.tracing_kernels import rasterised, weights_at
 
-    assert isinstance(surface.samples, tuple) and surface.mesh.uv is not None
+    assert isinstance(surface.samples, tuple)
+    assert surface.mesh.uv is not None
     columns, rows = surface.samples
     corners = surface.mesh.uv[surface.mesh.faces].astype(np.float32)
     face_at, n_shared = rasterised(corners, columns * LOOKUPS, rows * LOOKUPS)
     covered = int((face_at >= 0).sum())
     if not covered:
-        raise UsageError(f"{surface.name}: expected texels on the surface, got none; see its texture")
+        raise UsageError(
+            f"{surface.name}: expected texels on the surface, got none; see its texture"
+        )
     if n_shared > SHARED_POINTS * covered:
         raise UsageError(
             f"{surface.name}: expected every texel at one place, got texture coordinates of which "

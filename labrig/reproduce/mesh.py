@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +54,9 @@ class Mesh:
         edge_u_m, edge_v_m
             Edges from it in m; texture coordinates rise along them.
         """
-        corner, u, v = (np.asarray(each, dtype=np.float64) for each in (corner_m, edge_u_m, edge_v_m))
+        corner, u, v = (
+            np.asarray(each, dtype=np.float64) for each in (corner_m, edge_u_m, edge_v_m)
+        )
         vertices = np.array([corner, corner + u, corner + u + v, corner + v])
         faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
         return cls(vertices, faces, np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64))
@@ -105,7 +107,9 @@ class Mesh:
         half = np.asarray(size_m, dtype=np.float64) / 2
         turn = rotation(np.array([0.0, 0.0, 1.0]), turned_deg)
         vertices, faces, uv = [], [], []
-        for number, (axis, side) in enumerate((axis, side) for axis in range(3) for side in (1, -1)):
+        for number, (axis, side) in enumerate(
+            (axis, side) for axis in range(3) for side in (1, -1)
+        ):
             u, v = np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3]]
             if side < 0:
                 u, v = v, u
@@ -113,9 +117,7 @@ class Mesh:
             corners = [normal - u - v, normal + u - v, normal + u + v, normal - u + v]
             column, row = number % 3, number // 3
             vertices += [turn @ (half * corner) for corner in corners]
-            uv += [
-                ((column + s) / 3, (row + t) / 2) for s, t in ((0, 0), (1, 0), (1, 1), (0, 1))
-            ]
+            uv += [((column + s) / 3, (row + t) / 2) for s, t in ((0, 0), (1, 0), (1, 1), (0, 1))]
             faces += [[4 * number + k for k in triangle] for triangle in ((0, 1, 2), (0, 2, 3))]
         mesh = cls(
             np.array(vertices) + np.asarray(centre_m, dtype=np.float64),
@@ -160,7 +162,9 @@ class Mesh:
         return mesh.turned_over() if inward else mesh
 
     @classmethod
-    def grid(cls, corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, parts: int) -> Self:
+    def grid(
+        cls, corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, parts: int
+    ) -> Self:
         """Return a parallelogram of many triangles, which can be deformed.
 
         Parameters
@@ -170,7 +174,9 @@ class Mesh:
         parts
             Number of parts along each edge.
         """
-        corner, u, v = (np.asarray(each, dtype=np.float64) for each in (corner_m, edge_u_m, edge_v_m))
+        corner, u, v = (
+            np.asarray(each, dtype=np.float64) for each in (corner_m, edge_u_m, edge_v_m)
+        )
         row, column = np.divmod(np.arange((parts + 1) ** 2), parts + 1)
         uv = np.stack([column, row], axis=1) / parts
         corners = np.arange((parts + 1) ** 2)[(row < parts) & (column < parts)]
@@ -208,7 +214,7 @@ class Mesh:
 
     @property
     def is_closed(self) -> bool:
-        """Whether each edge has a triangle on both of its sides, vertices at one place being one."""
+        """Whether each edge has a triangle on both sides, vertices at one place being one."""
         _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
         faces = same.reshape(-1)[self.faces]
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
@@ -226,12 +232,17 @@ class Mesh:
 
 
 def read_mesh(path: Path) -> Mesh:
-    """Read a mesh from a file.
+    r"""Read a mesh from a file.
 
     Parameters
     ----------
     path
         File in a format of `FORMATS`; parts of a scene in it are joined.
+
+    Returns
+    -------
+    Mesh
+        Its triangles, in the file's own unit, with texture coordinates where it has some.
 
     Raises
     ------
@@ -242,7 +253,7 @@ def read_mesh(path: Path) -> Mesh:
     --------
     >>> from pathlib import Path
     >>> from labrig.reproduce import read_mesh
-    >>> _ = Path("triangle.obj").write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\n")
+    >>> _ = Path("triangle.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     >>> read_mesh(Path("triangle.obj")).area_m2
     0.5
     """
@@ -256,9 +267,13 @@ def read_mesh(path: Path) -> Mesh:
         vertices = np.asarray(loaded.vertices, dtype=np.float64)
         faces = np.asarray(loaded.faces, dtype=np.int32)
     except (ValueError, KeyError, IndexError, AttributeError, TypeError, OSError) as error:
-        raise UsageError(f"{path}: expected a mesh, got a file that cannot be read ({error})") from None
+        raise UsageError(
+            f"{path}: expected a mesh, got a file that cannot be read ({error})"
+        ) from None
     if not len(faces) or not np.isfinite(vertices).all():
-        raise UsageError(f"{path}: expected triangles with finite vertices, got {len(faces)} triangles")
+        raise UsageError(
+            f"{path}: expected triangles with finite vertices, got {len(faces)} triangles"
+        )
     uv = getattr(loaded.visual, "uv", None)
     mesh = Mesh(vertices, faces, None if uv is None else np.asarray(uv, dtype=np.float64))
     if not mesh.area_m2 > 0:
@@ -279,12 +294,10 @@ def rotation(axis: FloatArray, angle_deg: float) -> FloatArray:
     """Return the matrix of a turn about an axis of length 1 (Rodrigues)."""
     angle = np.deg2rad(angle_deg)
     across = np.cross(np.eye(3), axis)
-    return np.asarray(
-        np.eye(3) - np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
-    )
+    return np.asarray(np.eye(3) - np.sin(angle) * across + (1 - np.cos(angle)) * across @ across)
 
 
-def _trimesh():  # type: ignore[no-untyped-def]
+def _trimesh() -> Any:
     try:
         import trimesh
     except ModuleNotFoundError as error:

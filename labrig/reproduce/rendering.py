@@ -137,7 +137,7 @@ class Renderer:
     def _lamps(self, t_s: float) -> Float32Array:
         lamps = self._scene.lamps(t_s)
         light = np.array([lamp.light for lamp in lamps]).reshape(len(lamps), len(self._scene.bands))
-        return (self._scene.levels(t_s)[:, None] * light).astype(np.float32)
+        return np.asarray(self._scene.levels(t_s)[:, None] * light, dtype=np.float32)
 
     def _emitted(self, irradiance: FloatArray | None = None) -> Float32Array:
         """Return the radiance that each place emits by itself, shape (places, bands)."""

@@ -124,7 +124,8 @@ class Scene:
     def lamps(self, t_s: float) -> tuple[Lamp, ...]:
         """Return the lamps at a time in s, at their full strength."""
         return tuple(
-            _lamp(name, entry, self.bands, self._folder, t_s) for name, entry in self.file.lamps.items()
+            _lamp(name, entry, self.bands, self._folder, t_s)
+            for name, entry in self.file.lamps.items()
         )
 
     def levels(self, t_s: float) -> FloatArray:
@@ -152,6 +153,11 @@ def load_scene(
         relative to the current folder.
     assumptions
         What is taken for true where a measurement is missing and the scene says nothing.
+
+    Returns
+    -------
+    Scene
+        The scene, ready for a `Renderer`.
 
     Raises
     ------
@@ -185,6 +191,24 @@ def build_scene(
         Folder to which its paths are relative.
     replaced, assumptions
         As of `load_scene`.
+
+    Returns
+    -------
+    Scene
+        The scene, ready for a `Renderer`.
+
+    Raises
+    ------
+    UsageError, DataError
+        A file that it names is missing or malformed, or does not fit.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import build_scene, read_scene
+    >>> file, folder = read_scene("cornell-box")
+    >>> wide = file.model_copy(update={"frames_s": (0.0, 1.0, 2.0)})
+    >>> build_scene(wide, folder).file.frames_s
+    (0.0, 1.0, 2.0)
     """
     bands = Bands.even(file.bands.first_nm, file.bands.last_nm, file.bands.count)
     light = file.bench_light
@@ -360,16 +384,14 @@ def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
         )
     if not entry.two_sided and mesh.is_closed and (mesh.volume_m3 < 0) != entry.mesh.inward:
         raise UsageError(
-            f"{name}: expected triangles whose front is {'in' if entry.mesh.inward else 'out'}side, "
-            f"got inverted ones in {entry.mesh.file}; turn its normals over, or give "
+            f"{name}: expected triangles whose front is {'in' if entry.mesh.inward else 'out'}"
+            f"side, got inverted ones in {entry.mesh.file}; turn its normals over, or give "
             f"'inward: {str(not entry.mesh.inward).lower()}'"
         )
     return mesh
 
 
-def _motion(
-    name: str, entry: ObjectEntry, mesh: Mesh, folder: Path
-) -> Callable[[float], Mesh]:
+def _motion(name: str, entry: ObjectEntry, mesh: Mesh, folder: Path) -> Callable[[float], Mesh]:
     """Return a function that gives the mesh at a time in s."""
     if (wave := entry.wave) is not None:
         assert mesh.uv is not None
@@ -389,9 +411,7 @@ def _motion(
         before = min(int(at), len(times_s) - 2) if len(times_s) > 1 else 0
         after = min(before + 1, len(times_s) - 1)
         part = at - before
-        return Mesh(
-            (1 - part) * vertices_m[before] + part * vertices_m[after], mesh.faces, mesh.uv
-        )
+        return Mesh((1 - part) * vertices_m[before] + part * vertices_m[after], mesh.faces, mesh.uv)
 
     return moved
 
@@ -416,7 +436,11 @@ def _vertices_over_time(name: str, path: Path, mesh: Mesh) -> tuple[FloatArray, 
 
 
 def _mapped(
-    name: str, entry: MaterialMap, folder: Path, samples: tuple[int, int], numbers: Mapping[str, int]
+    name: str,
+    entry: MaterialMap,
+    folder: Path,
+    samples: tuple[int, int],
+    numbers: Mapping[str, int],
 ) -> IntArray:
     """Return the number of the material of each texel, by the nearest colour (rows, columns)."""
     import cv2
@@ -435,5 +459,3 @@ def _mapped(
     distance = np.abs(resized[:, :, None, :].astype(float) - np.array(colours)).sum(axis=3)
     chosen = np.array([numbers[material] for material in entry.materials.values()])
     return np.asarray(chosen[np.argmin(distance, axis=2)], dtype=np.int32)
-
-

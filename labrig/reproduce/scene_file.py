@@ -402,8 +402,8 @@ class ProgrammeEntry(_Part):
     at_s
         Time in s.
     lamps
-        Level of each lamp, as a factor of its strength; lamps that are not named keep theirs. Before
-        the first entry all are off.
+        Level of each lamp, as a factor of its strength; lamps that are not named keep theirs.
+        Before the first entry all are off.
     """
 
     at_s: Finite

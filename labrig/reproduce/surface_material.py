@@ -1,4 +1,4 @@
-"""What a surface does with light, in the bands of a rendering: return it at once, and glow later."""
+"""What a surface does with light in the bands of a rendering: returns it at once, or later."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ SAME_SHAPE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class BenchLight:
-    """Light by which materials were charged when they were measured: their rates are relative to it.
+    """Light that charged materials when they were measured: their rates are relative to it.
 
     Attributes
     ----------
@@ -91,10 +91,21 @@ def of_albedo(
     notes
         What was assumed.
 
+    Returns
+    -------
+    SurfaceMaterial
+        The surface in these bands.
+
     Raises
     ------
     UsageError
         Some albedo is 1 or more: light would never be lost.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import Bands, of_albedo
+    >>> of_albedo("grey", 0.5, Bands.even(400, 700, 3)).matrix.diagonal().tolist()
+    [0.5, 0.5, 0.5]
     """
     diagonal = _albedo_in_bands(albedo, bands)
     return SurfaceMaterial(name, _checked(name, np.diag(diagonal)), None, notes)
@@ -113,12 +124,25 @@ def of_matrix(matrix: ReradiationMatrix, bands: Bands) -> SurfaceMaterial:
     bands
         Bands of the rendering.
 
+    Returns
+    -------
+    SurfaceMaterial
+        The surface in these bands.
+
     Raises
     ------
     UsageError
         Its unit is relative, no band overlaps, or its largest eigenvalue reaches 1.
     DataError
         It returns more light than any surface does, see `physical_warnings`.
+
+    Examples
+    --------
+    >>> from labrig.material import read_any_material
+    >>> from labrig.reproduce import Bands, of_matrix
+    >>> textile = of_matrix(read_any_material("yellow-textile"), Bands.even())
+    >>> textile.is_diagonal, textile.matrix.shape
+    (False, (24, 24))
     """
     if matrix.unit == "relative":
         raise UsageError(
@@ -126,8 +150,9 @@ def of_matrix(matrix: ReradiationMatrix, bands: Bands) -> SurfaceMaterial:
             "brightness of the lights that excite it"
         )
     notes = physical_warnings(matrix)
-    low, high = max(matrix.output_edges_nm[0], bands.edges_nm[0]), min(
-        matrix.output_edges_nm[-1], bands.edges_nm[-1]
+    low, high = (
+        max(matrix.output_edges_nm[0], bands.edges_nm[0]),
+        min(matrix.output_edges_nm[-1], bands.edges_nm[-1]),
     )
     if low >= high:
         raise UsageError(
@@ -177,10 +202,25 @@ def of_phosphor(
     prompt
         Part η of captures that emit at once.
 
+    Returns
+    -------
+    SurfaceMaterial
+        The surface in these bands.
+
     Raises
     ------
     UsageError
         Λ, albedo or scale is missing, no band overlaps, or an albedo reaches 1.
+
+    Examples
+    --------
+    >>> from labrig.material import read_material
+    >>> from labrig.optics import absolute_irradiance, read_light
+    >>> from labrig.reproduce import Bands, BenchLight, of_phosphor
+    >>> bench = BenchLight(absolute_irradiance(1000.0, read_light("A")))
+    >>> paint = of_phosphor(read_material("blue-paint"), Bands.even(), bench, 0.7, 1.0)
+    >>> paint.notes[0]
+    'the albedo of blue-paint is assumed: 0.7 at all wavelengths'
     """
     rates = FieldParameters.of(material, prompt)
     assert material.bands_nm is not None
@@ -256,9 +296,7 @@ def _in_bands(wavelength_nm: FloatArray, values: FloatArray, bands: Bands) -> Fl
     """Return means in bands of a curve that goes on as a constant beyond its ends."""
     ends = np.array([bands.edges_nm[0] - 1, bands.edges_nm[-1] + 1])
     low, high = min(ends[0], wavelength_nm[0] - 1), max(ends[1], wavelength_nm[-1] + 1)
-    curve = Spectrum(
-        "", np.r_[low, wavelength_nm, high], np.r_[values[0], values, values[-1]]
-    )
+    curve = Spectrum("", np.r_[low, wavelength_nm, high], np.r_[values[0], values, values[-1]])
     return bands.means(curve)
 
 
@@ -273,5 +311,3 @@ def _checked(name: str, matrix: FloatArray) -> Float32Array:
             "eigenvalue of its matrix (its albedo, if it is not fluorescent); below 1 is needed"
         )
     return matrix.astype(np.float32)
-
-

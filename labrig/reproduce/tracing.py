@@ -179,9 +179,11 @@ class Tracer:
     ) -> None:
         self._geometry, self._lamps, self._length, self._seed = geometry, lamps, length, seed
         self._kernels, self._scene = _compiled(), _embree_scene(geometry.triangles)
-        self._sky = int(np.argmax(lamps.kind == self._kernels.SKY)) if (
-            lamps.kind == self._kernels.SKY
-        ).any() else -1
+        self._sky = (
+            int(np.argmax(lamps.kind == self._kernels.SKY))
+            if (lamps.kind == self._kernels.SKY).any()
+            else -1
+        )
 
     def from_camera(self, camera: Pinhole, per_pixel: int, threads: int) -> Iterator[Paths]:
         """Trace paths from the pixels of a camera.
@@ -269,9 +271,7 @@ class Tracer:
         seen = np.where(is_lamp, self._kernels.FIRST_LAMP - place, -1)
         if self._sky >= 0:
             seen = np.where(place == self._kernels.NOTHING, self._sky, seen)
-        return self._walk(
-            position, normal, place, seen.astype(np.int16), per_target, even, rng
-        )
+        return self._walk(position, normal, place, seen.astype(np.int16), per_target, even, rng)
 
     def _walk(
         self,
@@ -450,5 +450,3 @@ def _embree_scene(triangles: Float32Array) -> Any:
     # It is built by the first ray, and before threads use it.
     scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
     return scene
-
-

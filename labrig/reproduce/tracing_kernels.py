@@ -90,8 +90,8 @@ def locate(
             t = (a * uv[f, 0, 1] + b * uv[f, 1, 1] + c * uv[f, 2, 1]) * row[3]
             # Two numbers of one: the second is what is left of the first.
             many = chance[i] * np.float32(4096)
-            column = int(math.floor(s - np.float32(0.5) + math.floor(many) / np.float32(4096)))
-            line = int(math.floor(t - np.float32(0.5) + (many - math.floor(many))))
+            column = math.floor(s - np.float32(0.5) + math.floor(many) / np.float32(4096))
+            line = math.floor(t - np.float32(0.5) + (many - math.floor(many)))
             column = min(max(column, 0), row[2] - 1)
             line = min(max(line, 0), row[3] - 1)
             place[i] = row[1] + line * row[2] + column
@@ -255,8 +255,8 @@ def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[IntArray
         det = (s[1] - s[0]) * (t[2] - t[0]) - (s[2] - s[0]) * (t[1] - t[0])
         if det == 0:
             continue
-        left, right = int(math.floor(s.min() - 0.5)), int(math.ceil(s.max() - 0.5))
-        low, high = int(math.floor(t.min() - 0.5)), int(math.ceil(t.max() - 0.5))
+        left, right = math.floor(s.min() - 0.5), math.ceil(s.max() - 0.5)
+        low, high = math.floor(t.min() - 0.5), math.ceil(t.max() - 0.5)
         for row in range(max(low, 0), min(high + 1, rows)):
             for column in range(max(left, 0), min(right + 1, columns)):
                 x, y = column + np.float32(0.5) - s[0], row + np.float32(0.5) - t[0]

@@ -1,0 +1,187 @@
+"""Light that is traced once and folded, against what can be computed without rays."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from labrig.reproduce import (
+    Geometry,
+    Lamp,
+    LampTable,
+    Matrices,
+    Mesh,
+    PathLength,
+    Paths,
+    Pinhole,
+    Surface,
+    SurfaceMaterial,
+    Tracer,
+    fold,
+)
+
+FloatArray = NDArray[np.float64]
+
+BANDS = 24
+ROOM = Mesh.box((0, 0, 0), (2, 3, 2.5), inward=True)
+INSIDE = Pinhole((0, 0.3, 0.1), (1, 1, 0), width_px=24, height_px=24)
+
+
+def fluorescent(seed: int) -> SurfaceMaterial:
+    """A surface that re-radiates much, and at some wavelengths loses little."""
+    rng = np.random.default_rng(seed)
+    matrix = np.tril(rng.uniform(0, 0.06, (BANDS, BANDS)), -1)
+    matrix += np.diag(rng.uniform(0.2, 0.8, BANDS))
+    return SurfaceMaterial("dye", matrix.astype(np.float32))
+
+
+def folded(
+    paths: Sequence[Paths],
+    geometry: Geometry,
+    material: SurfaceMaterial,
+    glow: FloatArray,
+    lamps: FloatArray,
+    *,
+    incident: bool = False,
+) -> FloatArray:
+    everywhere = np.tile(glow, (geometry.n_places, 1)).astype(np.float32)
+    return np.asarray(
+        fold(
+            paths, Matrices.of([material]), geometry.material_of_place, everywhere,
+            lamps.reshape(-1, BANDS).astype(np.float32), 1, incident=incident,
+        ),
+        dtype=np.float64,
+    )  # fmt: skip
+
+
+def room_light(
+    length: PathLength, seed: int, per_pixel: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the light of each pixel within a room that glows evenly, its matrix and its glow."""
+    geometry = Geometry.of([Surface("room", ROOM, 0)])
+    assert geometry.is_room
+    dye = fluorescent(seed)
+    glow = np.random.default_rng((seed, 1)).uniform(0, 1, BANDS)
+    tracer = Tracer(geometry, LampTable.of([], geometry), length, seed)
+    paths = list(tracer.from_camera(INSIDE, per_pixel, 1))
+    return folded(paths, geometry, dye, glow, np.zeros(0)), dye.matrix.astype(np.float64), glow
+
+
+@pytest.mark.parametrize("vertices", [1, 6, 12])
+def test_in_a_closed_room_every_ray_sees_the_sum_of_so_many_bounces(vertices: int) -> None:
+    light, matrix, glow = room_light(PathLength(vertices, 0.0), 10 + vertices, 4)
+    bounces = [np.linalg.matrix_power(matrix, n) @ glow for n in range(vertices)]
+    np.testing.assert_allclose(light, np.tile(sum(bounces), (len(light), 1)), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("vertices", "survival"), [(2, 0.8), (4, 0.75), (8, 0.9)])
+def test_roulette_leaves_the_mean_as_it_is(vertices: int, survival: float) -> None:
+    light, matrix, glow = room_light(PathLength(vertices, survival), 20 + vertices, 32)
+    endless = np.linalg.solve(np.eye(BANDS) - matrix, glow)
+    error = light.std(axis=0) / np.sqrt(len(light))
+    assert (np.abs(light.mean(axis=0) - endless) < 3 * error).all()
+    # The error is small enough to find a missing bounce.
+    assert (error < 0.03 * endless).all()
+
+
+def test_a_disk_lamp_over_a_fluorescent_plane() -> None:
+    """L = M · lamp · R²/(R² + h²) on the axis of the disk."""
+    radius_m, height_m, dye = 0.5, 0.7, fluorescent(5)
+    light = np.random.default_rng(6).uniform(0, 1, BANDS)
+    geometry = Geometry.of(
+        [
+            Surface("plane", Mesh.rectangle((-5, -5, 0), (10, 0, 0), (0, 10, 0)), 0),
+            Surface("lamp", Mesh.disk((0, 0, height_m), (0, 0, -1), radius_m), -1, lamp=0),
+        ]
+    )
+    lamps = LampTable.of([Lamp("disk", "area", light)], geometry)
+    camera = Pinhole(
+        (0.0, 1e-4, 0.1), (0, 0, 0), (0, 1, 0), vertical_fov_deg=0.2, width_px=8, height_px=8
+    )
+    paths = list(Tracer(geometry, lamps, PathLength(1, 0.0)).from_camera(camera, 4096, 1))
+    seen = folded(paths, geometry, dye, np.zeros(BANDS), light).mean(axis=0)
+    expected = dye.matrix @ light * radius_m**2 / (radius_m**2 + height_m**2)
+    np.testing.assert_allclose(seen, expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "vector", "irradiance"),
+    [
+        ("point", (0.3, 0.4, 1.2), 1.2 / 1.3**3),
+        ("distant", (0.6, 0.0, 0.8), 0.8),
+        ("sky", (0.0, 0.0, 1.0), np.pi),
+    ],
+)
+def test_irradiance_of_other_lamps(
+    kind: str, vector: tuple[float, float, float], irradiance: float
+) -> None:
+    plane = Mesh.rectangle((-0.001, -0.001, 0), (0.002, 0, 0), (0, 0.002, 0))
+    geometry = Geometry.of([Surface("plane", plane, 0, samples=(1, 1))])
+    lamps = LampTable.of([Lamp("lamp", kind, np.ones(BANDS), vector)], geometry)  # type: ignore[arg-type]
+    paths = list(Tracer(geometry, lamps, PathLength(2, 0.0)).from_surface(0, 64, 1))
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    seen = folded(paths, geometry, black, np.zeros(BANDS), np.ones(BANDS), incident=True)
+    np.testing.assert_allclose(seen, irradiance, rtol=2e-3)
+
+
+def test_what_is_between_casts_a_shadow() -> None:
+    plane = Mesh.rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    screen = Mesh.rectangle((0, -2, 0.5), (2, 0, 0), (0, 4, 0))
+    geometry = Geometry.of(
+        [
+            Surface("plane", plane, 0, samples=(8, 1)),
+            Surface("screen", screen, 0, is_two_sided=True),
+        ]
+    )
+    lamps = LampTable.of([Lamp("sun", "distant", np.ones(BANDS))], geometry)
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    paths = list(Tracer(geometry, lamps, PathLength(1, 0.0)).from_surface(0, 16, 1))
+    seen = folded(paths, geometry, black, np.zeros(BANDS), np.ones(BANDS), incident=True)
+    np.testing.assert_allclose(seen[:, 0], [1, 1, 1, 1, 0, 0, 0, 0], atol=1e-6)
+
+
+def test_the_glow_of_a_wall_between_its_texels_and_its_vertices_is_interpolated() -> None:
+    """A glow that is linear over the wall is seen as linear, whichever way it is stored."""
+    camera = Pinhole((0.5, 0.5, 1.2), (0.5, 0.5, 0), (0, 1, 0), 40.0, 16, 16)
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    wall = Mesh.grid((0, 0, 0), (1, 0, 0), (0, 1, 0), 4)
+    for samples in ((8, 8), "vertices"):
+        geometry = Geometry.of([Surface("wall", wall, 0, samples=samples)])
+        x = wall.vertices_m[:, 0] if samples == "vertices" else np.tile((np.arange(8) + 0.5) / 8, 8)
+        tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(1, 0.0), seed=3)
+        paths = list(tracer.from_camera(camera, 1024, 1))
+        glow = np.repeat(x[:, None], BANDS, axis=1).astype(np.float32)
+        seen = fold(
+            paths, Matrices.of([black]), geometry.material_of_place, glow,
+            np.zeros((0, BANDS), np.float32), 1,
+        )  # fmt: skip
+        half = 1.2 * np.tan(np.deg2rad(20))
+        columns = 0.5 + half * (2 * (np.arange(16) + 0.5) / 16 - 1)
+        np.testing.assert_allclose(seen[:, 0].reshape(16, 16).mean(axis=0), columns, atol=0.004)
+
+
+def test_the_same_seed_gives_the_same_light_with_any_number_of_threads() -> None:
+    geometry = Geometry.of([Surface("room", ROOM, 0, samples=(16, 16))])
+    tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(), 7)
+    one, two = (
+        [*tracer.from_camera(INSIDE, 512, threads), *tracer.from_surface(0, 512, threads)]
+        for threads in (1, 2)
+    )
+    assert len(one) == len(two) > 2
+    for first, second in zip(one, two, strict=True):
+        np.testing.assert_array_equal(first.place, second.place)
+        np.testing.assert_array_equal(first.weight, second.weight)
+
+
+def test_the_front_of_a_wall_has_light_and_its_back_is_black() -> None:
+    wall = Mesh.rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    for two_sided, expected in ((False, 0.0), (True, 1.0)):
+        geometry = Geometry.of([Surface("wall", wall, 0, is_two_sided=two_sided)])
+        tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(1, 0.0))
+        for height_m, seen in ((1.0, 1.0), (-1.0, expected)):
+            camera = Pinhole((0, 0, height_m), (0, 0, 0), (0, 1, 0), 40.0, 4, 4)
+            paths = list(tracer.from_camera(camera, 4, 1))
+            light = folded(paths, geometry, black, np.ones(BANDS), np.zeros(0))
+            np.testing.assert_array_equal(light, seen)
