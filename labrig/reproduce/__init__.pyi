@@ -1,3 +1,8 @@
+from .display import (
+    Display as Display,
+    camera_values as camera_values,
+    tristimulus as tristimulus,
+)
 from .field import (
     Field as Field,
 )
