@@ -9,3 +9,8 @@ from .field import (
 from .field_parameters import (
     FieldParameters as FieldParameters,
 )
+from .night import (
+    NightLook as NightLook,
+    night_view as night_view,
+    scotopic_luminance as scotopic_luminance,
+)

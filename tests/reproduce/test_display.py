@@ -10,6 +10,7 @@ import labrig
 from labrig import colour_science
 from labrig.errors import UsageError
 from labrig.optics import (
+    CHART_PATCHES,
     CIE_1931,
     XYZ_TO_SRGB,
     delta_e,
@@ -31,26 +32,32 @@ def bands(width_nm: float) -> FloatArray:
     return np.linspace(300.0, 780.0, round(480 / width_nm) + 1)
 
 
-def chart(edges_nm: FloatArray) -> FloatArray:
-    """Radiance of the patches under D65, (24, bands), a perfect white with Y = 1."""
-    light = illuminant("D65").in_bands(edges_nm)
+def chart(edges_nm: FloatArray, light: str = "D65") -> FloatArray:
+    """X, Y, Z of the patches under a light, (24, 3), a perfect white with Y = 1."""
+    power = illuminant(light).in_bands(edges_nm)
     reflectances = np.stack([one.in_bands(edges_nm) for one in read_colour_chart("colorchecker")])
-    return np.asarray(reflectances * light / tristimulus(light, edges_nm)[1])
+    return tristimulus(reflectances * power / tristimulus(power, edges_nm)[1], edges_nm)
 
 
 def chart_lab(edges_nm: FloatArray) -> FloatArray:
-    return lab(tristimulus(chart(edges_nm), edges_nm), WHITE)
+    return lab(chart(edges_nm), WHITE)
+
+
+def adapted_lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
+    """CIELAB of colours under another white, adapted to D65 by Bradford's transform."""
+    colour = colour_science.load()
+    adapted = colour.chromatic_adaptation(
+        xyz, white, WHITE, method="Von Kries", transform="Bradford"
+    )
+    return lab(np.asarray(adapted), WHITE)
 
 
 def published_lab() -> FloatArray:
-    """CIELAB of the mean of 30 charts, published under D50 and adapted to D65 (Bradford)."""
+    """CIELAB of the mean of 30 charts, whose published colours are those under D50, adapted."""
     colour = colour_science.load()
     published = colour.CCS_COLOURCHECKERS["BabelColor Average"]
     xyz = colour.xyY_to_XYZ(np.array(list(published.data.values())))
-    adapted = colour.chromatic_adaptation(
-        xyz, colour.xy_to_XYZ(published.illuminant), WHITE, method="Von Kries", transform="Bradford"
-    )
-    return lab(np.asarray(adapted), WHITE)
+    return adapted_lab(np.asarray(xyz), np.asarray(colour.xy_to_XYZ(published.illuminant)))
 
 
 def test_tristimulus_values_of_a_piecewise_constant_spectrum_are_those_of_fine_sums() -> None:
@@ -77,20 +84,22 @@ def test_bands_displace_a_chart_by_less_than_is_seen(
     assert difference.mean() < mean
 
 
-def test_a_chart_under_d65_has_its_published_colours() -> None:
-    # The published values were measured under D50 and adapted: without bands, 0.57 remains.
-    published = published_lab()
-    assert delta_e(chart_lab(bands(1.0)), published).mean() < 0.6
-    assert delta_e(chart_lab(EDGES_NM), published).mean() < 0.75
+def test_a_chart_has_its_published_colours() -> None:
+    white = white_xyz("D50", observer(CIE_1931))
+    difference = delta_e(adapted_lab(chart(EDGES_NM, "D50"), white), published_lab())
+    assert difference.max() < 1.0
+    assert difference.mean() < 0.45
 
 
-def test_bytes_of_the_chart_are_the_colours_of_the_published_values() -> None:
-    shown = Display(white_luminance=1.0).shown(tristimulus(chart(EDGES_NM), EDGES_NM))
-    colour = colour_science.load()
-    linear = colour.cctf_decoding(shown / 255, function="sRGB")
-    seen = lab(linear @ np.linalg.inv(XYZ_TO_SRGB).T, WHITE)
-    in_gamut = np.array([patch != 17 for patch in range(24)])  # cyan is not
-    assert delta_e(seen, published_lab())[in_gamut].mean() < 1.0
+def test_a_chart_under_d65_on_the_screen_has_its_published_colours() -> None:
+    """Its colours adapted from D50 are not those under D65: 0.57 without bands, up to 1.4."""
+    assert delta_e(chart_lab(bands(1.0)), published_lab()).mean() < 0.6
+    shown = Display(white_luminance=1.0).shown(chart(EDGES_NM))
+    linear = colour_science.load().cctf_decoding(shown / 255, function="sRGB")
+    difference = delta_e(lab(linear @ np.linalg.inv(XYZ_TO_SRGB).T, WHITE), published_lab())
+    is_in_gamut = np.array([name != "cyan" for name in CHART_PATCHES])
+    assert difference[is_in_gamut].mean() < 0.8
+    assert difference[is_in_gamut].max() < 2.0
 
 
 def test_a_camera_records_its_curves() -> None:
