@@ -67,6 +67,7 @@ from labrig.optics.spectrometer import (
     read_spectrometer_reading,
 )
 from labrig.optics.spectrum import Spectrum, Transmittance
+from labrig.optics.srgb import XYZ_TO_SRGB, srgb_bytes
 from labrig.optics.strip import SLICES, Strip
 
 __all__ = [
@@ -77,6 +78,7 @@ __all__ = [
     "CURVES_FILE",
     "NOMINAL_FWHM_NM",
     "SLICES",
+    "XYZ_TO_SRGB",
     "Bands",
     "CameraModel",
     "CameraResponse",
@@ -128,5 +130,6 @@ __all__ = [
     "shipped_camera",
     "shipped_cameras",
     "signal_through",
+    "srgb_bytes",
     "white_xyz",
 ]

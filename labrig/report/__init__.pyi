@@ -40,6 +40,9 @@ from .figure_style import (
 from .figures_pdf import (
     write_figures_pdf as write_figures_pdf,
 )
+from .frame_sheet import (
+    draw_frames as draw_frames,
+)
 from .led_study import (
     ComparedLeds as ComparedLeds,
     describe_leds as describe_leds,

@@ -7,20 +7,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.number_format import rounded
-from labrig.optics import CIE_1931, CameraResponse, Observer, observer
+from labrig.optics import (
+    CIE_1931,
+    XYZ_TO_SRGB,
+    CameraResponse,
+    Observer,
+    observer,
+    srgb_bytes,
+)
 from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 #: Colour temperature in K of a tungsten halogen lamp, the usual lamp for charging.
 HALOGEN_K = 3200.0
 #: Second radiation constant of Planck's law in nm K.
 SECOND_RADIATION_NM_K = 1.438777e7
-#: CIE XYZ to linear sRGB, IEC 61966-2-1.
-XYZ_TO_SRGB = np.array(
-    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,13 +160,6 @@ def into_gamut(linear: FloatArray) -> FloatArray:
     return np.maximum(linear, 0.0)
 
 
-def encoded(linear: FloatArray) -> Bytes:
-    """Return linear sRGB as bytes with the curve of IEC 61966-2-1; values above 1 are clipped."""
-    linear = np.clip(linear, 0.0, 1.0)
-    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(255 * curve), dtype=np.uint8)
-
-
 def css_colour(linear: FloatArray) -> str:
     """Return a linear sRGB colour as CSS writes it.
 
@@ -185,7 +180,7 @@ def css_colour(linear: FloatArray) -> str:
     >>> css_colour(np.array([0.0, 0.5, 1.0]))  # half the light is more than half the byte
     '#00bcff'
     """
-    return "#" + bytes(encoded(linear)).hex()
+    return "#" + bytes(srgb_bytes(linear)).hex()
 
 
 #: Number of swatches that fit side by side on a desktop with a legible time below each.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import LabrigError, UsageError
 from labrig.number_format import exposure_text, rounded
+from labrig.optics import srgb_bytes
 from labrig.record import FrameRecord
 from labrig.reduce import (
     MakeThumbnail,
@@ -20,7 +21,7 @@ from labrig.reduce import (
     reduce_frames,
 )
 from labrig.region import region_pixels
-from labrig.report.colours import Screen, encoded, into_gamut
+from labrig.report.colours import Screen, into_gamut
 from labrig.report.report_model import GlowPhotograph, PatchReport
 
 Reduced = TypeVar("Reduced")
@@ -153,7 +154,7 @@ def daylight_picture(
     if view.is_grey:
         balance = "from a monochrome sensor"
     return Daylight(
-        source=_data_uri(encoded(linear)),
+        source=_data_uri(srgb_bytes(linear)),
         width=width,
         height=height,
         marks=_marks(patches, view, width, height),
@@ -195,9 +196,9 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
         pictures.append(
             GlowPicture(
                 t_s=photograph.t_s,
-                source=_data_uri(encoded(np.where(has_saturation, 1.0, linear / full_scale))),
+                source=_data_uri(srgb_bytes(np.where(has_saturation, 1.0, linear / full_scale))),
                 brightened_source=_data_uri(
-                    encoded(np.where(has_saturation, 1.0, linear * factor / full_scale))
+                    srgb_bytes(np.where(has_saturation, 1.0, linear * factor / full_scale))
                 ),
                 brightened=rounded(factor, 2),
                 has_saturation=bool(has_saturation.any()),

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from labrig.errors import DataError
 from labrig.material import Appearance, ReradiationMatrix, appearance, reradiates
 from labrig.number_format import plus_minus, rounded
-from labrig.optics import Spectrum, edges_from_centres, is_narrow
-from labrig.report.colours import XYZ_TO_SRGB, css_colour, into_gamut
+from labrig.optics import XYZ_TO_SRGB, Spectrum, edges_from_centres, is_narrow
+from labrig.report.colours import css_colour, into_gamut
 from labrig.report.figure_style import INK, MUTED, RULE, figure_style
 from labrig.report.heat_map import (
     BAND_NM,

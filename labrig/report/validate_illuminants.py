@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.number_format import plus_minus, rounded
-from labrig.report.colours import XYZ_TO_SRGB, css_colour, into_gamut
+from labrig.optics import XYZ_TO_SRGB
+from labrig.report.colours import css_colour, into_gamut
 from labrig.report.sections import Rendered, Section, Source, Table
 from labrig.results import (
     LampComparison,

@@ -1,6 +1,18 @@
 from .bands import (
     Bands as Bands,
 )
+from .display import (
+    Display as Display,
+    camera_values as camera_values,
+    tristimulus as tristimulus,
+)
+from .exr import (
+    SpectralFrame as SpectralFrame,
+    read_linear_exr as read_linear_exr,
+    read_spectral_exr as read_spectral_exr,
+    write_linear_exr as write_linear_exr,
+    write_spectral_exr as write_spectral_exr,
+)
 from .field import (
     Field as Field,
 )
@@ -22,6 +34,15 @@ from .lamp import (
 from .mesh import (
     Mesh as Mesh,
     read_mesh as read_mesh,
+)
+from .night import (
+    NightLook as NightLook,
+    night_view as night_view,
+    scotopic_luminance as scotopic_luminance,
+)
+from .png import (
+    read_png_texts as read_png_texts,
+    write_png as write_png,
 )
 from .rendering import (
     Frame as Frame,
@@ -49,4 +70,8 @@ from .tracing import (
     Paths as Paths,
     Pinhole as Pinhole,
     Tracer as Tracer,
+)
+from .video import (
+    require_ffmpeg as require_ffmpeg,
+    write_video as write_video,
 )

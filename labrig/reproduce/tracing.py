@@ -131,9 +131,9 @@ class Pinhole:
         within
             Where in each pixel, 0 to 1 from its upper left corner (n, 2).
         """
-        eye = np.array(self.position_m)
+        eye = np.array(self.position_m, dtype=np.float64)
         forward = np.array(self.look_at_m) - eye
-        right = np.cross(forward, np.array(self.up))
+        right = np.cross(forward, np.array(self.up, dtype=np.float64))
         if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(forward):
             raise UsageError(
                 "expected a camera that looks at another point than its own, and not upwards, got "

@@ -9,14 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from labrig import colour_science
-from labrig.optics import CameraResponse, read_camera
+from labrig.optics import XYZ_TO_SRGB, CameraResponse, read_camera, srgb_bytes
 from labrig.report.colours import (
     HALOGEN_K,
     MAX_SWATCHES,
-    XYZ_TO_SRGB,
     camera_to_xyz,
     colour_matching,
-    encoded,
     into_gamut,
     screen_for,
     swatches,
@@ -66,7 +64,7 @@ def test_a_deep_blue_glow_is_not_black() -> None:
 
 
 def test_the_transfer_curve() -> None:
-    np.testing.assert_array_equal(encoded(np.array([0.0, 0.2140, 1.0, 7.0])), [0, 127, 255, 255])
+    np.testing.assert_array_equal(srgb_bytes(np.array([0.0, 0.2140, 1.0, 7.0])), [0, 127, 255, 255])
 
 
 def test_swatches_fade_and_keep_their_hue() -> None:
@@ -153,7 +151,7 @@ def test_colours_are_those_of_colour_science() -> None:
     np.testing.assert_allclose(colour_matching(observer.wavelengths), observer.values, rtol=1e-9)
     linear = np.linspace(0, 1, 999)
     curve = colour.cctf_encoding(linear, function="sRGB")
-    np.testing.assert_array_equal(encoded(linear), np.rint(255 * curve))
+    np.testing.assert_array_equal(srgb_bytes(linear), np.rint(255 * curve))
     np.testing.assert_allclose(XYZ_TO_SRGB, colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
 
 

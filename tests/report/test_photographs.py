@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from labrig.optics import read_camera
-from labrig.report.colours import encoded, screen_for
+from labrig.optics import read_camera, srgb_bytes
+from labrig.report.colours import screen_for
 from labrig.report.photographs import daylight_picture, glow_pictures
 from labrig.report.report_model import GlowPhotograph
 from tests.reduce.conftest import _dng as write_dng
@@ -118,7 +118,7 @@ def test_the_daylight_photograph_has_the_colours_and_the_place(
     assert abs(picture.width - WIDTH / sensor.cell) <= 2
     (mark,) = picture.marks
     assert (mark.x, mark.y) == pytest.approx((picture.width / 4, picture.height / 4), abs=1)
-    expected = encoded(0.8 * sensor.colours).astype(float)
+    expected = srgb_bytes(0.8 * sensor.colours).astype(float)
     assert middle(shown(picture.source)) == pytest.approx(expected, abs=ROUNDED)
     grey = sensor.cfa == "L"
     assert ("from a monochrome sensor" if grey else "in raw colours") in picture.caption
@@ -138,12 +138,12 @@ def test_pictures_of_the_glow_are_on_one_scale_and_brightened(
     assert [picture.t_s for picture in pictures] == [0.5, 60.0, 5.0]
     colours = sensor.colours
     for picture, light in zip(pictures, (1.0, 0.1, 0.5), strict=True):
-        as_it_is = encoded(light * colours).astype(float)
+        as_it_is = srgb_bytes(light * colours).astype(float)
         assert middle(shown(picture.source)) == pytest.approx(as_it_is, abs=ROUNDED)
         brightened = shown(picture.brightened_source)
         y, x = (side // 4 for side in brightened.shape[:2])
         found = brightened[y - 2 : y + 2, x - 2 : x + 2].mean(axis=(0, 1))
-        assert found == pytest.approx(encoded(colours).astype(float), abs=ROUNDED)
+        assert found == pytest.approx(srgb_bytes(colours).astype(float), abs=ROUNDED)
         assert float(picture.brightened) == pytest.approx(1 / light, rel=0.05)
         assert not picture.has_saturation
 

@@ -1,0 +1,118 @@
+"""Frames of a rendered scene side by side, each with its time."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import UsageError
+from labrig.report.figure_style import INK, MUTED, figure_style
+from labrig.report.picture_file import DPI, require_picture, save_picture
+
+Bytes = NDArray[np.uint8]
+
+#: Widths in pixels between which frames are shown as they are; smaller ones are magnified.
+LEAST_PX, MOST_PX = 200, 480
+#: Largest width of a sheet in pixels, and margins for texts and between frames.
+SHEET_PX = 2000
+GAP_PX, LABEL_PX, TITLE_PX, CAPTION_PX = 14, 28, 46, 34
+
+
+def draw_frames(
+    frames: Sequence[Bytes], labels: Sequence[str], path: Path, title: str = "", caption: str = ""
+) -> None:
+    """Draw frames of one size side by side, pixel by pixel where they are neither small nor large.
+
+    Parameters
+    ----------
+    frames
+        Pictures in sRGB, at least one, shape (height, width, 3) each.
+    labels
+        Label of each, such as its time.
+    path
+        Path of the sheet, which ends in `.png`, `.svg` or `.pdf`.
+    title
+        Title above all.
+    caption
+        Line below all, such as the display transform.
+
+    Raises
+    ------
+    UsageError
+        There is no frame, sizes differ, labels are missing, or the file name is not that of a
+        picture.
+    DiskError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from labrig.report import draw_frames
+    >>> frames = [np.full((20, 30, 3), grey, np.uint8) for grey in (200, 90, 40)]
+    >>> draw_frames(frames, ["0 s", "1 s", "80 s"], Path("frames.png"), title="after the light")
+    """
+    from matplotlib.figure import Figure
+
+    require_picture(path)
+    if not frames or len({frame.shape for frame in frames}) > 1 or frames[0].shape[2:] != (3,):
+        raise UsageError(
+            f"{path}: expected one frame or more of one shape (height, width, 3), got "
+            f"{', '.join(str(frame.shape) for frame in frames[:4]) or 'none'}"
+        )
+    if len(labels) != len(frames):
+        raise UsageError(f"{path}: expected {len(frames)} labels of frames, got {len(labels)}")
+    shown = [_resized(frame) for frame in frames]
+    height, width = shown[0].shape[:2]
+    columns = _columns(len(frames), width, height)
+    rows = -(-len(frames) // columns)
+    top = TITLE_PX if title else GAP_PX
+    sheet_width = columns * (width + GAP_PX) + GAP_PX
+    sheet_height = top + rows * (height + LABEL_PX) + (CAPTION_PX if caption else 0)
+    with figure_style():
+        figure = Figure(figsize=(sheet_width / DPI, sheet_height / DPI), dpi=DPI)
+        for number, (frame, label) in enumerate(zip(shown, labels, strict=True)):
+            row, column = divmod(number, columns)
+            x = GAP_PX + column * (width + GAP_PX)
+            y = sheet_height - top - row * (height + LABEL_PX) - height
+            place = (x / sheet_width, y / sheet_height, width / sheet_width, height / sheet_height)
+            axes = figure.add_axes(place)
+            axes.imshow(frame, interpolation="none", aspect="auto")
+            axes.set_axis_off()
+            figure.text(
+                (x + width / 2) / sheet_width, (y - 5) / sheet_height, label,
+                ha="center", va="top", fontsize=7, color=INK,
+            )  # fmt: skip
+        figure.text(
+            GAP_PX / sheet_width, 1 - 12 / sheet_height, title, va="top", fontsize=10.5, color=INK
+        )
+        figure.text(
+            GAP_PX / sheet_width, 10 / sheet_height, caption, va="bottom", fontsize=6.5, color=MUTED
+        )
+        save_picture(figure, path)
+
+
+def _resized(frame: Bytes) -> Bytes:
+    """Return a frame of a fitting width: small ones magnified pixel by pixel, large ones averaged.
+
+    Averages are of bytes: a sheet is for looking at, and values are in the frames' own files.
+    """
+    # slow to load
+    import cv2
+
+    height, width = frame.shape[:2]
+    if width > MOST_PX:
+        size = (MOST_PX, max(1, round(height * MOST_PX / width)))
+        return np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    times = math.ceil(LEAST_PX / width)
+    return frame.repeat(times, axis=0).repeat(times, axis=1)
+
+
+def _columns(frames: int, width: int, height: int) -> int:
+    """Return the number of columns that makes a sheet about 3 : 2, and its rows full if it can."""
+    most = max(1, min(frames, (SHEET_PX - GAP_PX) // (width + GAP_PX)))
+    ideal = math.sqrt(1.5 * frames * (height + LABEL_PX) / (width + GAP_PX))
+    columns = min(most, max(1, round(ideal)))
+    return -(-frames // -(-frames // columns))
