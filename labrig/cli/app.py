@@ -17,6 +17,7 @@ from labrig.cli import (
     process,
     protocol,
     queue,
+    render,
     rig,
     run,
     runs,
@@ -38,6 +39,7 @@ app.command("process")(process.process)
 app.command("figures")(figures.figures)
 app.command("frame")(frame.frame)
 app.command("compare")(compare.compare)
+app.command("render")(render.render)
 app.command("note")(runs.note)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)

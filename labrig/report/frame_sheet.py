@@ -1,6 +1,7 @@
 """Frames of a rendered scene side by side, each with its time."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +19,8 @@ LEAST_PX, MOST_PX = 200, 480
 #: Largest width of a sheet in pixels, and margins for texts and between frames.
 SHEET_PX = 2000
 GAP_PX, LABEL_PX, TITLE_PX, CAPTION_PX = 14, 28, 46, 34
+#: Size in pixels of a letter of the caption, and of its lines.
+CHARACTER_PX, LINE_PX = 0.6 * 6.5 * DPI / 72, 1.4 * 6.5 * DPI / 72
 
 
 def draw_frames(
@@ -70,7 +73,9 @@ def draw_frames(
     rows = -(-len(frames) // columns)
     top = TITLE_PX if title else GAP_PX
     sheet_width = columns * (width + GAP_PX) + GAP_PX
-    sheet_height = top + rows * (height + LABEL_PX) + (CAPTION_PX if caption else 0)
+    lines = textwrap.wrap(caption, int((sheet_width - 2 * GAP_PX) / CHARACTER_PX))
+    below = CAPTION_PX + LINE_PX * (len(lines) - 1) if lines else 0
+    sheet_height = top + rows * (height + LABEL_PX) + below
     with figure_style():
         figure = Figure(figsize=(sheet_width / DPI, sheet_height / DPI), dpi=DPI)
         for number, (frame, label) in enumerate(zip(shown, labels, strict=True)):
@@ -89,7 +94,12 @@ def draw_frames(
             GAP_PX / sheet_width, 1 - 12 / sheet_height, title, va="top", fontsize=10.5, color=INK
         )
         figure.text(
-            GAP_PX / sheet_width, 10 / sheet_height, caption, va="bottom", fontsize=6.5, color=MUTED
+            GAP_PX / sheet_width,
+            10 / sheet_height,
+            "\n".join(lines),
+            va="bottom",
+            fontsize=6.5,
+            color=MUTED,
         )
         save_picture(figure, path)
 

@@ -44,6 +44,9 @@ from .png import (
     read_png_texts as read_png_texts,
     write_png as write_png,
 )
+from .render_folder import (
+    RenderFolder as RenderFolder,
+)
 from .rendering import (
     Frame as Frame,
     Renderer as Renderer,
@@ -57,6 +60,9 @@ from .scene import (
 from .scene_file import (
     SceneFile as SceneFile,
     read_scene as read_scene,
+)
+from .shown import (
+    shown_frames as shown_frames,
 )
 from .surface_material import (
     BenchLight as BenchLight,

@@ -1,6 +1,6 @@
 """A scene ready to be rendered: its file with materials, meshes and lamps in place."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
@@ -33,6 +33,7 @@ from labrig.reproduce.surface_material import (
     of_phosphor,
 )
 from labrig.reproduce.tracing import PathLength, Pinhole
+from labrig.yaml_file import validate
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -116,6 +117,18 @@ class Scene:
             for name, new in (("camera", size), ("paths", fineness))
         }
         return replace(self, file=self.file.model_copy(update=changed))
+
+    def at_times(self, frames_s: Sequence[float]) -> Self:
+        """Return the scene with pictures at other times in s, which rise.
+
+        Raises
+        ------
+        UsageError
+            They do not rise, or the first is before the programme.
+        """
+        content = self.file.model_dump(exclude_unset=True)
+        content["frames_s"] = tuple(frames_s)
+        return replace(self, file=validate(content, SceneFile, "--times"))
 
     def geometry(self, t_s: float) -> Geometry:
         """Return the surfaces at a time in s."""

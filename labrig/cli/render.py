@@ -1,0 +1,151 @@
+"""`labrig render`: measured materials in a scene, over time."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from labrig.reproduce import RenderFolder, Scene
+
+
+def render(
+    scene: Annotated[
+        str,
+        typer.Argument(help="A shipped scene, such as 'cornell-box', or a path to a YAML file."),
+    ],
+    materials: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--material",
+            help="NAME=FILE: another file, or shipped name, for a material; may be given again.",
+        ),
+    ] = None,
+    times: Annotated[
+        str | None, typer.Option("--times", help="Times of the pictures in s, such as 0,1,80.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder of the pictures. Default: renders/SCENE.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option("--size", help="Size of the pictures, such as 640x480.")
+    ] = None,
+    paths: Annotated[
+        int | None, typer.Option("--paths", min=1, help="Paths for each pixel and texel.")
+    ] = None,
+    assume_albedo: Annotated[
+        float | None,
+        typer.Option(
+            "--assume-albedo", help="Albedo of phosphors whose file has none, 0 to below 1."
+        ),
+    ] = None,
+    assume_scale: Annotated[
+        float | None,
+        typer.Option(
+            "--assume-scale", help="Factor from Λ to s/sr of phosphors whose file has no scale."
+        ),
+    ] = None,
+    exposure: Annotated[
+        str,
+        typer.Option(
+            "--exposure",
+            help="'each': so that each picture is bright; 'common': one for all; or the luminance "
+            "in cd/m² that is white.",
+        ),
+    ] = "each",
+    night: Annotated[
+        bool,
+        typer.Option("--night", help="As the eye sees it in the dark (Thompson et al., 2002)."),
+    ] = False,
+    video: Annotated[
+        Path | None, typer.Option("--video", help="File for a film of all pictures (.mp4).")
+    ] = None,
+    fps: Annotated[float, typer.Option("--fps", help="Pictures of the film per second.")] = 25.0,
+) -> None:
+    """Render a scene at its times. The last line is the folder of the pictures.
+
+    A rendering that was interrupted goes on when it is started again.
+    """
+    from labrig.clock import SystemClock
+    from labrig.quantity import duration_text
+    from labrig.reproduce import Assumptions, RenderFolder, load_scene, require_ffmpeg
+
+    if video is not None:
+        require_ffmpeg(video)
+    built = load_scene(scene, _pairs(materials or []), Assumptions(assume_albedo, assume_scale))
+    built = _changed(built, times, size, paths)
+    for note in built.notes:
+        typer.echo(f"note: {note}", err=True)
+    folder = RenderFolder.open(out or Path("renders") / built.file.name, built)
+    done, count = folder.n_done, len(folder.times_s)
+    if done:
+        typer.echo(f"{done} of {count} pictures are there already", err=True)
+    clock = SystemClock()
+    begin_s = clock.now()
+    for number, frame in enumerate(folder.rendered(built), done + 1):
+        left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
+        remaining = f", about {duration_text(left_s)} left" if number < count else ""
+        typer.echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
+    _draw(folder, built, exposure, night, video, fps)
+    typer.echo(folder.path)
+
+
+def _pairs(texts: list[str]) -> dict[str, str]:
+    from labrig.errors import UsageError
+
+    pairs = {}
+    for text in texts:
+        name, is_pair, value = text.partition("=")
+        if not (is_pair and name and value):
+            raise UsageError(f"expected --material NAME=FILE, got '{text}'")
+        pairs[name] = value
+    return pairs
+
+
+def _changed(scene: "Scene", times: str | None, size: str | None, paths: int | None) -> "Scene":
+    """Return the scene with what was given on the command line."""
+    from labrig.errors import UsageError
+
+    width = height = None
+    if size is not None:
+        parts = size.lower().split("x")
+        if len(parts) != 2 or not all(part.isdigit() and 0 < int(part) <= 8192 for part in parts):
+            raise UsageError(f"expected --size such as 640x480, up to 8192 each, got '{size}'")
+        width, height = int(parts[0]), int(parts[1])
+    scene = scene.resized(width, height, paths)
+    if times is None:
+        return scene
+    try:
+        frames_s = [float(part) for part in times.split(",")]
+    except ValueError:
+        raise UsageError(f"expected --times in s such as 0,1,80, got '{times}'") from None
+    return scene.at_times(frames_s)
+
+
+def _draw(
+    folder: "RenderFolder",
+    scene: "Scene",
+    exposure: str,
+    night: bool,
+    video: Path | None,
+    fps: float,
+) -> None:
+    """Draw all frames for a screen: a picture each, a sheet, and a film if it is wanted."""
+    from labrig.number_format import rounded
+    from labrig.quantity import duration_text
+    from labrig.report import draw_frames
+    from labrig.reproduce import shown_frames, write_png, write_video
+
+    frames = [folder.frame(number) for number in range(folder.n_done)]
+    pictures, labels = [], []
+    for number, (picture, display) in enumerate(shown_frames(frames, exposure, night)):
+        t_s = folder.times_s[number]
+        when = f"−{duration_text(-t_s)}" if t_s < 0 else duration_text(t_s)
+        labels.append(f"{when}; white is {rounded(display.white_luminance, 2)} cd/m²")
+        texts = {"Description": f"{scene.file.name} at {t_s:g} s", "Comment": display.statement}
+        write_png(folder.path / f"{number:03d}.png", picture, texts)
+        pictures.append(picture)
+    caption = "; ".join(scene.notes)
+    draw_frames(pictures, labels, folder.path / "sheet.png", scene.file.name, caption)
+    if video is not None:
+        write_video(video, pictures, fps)

@@ -1,0 +1,201 @@
+"""The folder of a rendering: finished frames, and what it takes to go on after an interruption."""
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import DiskError, UsageError
+from labrig.reproduce.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
+from labrig.reproduce.rendering import Frame, Renderer
+from labrig.reproduce.scene import Scene
+
+Float32Array = NDArray[np.float32]
+
+CONTENT = "render.json"
+
+
+@dataclass(frozen=True)
+class RenderFolder:
+    """A folder with the frames of one rendering.
+
+    It holds `render.json` with the scene and what was assumed, and of each frame a spectral EXR and
+    the levels of all phosphors at its time.
+
+    Attributes
+    ----------
+    path
+        Path of the folder.
+    times_s
+        Times of all frames of the scene in s.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.reproduce import RenderFolder, load_scene
+    >>> scene = load_scene("cornell-box").resized(width_px=8, height_px=8, paths=2)
+    >>> folder = RenderFolder.open(Path("box"), scene)
+    >>> [frame.t_s for frame in folder.rendered(scene)]
+    [-1.0, 0.1, 60.0]
+    >>> folder.n_done, folder.frame(2).radiance.shape
+    (3, (8, 8, 24))
+    """
+
+    path: Path
+    times_s: tuple[float, ...]
+
+    @classmethod
+    def open(cls, path: Path, scene: Scene) -> "RenderFolder":
+        """Make a folder, or open one in which the same rendering was interrupted.
+
+        Parameters
+        ----------
+        path
+            Path of the folder.
+        scene
+            The scene.
+
+        Raises
+        ------
+        UsageError
+            The folder holds something else.
+        DiskError
+            It cannot be written.
+        """
+        content = path / CONTENT
+        identity = _identity(scene)
+        if content.is_file():
+            try:
+                known = json.loads(content.read_text(encoding="utf-8"))["identity"]
+            except (ValueError, KeyError, TypeError):
+                known = None
+            if known != identity:
+                raise UsageError(
+                    f"{path}: expected a new folder or the same rendering, got another scene, "
+                    "other materials or other settings; give another folder (--out)"
+                )
+            return cls(path, scene.file.frames_s)
+        if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            raise UsageError(
+                f"{path}: expected a new folder, got one without {CONTENT}; give another (--out)"
+            )
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            described = {
+                "identity": identity,
+                "notes": scene.notes,
+                "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
+            }
+            _replace(content, json.dumps(described, indent=1, ensure_ascii=False).encode())
+        except OSError as error:
+            raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+        return cls(path, scene.file.frames_s)
+
+    @property
+    def n_done(self) -> int:
+        """Number of finished frames."""
+        done = 0
+        while done < len(self.times_s) and self.exr(done).is_file():
+            done += 1
+        return done
+
+    def exr(self, number: int) -> Path:
+        """Return the path of a frame's spectral EXR."""
+        return self.path / f"{number:03d}.exr"
+
+    def frame(self, number: int) -> SpectralFrame:
+        """Return a finished frame.
+
+        Raises
+        ------
+        UsageError, DataError
+            It is not there, or its file is damaged.
+        """
+        return read_spectral_exr(self.exr(number))
+
+    def rendered(self, scene: Scene, threads: int | None = None) -> Iterator[Frame]:
+        """Render the frames that are missing, and keep each.
+
+        Parameters
+        ----------
+        scene
+            The scene with which the folder was opened.
+        threads
+            Threads that trace and fold. Default: one for each processor.
+
+        Yields
+        ------
+        Frame
+            Each new frame, after it was written.
+
+        Raises
+        ------
+        UsageError, DataError
+            The scene cannot be rendered, or what was kept is damaged.
+        DiskError
+            The folder cannot be written.
+        """
+        done = self.n_done
+        if done == len(self.times_s):
+            return
+        renderer = Renderer(scene, threads)
+        if done:
+            renderer.restore(self.times_s[done - 1], self._levels(done - 1))
+        for number in range(done, len(self.times_s)):
+            frame = renderer.frame(self.times_s[number])
+            self._keep_levels(number, renderer.levels)
+            # The frame comes last: it says that all of it is there.
+            texts = {"t_s": repr(frame.t_s), "scene": scene.file.name}
+            write_spectral_exr(self.exr(number), frame.radiance, scene.bands.edges_nm, texts)
+            yield frame
+
+    def _levels(self, number: int) -> dict[str, Float32Array]:
+        path = self._levels_path(number)
+        try:
+            with np.load(path, allow_pickle=False) as content:
+                return {name: content[name] for name in content.files}
+        except (OSError, ValueError) as error:
+            raise UsageError(
+                f"{path}: expected the levels of a finished frame ({error}); remove {self.path} to "
+                "begin anew"
+            ) from None
+
+    def _keep_levels(self, number: int, levels: dict[str, Float32Array]) -> None:
+        path = self._levels_path(number)
+        partial = path.with_suffix(".part.npz")
+        try:
+            np.savez(partial, **levels)  # type: ignore[arg-type]
+            partial.replace(path)
+        except OSError as error:
+            raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+
+    def _levels_path(self, number: int) -> Path:
+        return self.path / f"{number:03d}.levels.npz"
+
+
+def _identity(scene: Scene) -> str:
+    """Return a hash of all that the numbers depend on."""
+    digest = hashlib.sha256(scene.file.model_dump_json().encode())
+    for material in scene.materials:
+        digest.update(material.matrix.tobytes())
+        if (parameters := material.parameters) is not None:
+            for array in (
+                parameters.k_r_per_s,
+                parameters.k_e_per_s,
+                parameters.reradiation,
+                parameters.order,
+            ):
+                digest.update(array.tobytes())
+    geometry = scene.geometry(scene.file.frames_s[-1])
+    digest.update(geometry.triangles.tobytes())
+    return digest.hexdigest()
+
+
+def _replace(path: Path, content: bytes) -> None:
+    partial = path.with_suffix(".part")
+    partial.write_bytes(content)
+    partial.replace(path)
