@@ -25,6 +25,7 @@ from .folding import (
 )
 from .geometry import (
     Geometry as Geometry,
+    Samples as Samples,
     Surface as Surface,
 )
 from .lamp import (

@@ -15,9 +15,12 @@ FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 
-#: How states lie on a surface: none of its own, texels (columns, rows), or its vertices.
-Samples: TypeAlias = tuple[int, int] | Literal["vertices"] | None
+#: How states lie on a surface: none of its own, texels (columns, rows), its vertices, or one for
+#: each of the particles that its mesh consists of.
+Samples: TypeAlias = tuple[int, int] | Literal["vertices", "particles"] | None
 ONE_PLACE, TEXELS, VERTICES = 0, 1, 2
+#: Vertices of the octahedron that a particle is.
+OF_PARTICLE = 6
 #: Points along each edge of a texel at which its place on the surface is looked up.
 LOOKUPS = 4
 #: Part of the looked-up points that may belong to two triangles: rounding along their edges.
@@ -61,6 +64,8 @@ class Surface:
             return 1
         if self.samples == "vertices":
             return len(self.mesh.vertices_m)
+        if self.samples == "particles":
+            return len(self.mesh.vertices_m) // OF_PARTICLE
         return self.samples[0] * self.samples[1]
 
 
@@ -132,7 +137,8 @@ class Geometry:
             normals.append(mesh.normals)
             uvs.append(_uv_of(surface)[faces])
             owners.append(np.full(len(faces), number))
-            corners.append(faces + first)
+            is_particle = surface.samples == "particles"
+            corners.append((faces // OF_PARTICLE if is_particle else faces) + first)
             columns, height = surface.samples if isinstance(surface.samples, tuple) else (1, 1)
             kind = (
                 TEXELS
@@ -206,7 +212,9 @@ class Geometry:
         """
         own = self.surfaces[surface]
         first = int(self.table[surface, 1])
-        if own.samples == "vertices":
+        if own.samples == "particles":
+            face, weights, place = _on_particles(own, per_place, rng, scattered)
+        elif own.samples == "vertices":
             face, weights, place = _around_vertices(own.mesh, per_place, rng, scattered)
         else:
             face, weights, place = _on_texels(own, per_place, rng, scattered)
@@ -266,6 +274,20 @@ def _around_vertices(
     return face[entry], weights, place.astype(np.int32)
 
 
+def _on_particles(
+    surface: Surface, per_place: int, rng: np.random.Generator, scattered: FloatArray
+) -> tuple[IntArray, FloatArray, IntArray]:
+    """Return triangles, weights of their corners, and particles, for points on each particle."""
+    place = np.arange(surface.n_places).repeat(per_place)
+    faces = len(surface.mesh.faces) // surface.n_places
+    turn = rng.integers(0, faces, surface.n_places).repeat(per_place)
+    face = faces * place + (turn + np.tile(np.arange(per_place), surface.n_places)) % faces
+    first, second = scattered.reshape(-1, 2)[: len(place)].T
+    root = np.sqrt(first)
+    weights = np.stack([1 - root, root * second, root * (1 - second)], axis=1)
+    return face.astype(np.int32), weights, place.astype(np.int32)
+
+
 def _inverse_hat(evenly: FloatArray) -> FloatArray:
     """Return w where ∫₀ʷ 6 x (1 − x) dx = 3 w² − 2 w³ is as given: 1/2 − sin(arcsin(1 − 2 x)/3)."""
     return np.asarray(0.5 - np.sin(np.arcsin(1 - 2 * evenly) / 3))
@@ -275,7 +297,7 @@ def _on_texels(
     surface: Surface, per_place: int, rng: np.random.Generator, scattered: FloatArray
 ) -> tuple[IntArray, FloatArray, IntArray]:
     """Return triangles, weights of their corners, and texels, for points on each texel."""
-    from labrig.reproduce.tracing_kernels import rasterised, weights_at
+    from labrig.reproduce.tracing_kernels import located_in_texture, rasterised
 
     assert isinstance(surface.samples, tuple)
     assert surface.mesh.uv is not None
@@ -303,11 +325,9 @@ def _on_texels(
     start = rng.integers(0, 2**31, len(texel)).repeat(per_place)
     turn = (start + np.tile(np.arange(per_place), len(texel))) % n_parts[place]
     part = order[place, turn]
-    face = parts[place, part].astype(np.int32)
     u = ((place % columns) + (part % LOOKUPS + even[:, 0]) / LOOKUPS) / columns
     v = ((place // columns) + (part // LOOKUPS + even[:, 1]) / LOOKUPS) / rows
-    weights = weights_at(corners[face], np.stack([u, v], axis=1).astype(np.float32))
-    # Near an edge of the texture the point may lie just outside of its triangle.
-    weights = np.clip(weights, 0, None)
-    weights /= weights.sum(axis=1, keepdims=True)
+    face, weights = located_in_texture(
+        corners, face_at, np.stack([u, v], axis=1).astype(np.float32)
+    )
     return face, weights, place.astype(np.int32)

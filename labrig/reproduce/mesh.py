@@ -189,6 +189,31 @@ class Mesh:
         )
         return cls(corner + uv @ np.array([u, v]), faces.astype(np.int32), uv)
 
+    @classmethod
+    def octahedra(cls, centre_m: ArrayLike, radius_m: float) -> Self:
+        """Return a small octahedron at each of some places, six vertices each.
+
+        Parameters
+        ----------
+        centre_m
+            Places in m, shape (n, 3).
+        radius_m
+            Distance of the vertices from them in m.
+        """
+        centres = np.asarray(centre_m, dtype=np.float64).reshape(-1, 3)
+        corners = np.vstack([np.eye(3), -np.eye(3)])
+        vertices = (centres[:, None] + radius_m * corners).reshape(-1, 3)
+        faces = np.array(
+            [
+                [x, y, z] if (x + y + z) % 2 else [x, z, y]
+                for x in (0, 3)
+                for y in (1, 4)
+                for z in (2, 5)
+            ]
+        )
+        number = 6 * np.arange(len(centres))[:, None, None]
+        return cls(vertices, (faces + number).reshape(-1, 3).astype(np.int32))
+
     @property
     def normals(self) -> FloatArray:
         """Unit normals of the triangles, zero of those without area, shape (m, 3)."""

@@ -83,8 +83,12 @@ class Scene:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed or is missing, one sentence each."""
-        return tuple(dict.fromkeys(note for each in self.materials for note in each.notes))
+        """What was assumed or is missing, one sentence each, after the names of the materials."""
+        of: dict[str, list[str]] = {}
+        for material in self.materials:
+            for note in material.notes:
+                of.setdefault(note, []).append(material.name)
+        return tuple(f"{', '.join(names)}: {note}" for note, names in of.items())
 
     @property
     def camera(self) -> Pinhole:
@@ -240,7 +244,9 @@ def build_scene(
         for name, entry in file.objects.items()
     )
     is_moving = any(
-        entry.wave is not None or entry.vertices_over_time is not None
+        entry.wave is not None
+        or entry.vertices_over_time is not None
+        or entry.particles is not None
         for entry in file.objects.values()
     ) or any(lamp.path is not None for lamp in file.lamps.values())
     return Scene(file, bands, materials, is_moving, surfaces, folder)
@@ -369,6 +375,8 @@ def _samples(name: str, entry: ObjectEntry, mesh: Mesh, glows: bool) -> Samples:
         return entry.samples or TEXELS
     if not glows:
         return None
+    if entry.particles is not None:
+        return "particles"
     return entry.samples or ("vertices" if mesh.uv is None else TEXELS)
 
 
@@ -381,6 +389,9 @@ def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
         return Mesh.box(**entry.box.model_dump())
     if entry.sphere is not None:
         return Mesh.sphere(**entry.sphere.model_dump())
+    if entry.particles is not None:
+        _, position_m = _trajectory(folder / entry.particles.file)
+        return Mesh.octahedra(position_m[0], entry.particles.radius_m)
     assert entry.mesh is not None
     mesh = read_mesh(folder / entry.mesh.file)
     turn = np.eye(3)
@@ -415,37 +426,54 @@ def _motion(name: str, entry: ObjectEntry, mesh: Mesh, folder: Path) -> Callable
             return Mesh(mesh.vertices_m + height[:, None] * front, mesh.faces, mesh.uv)
 
         return waved
+    if entry.particles is not None:
+        radius_m = entry.particles.radius_m
+        times_s, position_m = _trajectory(folder / entry.particles.file)
+        return lambda t_s: Mesh.octahedra(_between(t_s, times_s, position_m), radius_m)
     if entry.vertices_over_time is None:
         return lambda _: mesh
-    times_s, vertices_m = _vertices_over_time(name, folder / entry.vertices_over_time, mesh)
-
-    def moved(t_s: float) -> Mesh:
-        at = float(np.interp(t_s, times_s, np.arange(len(times_s))))
-        before = min(int(at), len(times_s) - 2) if len(times_s) > 1 else 0
-        after = min(before + 1, len(times_s) - 1)
-        part = at - before
-        return Mesh((1 - part) * vertices_m[before] + part * vertices_m[after], mesh.faces, mesh.uv)
-
-    return moved
+    path = folder / entry.vertices_over_time
+    moments_s, vertices_m = _over_time(path, "vertices_m")
+    if vertices_m.shape[1:] != mesh.vertices_m.shape:
+        raise UsageError(
+            f"{path}: expected 'vertices_m' of {len(mesh.vertices_m)} vertices for {name}, got "
+            f"those of {vertices_m.shape[1]}"
+        )
+    return lambda t_s: Mesh(_between(t_s, moments_s, vertices_m), mesh.faces, mesh.uv)
 
 
-def _vertices_over_time(name: str, path: Path, mesh: Mesh) -> tuple[FloatArray, FloatArray]:
+def _trajectory(path: Path) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) in s and places of particles (n, particles, 3) in m."""
+    return _over_time(path, "position_m")
+
+
+def _between(t_s: float, times_s: FloatArray, places_m: FloatArray) -> FloatArray:
+    """Return places at a time, straight between neighbouring times, (points, 3)."""
+    at = float(np.interp(t_s, times_s, np.arange(len(times_s))))
+    before = max(min(int(at), len(times_s) - 2), 0)
+    after = min(before + 1, len(times_s) - 1)
+    return np.asarray(places_m[before] + (at - before) * (places_m[after] - places_m[before]))
+
+
+def _over_time(path: Path, name: str) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) and places (n, points, 3) from a file."""
     try:
         with np.load(path, allow_pickle=False) as content:
-            times_s, vertices_m = content["t_s"], content["vertices_m"]
+            times_s = np.asarray(content["t_s"], dtype=np.float64)
+            places_m = np.asarray(content[name], dtype=np.float64)
     except (OSError, KeyError, ValueError) as error:
         raise UsageError(
-            f"{path}: expected a .npz file with 't_s' and 'vertices_m' ({error})"
+            f"{path}: expected a .npz file with 't_s' and '{name}' ({error})"
         ) from None
-    expected = (len(times_s), *mesh.vertices_m.shape)
-    if vertices_m.shape != expected or not np.isfinite(vertices_m).all():
+    is_series = places_m.ndim == 3 and places_m.shape[0] == times_s.size > 0
+    if not is_series or places_m.shape[2] != 3 or not np.isfinite(places_m).all():
         raise UsageError(
-            f"{path}: expected finite 'vertices_m' of shape {expected} for {name}, got "
-            f"{vertices_m.shape}"
+            f"{path}: expected finite '{name}' of shape ({times_s.size}, points, 3), got "
+            f"{places_m.shape}"
         )
-    if times_s.ndim != 1 or not len(times_s) or (np.diff(times_s) <= 0).any():
+    if times_s.ndim != 1 or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0).any():
         raise UsageError(f"{path}: expected times 't_s' that rise")
-    return times_s.astype(np.float64), vertices_m.astype(np.float64)
+    return times_s, places_m
 
 
 def _mapped(

@@ -283,6 +283,22 @@ class MeshEntry(_Part):
     inward: bool = False
 
 
+class ParticlesEntry(_Part):
+    """Particles on their ways, each with states of its own; they are small octahedra.
+
+    Attributes
+    ----------
+    file
+        File (.npz) with the times `t_s` and `position_m` (times, particles, 3), between which they
+        move straight; relative to the scene's.
+    radius_m
+        Radius of a particle in m.
+    """
+
+    file: Name
+    radius_m: Positive
+
+
 class Wave(_Part):
     """A wave that runs over a surface and moves it along its own front's direction.
 
@@ -321,7 +337,7 @@ class ObjectEntry(_Part):
 
     Attributes
     ----------
-    rectangle, disk, box, sphere, mesh
+    rectangle, disk, box, sphere, mesh, particles
         Its shape, one of them.
     material
         Name of its material.
@@ -346,6 +362,7 @@ class ObjectEntry(_Part):
     box: BoxEntry | None = None
     sphere: SphereEntry | None = None
     mesh: MeshEntry | None = None
+    particles: ParticlesEntry | None = None
     material: Name | None = None
     material_map: MaterialMap | None = None
     lamp: Name | None = None
@@ -361,6 +378,8 @@ class ObjectEntry(_Part):
             if len(given) != 1:
                 got = " and ".join(f"'{name}'" for name in given) or "none of them"
                 raise ValueError(f"expected one of {', '.join(names)}, got {got}")
+        if self.particles is not None and (self.samples or self.material is None):
+            raise ValueError("expected 'particles' of one 'material' and without 'samples'")
         if self.wave is not None and self.rectangle is None:
             raise ValueError("expected 'wave' with a rectangle only")
         if self.wave is not None and self.vertices_over_time is not None:
@@ -368,7 +387,7 @@ class ObjectEntry(_Part):
         return self
 
 
-SHAPES = ("rectangle", "disk", "box", "sphere", "mesh")
+SHAPES = ("rectangle", "disk", "box", "sphere", "mesh", "particles")
 
 
 class CameraEntry(_Part):

@@ -220,7 +220,7 @@ def of_phosphor(
     >>> bench = BenchLight(absolute_irradiance(1000.0, read_light("A")))
     >>> paint = of_phosphor(read_material("blue-paint"), Bands.even(), bench, 0.7, 1.0)
     >>> paint.notes[0]
-    'the albedo of blue-paint is assumed: 0.7 at all wavelengths'
+    'its albedo is assumed to be 0.7 at all wavelengths'
     """
     rates = FieldParameters.of(material, prompt)
     assert material.bands_nm is not None
@@ -239,7 +239,7 @@ def of_phosphor(
             "measure it (labrig run reflectance) or assume one (--assume-albedo 0.8)"
         )
     if material.albedo is None:
-        notes.append(f"the albedo of {material.name} is assumed: {albedo:g} at all wavelengths")
+        notes.append(f"its albedo is assumed to be {albedo:g} at all wavelengths")
     factor = 1.0 if material.scale == "absolute" else bench.mean(edges)
     if material.scale is None:
         if reradiation_scale is None:
@@ -250,10 +250,10 @@ def of_phosphor(
             )
         factor *= reradiation_scale
         notes.append(
-            f"the scale of {material.name}'s glow is assumed: {reradiation_scale:g} s/sr for Λ of 1"
+            f"the scale of its glow is assumed to be {reradiation_scale:g} s/sr for a Λ of 1"
         )
     if all(state.k_e_per_s is None for state in material.states):
-        notes.append(f"{material.name} has no excitation rates: light does not charge it")
+        notes.append("it has no excitation rates, so light does not charge it")
     k_e = rates.k_e_per_s.astype(np.float64)
     if material.irradiance_norm is not None:
         k_e *= material.irradiance_norm.value / bench.vector_length(edges)

@@ -272,14 +272,55 @@ def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[IntArray
 
 
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
-def weights_at(corners: Float32Array, uv: Float32Array) -> NDArray[np.float64]:
-    """Return the weights of the corners (n, 3) of triangles in the texture (n, 3, 2) at `uv`."""
+def located_in_texture(
+    corners: Float32Array, face_at: IntArray, uv: Float32Array
+) -> tuple[IntArray, NDArray[np.float64]]:
+    """Return the triangles in which points of the texture lie, and the weights of their corners.
+
+    Near an edge a point may lie in the triangle of a neighbouring cell of the grid. One beside all
+    triangles that are near is moved onto that of its own cell.
+
+    Parameters
+    ----------
+    corners
+        Texture coordinates of triangles (m, 3, 2).
+    face_at
+        Triangle at each point of the grid, from `rasterised` (rows, columns).
+    uv
+        Points (n, 2), whose cells have a triangle.
+
+    Returns
+    -------
+    tuple
+        Numbers of triangles (n,) and weights (n, 3).
+    """
+    rows, columns = face_at.shape
+    faces = np.empty(len(uv), np.int32)
     weights = np.empty((len(uv), 3))
+    near = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (-1, -1), (1, -1), (-1, 1))
     for i in range(len(uv)):
-        s, t = corners[i, :, 0] - corners[i, 0, 0], corners[i, :, 1] - corners[i, 0, 1]
-        x, y = uv[i, 0] - corners[i, 0, 0], uv[i, 1] - corners[i, 0, 1]
-        det = s[1] * t[2] - s[2] * t[1]
-        weights[i, 1] = (x * t[2] - y * s[2]) / det
-        weights[i, 2] = (y * s[1] - x * t[1]) / det
-        weights[i, 0] = 1 - weights[i, 1] - weights[i, 2]
-    return weights
+        column = min(max(math.floor(uv[i, 0] * columns), 0), columns - 1)
+        row = min(max(math.floor(uv[i, 1] * rows), 0), rows - 1)
+        for k in range(len(near) + 1):
+            # The last one is the triangle of the own cell again.
+            down, right = near[k % len(near)]
+            at_row, at_column = row + down, column + right
+            if not (0 <= at_row < rows and 0 <= at_column < columns):
+                continue
+            f = face_at[at_row, at_column]
+            if f < 0:
+                continue
+            s, t = corners[f, :, 0], corners[f, :, 1]
+            x, y = uv[i, 0] - s[0], uv[i, 1] - t[0]
+            det = (s[1] - s[0]) * (t[2] - t[0]) - (s[2] - s[0]) * (t[1] - t[0])
+            b = (x * (t[2] - t[0]) - y * (s[2] - s[0])) / det
+            c = (y * (s[1] - s[0]) - x * (t[1] - t[0])) / det
+            is_inside = min(b, c, 1 - b - c) >= -1e-5
+            if is_inside or k == len(near):
+                b, c, a = max(b, 0.0), max(c, 0.0), max(1 - b - c, 0.0)
+                faces[i] = f
+                weights[i, 0] = a / (a + b + c)
+                weights[i, 1] = b / (a + b + c)
+                weights[i, 2] = c / (a + b + c)
+                break
+    return faces, weights

@@ -15,6 +15,7 @@ from labrig.reproduce import (
     PathLength,
     Paths,
     Pinhole,
+    Samples,
     Surface,
     SurfaceMaterial,
     Tracer,
@@ -123,6 +124,38 @@ def test_irradiance_of_other_lamps(
     black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
     seen = folded(paths, geometry, black, np.zeros(BANDS), np.ones(BANDS), incident=True)
     np.testing.assert_allclose(seen, irradiance, rtol=2e-3)
+
+
+@pytest.mark.parametrize("samples", [(1, 1), (3, 2), "vertices"])
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_light_between_two_squares_that_meet_at_an_edge(samples: Samples, turned: bool) -> None:
+    """The view factor of perpendicular unit squares with a common edge is 0.20004."""
+    edges = ((0, 1, 0), (1, 0, 0)) if turned else ((1, 0, 0), (0, 1, 0))
+    floor = Mesh.grid((0, 0, 0), *edges, 2)
+    wall = Mesh.rectangle((0, 0, 0), (0, 1, 0), (0, 0, 1))
+    geometry = Geometry.of(
+        [
+            Surface("floor", floor.turned_over() if turned else floor, 0, samples=samples),
+            Surface("wall", wall, 0, samples=(1, 1)),
+        ]
+    )
+    n_places = geometry.places_of(0).stop
+    tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(2, 0.0), seed=9)
+    paths = list(tracer.from_surface(0, (1 << 17) // n_places, 1))
+    glow = np.zeros((geometry.n_places, BANDS), np.float32)
+    glow[geometry.places_of(1)] = 1.0
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    seen = fold(
+        paths, Matrices.of([black]), geometry.material_of_place, glow,
+        np.zeros((0, BANDS), np.float32), 1, incident=True,
+    )  # fmt: skip
+    if samples == "vertices":
+        # Each vertex counts as much as the area that it stands for.
+        area = np.bincount(floor.faces.ravel(), np.repeat(floor.areas_m2 / 3, 3))
+        mean = float(area @ seen[:, 0]) / area.sum()
+    else:
+        mean = float(seen[:, 0].mean())
+    assert mean == pytest.approx(np.pi * 0.20004, rel=0.01)
 
 
 def test_what_is_between_casts_a_shadow() -> None:
