@@ -125,6 +125,7 @@ def test_of_a_kinetic_order_they_are_what_becquerels_law_gives(shape: float) -> 
     np.testing.assert_allclose(found.sigma, [rate, amplitude, exponent], rtol=2e-3)
 
 
+@pytest.mark.campaign
 def test_fits_of_noisy_data_scatter_by_them() -> None:
     truth = ((0.08, 1.0), (0.015, 0.4))
     expected = series(truth)

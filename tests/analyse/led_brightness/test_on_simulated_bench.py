@@ -144,7 +144,13 @@ def dark(rig: Rig) -> None:
     rig["simulation"]["leds"][7]["level"] = 1e-12
 
 
-@pytest.mark.parametrize("change", [dark, without_spectrometer], ids=["spectrometer", "camera"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(dark, id="spectrometer"),
+        pytest.param(without_spectrometer, id="camera", marks=pytest.mark.campaign),
+    ],
+)
 def test_an_led_that_does_not_light_is_left_out(
     change: Callable[[Rig], None], tmp_path: Path
 ) -> None:
