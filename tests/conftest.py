@@ -44,8 +44,8 @@ SYNC = os.fsync
 HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
 # In CI the same examples every time, so that a red run is about the change; elsewhere new ones.
-settings.register_profile("ci", derandomize=True, max_examples=25, deadline=None)
-settings.register_profile("default", max_examples=25, deadline=None)
+settings.register_profile("ci", derandomize=True, max_examples=15, deadline=None)
+settings.register_profile("default", max_examples=15, deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 

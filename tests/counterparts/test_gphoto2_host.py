@@ -105,6 +105,7 @@ def test_a_picture_of_the_simulated_room_arrives_as_it_was_taken(
     assert ("100CANON" in picture["folder"]) is (target is TO_CARD)
 
 
+@pytest.mark.campaign
 def test_a_frame_of_a_large_sensor_arrives_byte_for_byte(home: dict[str, str]) -> None:
     film = Film(size=17_000_001)  # does not fit into three bytes
     with served(film) as server:
@@ -138,6 +139,7 @@ def test_a_camera_that_knows_the_standard_only(home: dict[str, str]) -> None:
     assert picture["name"] == "DSC_0001.DNG"
 
 
+@pytest.mark.campaign
 def test_one_host_after_another_and_after_one_that_was_killed(home: dict[str, str]) -> None:
     film = Film()
     with served(film) as server:

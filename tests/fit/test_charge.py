@@ -86,6 +86,7 @@ def test_first_order_stays_first_order() -> None:
         assert fit.states[0].decay_time_s.value == pytest.approx(50.0, rel=0.01)
 
 
+@pytest.mark.campaign
 def test_two_states_of_general_order() -> None:
     truth = light([(0.004, 0.2, 1.8, 2e4), (0.001, 0.004, 1.3, 2e4)], prompt=10.0)
     noise = np.random.default_rng(3).standard_normal(len(truth))

@@ -212,8 +212,10 @@ def test_pictures_over_the_loopback_network(rig: Callable[[str], Path]) -> None:
 
 
 def test_a_broken_connection_is_mended_on_the_way_to_the_safe_state(
-    rig: Callable[[str], Path],
+    rig: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # What the simulated camera has left over comes at once.
+    monkeypatch.setattr("labrig.drivers.ptp.eos.frames.LEFT_OVER_S", 0.1)
     film = Film()
     settings = ExposureSettings(1 / 64, 400, 4.0)
     with served(film) as server:
