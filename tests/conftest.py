@@ -44,8 +44,8 @@ SYNC = os.fsync
 HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
 # In CI the same examples every time, so that a red run is about the change; elsewhere new ones.
-settings.register_profile("ci", derandomize=True, max_examples=25, deadline=None)
-settings.register_profile("default", max_examples=25, deadline=None)
+settings.register_profile("ci", derandomize=True, max_examples=15, deadline=None)
+settings.register_profile("default", max_examples=15, deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 
@@ -167,16 +167,20 @@ def make_rig(tmp_path: Path) -> Callable[..., Path]:
     """Writes the shipped simulated rig with a small sensor, changed as told."""
 
     def write(name: str = "rig.yaml", base: str = "sim", **simulation: object) -> Path:
-        content = read_quickly((resources.folder("config") / f"{base}.yaml").read_text())
-        content["simulation"] |= {"sensor": {"width": 96, "height": 64}}
-        # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
-        content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-        content["simulation"] |= simulation
-        path = tmp_path / name
-        path.write_text(write_quickly(content))
-        return path
+        return write_small_rig(tmp_path / name, base, **simulation)
 
     return write
+
+
+def write_small_rig(path: Path, base: str = "sim", **simulation: object) -> Path:
+    """Write the shipped simulated rig with a small sensor, changed as told."""
+    content = read_quickly((resources.folder("config") / f"{base}.yaml").read_text())
+    content["simulation"] |= {"sensor": {"width": 96, "height": 64}}
+    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    content["simulation"] |= simulation
+    path.write_text(write_quickly(content))
+    return path
 
 
 @pytest.fixture
@@ -184,18 +188,22 @@ def make_protocol(tmp_path: Path) -> Callable[..., Path]:
     """Writes a short decay protocol, changed as told."""
 
     def write(name: str = "protocol.yaml", **keys: object) -> Path:
-        content = {
-            "protocol": "decay",
-            "sample": {"name": "test"},
-            "charge": "15 min",
-            "for": "60 s",
-            "exposure": "1 s",
-        } | keys
-        path = tmp_path / name
-        path.write_text(write_quickly(content))
-        return path
+        return write_short_decay(tmp_path / name, **keys)
 
     return write
+
+
+def write_short_decay(path: Path, **keys: object) -> Path:
+    """Write a short decay protocol, changed as told."""
+    content = {
+        "protocol": "decay",
+        "sample": {"name": "test"},
+        "charge": "15 min",
+        "for": "60 s",
+        "exposure": "1 s",
+    } | keys
+    path.write_text(write_quickly(content))
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,8 @@
-"""A simulated board at the other end of a real terminal device."""
+"""A simulated board at the other end of a real terminal device, and a guard that does nothing."""
 
 import os
 import select
+import subprocess
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,11 @@ import pytest
 from tests.drivers.serial_wire import Board
 
 pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
+
+
+def idle_guard(order: object) -> "subprocess.Popen[bytes]":
+    """What stands in for a guard's process: it listens until nobody speaks any more."""
+    return subprocess.Popen(["cat"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, bufsize=0)
 
 
 @contextmanager

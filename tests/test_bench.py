@@ -12,7 +12,7 @@ from labrig.bench import open_bench
 from labrig.clock import SystemClock
 from labrig.errors import DeviceError, UsageError
 from labrig.sim.boards import NumatoBoard
-from tests.terminal import on_a_terminal
+from tests.terminal import idle_guard, on_a_terminal
 
 RIG = """
 name: half a bench
@@ -29,6 +29,12 @@ class HearingBoard(NumatoBoard):
     def receive(self, data: bytes) -> bytes:
         self.heard_bytes += len(data)
         return super().receive(data)
+
+
+@pytest.fixture(autouse=True)
+def unguarded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No process of Python's is started for each bench; tests/test_guard.py has the real one."""
+    monkeypatch.setattr("labrig.guard._started", idle_guard)
 
 
 @pytest.fixture
@@ -66,35 +72,29 @@ def test_the_real_driver_on_a_real_port_with_the_systems_clock(
         assert not board.states[3], "off at the end"
 
 
-@pytest.mark.parametrize("spelling", ["as it is", "link", "relative path", "other TMPDIR"])
 def test_a_rig_in_use_is_refused_by_every_name_and_not_touched(
     wired: tuple[str, HearingBoard],
     rig: Callable[[str], Path],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    spelling: str,
 ) -> None:
     address, board = wired
     path = rig(address)
     with open_bench(read_rig_file(path), str(path)) as first, first.devices() as devices:
         devices[LAMP].on()
         before = board.heard_bytes
-        match spelling:
-            case "link":
-                (tmp_path / "by-id").symlink_to(address)
-                path = rig(str(tmp_path / "by-id"))
-            case "relative path":
-                path = rig(os.path.relpath(address))
-            case "other TMPDIR":
-                monkeypatch.setenv("TMPDIR", str(tmp_path))
-                monkeypatch.setattr("tempfile.tempdir", None)
-        with (
-            open_bench(read_rig_file(path), str(path)) as second,
-            pytest.raises(UsageError, match="held by another labrig"),
-            second.devices(),
-        ):
-            pass
-        assert board.heard_bytes == before
+        (tmp_path / "by-id").symlink_to(address)
+        monkeypatch.setenv("TMPDIR", str(tmp_path))
+        monkeypatch.setattr("tempfile.tempdir", None)
+        for spelling in (address, str(tmp_path / "by-id"), os.path.relpath(address)):
+            path = rig(spelling)
+            with (
+                open_bench(read_rig_file(path), str(path)) as second,
+                pytest.raises(UsageError, match="held by another labrig"),
+                second.devices(),
+            ):
+                pass
+            assert board.heard_bytes == before, spelling
         assert devices[LAMP].is_on()
 
 

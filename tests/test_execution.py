@@ -22,6 +22,7 @@ from tests.test_run import lamp_after, make_folder
 Make = Callable[..., Path]
 Labrig = Callable[..., Ended]
 
+CAMPAIGN = pytest.mark.campaign
 KINDS = {1: "command", 2: "data", 3: "response", 4: "event"}
 CAMERA_BACK = "20 s"
 
@@ -60,7 +61,7 @@ def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserv
     yield Watching()
 
 
-@pytest.mark.parametrize("fraction", [pytest.param(0.3, marks=pytest.mark.campaign), 0.97])
+@pytest.mark.parametrize("fraction", [pytest.param(0.3, marks=CAMPAIGN), 0.97])
 def test_unplugged_at_each_phase_of_a_transfer_the_decay_completes(
     quick: Path,
     make_rig: Make,
@@ -84,7 +85,15 @@ def test_unplugged_at_each_phase_of_a_transfer_the_decay_completes(
 
 
 @pytest.mark.parametrize("device", ["camera", "relays"])
-@pytest.mark.parametrize("moment", ["30 s", "1215 s", "2100 s", "2118 s"])
+@pytest.mark.parametrize(
+    "moment",
+    [
+        pytest.param("30 s", marks=CAMPAIGN),
+        "1215 s",
+        pytest.param("2100 s", marks=CAMPAIGN),
+        "2118 s",
+    ],
+)
 def test_unplugged_at_any_time_the_run_completes_and_the_lamp_is_off(
     quick: Path, make_rig: Make, tmp_path: Path, device: str, moment: str
 ) -> None:

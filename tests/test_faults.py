@@ -28,6 +28,8 @@ from tests.quick_yaml import read_quickly, write_quickly
 Make = Callable[..., Path]
 Labrig = Callable[..., Ended]
 
+CAMPAIGN = pytest.mark.campaign
+
 
 @pytest.fixture
 def protocol(make_protocol: Make) -> Path:
@@ -133,7 +135,9 @@ def moment(
         ("camera_busy", 3, "DeviceBusy", []),
         ("camera_full", 3, "StoreFull", []),
         ({"relays_unplugged": {"at": "30 s"}}, 3, "switch off by hand", ["dark"]),
-        ({"relays_silent": {"at": "30 s"}}, 3, "switch off by hand", ["dark"]),
+        pytest.param(
+            {"relays_silent": {"at": "30 s"}}, 3, "switch off by hand", ["dark"], marks=CAMPAIGN
+        ),
         ({"relays_echo_lost": {"at": "30 s"}}, 3, "did not echo", ["dark"]),
         ({"camera_unplugged": {"at": "30 s"}}, 3, "gone", ["dark"]),
         ({"disk_full": {"at": "30 s"}}, 5, "No space left on device", ["dark"]),
@@ -176,8 +180,16 @@ def test_a_fault_that_stays_ends_the_run_which_goes_on_when_it_is_mended(
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        ({"relays_silent": {"at": "30 s", "for": "60 s"}}, "the unit decay-1 is done again"),
-        ({"relays_echo_lost": {"at": "30 s", "for": "30 s"}}, "the unit decay-1 is done again"),
+        pytest.param(
+            {"relays_silent": {"at": "30 s", "for": "60 s"}},
+            "decay-1 is done again",
+            marks=CAMPAIGN,
+        ),
+        pytest.param(
+            {"relays_echo_lost": {"at": "30 s", "for": "30 s"}},
+            "decay-1 is done again",
+            marks=CAMPAIGN,
+        ),
         ({"relays_unplugged": {"at": "30 s", "for": "60 s"}}, "the unit decay-1 is done again"),
         ({"camera_unplugged": {"after_bytes": 90_000, "for": "5 s"}}, "is done again"),
         ({"camera_busy": {"at": "42 s", "for": "2.5 s"}}, "1 of 4 frames began late"),
@@ -280,7 +292,10 @@ def test_a_bulb_that_blows_while_charging_is_seen_in_the_first_frame(
     assert "it did not light at all" in ended.err
 
 
-@pytest.mark.parametrize("unit", ["meter", "decay-1", "daylight"])
+@pytest.mark.parametrize(
+    "unit",
+    [pytest.param("meter", marks=CAMPAIGN), "decay-1", pytest.param("daylight", marks=CAMPAIGN)],
+)
 def test_a_welded_relay_is_seen_by_the_camera(
     labrig: Labrig,
     rig: Make,
@@ -355,7 +370,9 @@ def test_times_of_faults_are_the_walls_so_that_what_is_over_stays_over(
     assert labrig("resume", run, "--no-process").code == 0
 
 
-@pytest.mark.parametrize(("step", "warned"), [("clock_back", True), ("clock_ahead", False)])
+@pytest.mark.parametrize(
+    ("step", "warned"), [("clock_back", True), pytest.param("clock_ahead", False, marks=CAMPAIGN)]
+)
 def test_a_clock_that_was_stepped_between_run_and_resume_harms_nothing(
     labrig: Labrig, rig: Make, protocol: Path, tmp_path: Path, step: str, warned: bool
 ) -> None:

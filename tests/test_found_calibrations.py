@@ -158,7 +158,9 @@ def moved(rig: dict[str, Any]) -> None:
     [
         (dimmer, "times as bright as when it was calibrated: the lamp aged"),
         (other_card, "this is another card"),
-        (aged, "the lamp is redder than when it was calibrated"),
+        pytest.param(
+            aged, "the lamp is redder than when it was calibrated", marks=pytest.mark.campaign
+        ),
         (moved, "nm from its place before the camera"),
     ],
 )

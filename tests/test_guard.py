@@ -22,6 +22,7 @@ from labrig.record import read_run
 pytest.importorskip("pty", reason="Windows has no pseudo terminals")
 
 from tests.lit_bench import RELAY, BoardProcess, lit_bench
+from tests.terminal import idle_guard
 
 OFF_WITHIN_S = 20.0
 RIG = (
@@ -81,6 +82,7 @@ def test_ctrl_z_stops_it_safely_and_after_kill_9_the_guard_switches_off(tmp_path
     assert "a process of its own" in record.attempts[0].start["guard"]
 
 
+@pytest.mark.campaign
 def test_after_kill_9_the_guard_sends_the_commands_of_the_rig_file(tmp_path: Path) -> None:
     with lit_bench(tmp_path, BoardProcess()) as bench:
         path = tmp_path / "rig.yaml"
@@ -164,9 +166,7 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> list["subprocess.Popen[bytes]"
     started: list[subprocess.Popen[bytes]] = []
 
     def start(order: object) -> "subprocess.Popen[bytes]":
-        started.append(
-            subprocess.Popen(["cat"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, bufsize=0)
-        )
+        started.append(idle_guard(order))
         return started[-1]
 
     monkeypatch.setattr(guard_module, "_started", start)

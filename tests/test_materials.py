@@ -60,7 +60,14 @@ def test_two_states_are_distinguished(
 
 
 def test_a_power_law_is_flagged(labrig: Labrig, make_rig: Make, tmp_path: Path) -> None:
-    fit = fit_of(measured(labrig, tmp_path, make_rig(sample="power-law", sensor=SENSOR), "decay"))
+    fit = fit_of(
+        measured(
+            labrig,
+            tmp_path,
+            make_rig(sample="power-law", sensor={"width": 192, "height": 128}),
+            "decay",
+        )
+    )
     assert fit["law"] != "exponentials"
     assert any("descriptive only" in warning for warning in fit["warnings"])
 

@@ -21,9 +21,10 @@ from labrig.errors import DeviceError
 from labrig.execution import execute
 from labrig.record import RunFolder, read_run
 from labrig.record.journal import read_journal
-from labrig.recording import Recording
+from labrig.recording import Recording, resume_run
 from tests.acquire.fakes import Watching
 
+CAMPAIGN = pytest.mark.campaign
 UNITS = ["dark", "decay-1", "decay-2"]
 
 
@@ -63,7 +64,7 @@ def outline(value: object) -> object:
     return type(value)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=CAMPAIGN) for n in range(1, 4))])
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("times", [1, 10])
 def test_stopped_at_any_wait_the_lamp_is_off_and_the_rest_can_be_done(
@@ -109,7 +110,9 @@ def test_stopped_at_any_wait_the_lamp_is_off_and_the_rest_can_be_done(
         event_model.schema_validators[event_model.DocumentNames[name]].validate(doc)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(n, marks=CAMPAIGN) for n in range(3, 8))]
+)
 def test_an_exception_anywhere_in_a_driver_ends_safely(
     quick: Path,
     make_rig: Callable[..., Path],
@@ -185,13 +188,7 @@ def test_after_kill_9_the_run_is_resumed(
     process.stderr.close()
     (folder,) = runs.iterdir()
     before = read_run(folder).completed()
-    done = subprocess.run(
-        [sys.executable, "-m", "labrig", "resume", folder, "--no-process"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    resume_run(folder, quietly)
     record = read_run(folder)
     assert list(record.completed()) == UNITS
     assert len(record.frames("decay")) == 2 * 4
@@ -199,7 +196,10 @@ def test_after_kill_9_the_run_is_resumed(
         assert record.completed()[name].uid == attempt.uid
 
 
-@pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("signum", "code"),
+    [pytest.param(signal.SIGINT, 130, marks=CAMPAIGN), (signal.SIGTERM, 143)],
+)
 def test_a_stopped_process_leaves_with_its_code_and_one_line(
     make_protocol: Callable[..., Path],
     make_rig: Callable[..., Path],
@@ -207,7 +207,7 @@ def test_a_stopped_process_leaves_with_its_code_and_one_line(
     signum: int,
     code: int,
 ) -> None:
-    protocol = make_protocol(repeats=60)
+    protocol = make_protocol(repeats=20)
     process = subprocess.Popen(
         [sys.executable, "-m", "labrig", "run", protocol, "--rig", make_rig(),
          "--runs", tmp_path / "runs"],
@@ -217,7 +217,7 @@ def test_a_stopped_process_leaves_with_its_code_and_one_line(
     )  # fmt: skip
     assert process.stderr is not None
     for line in process.stderr:
-        if "frame 20 " in line:
+        if "frame 3 " in line:
             break
     for _ in range(10):
         process.send_signal(signum)

@@ -42,7 +42,9 @@ def test_what_is_shipped_is_valid_and_every_misspelt_key_is_not(
 ) -> None:
     content = read_yaml(path)
     validators[kind].validate(content)
-    places = list(keys(content))
+    # Of a list of things that are alike, one.
+    alike = {tuple(key for key in place if isinstance(key, str)): place for place in keys(content)}
+    places = list(alike.values())
     assert places
     for place in places:
         assert not validators[kind].is_valid(misspelt(content, place)), place

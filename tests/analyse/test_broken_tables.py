@@ -94,7 +94,7 @@ def test_a_clean_table_is_not_complained_about(tmp_path: Path, seed: int) -> Non
     assert (fit.warnings, fit.sigma_factor, fit.sigma_origin) == ((), 1.0, "the table")
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
     count=st.floats(0.01, 100.0),
     constant=st.sampled_from([0.0, 1.0]),

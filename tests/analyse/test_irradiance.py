@@ -107,7 +107,7 @@ def test_rounds_are_averaged_and_their_scatter_is_reported() -> None:
 
 def test_on_the_simulated_bench_it_is_the_rooms(tmp_path: Path) -> None:
     """With a filter calibrated without error: what is left is the card's and the camera's."""
-    width, height = 192, 64
+    width, height = 128, 64
     on_sample = Strip(left=(0.08, 0.5), right=(0.92, 0.5), height=0.25, rising=False)
     calibrated = true_lvf_file(width, height).model_copy(update={"on_sample": on_sample})
     LVF_KIND.write(tmp_path, calibrated)

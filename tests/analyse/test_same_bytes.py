@@ -26,7 +26,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def test_a_result_is_made_again_bit_for_bit(
     labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:
-    protocol = make_protocol(patches=PATCHES, repeats=2, daylight=True, **{"for": "30 s"})
+    protocol = make_protocol(patches=PATCHES, daylight=True, **{"for": "30 s"})
     ended = labrig("run", protocol, "--rig", make_rig(), "--runs", tmp_path / "runs")
     assert ended.code == 0, ended.err
     result = contents(ended.run_folder / "result")

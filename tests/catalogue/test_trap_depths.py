@@ -17,7 +17,7 @@ from tests.conftest import Ended
 Labrig = Callable[..., Ended]
 
 DECAY: dict[str, Any] = {
-    "protocol": "decay", "charge": "30 s", "first": "1 s", "every": "5 s", "for": "3 min",
+    "protocol": "decay", "charge": "30 s", "first": "1 s", "every": "8 s", "for": "3 min",
     "exposure": "1/4 s", "daylight": False,
 }  # fmt: skip
 CELSIUS = (14.0, 21.0, 29.0)

@@ -29,12 +29,14 @@ def completed(typed: str, folder: Path) -> list[str]:
         ("labrig pla", ["plan"]),
         ("labrig run dec", ["decay", "decay-eleven"]),
         ("labrig run ./my-", []),  # the shell completes files itself
-        ("labrig rig use sim-p", ["sim-phosphor"]),
-        ("labrig plan decay --predict gre", ["green-paint"]),
-        ("labrig resume la", ["last"]),
+        pytest.param("labrig rig use sim-p", ["sim-phosphor"], marks=pytest.mark.campaign),
+        pytest.param(
+            "labrig plan decay --predict gre", ["green-paint"], marks=pytest.mark.campaign
+        ),
+        pytest.param("labrig resume la", ["last"], marks=pytest.mark.campaign),
         ("labrig runs show 2026-01-0", ["2026-01-02_b", "2026-01-01_a"]),
         ("labrig watch --runs elsewhere 2026", ["2026-01-03_c"]),
-        ("labrig watch --runs nowhere 2026", []),
+        pytest.param("labrig watch --runs nowhere 2026", [], marks=pytest.mark.campaign),
     ],
 )
 def test_names_are_completed(tmp_path: Path, typed: str, words: list[str]) -> None:

@@ -275,7 +275,13 @@ def test_a_mixture_needs_a_threshold_where_there_is_no_noise(labrig: Labrig, dye
     refused_in_one_line(labrig("fit", "mixture", dyed), 2, "or a threshold")
 
 
-@pytest.mark.parametrize("in_the_way", ["fit.json", "report.html", "figures"])
+@pytest.mark.parametrize(
+    "in_the_way",
+    [
+        "fit.json",
+        *(pytest.param(one, marks=pytest.mark.campaign) for one in ("report.html", "figures")),
+    ],
+)
 def test_a_mixture_that_cannot_be_written(labrig: Labrig, tmp_path: Path, in_the_way: str) -> None:
     write_reradiation(tmp_path / "paper.csv", measurement(11, YELLOW).measured)
     fit = ("fit", "mixture", tmp_path / "paper.csv", "--components", "1")

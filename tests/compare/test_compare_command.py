@@ -52,7 +52,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "sample": {"name": "double-wide"},
         "charge": "10 min",
         "for": "90 s",
-        "repeats": 2,
     }
     (folder / "rig.yaml").write_text(write_quickly(rig))
     (folder / "protocol.yaml").write_text(write_quickly(protocol))
@@ -145,7 +144,10 @@ def test_a_run_without_a_sound_result_is_one_clear_line(
     assert "labrig process" in bare.err
 
 
-@pytest.mark.parametrize("found_by", ["an earlier run", "a part of the chain"])
+@pytest.mark.parametrize(
+    "found_by",
+    [pytest.param("an earlier run", marks=pytest.mark.campaign), "a part of the chain"],
+)
 def test_curves_that_a_calibration_found_go_before_the_rigs(
     labrig: Labrig, run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found_by: str
 ) -> None:

@@ -11,7 +11,7 @@ from labrig.bench import open_bench
 from labrig.clock import VirtualClock
 from labrig.sim.boards import ArduinoBoard, LcusBoard, MaestroBoard
 from tests.drivers.serial_wire import Board
-from tests.terminal import on_a_terminal
+from tests.terminal import idle_guard, on_a_terminal
 
 RIG = """
 name: two boards
@@ -27,6 +27,12 @@ devices:
   lamp: {{driver: serial_relay, address: "{address}", baud: 19200, framing: 8N2,
           on: {{send: on 0, answer: ok}}, off: {{send: off 0, answer: ok}}}}
 """
+
+
+@pytest.fixture(autouse=True)
+def unguarded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No process of Python's is started for each bench; tests/test_guard.py has the real one."""
+    monkeypatch.setattr("labrig.guard._started", idle_guard)
 
 
 @pytest.fixture

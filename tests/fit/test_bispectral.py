@@ -60,7 +60,7 @@ def columns_of(
 @pytest.mark.parametrize(
     ("errors", "seed"),
     [
-        ({"noise": 3e-3}, 1),
+        pytest.param({"noise": 3e-3}, 1, marks=pytest.mark.campaign),
         ({"noise": 1e-4, "scale": 0.02}, 2),
         ({"noise": 1e-4, "change": 0.02}, 3),
     ],

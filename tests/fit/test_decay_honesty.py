@@ -28,7 +28,7 @@ def _says(each: DecayFit, text: str) -> bool:
 def test_a_state_that_the_timing_hardly_resolves_is_in_sigma_and_named() -> None:
     """8 % with a lifetime of 2 s, frames every 5 s: without it k₁ was off by 3.7 σ in the mean."""
     truth = hidden_truth(DOUBLE, 0.08)
-    fits = [fit(truth, seed) for seed in range(400, 414)]
+    fits = [fit(truth, seed) for seed in range(400, 408)]
     slow = [
         max(
             abs(state.k_r_per_s - k) / state.k_r_sigma_per_s
@@ -37,7 +37,7 @@ def test_a_state_that_the_timing_hardly_resolves_is_in_sigma_and_named() -> None
         for each in fits
     ]
     silent = [z for z, each in zip(slow, fits, strict=True) if z > 3 and not each.warnings]
-    assert len(silent) <= 2
+    assert len(silent) <= 1
     assert np.median(slow) < 2
     named = [_says(each, "may hide") or each.n_states == 3 for each in fits]
     assert np.mean(named) >= 0.7
@@ -124,7 +124,7 @@ def test_a_free_offset_leaves_a_spectrum_of_rates_its_sigma() -> None:
 
 def test_a_free_offset_hides_no_flicker() -> None:
     """A slow state and a negative offset cancel: ρ was up to five times too small, χ² 7."""
-    for seed in range(31000, 31008):
+    for seed in range(31000, 31004):
         seen = truths.observe(truths.exponentials((0.08, 1.0), (0.015, 0.4)), seed, snr=3000)
         each = fit_decay(
             seen.t_s,
@@ -192,14 +192,14 @@ def _with_memory(seed: int, memory: float, dark_sigma: float) -> DecayFit:
 
 def test_a_drift_is_told_beside_dark_levels_that_are_known() -> None:
     """Dark levels that were free to follow the drift hid it in most of these."""
-    fits = [_with_memory(seed, 0.85, 2e-5) for seed in range(2000, 2020)]
+    fits = [_with_memory(seed, 0.85, 2e-5) for seed in range(2000, 2010)]
     told = sum(_says(each, "noise of neighbouring values correlates") for each in fits)
-    assert told >= 13
+    assert told >= 6
 
 
 def test_a_flicker_that_is_given_too_large_is_no_drift() -> None:
     told = 0
-    for seed in range(2100, 2120):
+    for seed in range(2100, 2110):
         seen = truths.observe(
             truths.exponentials((0.02, 1.0)), seed, flicker=0.003, t_s=truths.TIMES_S[:24]
         )
@@ -207,7 +207,7 @@ def test_a_flicker_that_is_given_too_large_is_no_drift() -> None:
             seen.t_s, seen.values, seen.sigma, exposure_s=1.5, channels="RGB", flicker=0.007
         )
         told += _says(each, "noise of neighbouring values correlates")
-    assert told <= 2
+    assert told <= 1
 
 
 def test_a_spectrum_of_rates_that_two_states_describe_is_told() -> None:
@@ -216,7 +216,7 @@ def test_a_spectrum_of_rates_that_two_states_describe_is_told() -> None:
     fractions = np.exp(-(spread**2) / 2)
     states = zip(0.02 * np.exp(0.8 * spread), fractions / fractions.sum(), strict=True)
     truth = truths.exponentials(*states)
-    for seed in range(2200, 2208):
+    for seed in range(2200, 2204):
         seen = truths.observe(truth, seed, snr=1000)
         each = fit_decay(
             seen.t_s, seen.values, seen.sigma, exposure_s=1.5, channels="RGB", flicker=None

@@ -72,7 +72,7 @@ def test_number_and_rates_within_their_sigma(
 @pytest.mark.parametrize(
     ("dark_sigma", "seeds"),
     [
-        (0.01, 20),
+        (0.01, 10),
         pytest.param(0.004, 100, marks=CAMPAIGN),
         pytest.param(0.01, 100, marks=CAMPAIGN),
     ],
@@ -103,7 +103,7 @@ def test_dark_errors_of_opposite_signs_make_no_state(dark_sigma: float, seeds: i
 
 
 def test_sigma_is_the_cramer_rao_bound() -> None:
-    fits = _fits(truths.exponentials(*DOUBLE), flicker=0.007, n_states=2)
+    fits = _fits(truths.exponentials(*DOUBLE), range(8), flicker=0.007, n_states=2)
     seen = truths.observe(truths.exponentials(*DOUBLE), 0)
     bound = truths.fisher_rate_sigma(DOUBLE, seen, 0.007)
     sigma = np.median([[state.k_r_sigma_per_s for state in fit.states] for fit in fits], axis=0)
@@ -152,18 +152,18 @@ def test_other_laws_are_chosen(decay: truths.Decay, name: str, flicker: float | 
 
 
 def test_drifting_background_is_noticed() -> None:
-    fits = _fits(lambda t: truths.exponentials(*DOUBLE)(t) + 0.01 * t / 180, range(15), 0.007)
+    fits = _fits(lambda t: truths.exponentials(*DOUBLE)(t) + 0.01 * t / 180, range(10), 0.007)
     assert np.mean([bool(fit.warnings) for fit in fits]) >= 0.9
 
 
 def test_heavy_tailed_flicker_leaves_the_choice_alone() -> None:
-    fits = _fits(truths.exponentials(*DOUBLE), range(20), heavy_tails=True)
+    fits = _fits(truths.exponentials(*DOUBLE), range(10), heavy_tails=True)
     assert all(fit.n_states == 2 for fit in fits)
     assert np.abs(_pulls(fits, DOUBLE)).max() < 5
 
 
 def test_unsuspected_flicker_makes_no_states_but_a_warning() -> None:
-    fits = _fits(truths.exponentials(*SINGLE), flicker=0.0)
+    fits = _fits(truths.exponentials(*SINGLE), range(15), flicker=0.0)
     assert all(fit.n_states == 1 for fit in fits)
     warned = [any("estimate the flicker" in line for line in fit.warnings) for fit in fits]
     assert np.mean(warned) > 0.7

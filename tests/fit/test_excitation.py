@@ -318,7 +318,7 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
     _, jacobian = problem.residuals(theta)
     # Of a charge that leaves something to the next one, the derivative is not quite exact.
     left = columns.off.start - 7
-    for column in [*range(left), *range(columns.off.start, len(theta))]:
+    for column in [*range(0, left, 2), *range(columns.off.start, len(theta))]:
         h = 1e-6 * max(abs(theta[column]), 1e-3)
         up, down = theta.copy(), theta.copy()
         up[column] += h

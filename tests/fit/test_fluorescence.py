@@ -268,6 +268,7 @@ def test_a_predicted_colour_is_that_of_the_drawn_surfaces(green_fit: Fluorescenc
     assert_allclose(colour.lab, appearance(green_fit.matrix, lamp).lab)
 
 
+@pytest.mark.campaign
 def test_more_leds_are_found_better() -> None:
     camera, lamps = read_camera(CAMERA), [read_light("D65")]
     truth = [surface(smooth_reflectance(np.random.default_rng(7)), GREEN, name="green")]

@@ -148,7 +148,8 @@ def test_a_position_without_light() -> None:
 
 @pytest.mark.shared_data
 @pytest.mark.skipif(not made.DATA.is_dir(), reason="the folder of real data is not there")
-@pytest.mark.parametrize("catalogue", ["rosco", pytest.param("lee", marks=pytest.mark.campaign)])
+@pytest.mark.campaign
+@pytest.mark.parametrize("catalogue", ["rosco", "lee"])
 def test_real_filters_under_a_real_lamp(catalogue: str) -> None:
     place = {
         "rosco": "filters/art_roscolux/roscolux_transmittance.csv",

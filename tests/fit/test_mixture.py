@@ -155,7 +155,7 @@ def test_a_mixture_is_nearer_to_the_truth_than_the_noisy_entries(
     assert_allclose(bands(fit.mixture).sum(), truth().sum(), rtol=0.15)
 
 
-@pytest.mark.parametrize("seed", [24, 25])
+@pytest.mark.parametrize("seed", [24, pytest.param(25, marks=pytest.mark.campaign)])
 def test_more_components_have_less_error(seed: int) -> None:
     matrix = measured(two_dyes(), seed)
     errors = [one.masked_mse for one in fit_mixture(matrix).candidates]
@@ -216,7 +216,9 @@ def test_cross_validation_finds_the_number_of_normal_densities() -> None:
     assert fit.components == 2
 
 
-@pytest.mark.parametrize(("truth", "seed"), [(one_dye, 29), (two_dyes, 30)])
+@pytest.mark.parametrize(
+    ("truth", "seed"), [(one_dye, 29), pytest.param(two_dyes, 30, marks=pytest.mark.campaign)]
+)
 def test_colours_set_the_scale(truth: Callable[[], np.ndarray], seed: int) -> None:
     matrix = measured(truth(), seed)
     lights = [read_light("D65"), read_light("A")]
@@ -371,7 +373,7 @@ def bfc(path: Path) -> ReradiationMatrix:
 
 @shared_data
 @needs_bispectral
-@pytest.mark.parametrize("colour", ["yellow", "green"])
+@pytest.mark.parametrize("colour", [pytest.param("yellow", marks=pytest.mark.campaign), "green"])
 def test_postits_have_at_most_the_reference_error(colour: str) -> None:
     matrix = postit(colour)
     fits: dict[int, MixtureFit] = {}

@@ -30,7 +30,9 @@ def test_sigma_of_values_and_rates_is_right() -> None:
 
 
 @pytest.mark.parametrize("noise", ["constant", "2000 counts"])
-@pytest.mark.parametrize("decay", ["power law", "stretched exponential"])
+@pytest.mark.parametrize(
+    "decay", ["power law", pytest.param("stretched exponential", marks=pytest.mark.campaign)]
+)
 def test_a_decay_of_another_law_is_not_taken_for_noise(decay: str, noise: str) -> None:
     found = coverage(DECAYS[decay], NOISES[noise], len(T_S), range(100, 110))
     assert 0.9 < found.sigma_ratio < 1.12

@@ -52,6 +52,7 @@ def test_of_a_line_the_sum_is_known_and_its_division_is_open() -> None:
     assert draws.std() / draws.mean() < 0.3 * bands.std(axis=1).max() / bands.mean(axis=1).max()
 
 
+@pytest.mark.campaign
 def test_sigma_covers_lines_closer_than_the_band() -> None:
     rng = np.random.default_rng(2)
     light = light_of("Eu", rng)

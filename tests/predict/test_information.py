@@ -66,7 +66,7 @@ def without_noise(expected: ExpectedSeries) -> truths.FloatArray:
     return np.multiply.outer(expected.curve, expected.weights)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     slow=st.floats(0.008, 0.05),
     ratio=st.floats(2.5, 10.0),
@@ -125,6 +125,7 @@ def test_of_a_kinetic_order_they_are_what_becquerels_law_gives(shape: float) -> 
     np.testing.assert_allclose(found.sigma, [rate, amplitude, exponent], rtol=2e-3)
 
 
+@pytest.mark.campaign
 def test_fits_of_noisy_data_scatter_by_them() -> None:
     truth = ((0.08, 1.0), (0.015, 0.4))
     expected = series(truth)
@@ -180,6 +181,7 @@ def test_reading_rules_where_it_is_raised() -> None:
     assert max(budget, key=lambda name: budget[name][0]) == READING
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("fast_per_s", "slow_per_s", "snr"),
     [(0.06, 0.02, 7), pytest.param(0.05, 0.03, 40, marks=pytest.mark.campaign)],

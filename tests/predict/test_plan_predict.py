@@ -224,7 +224,9 @@ def test_several_patches_want_names(labrig: Labrig) -> None:
     assert "--predict blue-paint=blue-paint" in ended.err
 
 
-@pytest.mark.parametrize("name", ["bottle", "orange-paint", "double-wide-slow"])
+@pytest.mark.parametrize(
+    "name", ["bottle", "orange-paint", pytest.param("double-wide-slow", marks=pytest.mark.campaign)]
+)
 def test_materials_from_a_paper_can_be_predicted(labrig: Labrig, name: str) -> None:
     ended = labrig("plan", "decay", "--rig", "sim", "--predict", name, "--json")
     assert ended.code == 0, ended.err

@@ -86,6 +86,7 @@ def test_nothing_overflows_and_no_printed_page_is_blank(chromium: "Chrome", tmp_
     assert 5 <= len(pages) <= 7
 
 
+@pytest.mark.campaign
 def test_a_mixture_overflows_nowhere(chromium: "Chrome", tmp_path: Path) -> None:
     matrix = replace(with_sigma(measurement(21, YELLOW).measured), name="paper_" * 20)
     lights = tuple(read_light(name) for name in ("D65", "A", "450nm", "395nm", "FL2"))

@@ -38,9 +38,9 @@ def written(folder: Path) -> Path:
     return pdf.parent
 
 
-@pytest.fixture
-def figures(tmp_path: Path) -> Path:
-    return written(tmp_path / "one")
+@pytest.fixture(scope="module")
+def figures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("plates") / "one")
 
 
 @pytest.mark.parametrize("name", [picture.name for picture in PICTURES])

@@ -76,10 +76,10 @@ def integrated(of: FieldParameters, start: FloatArray, light: FloatArray, t_s: f
 @pytest.mark.parametrize(
     ("order", "texture", "error"),
     [
-        ((1.0, 1.0), {}, 1e-6),
+        pytest.param((1.0, 1.0), {}, 1e-6, marks=pytest.mark.campaign),
         ((1.0, 1.0), {"k_e": True, "k_r": True, "emitted": True}, 1e-6),
         ((2.0,), {}, 1e-4),
-        ((1.0, 1.5), {}, 1e-4),
+        pytest.param((1.0, 1.5), {}, 1e-4, marks=pytest.mark.campaign),
         ((1.1, 2.7), {"k_e": True}, 1e-4),
     ],
 )

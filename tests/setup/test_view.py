@@ -275,6 +275,7 @@ class TestStatistics:
 
 
 class TestCommand:
+    @pytest.mark.campaign
     def test_ctrl_c_ends_it_in_one_line(self, make_rig: Callable[..., Path]) -> None:
         command = [sys.executable, "-m", "labrig", "rig", "view", str(make_rig()), "--no-browser"]
         with subprocess.Popen(

@@ -141,6 +141,7 @@ def test_the_body_is_noted_and_known_again(run: Path, camera: CameraFile) -> Non
         camera.require_match(identity, None, 5.6)
 
 
+@pytest.mark.campaign
 def test_killed_within_a_bracket_it_goes_on_there(
     run: Path, result: CameraCalibrationResult, camera: CameraFile, tmp_path: Path
 ) -> None:

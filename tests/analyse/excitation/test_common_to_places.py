@@ -11,7 +11,7 @@ from tests.fit.charged_samples import Bench
 from tests.fit.test_excitation_order import BARE, LVF
 
 
-@pytest.mark.parametrize("flicker", [0.004, 0.012])
+@pytest.mark.parametrize("flicker", [pytest.param(0.004, marks=pytest.mark.campaign), 0.012])
 def test_flicker_is_that_of_all_photographs(flicker: float) -> None:
     """Of 3 × 175 photographs; those of a dozen would scatter by a fifth."""
     found = []

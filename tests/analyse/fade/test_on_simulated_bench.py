@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 PROTOCOL: dict[str, Any] = {
     "protocol": "fade",
     "sample": {"name": "lamp"},
-    "every": "50 ms",
+    "every": "80 ms",
     "until": "400 ms",
     "passes": 2,
 }

@@ -144,7 +144,13 @@ def dark(rig: Rig) -> None:
     rig["simulation"]["leds"][7]["level"] = 1e-12
 
 
-@pytest.mark.parametrize("change", [dark, without_spectrometer], ids=["spectrometer", "camera"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(dark, id="spectrometer"),
+        pytest.param(without_spectrometer, id="camera", marks=pytest.mark.campaign),
+    ],
+)
 def test_an_led_that_does_not_light_is_left_out(
     change: Callable[[Rig], None], tmp_path: Path
 ) -> None:
@@ -163,6 +169,7 @@ def stuck(rig: Rig) -> None:
     rig["simulation"]["faults"] = [{"led_stuck": {"relay": 8}}]
 
 
+@pytest.mark.campaign
 def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Path) -> None:
     found = faults(result_of(recorded(tmp_path, stuck, leds=LONG)))
     assert found[LedFault.NOT_LIT] == ("590 nm",)
@@ -283,6 +290,7 @@ def test_drift_is_reported_and_in_sigma(tmp_path: Path) -> None:
         assert led.brightness.sigma / led.brightness.value > -result.drift.value / math.sqrt(12)
 
 
+@pytest.mark.campaign
 def test_an_unfinished_run_keeps_what_is_measured(tmp_path: Path) -> None:
     run = recorded(tmp_path, leds=LONG)
     journal = run / "journal.jsonl"

@@ -264,6 +264,7 @@ def test_leds_in_another_order_count_as_what_they_are(tmp_path: Path) -> None:
     assert _is_felt(result)
 
 
+@pytest.mark.campaign
 def test_an_led_that_stays_lit_leaves_what_was_measured_before(tmp_path: Path) -> None:
     """It is the last one of the card, and all samples are lit by it, too."""
     stuck = _with(faults=[{"led_stuck": {"relay": 1, "at": "0 s"}}])

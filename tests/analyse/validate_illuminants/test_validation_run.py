@@ -135,6 +135,7 @@ def test_lamps_in_another_order_count_as_those_that_were_lit(run: Path) -> None:
     assert "halogen for daylight" in line
 
 
+@pytest.mark.campaign
 def test_light_of_the_room_is_subtracted_and_said(tmp_path: Path) -> None:
     def leaking(rig: dict[str, Any]) -> None:
         rig["simulation"]["faults"] = [{"ambient_light": {"level": "0.5 %", "at": "3 min"}}]

@@ -100,14 +100,14 @@ def test_what_it_does_not_offer() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ready_s", "taken_s"), [(0.0, [1 / 64]), (0.1, [0.5, 1 / 64])], ids=["not ready", "exposing"]
+    ("ready_s", "taken_s"), [(0.0, [1 / 64]), (0.1, [0.25, 1 / 64])], ids=["not ready", "exposing"]
 )
 def test_a_frame_that_was_broken_off_is_never_taken_for_the_next(
     ready_s: float, taken_s: list[float]
 ) -> None:
     clock = SystemClock()
     with photographing(clock) as (camera, film):
-        camera.configure(ExposureSettings(0.5, 100, 8.0))
+        camera.configure(ExposureSettings(0.25, 100, 8.0))
         camera.arm()
         clock.sleep(ready_s)
         clock.interrupt(signal.SIGINT)

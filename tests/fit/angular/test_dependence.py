@@ -61,6 +61,7 @@ def test_five_in_a_hundred_are_found_where_there_is_none(name: str) -> None:
     assert inside / SEEDS == pytest.approx(0.95, abs=0.035)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", FIRST_OF_SCATTERS)
 def test_a_dependence_of_the_stated_size_is_found_in_nine_of_ten(name: str) -> None:
     exact = np.sqrt(SCATTER**2 + NOISE**2)
@@ -98,7 +99,7 @@ def test_what_all_views_share_is_no_dependence() -> None:
     """An error of the reflected light, known to 2 %, looks like a dependence of one σ."""
     shape = np.exp((45 - ANGLES) / 60) - 1
     found = found_without = 0
-    for seed in range(200):
+    for seed in range(80):
         rng = np.random.default_rng([3, seed])
         angle_deg, signal = views(rng, SCATTERS["normal"])
         error = 0.02 * np.interp(angle_deg, ANGLES, shape)
@@ -106,8 +107,8 @@ def test_what_all_views_share_is_no_dependence() -> None:
         noise = NOISE * signal
         found += fit_dependence(angle_deg, changed, noise, shared=error).test.finds_dependence
         found_without += fit_dependence(angle_deg, changed, noise).test.finds_dependence
-    assert found <= 22
-    assert found_without > 60
+    assert found <= 11
+    assert found_without > 20
 
 
 def test_noise_alone_is_enough_where_placings_do_not_scatter() -> None:

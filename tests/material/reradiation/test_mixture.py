@@ -119,7 +119,7 @@ def test_a_conditional_times_its_integral_is_the_joint_density(
 
 
 @both_ways
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(seed=seeds, given_nm=wavelengths)
 def test_pdf_and_cdf_agree_and_end_at_the_diagonal(given: str, seed: int, given_nm: float) -> None:
     density = conditional(random_mixture(seed), given)
@@ -136,7 +136,7 @@ def test_pdf_and_cdf_agree_and_end_at_the_diagonal(given: str, seed: int, given_
 
 
 @both_ways
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.campaign)])
 def test_draws_have_the_density(given: str, seed: int) -> None:
     density = conditional(random_mixture(seed), given)
     given_nm = 470.0 if given == "input" else 540.0
@@ -148,7 +148,7 @@ def test_draws_have_the_density(given: str, seed: int) -> None:
     assert ((counts - expected) ** 2 / expected).sum() < chi2.isf(LEVEL, BINS - 1)
 
 
-@both_ways
+@pytest.mark.parametrize("given", ["input", pytest.param("output", marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("seed", [3])
 def test_the_mean_weight_of_draws_is_the_integral(given: str, seed: int) -> None:
     # Weighted by a re-radiation that is not the sampled one, as of a measured matrix.

@@ -59,7 +59,7 @@ def real_tiles() -> tuple[list[ReradiationMatrix], list[ReradiationMatrix]]:
     return tiles[::2], tiles[1::2]
 
 
-@pytest.mark.parametrize("common", [0.0, 0.75])
+@pytest.mark.parametrize("common", [pytest.param(0.0, marks=pytest.mark.campaign), 0.75])
 @pytest.mark.parametrize("dyes", [(YELLOW,), (BRIGHTENER, ORANGE)], ids=["one dye", "two dyes"])
 def test_sigma_without_repeats_is_that_of_the_noise(common: float, dyes: tuple[Dye, ...]) -> None:
     samples = [measurement(seed, *dyes, common=common) for seed in range(20)]
@@ -70,7 +70,7 @@ def test_sigma_without_repeats_is_that_of_the_noise(common: float, dyes: tuple[D
     assert 1 < np.mean(ratio[:, ULTRAVIOLET]) < 1.5
 
 
-@pytest.mark.parametrize("common", [0.0, 0.75])
+@pytest.mark.parametrize("common", [pytest.param(0.0, marks=pytest.mark.campaign), 0.75])
 def test_sigma_with_repeats_is_that_of_the_noise(common: float) -> None:
     ratio = []
     for seed in range(12):

@@ -12,7 +12,7 @@ import usb.util
 
 from labrig.acquire import CAMERA, ExposureSettings, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import SystemClock, VirtualClock
+from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError, UsageError
 from labrig.sim.camera import BodySettings, SimulatedCamera
@@ -24,24 +24,11 @@ BUSES = 2
 EOS_IDS, STANDARD_IDS = "04a9:3199", "1209:0001"
 
 
-class PacedClock(VirtualClock):
-    """A simulated clock that is never behind the PC's."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._pc = SystemClock()
-        self._zero_s = self._pc.now()
-
-    def now(self) -> float:
-        self._now_s = max(self._now_s, self._pc.now() - self._zero_s)
-        return self._now_s
-
-
 class Twins:
     """Cameras with the serial numbers 0111 and 0222, and what each has taken."""
 
     def __init__(self, body: BodySettings) -> None:
-        self.clock = PacedClock()
+        self.clock = VirtualClock()
         self.films = {serial: Film(size=3000) for serial in ("0111", "0222")}
         self.cameras = {
             serial: SimulatedCamera(self.clock, film, serial=serial, seed=1, body=body)
@@ -73,6 +60,8 @@ def plug_in(monkeypatch: pytest.MonkeyPatch) -> Callable[[BodySettings], Twins]:
     def plug(body: BodySettings) -> Twins:
         twins = Twins(body)
         monkeypatch.setattr(usb.core, "find", twins.find)
+        # The bench has the cameras' clock: nobody waits for exposures.
+        monkeypatch.setattr("labrig.bench.SystemClock", lambda: twins.clock)
         return twins
 
     return plug
