@@ -14,7 +14,7 @@ M · lamp · R²/(R² + h²).
 
 Noise is the standard deviation of one path's estimate, over the mean light, for the mean of the 24
 bands of 20 nm in the root of squares, and for the luminance Y. At equal time it is multiplied by
-the root of the time of a path: what is left after one second of one core. `× time` is how many
+the root of the time of a path: what is left after one second of a processor. `× time` is how many
 times as long as the fold a method takes for the same noise. Rays are not traced here; `--ray` adds
 that time in µs for each vertex (or connexion to the lamp) to all methods.
 """
@@ -256,9 +256,9 @@ def measured(draw: Draw, exact: FloatArray, paths: int, seed: int, ray_s: float 
     band_y = fine_y.reshape(BANDS, -1).mean(axis=1)
     sums, squares, y, taken_s, done, vertices = np.zeros(BANDS), np.zeros(BANDS), [], 0.0, 0, 0
     while done < paths:
-        began_s = time.perf_counter()
+        began_s = time.process_time()
         started, light, met = draw(rng, CHUNK)
-        taken_s += time.perf_counter() - began_s
+        taken_s += time.process_time() - began_s
         vertices += met
         done += CHUNK
         if started.size:
@@ -352,9 +352,9 @@ def main() -> None:
         papers["yellow paper as measured, 4 components"] = measured_paper
     for paper_number, (name, make) in enumerate(papers.items()):
         print(f"\n{name}: {options.paths} paths, {options.ray:g} µs for a ray")
-        print(f"{'':44}{'noise of a path':^18}{'after 1 s, %':^16}{'× time':^16}{'error of Y':^16}")
+        print(f"{'':44}{'noise of a path':^18}{'after 1 s, %':^16}{'× time':^20}{'error of Y':^16}")
         print(f"{'case':20}{'method':24}{'spectrum':>9}{'Y':>9}{'spectrum':>9}{'Y':>7}"
-              f"{'spectrum':>9}{'Y':>7}{'σ':>7}{'%':>9}")  # fmt: skip
+              f"{'spectrum':>10}{'Y':>10}{'σ':>7}{'%':>9}")  # fmt: skip
         for number, (case, (exact, methods)) in enumerate(cases(make()).items()):
             fold: Found | None = None
             for method_number, (method, draw) in enumerate(methods.items()):
@@ -372,7 +372,7 @@ def main() -> None:
                 ]
                 print(f"{case:20}{method:24}{one.spectrum:9.3f}{one.luminance:9.3f}"
                       f"{one.spectrum * root_s:9.4f}{one.luminance * root_s:7.3f}"
-                      f"{ratio[0]:9.3g}{ratio[1]:7.3g}{one.bias:+7.1f}"
+                      f"{ratio[0]:10.3g}{ratio[1]:10.3g}{one.bias:+7.1f}"
                       f"{100 * one.bias_part:+9.3f}")  # fmt: skip
 
 
