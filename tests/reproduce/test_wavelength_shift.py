@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
@@ -19,6 +20,7 @@ from labrig.reproduce import (
 )
 from labrig.reproduce.wavelength_shift import Start
 from tests.material.reradiation import bfc450
+from tests.material.reradiation.test_mixture import random_mixture
 
 FloatArray = NDArray[np.float64]
 
@@ -67,16 +69,16 @@ def test_parts_weights_and_wavelengths_are_those_of_the_mixture(
     start: Start, given_nm: float
 ) -> None:
     surface = paper()
-    given, reflectance = np.full(DRAWS, given_nm), REFLECTANCE[int((given_nm - 300) // 10)]
+    known, reflectance = np.full(DRAWS, given_nm), REFLECTANCE[int((given_nm - 300) // 10)]
     rng = np.random.default_rng((int(given_nm), len(start)))
-    drawn = surface.draw(given, start, rng.random((3, DRAWS)))
+    drawn = surface.draw(known, start, rng.random((3, DRAWS)))
     shifted = integral(start, given_nm)
     kept = surface.reflected_part([given_nm], start)
     assert kept == pytest.approx(reflectance / (reflectance + shifted), rel=1e-8)
     assert drawn.weight == pytest.approx(reflectance + shifted, rel=1e-8)
     assert is_within(drawn.is_reflected.astype(float), float(kept[0]))
     assert (drawn.wavelength_nm[drawn.is_reflected] == given_nm).all()
-    other = surface.draw_shift(given, start, rng.random((2, DRAWS)))
+    other = surface.draw_shift(known, start, rng.random((2, DRAWS)))
     assert is_within(other, integral(start, given_nm, 1.0) / shifted)
     assert is_within(other**3, integral(start, given_nm, 3.0) / shifted)
 
@@ -92,6 +94,24 @@ def test_densities_integrate_to_one_and_are_none_beyond_the_stokes_side(start: S
         assert not pdf[beyond].any()
 
 
+@given(seed=st.integers(0, 10_000), given_nm=st.floats(330, 750))
+@settings(max_examples=25)
+def test_densities_are_the_conditional_ones_within_the_range(seed: int, given_nm: float) -> None:
+    mixture = random_mixture(seed)
+    surface = WavelengthShift(mixture.to_matrix(NM, NM), mixture)
+    others = np.arange(302.5, 780.0, 5.0)
+    for start in STARTS:
+        conditional = mixture.input_given_output if start == "eye" else mixture.output_given_input
+        reached = conditional.cdf([300.0, 780.0], given_nm)
+        inside = float(reached[1] - reached[0])
+        if inside < 1e-9:
+            continue
+        expected = conditional.pdf(others, given_nm) / inside
+        assert surface.density(given_nm, others, start) == pytest.approx(
+            expected, rel=1e-6, abs=1e-12
+        )
+
+
 def test_the_ends_of_the_random_numbers_draw_the_ends_of_the_range() -> None:
     """The component is the one that reaches the number, also at 0 and just below 1."""
     last = np.nextafter(1.0, 0.0)
@@ -105,14 +125,14 @@ def test_the_ends_of_the_random_numbers_draw_the_ends_of_the_range() -> None:
 
 def test_without_re_radiation_all_is_reflected() -> None:
     grey = ReradiationMatrix.from_bands("grey", NM, NM, np.diag(REFLECTANCE))
-    given = np.linspace(301, 779, 300)
+    known = np.linspace(301, 779, 300)
     for start in STARTS:
         drawn = WavelengthShift(grey, None).draw(
-            given, start, np.random.default_rng(4).random((3, 300))
+            known, start, np.random.default_rng(4).random((3, 300))
         )
         assert drawn.is_reflected.all()
-        assert (drawn.wavelength_nm == given).all()
-        assert (drawn.weight == REFLECTANCE[((given - 300) // 10).astype(int)]).all()
+        assert (drawn.wavelength_nm == known).all()
+        assert (drawn.weight == REFLECTANCE[((known - 300) // 10).astype(int)]).all()
 
 
 def test_beyond_the_bands_nothing_comes_back() -> None:
@@ -154,8 +174,8 @@ def test_measured_matrices_give_back_their_sums(name: str) -> None:
     for start in STARTS:
         given_nm, axis = (matrix.output_nm, 1) if start == "eye" else (matrix.input_nm, 0)
         each = DRAWS // 10
-        given = np.repeat(given_nm, each)
-        weight = surface.draw(given, start, rng.random((3, len(given)))).weight
+        known = np.repeat(given_nm, each)
+        weight = surface.draw(known, start, rng.random((3, len(known)))).weight
         weight -= np.repeat(light.sum(axis=axis), each)
         assert is_within(weight, 0.0)
         by_band = weight.reshape(-1, each)
