@@ -16,8 +16,8 @@ Noise is the standard deviation of one path's estimate, over the mean light, for
 bands of 20 nm in the root of squares, and for the luminance Y. At equal time it is multiplied by
 the root of a path's time: what is left after one second of a processor. `× time` is how many times
 as long as the fold a method takes for the same noise. Rays are not traced here: each vertex, and
-each connexion to the lamp, is taken to cost 0.3 µs, as measured of compiled rays in a small scene,
-or 10 µs, as of a large one. The error of Y is in σ and in % of the exact one; that of the fold is
+each connexion to the lamp, is taken to cost 0.3 µs, as compiled rays do in a small scene, or 10 µs,
+as in a large one. The error of Y is in σ and in % of the exact one; that of the fold is
 the width of its bands.
 """
 
