@@ -82,3 +82,11 @@ from .video import (
     require_ffmpeg as require_ffmpeg,
     write_video as write_video,
 )
+from .wavelength_shift import (
+    LampWavelengths as LampWavelengths,
+    ShiftedWavelengths as ShiftedWavelengths,
+    WavelengthShift as WavelengthShift,
+    balance as balance,
+    direct_light as direct_light,
+    rotated_wavelengths as rotated_wavelengths,
+)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
 from labrig.material import steady_concentration
+from labrig.reproduce.compiled import compiled
 from labrig.reproduce.field_parameters import FieldParameters
 from labrig.reproduce.order_table import LONGEST, order_table
 
@@ -61,7 +62,7 @@ class Field:
     def __init__(
         self, parameters: FieldParameters, n_samples: int | None = None, levels: ArrayLike = 0.0
     ) -> None:
-        _kernels()
+        compiled("kernels")
         of_textures = parameters.n_samples
         if n_samples is None:
             n_samples = of_textures
@@ -129,7 +130,7 @@ class Field:
         if method == "euler":
             self._euler(light, base, duration_s)
             return
-        kernels, order = _kernels(), self._parameters.order
+        kernels, order = compiled("kernels"), self._parameters.order
         if (order == 1).all():
             self._in_threads(
                 kernels.step_first_order,
@@ -219,7 +220,7 @@ class Field:
     def _kappa(self, light: Float32Array, base: Float32Array, state: int) -> Float32Array:
         """Return κ of a state in 1/s (samples,)."""
         kappa = np.empty(self.n_samples, np.float32)
-        self._in_threads(_kernels().excitation, kappa, light, self._k_e, base, state)
+        self._in_threads(compiled("kernels").excitation, kappa, light, self._k_e, base, state)
         return kappa
 
     def _euler(self, light: Float32Array, base: Float32Array, duration_s: float) -> None:
@@ -237,18 +238,6 @@ class Field:
         run = map if len(parts) == 1 else _pool().map
         if not all(list(run(lambda part: kernel(*arguments, *part), parts))):
             raise UsageError(IMPROPER)
-
-
-def _kernels() -> Any:
-    """Return the compiled functions; compiled, or read from the cache, when first used."""
-    try:
-        from labrig.reproduce import kernels
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"labrig.reproduce needs an extra ({error.name} is missing): pip install "
-            "'labrig[render]'"
-        ) from None
-    return kernels
 
 
 @cache

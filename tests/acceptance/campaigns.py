@@ -172,6 +172,9 @@ CAMPAIGNS = {
             _module("mixture_colours", *arguments, called="_".join(("mixture_colours", *words)))
             for words, arguments in MIXTURE_SCALES.items()
         ),
+        _module("wavelength_noise", "--paths", "786432"),
+        _module("history_sampling"),
+        _module("euler_steps"),
         Campaign(
             "benchmarks",
             ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),

@@ -2,7 +2,7 @@
 
 import re
 
-from tests.acceptance import quoted_decay_fit, quoted_examples
+from tests.acceptance import quoted_decay_fit, quoted_examples, quoted_rendering
 from tests.acceptance.printed import Extract, columns, match, part, span
 from tests.acceptance.quote import DECISIONS, EXPLANATION, HOW_TO, Quote
 
@@ -242,6 +242,7 @@ QUOTES = (
     Quote(f"{EXPLANATION}/excitation_fit.md", "excitation_light", _light_errors),
     *quoted_examples.QUOTES,
     *quoted_decay_fit.QUOTES,
+    *quoted_rendering.QUOTES,
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _charging),
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _two_rates),
     Quote(f"{EXPLANATION}/identifiability.md", "coverage_pipeline", _of_bound),
