@@ -3,6 +3,11 @@ from .display import (
     camera_values as camera_values,
     tristimulus as tristimulus,
 )
+from .exported_scene import (
+    ExportedCamera as ExportedCamera,
+    ExportedMesh as ExportedMesh,
+    Glow as Glow,
+)
 from .exr import (
     SpectralFrame as SpectralFrame,
     read_linear_exr as read_linear_exr,
@@ -15,6 +20,9 @@ from .field import (
 )
 from .field_parameters import (
     FieldParameters as FieldParameters,
+)
+from .gltf import (
+    write_gltf as write_gltf,
 )
 from .night import (
     NightLook as NightLook,
