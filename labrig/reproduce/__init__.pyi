@@ -24,6 +24,9 @@ from .field_parameters import (
 from .gltf import (
     write_gltf as write_gltf,
 )
+from .mitsuba_scene import (
+    write_mitsuba_scene as write_mitsuba_scene,
+)
 from .night import (
     NightLook as NightLook,
     night_view as night_view,
