@@ -6,6 +6,11 @@ from .display import (
     camera_values as camera_values,
     tristimulus as tristimulus,
 )
+from .exported_scene import (
+    ExportedCamera as ExportedCamera,
+    ExportedMesh as ExportedMesh,
+    Glow as Glow,
+)
 from .exr import (
     SpectralFrame as SpectralFrame,
     read_linear_exr as read_linear_exr,
@@ -28,6 +33,9 @@ from .geometry import (
     Samples as Samples,
     Surface as Surface,
 )
+from .gltf import (
+    write_gltf as write_gltf,
+)
 from .lamp import (
     Lamp as Lamp,
     LampTable as LampTable,
@@ -35,6 +43,9 @@ from .lamp import (
 from .mesh import (
     Mesh as Mesh,
     read_mesh as read_mesh,
+)
+from .mitsuba_scene import (
+    write_mitsuba_scene as write_mitsuba_scene,
 )
 from .night import (
     NightLook as NightLook,

@@ -26,8 +26,13 @@ from labrig.optics import (
 FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
-#: Percentage of the pixels that automatic exposure shows unclipped.
+#: Percentage of the pixels that are not black which automatic exposure shows unclipped.
 UNCLIPPED_PER_CENT = 99.5
+
+#: X, Y, Z to the responses of Bradford's transform (CIE 159:2004, from Lam, 1985).
+BRADFORD = np.array(
+    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+)
 
 
 def tristimulus(radiance: ArrayLike, edges_nm: ArrayLike) -> FloatArray:
@@ -135,20 +140,23 @@ def weighted_bands(radiance: ArrayLike, edges_nm: ArrayLike, weights: FloatArray
 class Display:
     """Transform from X, Y, Z to 8-bit sRGB, the same for all pixels.
 
-    X, Y, Z are divided by the luminance of the screen's white, and become linear sRGB without
-    chromatic adaptation: D65 is white. A colour outside of the screen's gamut is mixed with the
-    grey of its own luminance until it fits, so that its luminance stays; brighter than white is
-    white. The curve is that of IEC 61966-2-1.
+    X, Y, Z are divided by the luminance of the screen's white, and become linear sRGB. D65 is
+    white; another white is adapted to it by Bradford's transform. A colour outside of the screen's
+    gamut is mixed with the grey of its own luminance until it fits, so that its luminance stays;
+    brighter than white is white. The curve is that of IEC 61966-2-1.
 
     Parameters
     ----------
     white_luminance
         Luminance that is the screen's white, above 0, in cd/m² or the unit of a relative Y.
+    adapted_white
+        X, Y, Z, on any scale, of what is to look white, such as a white surface under the lamp to
+        which eyes are used; None for D65.
 
     Raises
     ------
     UsageError
-        The luminance is not above 0 or not finite.
+        The luminance or the white is not above 0 or not finite.
 
     Examples
     --------
@@ -161,8 +169,12 @@ class Display:
     """
 
     white_luminance: float
+    adapted_white: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
+        white = (1.0, 1.0, 1.0) if self.adapted_white is None else self.adapted_white
+        if not all(0 < value < np.inf for value in white):
+            raise UsageError(f"expected X, Y and Z of white above 0 and finite, got {white}")
         if not 0 < self.white_luminance < np.inf:
             raise UsageError(
                 "expected the luminance of white above 0 and finite, got "
@@ -177,7 +189,12 @@ class Display:
         return cls(1 / exposure)
 
     @classmethod
-    def automatic(cls, xyz: FloatArray, unclipped_per_cent: float = UNCLIPPED_PER_CENT) -> Self:
+    def automatic(
+        cls,
+        xyz: FloatArray,
+        unclipped_per_cent: float = UNCLIPPED_PER_CENT,
+        adapted_white: tuple[float, float, float] | None = None,
+    ) -> Self:
         """Return the transform that shows most pixels of X, Y, Z (…, 3) unclipped.
 
         Parameters
@@ -185,17 +202,22 @@ class Display:
         xyz
             X, Y, Z of a picture, or of several that are to have the same exposure, shape (…, 3).
         unclipped_per_cent
-            Percentage of the pixels whose highest channel is at most full.
+            Percentage, of the pixels that are not black, of those whose highest channel is at most
+            full.
+        adapted_white
+            What is to look white, as in `Display`.
 
         Raises
         ------
         UsageError
-            The percentage is not from 0 to 100, or so many pixels are black.
+            The percentage is not from 0 to 100, or all pixels are black.
         """
         if not 0 <= unclipped_per_cent <= 100:
             raise UsageError(f"expected a percentage from 0 to 100, got {unclipped_per_cent:g}")
-        highest = _lifted(xyz).max(axis=-1)
-        return cls(float(np.percentile(highest, unclipped_per_cent)))
+        highest = _lifted(_adapted(xyz, adapted_white)).max(axis=-1)
+        lit = highest[highest > 0]
+        white_luminance = float(np.percentile(lit, unclipped_per_cent)) if lit.size else 0.0
+        return cls(white_luminance, adapted_white)
 
     @property
     def exposure(self) -> float:
@@ -205,14 +227,19 @@ class Display:
     @property
     def statement(self) -> str:
         """The transform in one line for people."""
+        white = "D65"
+        if self.adapted_white is not None:
+            total = sum(self.adapted_white)
+            x, y = (value / total for value in self.adapted_white[:2])
+            white = f"x, y = {x:.4f}, {y:.4f} (by Bradford's transform)"
         return (
-            f"sRGB (IEC 61966-2-1), D65 of luminance {rounded(self.white_luminance, 4)} is white; "
-            "colours out of gamut are mixed with the grey of their luminance"
+            f"sRGB (IEC 61966-2-1), {white} of luminance {rounded(self.white_luminance, 4)} is "
+            "white; colours out of gamut are mixed with the grey of their luminance"
         )
 
     def linear(self, xyz: FloatArray) -> FloatArray:
         """Return linear sRGB from 0 to 1 of X, Y, Z (…, 3)."""
-        relative = np.asarray(xyz, dtype=np.float64) * self.exposure
+        relative = _adapted(np.asarray(xyz, dtype=np.float64), self.adapted_white) * self.exposure
         lifted = _lifted(relative)
         grey = np.clip(relative[..., 1:2], 0.0, 1.0)
         above = lifted.max(axis=-1, keepdims=True) - grey
@@ -222,6 +249,15 @@ class Display:
     def shown(self, xyz: FloatArray) -> Bytes:
         """Return the bytes of sRGB of X, Y, Z (…, 3)."""
         return srgb_bytes(self.linear(xyz))
+
+
+def _adapted(xyz: FloatArray, white: tuple[float, float, float] | None) -> FloatArray:
+    """Return X, Y, Z (…, 3) as they look where a white is adapted to the screen's."""
+    if white is None:
+        return xyz
+    screen = BRADFORD @ np.linalg.inv(XYZ_TO_SRGB).sum(axis=1)
+    gain = screen / (BRADFORD @ white) * white[1]
+    return np.asarray(xyz @ (np.linalg.inv(BRADFORD) @ (gain[:, np.newaxis] * BRADFORD)).T)
 
 
 def _lifted(xyz: FloatArray) -> FloatArray:

@@ -145,12 +145,34 @@ def test_automatic_exposure_clips_the_share_that_it_says() -> None:
     display = Display.automatic(xyz, unclipped_per_cent=98.0)
     clipped = (xyz @ XYZ_TO_SRGB.T * display.exposure > 1).any(axis=-1).mean()
     assert clipped == pytest.approx(0.02, abs=1e-4)
+    # A small glow in the dark is exposed as if it were all.
+    in_the_dark = np.concatenate([np.zeros((2000, 100, 3)), xyz])
+    in_the_dark_display = Display.automatic(in_the_dark, unclipped_per_cent=98.0)
+    assert in_the_dark_display == display
 
 
 def test_an_exposure_is_the_reciprocal_of_the_white() -> None:
     xyz = np.random.default_rng(4).uniform(0, 50, (7, 3))
     np.testing.assert_array_equal(Display.of_exposure(0.02).shown(xyz), Display(50.0).shown(xyz))
     assert "luminance 50 is white" in Display.of_exposure(0.02).statement
+
+
+def test_a_white_under_a_lamp_is_white_and_all_else_is_adapted_as_by_colour_science() -> None:
+    lamp = white_xyz("A", observer(CIE_1931))
+    display = Display(2.0, tuple(7.0 * lamp))
+    np.testing.assert_allclose(display.linear(2.0 * lamp), 1.0, atol=1e-9)
+    np.testing.assert_allclose(display.linear(0.4 * lamp), 0.2, atol=1e-9)
+    xyz = chart(EDGES_NM, "A")
+    colour = colour_science.load()
+    adapted = colour.chromatic_adaptation(
+        xyz, lamp, np.linalg.inv(XYZ_TO_SRGB).sum(axis=1), "Von Kries", transform="Bradford"
+    )
+    np.testing.assert_allclose(display.linear(xyz), Display(2.0).linear(adapted), atol=1e-4)
+    assert "x, y = 0.4476, 0.4074" in display.statement
+    automatic = Display.automatic(xyz, 100.0, tuple(lamp))
+    assert automatic.white_luminance == pytest.approx(np.max(adapted @ XYZ_TO_SRGB.T), rel=1e-4)
+    with pytest.raises(UsageError, match="white"):
+        Display(1.0, (0.9, 1.0, 0.0))
 
 
 @pytest.mark.parametrize(
