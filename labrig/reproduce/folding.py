@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.reproduce.compiled import compiled
 from labrig.reproduce.surface_material import SurfaceMaterial
 from labrig.reproduce.tracing import Paths
 
@@ -103,8 +104,7 @@ def fold(
     >>> fold(paths, walls, room.material_of_place, np.ones((1, 3), np.float32), no_lamps, 1)[0]
     array([2., 2., 2.], dtype=float32)
     """
-    from labrig.reproduce.folding_kernels import fold_paths
-
+    fold_paths = compiled("folding_kernels").fold_paths
     arguments = (
         matrices.values, matrices.first, matrices.last, matrices.is_diagonal,
         np.ascontiguousarray(material_of_place, dtype=np.int32),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
+from labrig.reproduce.compiled import compiled
 from labrig.reproduce.mesh import Mesh
 
 FloatArray = NDArray[np.float64]
@@ -297,13 +298,12 @@ def _on_texels(
     surface: Surface, per_place: int, rng: np.random.Generator, scattered: FloatArray
 ) -> tuple[IntArray, FloatArray, IntArray]:
     """Return triangles, weights of their corners, and texels, for points on each texel."""
-    from labrig.reproduce.tracing_kernels import located_in_texture, rasterised
-
+    kernels = compiled("tracing_kernels")
     assert isinstance(surface.samples, tuple)
     assert surface.mesh.uv is not None
     columns, rows = surface.samples
     corners = surface.mesh.uv[surface.mesh.faces].astype(np.float32)
-    face_at, n_shared = rasterised(corners, columns * LOOKUPS, rows * LOOKUPS)
+    face_at, n_shared = kernels.rasterised(corners, columns * LOOKUPS, rows * LOOKUPS)
     covered = int((face_at >= 0).sum())
     if not covered:
         raise UsageError(
@@ -327,7 +327,7 @@ def _on_texels(
     part = order[place, turn]
     u = ((place % columns) + (part % LOOKUPS + even[:, 0]) / LOOKUPS) / columns
     v = ((place // columns) + (part // LOOKUPS + even[:, 1]) / LOOKUPS) / rows
-    face, weights = located_in_texture(
+    face, weights = kernels.located_in_texture(
         corners, face_at, np.stack([u, v], axis=1).astype(np.float32)
     )
     return face, weights, place.astype(np.int32)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
+from labrig.reproduce.compiled import compiled
 from labrig.reproduce.geometry import Geometry
 from labrig.reproduce.lamp import LampTable
 
@@ -178,7 +179,8 @@ class Tracer:
         self, geometry: Geometry, lamps: LampTable, length: PathLength, seed: int = 1
     ) -> None:
         self._geometry, self._lamps, self._length, self._seed = geometry, lamps, length, seed
-        self._kernels, self._scene = _compiled(), _embree_scene(geometry.triangles)
+        self._kernels = compiled("tracing_kernels")
+        self._scene = _embree_scene(geometry.triangles)
         self._sky = (
             int(np.argmax(lamps.kind == self._kernels.SKY))
             if (lamps.kind == self._kernels.SKY).any()
@@ -427,12 +429,6 @@ def _in_threads(part: Callable[[int], Paths], n_parts: int, threads: int) -> Ite
         return
     with ThreadPoolExecutor(threads, thread_name_prefix="paths") as pool:
         yield from pool.map(part, range(n_parts))
-
-
-def _compiled() -> Any:
-    from labrig.reproduce import tracing_kernels
-
-    return tracing_kernels
 
 
 def _embree_scene(triangles: Float32Array) -> Any:
