@@ -60,6 +60,16 @@ def render(
     video: Annotated[
         Path | None, typer.Option("--video", help="File for a film of all pictures (.mp4).")
     ] = None,
+    gltf: Annotated[
+        Path | None,
+        typer.Option(
+            "--gltf", help="File for a preview in a browser, with the glow over time (.glb)."
+        ),
+    ] = None,
+    mitsuba: Annotated[
+        Path | None,
+        typer.Option("--mitsuba", help="Folder for the first picture as a scene of Mitsuba 3."),
+    ] = None,
     fps: Annotated[float, typer.Option("--fps", help="Pictures of the film per second.")] = 25.0,
 ) -> None:
     """Render a scene at its times. The last line is the folder of the pictures.
@@ -87,7 +97,35 @@ def render(
         remaining = f", about {duration_text(left_s)} left" if number < count else ""
         typer.echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
     _draw(folder, built, exposure, night, video, fps)
+    _export(folder, built, gltf, mitsuba)
     typer.echo(folder.path)
+
+
+def _export(
+    folder: "RenderFolder", scene: "Scene", gltf: Path | None, mitsuba: Path | None
+) -> None:
+    """Write the scene for other programs."""
+    if gltf is None and mitsuba is None:
+        return
+    from labrig.reproduce import (
+        exported_camera,
+        exported_meshes,
+        write_gltf,
+        write_mitsuba_scene,
+    )
+
+    meshes, camera = exported_meshes(scene, folder), exported_camera(scene)
+    if gltf is not None:
+        times_s = [t_s - folder.times_s[0] for t_s in folder.times_s]
+        brightest = max(
+            (float(each.glow.colour[1:].max(initial=0.0)) for each in meshes if each.glow),
+            default=0.0,
+        )
+        write_gltf(gltf, meshes, times_s, 1 / brightest if brightest else 1.0, camera, up="z")
+        typer.echo(f"wrote {gltf}: sRGB of what glows, without light between surfaces", err=True)
+    if mitsuba is not None:
+        written = write_mitsuba_scene(mitsuba, meshes, camera)
+        typer.echo(f"wrote {written}: lamps and glow in sRGB, without re-radiation", err=True)
 
 
 def _pairs(texts: list[str]) -> dict[str, str]:

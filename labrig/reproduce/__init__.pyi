@@ -69,6 +69,10 @@ from .scene import (
     build_scene as build_scene,
     load_scene as load_scene,
 )
+from .scene_export import (
+    exported_camera as exported_camera,
+    exported_meshes as exported_meshes,
+)
 from .scene_file import (
     SceneFile as SceneFile,
     read_scene as read_scene,

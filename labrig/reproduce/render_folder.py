@@ -144,7 +144,7 @@ class RenderFolder:
             return
         renderer = Renderer(scene, threads)
         if done:
-            renderer.restore(self.times_s[done - 1], self._levels(done - 1))
+            renderer.restore(self.times_s[done - 1], self.levels(done - 1))
         for number in range(done, len(self.times_s)):
             frame = renderer.frame(self.times_s[number])
             self._keep_levels(number, renderer.levels)
@@ -153,7 +153,14 @@ class RenderFolder:
             write_spectral_exr(self.exr(number), frame.radiance, scene.bands.edges_nm, texts)
             yield frame
 
-    def _levels(self, number: int) -> dict[str, Float32Array]:
+    def levels(self, number: int) -> dict[str, Float32Array]:
+        """Return the levels of each phosphor at a finished frame, shape (states, places).
+
+        Raises
+        ------
+        UsageError
+            They are not there.
+        """
         path = self._levels_path(number)
         try:
             with np.load(path, allow_pickle=False) as content:

@@ -91,6 +91,11 @@ class Renderer:
             state.field.levels[:] = levels[state.name]
         self._t_s = t_s
 
+    def emitted_at(self, t_s: float, levels: dict[str, Float32Array]) -> Float32Array:
+        """Return the radiance that each place emits by itself at kept levels (places, bands)."""
+        self.restore(t_s, levels)
+        return self._emitted()
+
     @property
     def memory_bytes(self) -> int:
         """Memory of the kept paths in bytes."""

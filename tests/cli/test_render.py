@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.reproduce import RenderFolder, load_scene, read_spectral_exr
+from labrig.reproduce import RenderFolder, exported_meshes, load_scene, read_spectral_exr
 from tests.conftest import Ended
 
 SMALL = ("--size", "12x9", "--paths", "4")
@@ -88,3 +88,20 @@ def test_what_cannot_be_rendered_is_one_line(
     assert ended.code == 2
     assert says in ended.err.splitlines()[-1]
     assert "Traceback" not in ended.err
+
+
+def test_other_programs_take_the_scene(labrig: Callable[..., Ended]) -> None:
+    ended = labrig("render", "cornell-box", *SMALL, "--gltf", "box.glb", "--mitsuba", "for-mitsuba")
+    assert ended.code == 0, ended.err
+    assert Path("box.glb").read_bytes()[:4] == b"glTF"
+    assert (Path("for-mitsuba") / "scene.xml").is_file()
+    scene = load_scene("cornell-box").resized(12, 9, 4)
+    meshes = exported_meshes(scene, RenderFolder.open(ended.run_folder, scene))
+    wall, lamp = (next(each for each in meshes if each.name == name) for name in ("left", "lamp"))
+    assert wall.glow is not None
+    assert lamp.glow is not None
+    # The lamp goes off, and the glow of one exponential keeps its texture.
+    np.testing.assert_allclose(lamp.glow.colour[:, 1] > 0, [True, False, False])
+    ratio = wall.glow.colour[2, 2] / wall.glow.colour[1, 2]
+    assert ratio == pytest.approx(np.exp(-0.032 * 59.9), rel=0.02)
+    assert wall.glow.lost < 0.02

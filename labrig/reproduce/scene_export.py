@@ -1,0 +1,138 @@
+"""A rendered scene for other programs: its meshes, and their glow over the frames, in sRGB."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from labrig.optics import XYZ_TO_SRGB, illuminant
+from labrig.reproduce.display import Display, tristimulus
+from labrig.reproduce.exported_scene import ExportedCamera, ExportedMesh, Glow
+from labrig.reproduce.geometry import Geometry
+from labrig.reproduce.render_folder import RenderFolder
+from labrig.reproduce.rendering import Renderer
+from labrig.reproduce.scene import Scene
+
+FloatArray = NDArray[np.float64]
+
+
+def exported_camera(scene: Scene) -> ExportedCamera:
+    """Return the camera of a scene for other programs.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    ExportedCamera
+        The same pinhole.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import exported_camera, load_scene
+    >>> exported_camera(load_scene("cornell-box")).field_of_view_deg
+    40.0
+    """
+    camera = scene.file.camera
+    return ExportedCamera(
+        camera.position_m,
+        camera.look_at_m,
+        camera.up,
+        camera.vertical_fov_deg,
+        camera.width_px,
+        camera.height_px,
+    )
+
+
+def exported_meshes(scene: Scene, folder: RenderFolder) -> list[ExportedMesh]:
+    """Return the objects of a rendered scene, with what each emits at its frames.
+
+    They are where they stand at the first frame. Light is reduced to linear sRGB in cd/m²: lamps
+    emit theirs, phosphors their glow; surfaces have the colour that they have under D65. What a
+    fluorescent surface re-radiates of other light is not in it.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    folder
+        Its finished rendering.
+
+    Returns
+    -------
+    list of ExportedMesh
+        Objects in the order of the scene; those without light have no glow.
+
+    Raises
+    ------
+    UsageError
+        The levels of a frame are missing.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.reproduce import RenderFolder, exported_meshes, load_scene
+    >>> scene = load_scene("cornell-box").resized(width_px=8, height_px=8, paths=2)
+    >>> folder = RenderFolder.open(Path("box"), scene)
+    >>> frames = list(folder.rendered(scene))
+    >>> [mesh.name for mesh in exported_meshes(scene, folder) if mesh.glow is not None]
+    ['left', 'lamp']
+    """
+    geometry = scene.geometry(folder.times_s[0])
+    renderer = Renderer(scene)
+    emitted = np.stack(
+        [
+            _srgb(renderer.emitted_at(t_s, folder.levels(number)), scene)
+            for number, t_s in enumerate(folder.times_s)
+        ]
+    )
+    meshes = []
+    for number, surface in enumerate(geometry.surfaces):
+        glow = None
+        if surface.lamp >= 0:
+            lamp = scene.lamps(folder.times_s[0])[surface.lamp]
+            light = np.array([scene.levels(t_s)[surface.lamp] for t_s in folder.times_s])
+            glow = Glow(light[:, None] * _srgb(lamp.light, scene))
+        elif surface.samples is not None:
+            glow = _glow(emitted[:, geometry.places_of(number)], geometry, number)
+        colour = _colour(scene, surface.material)
+        mesh = surface.mesh
+        meshes.append(
+            ExportedMesh(
+                surface.name, mesh.vertices_m, mesh.faces.astype(np.int64), colour, mesh.uv, glow
+            )
+        )
+    return meshes
+
+
+def _glow(emitted: FloatArray, geometry: Geometry, number: int) -> Glow | None:
+    """Return the glow of a surface from that of its places (frames, places, 3)."""
+    if not emitted.any():
+        return None
+    samples = geometry.surfaces[number].samples
+    if not isinstance(samples, tuple):
+        return Glow(emitted.mean(axis=1))
+    columns, rows = samples
+    # Textures begin at the top.
+    return Glow.of_textures(emitted.reshape(len(emitted), rows, columns, 3)[:, ::-1])
+
+
+def _srgb(radiance: ArrayLike, scene: Scene) -> FloatArray:
+    """Return spectral radiances (…, bands) in linear sRGB and cd/m², within its gamut."""
+    xyz = tristimulus(radiance, scene.bands.edges_nm)
+    largest = float(xyz.max(initial=0.0))
+    if largest <= 0:
+        return np.zeros(xyz.shape)
+    # The transform clips what is brighter than white: a white beyond all of it.
+    white = 100 * largest
+    return np.asarray(Display(white).linear(xyz) * white)
+
+
+def _colour(scene: Scene, material: int) -> FloatArray:
+    """Return the colour of a material under D65 in linear sRGB, with what it re-radiates."""
+    if material < 0:
+        return np.zeros(3)
+    daylight = scene.bands.means(illuminant("D65"))
+    seen = tristimulus(scene.materials[material].matrix @ daylight, scene.bands.edges_nm)
+    white = tristimulus(daylight, scene.bands.edges_nm)
+    return np.asarray(np.clip(XYZ_TO_SRGB @ seen / white[1], 0.0, 1.0))
