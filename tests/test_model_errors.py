@@ -80,7 +80,7 @@ def replaced(content: Any, place: tuple[Any, ...], value: Any) -> Any:
     return items
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.sampled_from(FILES), st.data(), ODD)
 def test_no_refusal_of_a_changed_file_has_pydantics_words(
     file: tuple[type[BaseModel], Content], data: st.DataObject, value: Any

@@ -37,7 +37,7 @@ def _assert_minimum(design: FloatArray, target: FloatArray) -> None:
 
 @settings(
     deadline=None,
-    max_examples=60,
+    max_examples=30,
     # the same fixture is right for every example
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -31,6 +31,7 @@ def fitted(folder: Path, *columns: np.ndarray, **options: object) -> DecayFit:
     return fit_table(table, TableFitOptions(**options))[0].fit  # type: ignore[arg-type]
 
 
+@pytest.mark.campaign
 def test_noise_that_correlates_is_in_sigma_and_named() -> None:
     pulls, said = broken_pulls(drift(SINGLE, 60, 0.8, given=False), range(8))
     # Without it the rms is 2.7.

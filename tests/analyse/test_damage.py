@@ -109,7 +109,7 @@ def edited_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(shutil.copytree(RECORDED, tmp_path_factory.mktemp("edited") / "run"))
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(data=st.data())
 def test_an_edited_journal_is_one_line_or_still_makes_sense(
     edited_run: Path, data: st.DataObject

@@ -319,7 +319,11 @@ def test_what_there_is_is_listed(labrig: Labrig) -> None:
 @pytest.mark.parametrize(
     ("arguments", "slow"),
     [
-        ("--help", ("numpy", "scipy", "pydantic", "event_model", "rawpy")),
+        pytest.param(
+            "--help",
+            ("numpy", "scipy", "pydantic", "event_model", "rawpy"),
+            marks=pytest.mark.campaign,
+        ),
         ("runs list --runs .", ("numpy", "scipy", "yaml", "event_model", "rawpy")),
         ("plan decay --rig sim", ("scipy", "event_model", "rawpy", "matplotlib")),
     ],

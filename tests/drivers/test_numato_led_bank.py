@@ -110,7 +110,7 @@ def test_anything_but_the_expected_answer_is_a_device_error(answer: bytes, said:
     assert "\n" not in str(caught.value)
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(
     st.lists(st.sampled_from(["a", "b", "c", None]), max_size=6), st.integers(1, 200), st.booleans()
 )

@@ -100,7 +100,7 @@ COMMANDS = [
 WAITS = [1, 50, 200]
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     st.lists(
         st.sampled_from(COMMANDS) | st.sampled_from(WAITS) | st.binary(min_size=1, max_size=5),

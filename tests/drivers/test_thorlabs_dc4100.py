@@ -223,7 +223,7 @@ def three_units(heads: Heads) -> Iterator[tuple[str, Dc4100Board]]:
         yield address, Dc4100Board(Shifted(4 * unit), wavelengths, f"M{unit}")
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.lists(st.integers(-1, 8), max_size=6), st.integers(1, 400), st.integers(0, 11))
 def test_over_three_units_two_are_never_lit_and_any_interruption_can_be_made_safe(
     sequence: list[int], waits: int, left_on: int

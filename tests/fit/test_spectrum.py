@@ -30,7 +30,7 @@ def broad(centre_nm: float, fwhm_nm: float) -> Spectrum:
 GREEN = broad(525.0, 70.0)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 30))
 def test_quadratic_functions_have_their_least_where_lawson_and_hanson_find_it(
     seed: int, n: int

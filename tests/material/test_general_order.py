@@ -35,7 +35,7 @@ def integrated(start: float, kappa: float, k: float, b: float, duration_s: float
     return float(solved.y[0, -1])
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(concentrations, rates, rates, orders, durations)
 def test_steps_under_light(start: float, kappa: float, k: float, b: float, t_s: float) -> None:
     value = lit_concentration(start, kappa, k, b, t_s).value

@@ -83,7 +83,7 @@ def test_a_line_that_was_cut_off_does_not_spoil_the_next(
     assert not content.torn
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(room=st.integers(0, 9000))
 def test_wherever_the_disk_fills_up_the_run_can_be_resumed(
     tmp_path_factory: pytest.TempPathFactory, room: int

@@ -64,7 +64,7 @@ def test_bad_pixels_of_a_real_photograph_are_found(shared_data: Path) -> None:
         assert after[name].sigma == pytest.approx(stats.sigma, rel=0.1)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     x=st.integers(0, 60),
     y=st.integers(0, 40),

@@ -123,7 +123,7 @@ def test_strips_are_means_over_bands_of_rows() -> None:
     np.testing.assert_allclose(sums.strip_means_dn(4)[:, 0], [5.5, 17.5, 29.5, 41.5])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(areas)
 def test_light_that_rises_across_the_frame_is_measured_at_the_middle_of_a_channels_pixels(
     area: tuple[int, int, int, int],

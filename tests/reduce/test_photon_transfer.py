@@ -11,7 +11,7 @@ gains = st.floats(0.01, 3.0)
 unevens = st.floats(0.0, 1e-4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(read_noises, gains, unevens)
 def test_exact_variances_give_the_model_itself(read: float, photon: float, uneven: float) -> None:
     truth = NoiseModel(read, photon, uneven)
@@ -24,7 +24,7 @@ def test_exact_variances_give_the_model_itself(read: float, photon: float, uneve
     assert held.photon_dn == pytest.approx(photon, rel=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(read_noises, gains, st.integers(0, 10**6))
 def test_parts_add_up_and_none_is_negative(read: float, photon: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

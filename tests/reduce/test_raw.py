@@ -106,7 +106,7 @@ def test_cut_off_files_are_refused_quietly(
     assert capfd.readouterr() == ("", "")
 
 
-@settings(max_examples=100, deadline=2000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=2000, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_damaged_files_are_read_or_refused(write_dng: WriteDng, data: st.DataObject) -> None:
     content = bytearray(write_dng(MOSAIC, exposure=(1, 60), iso=100))
@@ -117,7 +117,7 @@ def test_damaged_files_are_read_or_refused(write_dng: WriteDng, data: st.DataObj
 
 
 @pytest.mark.shared_data
-@settings(max_examples=60, deadline=2000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=30, deadline=2000, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_damaged_real_files_are_read_or_refused(shared_data: Path, data: st.DataObject) -> None:
     content = bytearray((shared_data / "raw_photos" / "kodak_dc50.kdc").read_bytes())

@@ -40,7 +40,7 @@ gains = st.floats(0.2, 20)
 steps = st.sampled_from([1, 2, 4, 16])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     shape=scenes,
     highest=st.floats(2000, 16000),
@@ -55,7 +55,7 @@ def test_noise_that_is_not_clipped_is_never_a_plateau(
     assert clip_level(frame, BLACK, WHITE) == WHITE
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     noise=st.sampled_from(["normal", "uniform", "exponential"]),
     middle=st.floats(1000, 15000),
@@ -76,7 +76,7 @@ def test_nor_is_noise_of_any_kind_and_width(
     assert clip_level(frame, BLACK, WHITE) == WHITE
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     shape=scenes.filter(lambda shape: shape != "flat"),
     full=st.integers(9000, 14990),

@@ -175,7 +175,7 @@ def test_each_column_of_values_has_the_uncertainty_right_of_it() -> None:
 _finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     rows=st.lists(
         st.tuples(_finite, _finite, st.floats(min_value=1e-300, max_value=1e300)),

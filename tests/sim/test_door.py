@@ -86,7 +86,7 @@ def test_it_waits_for_the_servos_frame_travels_overshoots_and_rings_out() -> Non
 times = st.lists(st.floats(0.1, 3.0), min_size=1, max_size=6).map(sorted)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(times=times, widths=st.lists(st.floats(900e-6, 2100e-6), min_size=6, max_size=6))
 def test_openness_is_a_part_and_goes_on_steadily_until_it_rests(
     times: list[float], widths: list[float]

@@ -38,7 +38,7 @@ def one_state(k_r_per_s: float, kappa_per_s: float) -> Phosphor:
     return Phosphor(np.array([k_r_per_s]), row[None, :], np.array([0], dtype=np.intp))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     k_r=st.floats(1e-4, 1),
     kappa=st.just(0.0) | st.floats(1e-12, 2),

@@ -251,7 +251,7 @@ class DamagingWire(Wire):
         super().send(transfer)
 
 
-@settings(quiet, max_examples=100)
+@settings(quiet, max_examples=40)
 @given(
     transfer=st.integers(1, 60),
     position=st.one_of(st.integers(0, 13), st.integers(0, 4000)),

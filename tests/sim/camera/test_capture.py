@@ -67,7 +67,7 @@ def test_the_generic_partial_object_counts_what_it_sends() -> None:
 sizes = st.integers(0, 5000) | st.integers(1, 40).map(lambda n: 512 * n - 12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(size=sizes, packets=st.integers(1, 12))
 def test_objects_arrive_byte_for_byte_whatever_the_packets(size: int, packets: int) -> None:
     raw = bytes(i * 7 % 251 for i in range(size))

@@ -238,7 +238,7 @@ almost_containers = st.builds(
 requests = st.tuples(st.sampled_from([0x21, 0xA1]), st.integers(0x60, 0x70), st.binary(max_size=8))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.lists(st.binary(max_size=600) | almost_containers | requests, max_size=12))
 def test_whatever_the_host_sends_it_gets_usb_errors_at_worst(
     sent: list[bytes | tuple[int, int, bytes]],

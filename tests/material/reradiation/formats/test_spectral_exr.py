@@ -224,7 +224,7 @@ def test_what_an_image_cannot_hold_is_refused(tmp_path: Path) -> None:
         write_reradiation(tmp_path / "nowhere/m.exr", square(paper))
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(at=st.floats(0, 1), change=st.one_of(st.none(), st.binary(min_size=1, max_size=6)))
 def test_a_broken_image_is_read_or_refused_in_one_line(
     tmp_path_factory: pytest.TempPathFactory, at: float, change: bytes | None
