@@ -17,13 +17,14 @@ from labrig import plugins
 from labrig.acquire import ROLES, DeviceEntry, RigFile
 from labrig.errors import UsageError
 from labrig.material import FluorescentMaterial, Material
+from labrig.reproduce import SceneFile
 from labrig.yaml_file import did_you_mean
 
-KINDS = ("protocol", "rig", "material")
+KINDS = ("protocol", "rig", "material", "scene")
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """Return the JSON Schema of a `protocol`, a `rig` or a `material` file, as YAML loads it.
+    """Return the JSON Schema of a `protocol`, `rig`, `material` or `scene` file, as YAML loads it.
 
     Raises
     ------
@@ -36,6 +37,7 @@ def schema(kind: str) -> dict[str, Any]:
         "protocol": _protocol,
         "rig": _rig,
         "material": lambda: _one_of("kind", [Material, FluorescentMaterial]),
+        "scene": lambda: SceneFile,
     }
     model = makers[kind]()
     json_schema = TypeAdapter(model).json_schema(by_alias=True, schema_generator=_Described)

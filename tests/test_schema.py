@@ -20,12 +20,13 @@ SHIPPED = [
         ("protocol", "protocols"),
         ("rig", "config"),
         ("material", "config/materials"),
+        ("scene", "config/scenes"),
     )
     for path in resources.names(place).values()
 ]
 #: Mappings whose keys are names that a person chooses, and a chain's parts: those are checked by
 #: their own protocols when the file is read.
-FREE = ("patches", "parts", "channels", "lamps", "fluorescence")
+FREE = ("patches", "parts", "channels", "lamps", "fluorescence", "materials", "objects")
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +65,8 @@ def test_what_is_shipped_is_valid_and_every_misspelt_key_is_not(
         ("rig", {"simulation": {"sample": "blue-paint", "faults": [{"lamp_dead": {"at": 5}}]}}),
         ("material", {"kind": "gas"}),
         ("material", {"states": []}),
+        ("scene", {"objects": {}}),
+        ("scene", {"lamps": {"sun": {"kind": "laser"}}}),
     ],
 )
 def test_what_labrig_refuses_an_editor_underlines(
@@ -73,6 +76,7 @@ def test_what_labrig_refuses_an_editor_underlines(
         "protocol": ("protocols", "decay"),
         "rig": ("config", "sim"),
         "material": ("config/materials", "blue-paint"),
+        "scene": ("config/scenes", "cornell-box"),
     }[kind]
     content = read_yaml(resources.find(place, kind, name))
     assert not validators[kind].is_valid(content | changes)

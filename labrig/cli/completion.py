@@ -1,4 +1,4 @@
-"""Completion by the shell: names of protocols, rigs, materials and runs.
+"""Completion by the shell: names of protocols, rigs, materials, scenes and runs.
 
 No file is opened, since a person waits for the answer; an unreadable folder has no names.
 """
@@ -24,6 +24,11 @@ def complete_rig(incomplete: str) -> list[str]:
 def complete_material(incomplete: str) -> list[str]:
     """Return the shipped phosphors that begin so."""
     return [name for name in _shipped("config/materials") if name.startswith(incomplete)]
+
+
+def complete_scene(incomplete: str) -> list[str]:
+    """Return the shipped scenes that begin so."""
+    return [name for name in _shipped("config/scenes") if name.startswith(incomplete)]
 
 
 def complete_run(ctx: Any, incomplete: str) -> list[str]:

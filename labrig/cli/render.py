@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.completion import complete_scene
+
 if TYPE_CHECKING:
     from labrig.reproduce import RenderFolder, Scene
 
@@ -12,7 +14,10 @@ if TYPE_CHECKING:
 def render(
     scene: Annotated[
         str,
-        typer.Argument(help="A shipped scene, such as 'cornell-box', or a path to a YAML file."),
+        typer.Argument(
+            help="A shipped scene, such as 'cornell-box', or a path to a YAML file.",
+            autocompletion=complete_scene,
+        ),
     ],
     materials: Annotated[
         list[str] | None,

@@ -73,7 +73,7 @@ def exported_meshes(scene: Scene, folder: RenderFolder) -> list[ExportedMesh]:
     >>> from pathlib import Path
     >>> from labrig.reproduce import RenderFolder, exported_meshes, load_scene
     >>> scene = load_scene("cornell-box").resized(width_px=8, height_px=8, paths=2)
-    >>> folder = RenderFolder.open(Path("box"), scene)
+    >>> folder = RenderFolder.open(Path("exported"), scene)
     >>> frames = list(folder.rendered(scene))
     >>> [mesh.name for mesh in exported_meshes(scene, folder) if mesh.glow is not None]
     ['left', 'lamp']
@@ -97,11 +97,9 @@ def exported_meshes(scene: Scene, folder: RenderFolder) -> list[ExportedMesh]:
             glow = _glow(emitted[:, geometry.places_of(number)], geometry, number)
         colour = _colour(scene, surface.material)
         mesh = surface.mesh
-        meshes.append(
-            ExportedMesh(
-                surface.name, mesh.vertices_m, mesh.faces.astype(np.int64), colour, mesh.uv, glow
-            )
-        )
+        uv = None if glow is None or glow.texture is None else mesh.uv
+        faces = mesh.faces.astype(np.int64)
+        meshes.append(ExportedMesh(surface.name, mesh.vertices_m, faces, colour, uv, glow))
     return meshes
 
 

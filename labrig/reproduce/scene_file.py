@@ -139,7 +139,7 @@ class LampEntry(_Part):
     Attributes
     ----------
     kind
-        `point`, `area` (objects name it as their `lamp`), `distant` or `sky`.
+        Kind of the lamp: `point`, `area` (objects name it as their `lamp`), `distant` or `sky`.
     spectrum
         Spectrum: a CIE illuminant, a wavelength such as `450nm`, or a file.
     intensity_cd, luminance_cd_per_m2, illuminance_lux

@@ -103,5 +103,6 @@ def test_other_programs_take_the_scene(labrig: Callable[..., Ended]) -> None:
     # The lamp goes off, and the glow of one exponential keeps its texture.
     np.testing.assert_allclose(lamp.glow.colour[:, 1] > 0, [True, False, False])
     ratio = wall.glow.colour[2, 2] / wall.glow.colour[1, 2]
-    assert ratio == pytest.approx(np.exp(-0.032 * 59.9), rel=0.02)
+    # Its own light, back from the walls, charges it a little again.
+    assert ratio == pytest.approx(np.exp(-0.032 * 59.9), rel=0.04)
     assert wall.glow.lost < 0.02
