@@ -243,9 +243,9 @@ class Mesh:
         _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
         faces = same.reshape(-1)[self.faces]
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-        edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-        there = {tuple(edge) for edge in edges.tolist()}
-        return all((second, first) in there for first, second in there)
+        edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+        n = len(self.vertices_m)
+        return bool(np.isin(edges[:, 1] * n + edges[:, 0], edges[:, 0] * n + edges[:, 1]).all())
 
     def turned_over(self) -> Self:
         """Return the mesh with its front on the other side."""

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.errors import UsageError
 from labrig.reproduce.field import Field
 from labrig.reproduce.folding import Matrices, fold
 from labrig.reproduce.geometry import Geometry
@@ -24,6 +25,8 @@ Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
+#: Part of the memory that paths and pictures may take, and copies of a picture at once.
+LARGEST_PART, MOST_COPIES = 0.7, 6
 #: First step after a change of light, as a part of the fastest relaxation; later ones grow.
 FIRST_STEP, GROWTH = 0.25, 1.5
 
@@ -67,6 +70,7 @@ class Renderer:
     def __init__(self, scene: Scene, threads: int | None = None) -> None:
         self._scene = scene
         self._threads = threads or _n_processors()
+        _require_memory(scene)
         self._matrices = Matrices.of(scene.materials)
         self._t_s = scene.file.programme[0].at_s
         geometry = scene.geometry(self._t_s)
@@ -309,6 +313,29 @@ def _states(scene: Scene, geometry: Geometry) -> list[_State]:
         name = list(scene.file.materials)[number]
         states.append(_State(name, places.astype(np.int32), field, is_charged))
     return states
+
+
+def _require_memory(scene: Scene) -> None:
+    """Refuse a scene whose paths take more memory than there is."""
+    try:
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return  # Windows does not tell
+    camera, paths = scene.file.camera, scene.file.paths
+    places = sum(
+        surface.n_places
+        for surface in scene.geometry(scene.file.programme[0].at_s).surfaces
+        if surface.samples is not None
+    )
+    n_paths = camera.width_px * camera.height_px * paths.per_pixel + places * paths.per_place
+    needed = scene.path_length.nbytes(n_paths, len(scene.file.lamps))
+    needed += MOST_COPIES * 4 * len(scene.bands) * (places + camera.width_px * camera.height_px)
+    if needed > LARGEST_PART * there:
+        raise UsageError(
+            f"{scene.file.name}: expected paths that fit into {LARGEST_PART * there / 1e9:.1f} GB, "
+            f"of {there / 1e9:.1f} GB of memory, got {needed / 1e9:.1f} GB; take fewer paths "
+            "(--paths), a smaller picture (--size) or fewer texels"
+        )
 
 
 def _n_processors() -> int:

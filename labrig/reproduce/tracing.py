@@ -56,6 +56,16 @@ class PathLength:
                 f"{self.vertices} and {self.survival:g}"
             )
 
+    @property
+    def mean_vertices(self) -> float:
+        """Number of vertices of a path that never leaves the scene, on average."""
+        return self.vertices + self.survival / (1 - self.survival)
+
+    def nbytes(self, n_paths: int, n_lamps: int) -> int:
+        """Return the memory of so many kept paths in a closed scene, in bytes."""
+        of_path, of_vertex = 10, 8 + 4 * n_lamps
+        return round(n_paths * (of_path + of_vertex * self.mean_vertices))
+
 
 @dataclass(frozen=True, eq=False)
 class Paths:

@@ -1,5 +1,6 @@
 """Scenes over time: what is charged by which light, and how it then glows."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,19 @@ from scipy.integrate import solve_ivp
 from labrig.errors import UsageError
 from labrig.material import Material, State, read_material, write_material
 from labrig.optics import absolute_irradiance, read_light
-from labrig.reproduce import Assumptions, Renderer, Scene, SceneFile, build_scene, load_scene
+from labrig.reproduce import (
+    Assumptions,
+    Mesh,
+    Renderer,
+    Scene,
+    SceneFile,
+    build_scene,
+    load_scene,
+)
 from labrig.yaml_file import write_yaml
 
 LUX = 800.0
+HUGE = {"width_px": 8192, "height_px": 8192}
 MIRROR = {"wavelength_nm": [400, 500], "value": [1, 1]}
 SUN = {"kind": "distant", "irradiance_w_per_m2": 1, "towards": [0, 0, 1]}
 BENCH = {"spectrum": "A", "illuminance_lux": 1000.0}
@@ -188,6 +198,13 @@ def test_levels_at_first_are_given_or_those_of_the_light(tmp_path: Path) -> None
         ({"lamps": {"sun": {"spectrum": "900nm", **SUN}}}, "between 300 and 780 nm"),
         ({"bands": {"first_nm": 710, "last_nm": 780, "count": 4}}, "overlap"),
         ({"camera": {"position_m": [0, 0, 1], "look_at_m": [0, 0, 0]}}, "upwards"),
+        (
+            {
+                "camera": {**HUGE, "position_m": [0, 0, 1], "look_at_m": [0, 1, 0]},
+                "paths": {"per_pixel": 65536},
+            },
+            "GB",
+        ),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_one_line(tmp_path: Path, changed: dict[str, Any], says: str) -> None:
@@ -278,3 +295,27 @@ def test_a_scene_file_is_read_back(tmp_path: Path) -> None:
     file = scene(tmp_path).file
     write_yaml(tmp_path / "scene.yaml", file)
     assert load_scene(tmp_path / "scene.yaml").file == file
+
+
+@pytest.mark.parametrize("missing", ["embreex", "numba"])
+def test_without_the_extra_it_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str
+) -> None:
+    for name in list(sys.modules):
+        if name.split(".")[0] == missing or name.endswith("kernels"):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(UsageError, match=r"pip install 'labrig\[render\]'"):
+        Renderer(scene(tmp_path)).frame(0.0)
+
+
+def test_how_closed_a_mesh_is() -> None:
+    sphere, box = Mesh.sphere((1, 2, 3), 0.5, rows=12), Mesh.box((0, 0, 0), (1, 2, 3), 30)
+    for mesh, volume in ((sphere, None), (box, 6.0), (box.turned_over(), -6.0)):
+        assert mesh.is_closed
+        assert volume is None or mesh.volume_m3 == pytest.approx(volume)
+    assert 0.9 < sphere.volume_m3 / (np.pi / 6) < 1
+    drops = Mesh.octahedra([[0, 0, 0], [5, 0, 0]], 0.1)
+    assert drops.is_closed
+    assert drops.volume_m3 == pytest.approx(2 * 4 / 3 * 0.1**3)
+    assert not Mesh(box.vertices_m, box.faces[1:]).is_closed
