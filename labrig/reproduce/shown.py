@@ -60,7 +60,12 @@ def shown_frames(
     pictures = []
     for number, (frame, display) in enumerate(zip(frames, displays, strict=True)):
         look = NightLook(seed=number)
-        seen, used = night_view(frame.radiance, frame.edges_nm, look, display)
+        used = display
+        if exposure == EACH and xyz[number].any():
+            # The rods' luminance is several times that of the cones: it has its own exposure.
+            dark, _ = night_view(frame.radiance, frame.edges_nm, look)
+            used = Display.automatic(dark, UNCLIPPED_PER_CENT)
+        seen, used = night_view(frame.radiance, frame.edges_nm, look, used)
         pictures.append((used.shown(seen), used))
     return pictures
 
