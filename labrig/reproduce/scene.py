@@ -301,6 +301,8 @@ def _material(
     assert entry.file is not None
     material = read_any_material(_beside(entry.file, folder))
     if not isinstance(material, Material):
+        if not entry.is_fluorescent:
+            material = replace(material, reradiation=np.zeros_like(material.reradiation))
         return of_matrix(material, bands)
     albedo, scale = entry.assume_albedo, entry.assume_scale
     return of_phosphor(

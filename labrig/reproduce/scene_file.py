@@ -92,6 +92,9 @@ class MaterialEntry(_Part):
         Albedo to assume for a phosphor whose file has none.
     assume_scale
         Factor from Λ to s sr⁻¹ to assume for a phosphor whose file has no scale.
+    is_fluorescent
+        Whether a measured re-radiation matrix is used whole; else its reflectance only, to see what
+        re-radiation contributes.
     prompt
         Part of the captures that find their trap filled and emit at once, 0 to 1.
     levels
@@ -104,6 +107,7 @@ class MaterialEntry(_Part):
     chart_patch: Annotated[int, Field(ge=1, le=24)] | None = None
     assume_albedo: Annotated[float, Field(ge=0, lt=1)] | None = None
     assume_scale: Positive | None = None
+    is_fluorescent: bool = True
     prompt: Annotated[float, Field(ge=0, le=1)] = 0.0
     levels: Annotated[float, Field(ge=0, le=1)] | Literal["charged"] = 0.0
 
