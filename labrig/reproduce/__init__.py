@@ -1,6 +1,7 @@
-"""Reproduction: what a measured material emits where and when it is lit.
+"""Reproduction: what a measured material emits where and when it is lit, and pictures of it.
 
-Names are listed in `__init__.pyi`, and loaded when first used. Needs the extra `labrig[render]`.
+Names are listed in `__init__.pyi`, and loaded when first used. Fields of levels need the extra
+`labrig[render]`.
 """
 
 import lazy_loader

@@ -131,7 +131,7 @@ def night_view(
     Of a pixel with luminance Y, chromaticity (x, y) and the rods' share k, it is Y′ = (1 − k) Y +
     k V and x′ = (1 − k) x + k/3, x″ = (1 − k b) x′ + k b/4, and y alike. Relative to white, Y′ is
     blurred by Gaussians of s and 1.6 s into G₁ and G₂, d = G₁ − G₂, and becomes
-    `G₂ + sign(d) |d|^(1/γ)` + noise where rods see alone; in between it is mixed with Y′ by k.
+    G₂ + sign(d) abs(d)^(1/γ) + noise where rods see alone; in between it is mixed with Y′ by k.
 
     Parameters
     ----------
