@@ -24,7 +24,7 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.radiometric_scale import RadiometricScale, radiometric_scale
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
-from labrig.analyse.surface import with_reflectance
+from labrig.analyse.surface import with_layer, with_reflectance
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
@@ -133,6 +133,7 @@ def _patch_excitation(
     if spectrum is not None and (scale := _scale(part, charging, fit, irradiance, spectrum)):
         material = scale.of(material)
     material = with_reflectance(material, patch.folder, part.inputs.reflectance)
+    material = with_layer(material, part.protocol.sample)
     material = at_temperature(material, run, part.protocol.rate_frames)
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
