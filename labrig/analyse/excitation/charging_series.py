@@ -115,7 +115,7 @@ def patch_chargings(
     is_earlier = through.charges[-1].off_s < direct_charges[0].on_s
     direct = ChargingSeries(
         "by the lamp itself", direct_charges, rise, fade, everywhere, NOTHING, NOTHING,
-        earlier=EarlierCharges(through.charges, through.irradiance) if is_earlier else None,
+        earlier=EarlierCharges(through.charges, through.irradiance, rise, fade) if is_earlier else None,
     )  # fmt: skip
     chargings = {}
     for patch, slices in sites.items():

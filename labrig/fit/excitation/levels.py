@@ -146,12 +146,11 @@ def _independent_charges(
     """Compute the effect of every charge on its own."""
     duration_s, fraction = _steps(series)
     brightness = np.array([charge.brightness for charge in series.charges])
-    sites, bands = series.irradiance.shape
+    sites, bands = series.sites, series.irradiance.shape[1]
     shape = (len(brightness), sites, len(k_r_per_s))
     # Sites and states in one axis, and all charges' steps side by side: long rows for numpy.
     k_r = np.tile(k_r_per_s, sites)
-    steady_rates = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
-    kappa = brightness[:, None] * (fraction @ steady_rates.T)[:, None, :]
+    kappa = brightness[:, None] * _steady_and_changing(series, k_e_per_s, fraction)
     tau = duration_s[:, :, None]
     step, slopes = relaxation_with_slopes(kappa, k_r, tau)
     r_before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
@@ -164,7 +163,10 @@ def _independent_charges(
     by_kappa = after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_kappa)
     by_k_r = (after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
     by_fraction = (by_kappa.reshape(len(tau), -1).T @ fraction).reshape(*shape, bands)
-    light = brightness[:, None, None] * series.irradiance
+    irradiance = [
+        np.broadcast_to(series.irradiance_of(charge), (sites, bands)) for charge in series.charges
+    ]
+    light = brightness[:, None, None] * np.array(irradiance)
     return _Charges(
         duration_s.sum(axis=0),
         light * (duration_s.T @ fraction)[:, None, :],
@@ -176,6 +178,19 @@ def _independent_charges(
             np.zeros(shape),
         ),
     )
+
+
+def _steady_and_changing(
+    series: ChargingSeries, k_e_per_s: FloatArray, fraction: FloatArray
+) -> FloatArray:
+    """Return κ in every step at brightness 1, shape (m, K, P N) or, the same of all, (m, 1, P N)."""
+    bands = series.irradiance.shape[1]
+    rates = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
+    kappa = (fraction @ rates.T).reshape(len(fraction), -1, len(k_e_per_s))
+    if not series.is_by_light:
+        return np.asarray(kappa.reshape(len(fraction), 1, -1))
+    lights = [charge.light for charge in series.charges]
+    return np.tile(kappa[:, lights], (1, 1, series.sites))
 
 
 def _steps(series: ChargingSeries) -> tuple[FloatArray, FloatArray]:

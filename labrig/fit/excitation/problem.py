@@ -191,9 +191,14 @@ class ExcitationProblem:
             shot = charge_shots.stop
         if charging.site_modes is not None:
             modes, first = self.parameters.modes(number), columns.off.start
-            slopes[..., first + modes.start : first + modes.stop] = np.einsum(
-                "fpb,mpb->fpm", by_band, charging.site_modes
-            )
+            columns_of_modes = slice(first + modes.start, first + modes.stop)
+            if charging.is_by_light:
+                of_shots = charging.site_modes[:, charging.row_of_shots()]
+                slopes[..., columns_of_modes] = np.einsum("fpb,mfpb->fpm", by_band, of_shots)
+            else:
+                slopes[..., columns_of_modes] = np.einsum(
+                    "fpb,mpb->fpm", by_band, charging.site_modes
+                )
 
     def whitened(self, number: int, columns: FloatArray) -> FloatArray:
         """Return changes (n, P, C, k) of a series' signal in whitened σ, shape (n P C, k)."""
