@@ -1,21 +1,26 @@
-"""Irradiance of the lamp at the sample, by itself and through the LVF that lies on it.
+"""Irradiance at the sample: of the lamp by itself, and through the LVF or of selected lights.
 
 The map lamp × LVF at the sample's plane enters excitation rates one to one (Nalbach et al.,
 Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.6): it is measured.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from labrig.acquire import LAMP, LAMP_OFF, LEDS, LEDS_OFF, LedSwitch, RigFile, Session
 from labrig.calibration import LVF_KIND
 from labrig.quantity import Count, DurationS
+from labrig.region import Region
 
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings
+from .steps.exciting_lights import ExcitingLights, Nanometres
+from .steps.sample_pose import LAMP_DARK_S, face_lamp
 from .steps.scenes import (
     Arrangement,
     Bracketing,
@@ -27,18 +32,40 @@ from .steps.scenes import (
 
 
 class CardFrames(StrEnum):
-    """Roles of frames of the card under the lamp by itself, and through the filter."""
+    """Roles of frames of the card under the lamp by itself, and by a part of its light, or LEDs."""
 
     DIRECT = "irradiance-direct"
     THROUGH = "irradiance-through"
 
 
-Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-
 #: Edges of the bands of Table 1 of the paper.
 BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
 _DIRECT = Arrangement("grey card")
 _THROUGH = Arrangement("grey card", "on sample")
+
+
+def light_unit(name: str, number: int) -> str:
+    """Return the name of the unit that photographs the card under a selected light."""
+    return f"light-{name}-{number}"
+
+
+@dataclass(frozen=True)
+class LedCardUnit(SceneUnit):
+    """The card under one LED, with the lamp off; `lamp` is the LED's name."""
+
+    def run(self, session: Session) -> None:
+        """Light the LED, photograph, switch it off."""
+        super().run(session)
+        session.perform(LEDS_OFF)
+
+    def light(self, session: Session) -> None:
+        """Switch the lamp off and the LED on, and wait until it is steady."""
+        if session.rig[LAMP].is_on():
+            session.perform(LAMP_OFF)
+        face_lamp(session)
+        session.perform(LedSwitch(self.lamp))
+        settles_s = max(session.rig[LEDS].settling_s(self.lamp), LAMP_DARK_S)
+        session.wait(settles_s, f"the {self.lamp} LED settles")
 
 
 class Irradiance(ScenesProtocol):
@@ -48,6 +75,13 @@ class Irradiance(ScenesProtocol):
     ----------
     bands_nm
         Edges of the wavelength bands in nm, rising. The default is that of Table 1 of the paper.
+    select
+        Lights that excite the sample one after another, as in the protocol `excitation`: colour
+        filters by hand or in a wheel, wavelengths of a monochromator, or LEDs. There must be at
+        least as many as there are bands. Default: the variable filter.
+    sites
+        With `select`: place of the sample in the frame, over which the card's light is averaged,
+        `[x, y, width, height]` in pixels, or all four as fractions of the frame.
     vector_length
         Euclidean length to which the lamp's irradiance, one number for each band, is scaled;
         excitation rates belong to it. Table 1 of the paper has 1.
@@ -70,10 +104,10 @@ class Irradiance(ScenesProtocol):
         because the lamp drifts.
     """
 
-    rests_on = (LVF_KIND,)
-
     protocol: Literal["irradiance"] = "irradiance"
     bands_nm: tuple[Nanometres, ...] = BANDS_NM
+    select: ExcitingLights | None = None
+    sites: Region = (0.1, 0.4, 0.8, 0.2)
     vector_length: float = Field(1.0, gt=0, allow_inf_nan=False)
     illuminance_lux: float | None = Field(None, gt=0, allow_inf_nan=False)
     illuminance_sigma_lux: float | None = Field(None, ge=0, allow_inf_nan=False)
@@ -87,6 +121,16 @@ class Irradiance(ScenesProtocol):
         if len(self.bands_nm) < 2 or any(b <= a for a, b in pairwise(self.bands_nm)):
             raise ValueError(
                 f"expected two or more rising wavelengths in 'bands_nm', got {list(self.bands_nm)}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _a_light_for_every_band(self) -> Self:
+        bands = len(self.bands_nm) - 1
+        if self.select is not None and len(self.select.names()) < bands:
+            raise ValueError(
+                f"expected at least one light for each of the {bands} bands, got "
+                f"{len(self.select.names())}; give fewer, wider bands in 'bands_nm'"
             )
         return self
 
@@ -107,10 +151,27 @@ class Irradiance(ScenesProtocol):
         rounds = (self._round(number) for number in range(1, self.rounds + 1))
         return [dark, *(scene for scenes in rounds for scene in scenes)]
 
-    def _round(self, number: int) -> tuple[Scene, Scene]:
+    def unmeasured(self, rig: RigFile) -> Sequence[str]:
+        """Return the protocols whose results this one needs and the rig file does not name."""
+        needed = (LVF_KIND,) if self.select is None else ()
+        return [kind.protocol for kind in needed if rig.optics.named(kind) is None]
+
+    def _round(self, number: int) -> Sequence[Scene]:
         direct = SceneUnit(self.bracketing, f"direct-{number}", CardFrames.DIRECT)
+        if self.select is not None:
+            return (
+                Scene(direct, _DIRECT, "how bright the lamp is by itself"),
+                *self._lights(self.select, number),
+            )
         through = StripUnit(self.bracketing, f"through-{number}", CardFrames.THROUGH)
         return (
             Scene(direct, _DIRECT, "how bright the lamp is by itself"),
             Scene(through, _THROUGH, "how much of it the variable filter leaves"),
         )
+
+    def _lights(self, lights: ExcitingLights, number: int) -> Iterator[Scene]:
+        """Yield the card under one light after another."""
+        for name in lights.names():
+            scene = (self.bracketing, light_unit(name, number), CardFrames.THROUGH)
+            unit = LedCardUnit(*scene, name) if lights.leds else SceneUnit(*scene)
+            yield Scene(unit, lights.arrangement(name, "grey card"), "how bright this light is")

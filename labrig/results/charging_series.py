@@ -220,7 +220,7 @@ class ChargingSeries:
                         np.tile(irradiance, (self.sites, 1)),
                         self.values[row == light],
                         self.sigma[row == light],
-                    )  # fmt: skip
+                    )
                 )
         return series
 

@@ -106,7 +106,7 @@ class Bench:
         behind all windows at once.
         """
         lamp, charges, at_s = Lamp.found(self.lamp, on=False), [], 10.0
-        each_light = lights or [None] * len(charge_durations_s)
+        each_light: Sequence[int | None] = lights or [None] * len(charge_durations_s)
         for duration_s, light in zip(charge_durations_s, each_light, strict=True):
             off_s = at_s + duration_s
             start_s: FloatArray = off_s + DOOR_S + every_s * np.arange(float(shots))

@@ -164,12 +164,17 @@ def _scale(
 
 
 def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
-    if max(fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes) > AT_END * LARGEST_FACTOR:
+    if max((fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes)) > AT_END * LARGEST_FACTOR:
         light = light_scatter(fit)
+        places = (
+            ""
+            if light.sites is None or light.wavelength_nm is None
+            else f", {100 * light.sites:.1f} % from place to place and {light.wavelength_nm:.1f} "
+            "nm in wavelength"
+        )
         yield (
-            f"the light seems to be off by {100 * light.lamp:.1f} % from charge to charge, "
-            f"{100 * light.sites:.1f} % from place to place and {light.wavelength_nm:.1f} nm in "
-            "wavelength, which is about the most that is tried, so that σ may be too small: the "
+            f"the light seems to be off by {100 * light.lamp:.1f} % from charge to charge{places}, "
+            "which is about the most that is tried, so that σ may be too small: the "
             "irradiance is of another bench or filter, excitation changes much within a band (give "
             "narrower bands to irradiance), or the rate equation does not hold"
         )

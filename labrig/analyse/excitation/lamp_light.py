@@ -70,6 +70,23 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
     )
 
 
+def light_modes(irradiance: IrradianceFile) -> FloatArray:
+    """Return the error modes of the irradiance of selected lights, their levels and wavelengths.
+
+    Returns
+    -------
+    ndarray
+        Modes of the logarithm, of known size, shape (2 L, L, B).
+    """
+    through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
+    shift = np.array(irradiance.through_shift)
+    positive = _positive_light(through)
+    own = np.eye(len(through))[..., None]
+    level_variance = ((sigma**2 - shift**2) * through).sum(axis=1) / (through**3).sum(axis=1)
+    level = np.sqrt(np.clip(level_variance, 0.0, WORST**2))[:, None] * np.ones(through.shape[1])
+    return np.concatenate([own * level, own * np.clip(shift / positive, -WORST, WORST)])
+
+
 def mode_kinds(irradiance: IrradianceFile) -> NDArray[np.intp]:
     """Return the kind of each of the `site_modes`, shape (M,)."""
     smooth = np.repeat([KNOWN, WAVELENGTHS, KNOWN], SMOOTH_MODES)
@@ -77,7 +94,9 @@ def mode_kinds(irradiance: IrradianceFile) -> NDArray[np.intp]:
 
 
 def light_scatter(fit: FittedExcitation) -> LightScatter:
-    """Return the scatter of the light that a fit found."""
+    """Return the scatter of the light that a fit found; of selected lights, the lamp's alone."""
+    if not fit.site_sizes:
+        return LightScatter(fit.lamp_sigma, None, None)
     return LightScatter(
         lamp=fit.lamp_sigma,
         wavelength_nm=WAVELENGTH_SIGMA_NM * fit.site_sizes[WAVELENGTHS],

@@ -183,13 +183,13 @@ def _independent_charges(
 def _steady_and_changing(
     series: ChargingSeries, k_e_per_s: FloatArray, fraction: FloatArray
 ) -> FloatArray:
-    """Return κ in every step at brightness 1, shape (m, K, P N) or, the same of all, (m, 1, P N)."""
+    """Return κ in every step at brightness 1, shape (m, K, P N); (m, 1, P N) if all are alike."""
     bands = series.irradiance.shape[1]
     rates = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
     kappa = (fraction @ rates.T).reshape(len(fraction), -1, len(k_e_per_s))
     if not series.is_by_light:
         return np.asarray(kappa.reshape(len(fraction), 1, -1))
-    lights = [charge.light for charge in series.charges]
+    lights = [charge.light or 0 for charge in series.charges]
     return np.tile(kappa[:, lights], (1, 1, series.sites))
 
 
