@@ -12,7 +12,17 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import LAMP, LAMP_OFF, LEDS, LEDS_OFF, LedSwitch, RigFile, Session
+from labrig.acquire import (
+    LAMP,
+    LAMP_OFF,
+    LEDS,
+    LEDS_OFF,
+    SPECTROMETER,
+    LedSwitch,
+    ReadSpectrum,
+    RigFile,
+    Session,
+)
 from labrig.calibration import LVF_KIND
 from labrig.quantity import Count, DurationS
 from labrig.region import Region
@@ -20,6 +30,7 @@ from labrig.region import Region
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings
 from .steps.exciting_lights import ExcitingLights, Nanometres
+from .steps.led_spectra import SpectrumReadings
 from .steps.sample_pose import LAMP_DARK_S, face_lamp
 from .steps.scenes import (
     Arrangement,
@@ -38,6 +49,14 @@ class CardFrames(StrEnum):
     THROUGH = "irradiance-through"
 
 
+class CardSpectra(StrEnum):
+    """Roles of a spectrometer's readings of the card under the same lights."""
+
+    DIRECT = "spectrum-direct"
+    LIGHT = "spectrum-light"
+    DARK = "spectrum-dark"
+
+
 #: Edges of the bands of Table 1 of the paper.
 BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
 _DIRECT = Arrangement("grey card")
@@ -50,7 +69,30 @@ def light_unit(name: str, number: int) -> str:
 
 
 @dataclass(frozen=True)
-class LedCardUnit(SceneUnit):
+class CardUnit(SceneUnit):
+    """The card under the lamp or a part of its light, for the camera and for a spectrometer.
+
+    Attributes
+    ----------
+    readings
+        Settings of the spectrometer's readings, if there is one; None for none.
+    spectrum
+        Role of its reading.
+    """
+
+    readings: SpectrumReadings | None = None
+    spectrum: CardSpectra = CardSpectra.LIGHT
+
+    def run(self, session: Session) -> None:
+        """Light, photograph, read the spectrum."""
+        super().run(session)
+        if self.readings is not None and SPECTROMETER in session.rig:
+            self.readings.meter(session, self.name)
+            self.readings.read(session, self.spectrum, self.name)
+
+
+@dataclass(frozen=True)
+class LedCardUnit(CardUnit):
     """The card under one LED, with the lamp off; `lamp` is the LED's name."""
 
     def run(self, session: Session) -> None:
@@ -66,6 +108,39 @@ class LedCardUnit(SceneUnit):
         session.perform(LedSwitch(self.lamp))
         settles_s = max(session.rig[LEDS].settling_s(self.lamp), LAMP_DARK_S)
         session.wait(settles_s, f"the {self.lamp} LED settles")
+
+
+@dataclass(frozen=True)
+class DarkSpectraUnit:
+    """Readings of the spectrometer, if there is one, with the lights off, as long as all others.
+
+    Attributes
+    ----------
+    readings
+        Settings of the readings.
+    most
+        Largest number of integration times.
+    """
+
+    readings: SpectrumReadings
+    most: int
+    name: str = "dark-spectra"
+
+    def run(self, session: Session) -> None:
+        """Switch the lamp off, and read with every integration time that was used."""
+        if SPECTROMETER not in session.rig:
+            return
+        session.perform(LAMP_OFF)
+        session.wait(LAMP_DARK_S, "the lamp goes out")
+
+        def used_s() -> tuple[float, ...]:
+            records = [*session.spectra(CardSpectra.DIRECT), *session.spectra(CardSpectra.LIGHT)]
+            return tuple(sorted({record.integration_s for record in records}))
+
+        longest_s = (self.readings.longest_s,) * self.most
+        for integration_s in session.choose("integration", used_s, longest_s):
+            repetitions = self.readings.repetitions
+            session.perform(ReadSpectrum(CardSpectra.DARK, integration_s, repetitions))
 
 
 class Irradiance(ScenesProtocol):
@@ -96,6 +171,12 @@ class Irradiance(ScenesProtocol):
         Sensitivity and aperture of the camera.
     longest
         Longest exposure, for example `8 s`.
+    integration
+        With `select`: longest integration time of the spectrometer, if there is one, for example
+        `1 s`. It faces the card, or a white beside it, and tells spectrum and brightness of every
+        light better than the camera does.
+    repetitions
+        Number of spectra in each of its readings.
     repeats
         Number of photographs at each of two exposures of a scene; the longer exposure is for the
         dim ends of the strip.
@@ -113,6 +194,8 @@ class Irradiance(ScenesProtocol):
     illuminance_sigma_lux: float | None = Field(None, ge=0, allow_inf_nan=False)
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)
+    integration: DurationS = Field(1.0, gt=0)
+    repetitions: Count = Field(10, ge=2)
     repeats: Count = Field(2, ge=1)
     rounds: Count = Field(2, ge=1)
 
@@ -149,7 +232,14 @@ class Irradiance(ScenesProtocol):
         """Return darks, then the card by itself and through the LVF in turn, as the lamp drifts."""
         dark = Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True)
         rounds = (self._round(number) for number in range(1, self.rounds + 1))
-        return [dark, *(scene for scenes in rounds for scene in scenes)]
+        scenes = [dark, *(scene for scenes in rounds for scene in scenes)]
+        if self.select is None:
+            return scenes
+        most = self.rounds * (1 + len(self.select.names()))
+        return [
+            *scenes,
+            Scene(DarkSpectraUnit(self._readings, most), _DIRECT, "the lights are off"),
+        ]
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols whose results this one needs and the rig file does not name."""
@@ -157,21 +247,31 @@ class Irradiance(ScenesProtocol):
         return [kind.protocol for kind in needed if rig.optics.named(kind) is None]
 
     def _round(self, number: int) -> Sequence[Scene]:
-        direct = SceneUnit(self.bracketing, f"direct-{number}", CardFrames.DIRECT)
+        scene = (self.bracketing, f"direct-{number}", CardFrames.DIRECT)
         if self.select is not None:
+            card = CardUnit(*scene, readings=self._readings, spectrum=CardSpectra.DIRECT)
             return (
-                Scene(direct, _DIRECT, "how bright the lamp is by itself"),
+                Scene(card, _DIRECT, "how bright the lamp is by itself"),
                 *self._lights(self.select, number),
             )
+        direct = SceneUnit(*scene)
         through = StripUnit(self.bracketing, f"through-{number}", CardFrames.THROUGH)
         return (
             Scene(direct, _DIRECT, "how bright the lamp is by itself"),
             Scene(through, _THROUGH, "how much of it the variable filter leaves"),
         )
 
+    @property
+    def _readings(self) -> SpectrumReadings:
+        return SpectrumReadings(self.integration, self.repetitions)
+
     def _lights(self, lights: ExcitingLights, number: int) -> Iterator[Scene]:
         """Yield the card under one light after another."""
         for name in lights.names():
             scene = (self.bracketing, light_unit(name, number), CardFrames.THROUGH)
-            unit = LedCardUnit(*scene, name) if lights.leds else SceneUnit(*scene)
+            unit = (
+                LedCardUnit(*scene, name, readings=self._readings)
+                if lights.leds
+                else CardUnit(*scene, readings=self._readings)
+            )
             yield Scene(unit, lights.arrangement(name, "grey card"), "how bright this light is")

@@ -53,13 +53,14 @@ QUICK: dict[str, Any] = {
 }
 
 
-def bench(kind: str, **simulation: Any) -> Callable[[dict[str, Any]], None]:
+def bench(
+    kind: str, *, has_spectrometer: bool = False, **simulation: Any
+) -> Callable[[dict[str, Any]], None]:
     """Change the shipped rig for phosphors into one that selects lights in that way."""
 
     def change(rig: dict[str, Any]) -> None:
         room = rig["simulation"]
         room["sensor"] = {"width": WIDTH, "height": HEIGHT}
-        rig["devices"]["lamp"]["warm_up"] = "0 s"
         del room["lvf"]
         if kind == "wheel":
             slots = [None, *FILTERS[:5]]
@@ -97,6 +98,11 @@ def bench(kind: str, **simulation: Any) -> Callable[[dict[str, Any]], None]:
                     for n, (name, nm) in enumerate(zip(LED_NAMES, PEAKS_NM, strict=True), 1)
                 },
             }
+        if has_spectrometer:
+            rig["devices"]["spectrometer"] = {
+                "driver": "seabreeze_spectrometer",
+                "address": "sim://room/spectrometer",
+            }
         room |= simulation
 
     return change
@@ -109,9 +115,9 @@ def true_spectra(kind: str, room: Simulation) -> FloatArray:
         return np.array([led_spectrum(led) for led in room.leds])
     if kind == "monochromator":
         assert room.monochromator is not None
-        return lamp * np.array([passed_by(room.monochromator, nm) for nm in TUNED_NM])
+        return np.array([lamp * passed_by(room.monochromator, nm) for nm in TUNED_NM])
     filters = Filters(room.filters, room.filters_bent, room.seed)
-    return lamp * np.array([filters.transmission(name) for name in FILTERS])
+    return np.array([lamp * filters.transmission(name) for name in FILTERS])
 
 
 def true_light(kind: str, room: Simulation, bands_nm: Sequence[float] = BANDS_NM) -> IrradianceFile:
@@ -153,6 +159,7 @@ def recorded(folder: Path, kind: str, irradiance: Path, **simulation: Any) -> Pa
 
     def change(rig: dict[str, Any]) -> None:
         bench(kind, **simulation)(rig)
+        rig["devices"]["lamp"]["warm_up"] = "0 s"
         rig["optics"]["irradiance"] = str(irradiance)
 
     return record(folder, QUICK | {"select": SELECTIONS[kind]}, change)
