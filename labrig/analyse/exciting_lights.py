@@ -32,6 +32,8 @@ FILTER_SIGMA, FILTER_NM = 0.02, 0.5
 READING_SIGMA, READING_NM = 0.01, 0.3
 #: Pixels over which readings are smoothed, and limit of detection in σ.
 SMOOTHED, SEEN = 5, 4.0
+#: Distance from the middle of a light, in its standard deviations, within which all of it lies.
+NEAR = 5.0
 #: Fraction of the lamp's strongest counts below which its light is not seen.
 LEAST_LAMP = 2e-3
 
@@ -120,8 +122,16 @@ def _measured(part: Part, name: str, lamp: Spectrum) -> ExcitingLight:
             f"{part.run.folder}: expected the lamp's light in the spectrometer's readings of the "
             "card, got none; turn its head to the card"
         )
-    # Noise that is left out neither adds to other bands nor is missing in the light's own.
-    over_lamp = np.where(rate > SEEN * sigma, rate, 0.0)[is_lit] / of_lamp[is_lit]
+    is_seen = rate > SEEN * sigma
+    if not is_seen[is_lit].any():
+        raise DataError(f"{part.run.folder}: the spectrometer saw nothing of the light '{name}'")
+    # Far from the light there is only noise, which would add to other bands.
+    weight = np.where(is_seen & is_lit, rate, 0.0)
+    middle_nm = np.average(grid_nm, weights=weight)
+    width_nm = np.sqrt(np.average((grid_nm - middle_nm) ** 2, weights=weight))
+    is_near = np.abs(grid_nm - middle_nm) < NEAR * width_nm
+    kept = np.where(is_seen | is_near, np.maximum(rate, 0.0), 0.0)
+    over_lamp = kept[is_lit] / of_lamp[is_lit]
     value = over_lamp * lamp.at(grid_nm[is_lit])
     return ExcitingLight(Spectrum(name, grid_nm[is_lit], value), READING_SIGMA, READING_NM)
 

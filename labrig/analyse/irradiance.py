@@ -39,6 +39,11 @@ PARABOLA = (0.2, 0.3, 10.0)
 ROUGH = 0.02
 #: Least factor, for its logarithm.
 LEAST = 1e-6
+#: Error of a camera's curves for a light alone, which has no neighbours as the places of a strip
+#: have: published curves of one camera differ by 2 to 6 % of their peak (rms), 9 % of themselves.
+ALONE = CurveError(relative=0.09, added=0.015)
+#: Relative σ of a light from which a warning is given.
+HARDLY_KNOWN = 0.1
 #: Relative σ of a lux meter's reading, with its mismatch to the eye.
 LUX_SIGMA = 0.05
 #: Step of derivatives by a band's parameters, in their σ.
@@ -108,16 +113,28 @@ def _of_lights(part: Part, select: ExcitingLights) -> IrradianceResult:
     camera = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
     scale = light_scale(ratio, lights, names, lamp, card_reflectance(part.rig), camera)
     calibration = _file_of_lights(part, names, lights, lamp, ratio, scale)
-    means = [
-        float(np.average(one.spectrum.wavelength_nm, weights=one.spectrum.value)) for one in lights
-    ]
     return IrradianceResult(
         calibration=calibration.model_copy(update={"card": _card_light(frames, values)}),
-        centre_nm=np.array(means),
+        centre_nm=np.array(calibration.centre_nm),
         card_ratio=ratio,
         scale=scale,
-        warnings=tuple(_warnings(ratio)),
+        warnings=(*_warnings(ratio), *_hardly_known(names, scale)),
     )
+
+
+def _hardly_known(names: Sequence[str], scale: StripScale) -> Iterator[str]:
+    """Yield a line if the camera alone tells too little of some lights."""
+    unknown = [
+        f"{name} to {100 * sigma:.0f} %"
+        for name, sigma in zip(names, scale.relative_sigma, strict=True)
+        if sigma > HARDLY_KNOWN
+    ]
+    if unknown:
+        yield (
+            f"the irradiance of some lights is hardly known ({', '.join(unknown)}), nor are the "
+            "excitation rates of their bands: let a spectrometer read the card, too "
+            "('spectrometer' under 'devices'), or measure the camera's curves (camera_curves)"
+        )
 
 
 def _stacked(values: Sequence[SliceValues]) -> SliceValues:
@@ -152,6 +169,7 @@ def _file_of_lights(
     )  # fmt: skip
     sigma = np.hypot(through * scale.relative_sigma[:, np.newaxis], moved - through)
     ratio = norm * direct.sum() / through.sum(axis=1)
+    centre_nm, width_nm = np.array([_moments(one.spectrum, edges) for one in lights]).T
     return IrradianceFile(
         lamp=lamp.name,
         bands_nm=part.protocol.bands_nm,
@@ -159,6 +177,8 @@ def _file_of_lights(
         direct=tuple((norm * direct).tolist()),
         direct_sigma=tuple(_direct_sigma(lamp, edges, norm).tolist()),
         lights=names,
+        centre_nm=tuple(centre_nm.tolist()),
+        width_nm=tuple(width_nm.tolist()),
         through=tuple(tuple(row) for row in through.tolist()),
         through_sigma=tuple(tuple(row) for row in sigma.tolist()),
         through_shift=tuple(tuple(row) for row in (moved - through).tolist()),
@@ -170,6 +190,14 @@ def _file_of_lights(
         source=f"grey card by itself and by selected lights in {card.rounds} rounds, with labrig",
         run=part.run.folder.resolve().name,
     )
+
+
+def _moments(light: Spectrum, edges_nm: FloatArray) -> tuple[float, float]:
+    """Return mean and standard deviation in nm of the wavelengths of a light within the bands."""
+    grid_nm = np.arange(edges_nm[0], edges_nm[-1] + 0.5)
+    weight = light.at(grid_nm)
+    mean = float(np.average(grid_nm, weights=weight))
+    return mean, float(np.sqrt(np.average((grid_nm - mean) ** 2, weights=weight)))
 
 
 def _card_values(part: Part, frames: StripFrames, strip: Strip) -> Mapping[str, SliceValues]:
@@ -335,7 +363,6 @@ def light_scale(
     lamp: Spectrum,
     card: Transmittance,
     camera: CameraResponse,
-    curve_error: CurveError = CurveError(),  # noqa: B008 (frozen)
 ) -> StripScale:
     """Fit one factor for each selected light, such that light × factor explains the card's ratios.
 
@@ -349,8 +376,8 @@ def light_scale(
         What is known of the lights, and their names.
     lamp, card
         Spectrum of the lamp and reflectance of the card.
-    camera, curve_error
-        Curves of the camera and their error model.
+    camera
+        Curves of the camera.
 
     Raises
     ------
@@ -370,7 +397,7 @@ def light_scale(
             raise DataError(f"light '{name}': nothing was measured of it; expose longer")
     value, noise, curves = _factors(
         ratio, nodes, reflected * lamp.at(nodes), spectra, (moved - spectra)[np.newaxis], camera,
-        curve_error,
+        ALONE,
     )  # fmt: skip
     covariance = np.diag(noise**2) + curves @ curves.T
     # Of the logarithm: an unknown level weighs nothing.

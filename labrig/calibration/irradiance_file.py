@@ -62,6 +62,8 @@ class IrradianceFile(BaseModel):
         Middles of `strip.slices()`: 0 at the blue end, 1 at the red end; none of selected lights.
     lights
         Names of the selected lights; none of the LVF.
+    centre_nm, width_nm
+        Mean wavelength of each of `lights` and its standard deviation, in nm.
     through, through_sigma
         Irradiance of each band behind the LVF, a row for each position, or of each of `lights`, and
         σ.
@@ -103,6 +105,8 @@ class IrradianceFile(BaseModel):
     direct_sigma: Numbers
     position: tuple[Annotated[float, Field(ge=0, le=1)], ...] = ()
     lights: tuple[str, ...] = ()
+    centre_nm: tuple[Positive, ...] = ()
+    width_nm: Numbers = ()
     through: tuple[Numbers, ...]
     through_sigma: tuple[Numbers, ...]
     through_shift: tuple[tuple[FiniteFloat, ...], ...] = ()
@@ -139,8 +143,12 @@ class IrradianceFile(BaseModel):
                 f"expected {places} entries, one a position or light, in 'through', 'ratio' and "
                 "their σ"
             )
-        if len(self.through_shift) != len(self.lights):
-            raise ValueError(f"expected {len(self.lights)} entries in 'through_shift', one a light")
+        of_lights = (self.through_shift, self.centre_nm, self.width_nm)
+        if any(len(column) != len(self.lights) for column in of_lights):
+            raise ValueError(
+                f"expected {len(self.lights)} entries, one a light, in 'through_shift', "
+                "'centre_nm' and 'width_nm'"
+            )
         return self
 
     def lvf_strip(self) -> Strip:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from labrig.calibration import IrradianceFile
 from labrig.material import read_material
 from labrig.sim.filters import Filters
-from labrig.sim.lamp import BURNING_K, filament_spectrum
+from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.leds import led_spectrum
 from labrig.sim.monochromator import passed_by
 from labrig.sim.phosphor import band_cells
@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 WIDTH, HEIGHT = 96, 64
 FILTERS = (
-    "bandpass-425", "bandpass-450", "bandpass-500", "bandpass-525", "bandpass-580", "bandpass-610",
+    "shortpass-430", "bandpass-450", "bandpass-500", "bandpass-525", "bandpass-580", "bandpass-610",
     "bandpass-640", "longpass-660",
 )  # fmt: skip
 #: In the middle of the bands of Table 1.
@@ -33,6 +33,9 @@ TUNED_NM = (420, 455, 495, 530, 570, 605, 645, 680)
 PEAKS_NM = (415, 455, 495, 530, 565, 605, 640, 680)
 LED_NAMES = tuple(f"{nm} nm" for nm in PEAKS_NM)
 BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
+#: As narrow as a monochromator's own band.
+FINE_NM = tuple(range(410, 700, 20))
+FINE_BANDS_NM = tuple(float(nm) for nm in range(400, 720, 20))
 SITES = (0.1, 0.2, 0.8, 0.6)
 
 SELECTIONS: dict[str, dict[str, Any]] = {
@@ -40,6 +43,7 @@ SELECTIONS: dict[str, dict[str, Any]] = {
     "wheel": {"filters": list(FILTERS)},
     "monochromator": {"monochromator": list(TUNED_NM)},
     "leds": {"leds": list(LED_NAMES)},
+    "fine": {"monochromator": list(FINE_NM)},
 }
 QUICK: dict[str, Any] = {
     "protocol": "excitation",
@@ -70,7 +74,7 @@ def bench(
                 "address": "sim://room/wheel",
                 "filters": {name: number for number, name in enumerate(slots, 1) if name},
             }
-        if kind == "monochromator":
+        if kind in ("monochromator", "fine"):
             room["monochromator"] = {"fwhm": 20, "off_nm": 0.3}
             rig["devices"]["monochromator"] = {
                 "driver": "oriel_cornerstone",
@@ -125,7 +129,10 @@ def true_light(kind: str, room: Simulation, bands_nm: Sequence[float] = BANDS_NM
     cells = band_cells(bands_nm)
     direct = cells @ filament_spectrum(BURNING_K)
     norm = np.linalg.norm(direct)
-    through = true_spectra(kind, room) @ cells.T / norm
+    spectra = true_spectra(kind, room)
+    through = spectra @ cells.T / norm
+    centre_nm = spectra @ WAVELENGTH_NM / spectra.sum(axis=1)
+    about_nm = (WAVELENGTH_NM - centre_nm[:, None]) ** 2
     direct = direct / norm
     return IrradianceFile(
         lamp="the room's own",
@@ -133,6 +140,8 @@ def true_light(kind: str, room: Simulation, bands_nm: Sequence[float] = BANDS_NM
         direct=tuple(direct),
         direct_sigma=tuple(0.003 * direct),
         lights=names(kind),
+        centre_nm=tuple(centre_nm),
+        width_nm=tuple(np.sqrt((spectra * about_nm).sum(axis=1) / spectra.sum(axis=1))),
         through=tuple(map(tuple, through)),
         through_sigma=tuple(map(tuple, 0.005 * through)),
         through_shift=tuple(map(tuple, 0 * through)),

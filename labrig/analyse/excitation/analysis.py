@@ -18,6 +18,7 @@ from labrig.analyse.excitation.lamp_light import (
     scale_sigma,
 )
 from labrig.analyse.excitation.material import excited_material
+from labrig.analyse.excitation.narrow_lights import narrow_light_warnings
 from labrig.analyse.excitation.orders import OrderFits
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
@@ -142,6 +143,7 @@ def _patch_excitation(
             *(decay.warnings if fit.is_first_order else ()),
             *fit.warnings,
             *_light_warnings(fit),
+            *narrow_light_warnings(fit, irradiance),
             *_closure_warnings(closure),
             *no_spectrum,
         ),

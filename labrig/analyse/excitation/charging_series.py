@@ -14,6 +14,7 @@ from labrig.analyse.excitation.lamp_light import (
     lamp_transients,
     light_modes,
     mode_kinds,
+    selected_light,
     site_modes,
 )
 from labrig.analyse.excitation.site_means import site_means, site_weights
@@ -121,8 +122,9 @@ def patch_chargings(
             if interval.is_direct is direct
         )
 
-    through = _through(irradiance, charges(False), rise, fade)
-    if any(interval.is_led for interval in frames.intervals):
+    by_leds = any(interval.is_led for interval in frames.intervals)
+    through = _through(irradiance, charges(False), (rise, fade), by_leds=by_leds)
+    if by_leds:
         at_once = Transient.none(len(irradiance.direct))
         through = replace(through, rise=at_once, fade=at_once)
     everywhere = np.tile(irradiance.direct, (len(irradiance.position) or 1, 1))
@@ -196,16 +198,21 @@ def _veil_shapes(sites: int) -> FloatArray:
 
 
 def _through(
-    irradiance: IrradianceFile, charges: tuple[Charge, ...], rise: Transient, fade: Transient
+    irradiance: IrradianceFile,
+    charges: tuple[Charge, ...],
+    transients: tuple[Transient, Transient],
+    *,
+    by_leds: bool,
 ) -> ChargingSeries:
     """Return the series through the filter or by selected lights, without its values."""
-    light, lit = np.array(irradiance.through), (charges, rise, fade)
+    lit = (charges, *transients)
     if irradiance.lights:
-        modes = light_modes(irradiance)
+        light, _ = selected_light(irradiance, by_leds=by_leds)
+        modes = light_modes(irradiance, by_leds=by_leds)
         kinds = np.full(len(modes), KNOWN)
         return ChargingSeries("by selected lights", *lit, light, NOTHING, NOTHING, modes, kinds)
     return ChargingSeries(
-        "through the filter", *lit, light, NOTHING, NOTHING,
+        "through the filter", *lit, np.array(irradiance.through), NOTHING, NOTHING,
         site_modes(irradiance), mode_kinds(irradiance), across_sites(irradiance),
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from labrig.fit.excitation import levels_of_order
 from labrig.fit.excitation.level_slopes import Levels
-from labrig.material import relaxation_with_slopes
+from labrig.material import phi1, relaxation_with_slopes
 from labrig.results import ChargingSeries, FloatArray
 
 
@@ -97,6 +97,41 @@ def levels_at_off(
         return after_charges.decayed(k_r_per_s, back_s, zeros)
     after_charges = levels_of_order.levels_after_charges(series, k_r_per_s, k_e_per_s, order)
     return levels_of_order.decayed(after_charges, k_r_per_s, order, back_s)
+
+
+def slopes_by_light(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+) -> FloatArray:
+    """Return the derivatives of the levels of all exposures by ln E of every charge and band.
+
+    Of first order, and with what a charge has left at those after it.
+
+    Returns
+    -------
+    ndarray
+        Derivatives, shape (n, K, P, N, B).
+    """
+    charges = _independent_charges(series, k_r_per_s, k_e_per_s)
+    dark_s = _dark_s(series)
+    own = charges.gained.by_k_e * k_e_per_s
+    after = np.zeros((len(series.charges), *own.shape))
+    value = charges.gained.value
+    for number, charge in enumerate(series.charges):
+        after[number, number] = own[number]
+        if number and not charge.fresh:
+            wait_s = charge.on_s - float(dark_s[number - 1])
+            kept = charges.kept[number] * np.exp(-k_r_per_s * wait_s)
+            left = kept * value[number - 1]
+            value[number] += left
+            after[number, :number] = kept[..., None] * after[number - 1, :number]
+            dose = charges.dose[number, :, None] * k_e_per_s
+            after[number, number] -= left[..., None] * dose
+    shots = [len(charge.start_s) for charge in series.charges]
+    of_charge = np.repeat(np.arange(len(shots)), shots)
+    starts_s = np.concatenate([charge.start_s for charge in series.charges]) - dark_s[of_charge]
+    exposure_s = np.concatenate([charge.exposure_s for charge in series.charges])
+    decay = np.exp(-k_r_per_s * starts_s[:, None]) * phi1(k_r_per_s * exposure_s[:, None])
+    return np.asarray(after[of_charge] * decay[:, None, None, :, None])
 
 
 def _dark_s(series: ChargingSeries) -> FloatArray:
