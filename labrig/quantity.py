@@ -1,4 +1,4 @@
-"""Quantities with units in files: `90 min`, `320 ms`, `1/60 s`, `0.7 %`, `25 MB`.
+"""Quantities with units in files: `90 min`, `1/60 s`, `0.7 %`, `25 MB`, `0.4 mm`, `300 g/m2`.
 
 Each annotated type below turns such a text into a plain float in the named unit, so that inside
 labrig a name such as `exposure_s` carries the unit.
@@ -24,11 +24,13 @@ TEMPERATURE_STEP_K = {"K": 1.0}
 #: Boltzmann's constant in eV/K, exact since 2019, and 0 °C in K.
 BOLTZMANN_EV_PER_K = 8.617333262e-5
 ZERO_C_K = 273.15
+LENGTH_MM = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0}
+MASS_PER_AREA_G_PER_M2 = {"g/m2": 1.0, "g/m²": 1.0, "mg/cm2": 10.0, "mg/cm²": 10.0}
 SIZE_BYTES = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}
 
 _PATTERN = re.compile(
     r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|\.\d+)(?:\s*/\s*(?P<divisor>\d+(?:\.\d+)?))?"
-    r"\s*(?P<unit>[A-Za-zµ%]+)\s*"
+    r"\s*(?P<unit>[A-Za-zµ%]+(?:/[a-z]+[2²])?)\s*"
 )
 
 
@@ -146,6 +148,17 @@ DurationS = Annotated[
 ]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
 Fraction = Annotated[float, _validator(FRACTION, bare=True), _schema(FRACTION, bare=True)]
+#: Millimetres, written with a unit of length.
+LengthMm = Annotated[
+    float, _validator(LENGTH_MM, bare=False), _serializer("mm"), _schema(LENGTH_MM, bare=False)
+]
+#: Grams per square metre, written with a unit such as `g/m2`.
+MassPerArea = Annotated[
+    float,
+    _validator(MASS_PER_AREA_G_PER_M2, bare=False),
+    _serializer("g/m2"),
+    _schema(MASS_PER_AREA_G_PER_M2, bare=False),
+]
 #: Bytes, written with a unit such as `MB`.
 SizeBytes = Annotated[
     float, _validator(SIZE_BYTES, bare=False), _serializer("B"), _schema(SIZE_BYTES, bare=False)

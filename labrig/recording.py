@@ -69,9 +69,12 @@ class Recording:
         requested = read_protocol(protocol_path, changes)
         rig = with_frame_size(read_rig_file(rig_path), str(rig_path))
         planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
-        found = find_calibrations(rig, runs, wall_at_start(rig, str(rig_path)))
-        if not requested.uses_calibrations:
-            found = FoundCalibrations(rig, {}, ())
+        # A kept file that is malformed does not stop a run that measures it anew.
+        found = (
+            find_calibrations(rig, runs, wall_at_start(rig, str(rig_path)))
+            if requested.uses_calibrations
+            else FoundCalibrations(rig, {}, ())
+        )
         found = found.without_apertures(requested.apertures())
         protocol = requested.suited_to(found.rig)
         require_optics(found.rig)

@@ -1,9 +1,10 @@
-"""Excitation rates of all bands at once: charges through the variable filter, then without it.
+"""Excitation rates: charges through the variable filter, all bands at once, then without it.
 
-After Nalbach et al., sec. 4.5 and 4.6, where bands are charged one by one with narrow filters.
+After Nalbach et al., sec. 4.5 and 4.6, where bands are charged one by one with narrow filters; that
+can be done, too, by filters, a monochromator or LEDs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
@@ -14,12 +15,18 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
+    LAMP,
+    LAMP_OFF,
+    LAMP_ON,
+    LEDS,
     CameraOffers,
     ExposureSettings,
+    LedSwitch,
     ManualStep,
     ProtocolModel,
     Session,
     Shoot,
+    Switch,
     Unit,
     at,
 )
@@ -37,7 +44,15 @@ from .steps.camera_settings import (
 )
 from .steps.charge_times import FloatArray, fades_below_s, most_informative_s, still_grows
 from .steps.darkness import levels
-from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
+from .steps.exciting_lights import ExcitingLights
+from .steps.exposure_metering import (
+    SEEN_DN,
+    SEEN_SIGMA,
+    DecayMeter,
+    MeteringFrame,
+    Schedule,
+    measure_frame,
+)
 from .steps.glow import dark_frames
 from .steps.patch_names import FilterPatches
 from .steps.sample_pose import charge, check_visible, face_camera, face_lamp, lights_out
@@ -46,17 +61,23 @@ from .steps.scenes import Arrangement, Scene, ScenesProtocol
 
 
 class ExcitationFrames(StrEnum):
-    """Roles of frames of the glow after a charge through the filter, and by the lamp itself."""
+    """Roles of frames of the glow after a charge through the variable filter, by a selected light,
+    and by the lamp itself.
+    """
 
     STRIP = "strip"
+    BAND = "band"
     DIRECT = "direct"
 
 
 class UnitKind(StrEnum):
-    """Kinds of charges: doubling ones through the filter, most informative ones, direct ones."""
+    """Kinds of charges: doubling ones through the variable filter, most informative ones, those by
+    a selected light, direct ones.
+    """
 
     STRIP = "strip"
     REFINE = "refine"
+    BAND = "band"
     DIRECT = "direct"
 
     def numbered(self, number: int) -> str:
@@ -66,6 +87,17 @@ class UnitKind(StrEnum):
     def has(self, unit: str) -> bool:
         """Return whether a unit is of this kind."""
         return unit.rpartition("-")[0] == self
+
+    @classmethod
+    def of_light(cls, light: str, number: int | str) -> str:
+        """Return the name of a unit that charges by a selected light."""
+        return f"{cls.BAND}-{light}-{number}"
+
+    @classmethod
+    def light_of(cls, unit: str) -> str | None:
+        """Return the selected light of a unit, None for one of another kind."""
+        kind, _, light = unit.rpartition("-")[0].partition("-")
+        return light if kind == cls.BAND and light else None
 
 
 #: Factor by which each pause between two frames is longer than the one before.
@@ -119,6 +151,14 @@ class ExcitationSettings(ProtocolModel):
         Largest number of charges that double.
     refine
         Number of charges after those, of durations that add most information on the rates.
+    select
+        Lights that charge the sample one after another, in place of the variable filter: colour
+        filters by hand or in a wheel, wavelengths of a monochromator, or LEDs, for example
+        `{leds: [450 nm, 525 nm]}`. `irradiance` must have measured them. Default: the variable
+        filter.
+    charges
+        Durations of the charges by each of the lights of `select`, rising, for example
+        `[30 s, 5 min]`. They take the place of `first_charge`, `growth`, `at_most` and `refine`.
     direct
         Durations of the charges by the lamp itself, without the filter, rising, for example
         `[3 s, 1 min]`. They determine the level of the charge; the shortest ones, that of states
@@ -144,7 +184,8 @@ class ExcitationSettings(ProtocolModel):
     sites
         Place of the filter on the sample in the frame: `[x, y, width, height]` in pixels, or all
         four as fractions of the frame. Only exposures and charge times depend on it; the fit uses
-        the place that `lvf_calibration` measured.
+        the place that `lvf_calibration` measured. With `select` it is the place of the sample, of
+        which the fit takes the mean.
     patches
         Rows of several materials below the filter, by name: `[x, y, width, height]`, one above the
         other, each as long as the filter. They take the place of `sites`, and each has a material
@@ -164,6 +205,8 @@ class ExcitationSettings(ProtocolModel):
     growth: Fraction = Field(0.03, gt=0, lt=1)
     at_most: Count = Field(9, ge=2)
     refine: Count = Field(3, ge=0)
+    select: ExcitingLights | None = None
+    charges: tuple[DurationS, ...] = Field((30.0, 300.0), min_length=1)
     direct: tuple[DurationS, ...] = Field((3.0, 10.0, 60.0, 900.0), min_length=1)
     first: DurationS = Field(1.0, ge=0)
     every: DurationS = Field(4.0, gt=0)
@@ -179,8 +222,9 @@ class ExcitationSettings(ProtocolModel):
 
     @model_validator(mode="after")
     def _rising_charges(self) -> Self:
-        if any(later <= earlier for earlier, later in pairwise(self.direct)):
-            raise ValueError("expected charges in 'direct' that become longer and longer")
+        for name in ("direct", "charges"):
+            if any(later <= earlier for earlier, later in pairwise(getattr(self, name))):
+                raise ValueError(f"expected charges in '{name}' that become longer and longer")
         if self.first + self.every > self.duration:
             raise ValueError(
                 f"for: {duration_text(self.duration)} leaves no two frames "
@@ -244,6 +288,7 @@ class ExcitationSettings(ProtocolModel):
 LVF_ON = Arrangement(lvf="on sample")
 LVF_AWAY = Arrangement()
 THROUGH_IT = "every place is then charged by light of another wavelength"
+BY_ONE = "light of some wavelengths charges the sample"
 BY_ITSELF = "the lamp by itself charges the sample now"
 
 FRESH = ManualStep(
@@ -258,6 +303,16 @@ class ExcitationUnit:
     """Common part of all units."""
 
     protocol: ExcitationSettings
+
+    @property
+    def light_on(self) -> Switch | LedSwitch:
+        """Action that switches the light on which charges."""
+        return LAMP_ON
+
+    @property
+    def light_off(self) -> Switch | LedSwitch:
+        """Action that switches that light off."""
+        return LAMP_OFF
 
     def measure(self, frame: FrameRecord) -> MeteringFrame:
         """Measure a frame in every place of the strip."""
@@ -294,21 +349,26 @@ class ExcitationUnit:
 
         It goes on fading as it did between the last two photographs.
         """
-        frames = [
-            *session.frames(ExcitationFrames.STRIP),
-            *session.frames(ExcitationFrames.DIRECT),
-            *session.frames(FrameRole.METER),
-        ]
+        roles = (*ExcitationFrames, FrameRole.METER)
+        frames = [frame for role in roles for frame in session.frames(role)]
         last_unit = max(frames, key=lambda frame: frame.start_time).unit
         last_frames = sorted(
             (frame for frame in frames if frame.unit == last_unit),
             key=lambda frame: frame.start_time,
         )
         darks, rule = self.darks(session), self.protocol.rest
+        if not any(map(self._is_seen, last_frames)):
+            return rule.at_least
         glows = np.array([self.rates(frame, darks).max(axis=1) for frame in last_frames])
         pause_s = last_frames[-1].start_time - last_frames[-2].start_time
         until_s = fades_below_s(glows, pause_s, rule.below)
         return min(max(until_s, rule.at_least), rule.at_most)
+
+    def _is_seen(self, frame: FrameRecord) -> bool:
+        channels = [
+            channel for place in self.measure(frame).patches for channel in place.channels.values()
+        ]
+        return any(channel.mean > max(SEEN_SIGMA * channel.sigma, SEEN_DN) for channel in channels)
 
 
 @dataclass(frozen=True)
@@ -332,20 +392,23 @@ class DarkUnit(ExcitationUnit):
 class _MeterUnit(ExcitationUnit):
     """A charge whose glow determines the exposures."""
 
-    def _meter(self, session: Session, unit: str, charge_s: float) -> None:
+    def _meter(self, session: Session, charge_s: float) -> None:
         session.wait_until_warm("camera")
         ladder = self.protocol.ladder(session.rig[CAMERA].offers())
         check_visible(session, ladder[0][0])
-        charge(session, charge_s)
+        charge(session, charge_s, self.light_on)
         session.run_sequence(
             [
-                *lights_out(session),
+                *lights_out(session, self.light_off),
                 *(
                     at(time_s, Shoot(FrameRole.METER, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in ladder
                 ),
             ]
         )
+
+    def _require_glow(self, session: Session, unit: str) -> None:
+        ladder = self.protocol.ladder(session.rig[CAMERA].offers())
         shorter = [self.protocol.settings(exposure_s) for _, exposure_s in ladder[:3]]
         SanityChecks(session, unit, self.protocol.regions(), None).require_glow(shorter)
 
@@ -358,7 +421,45 @@ class StripMeter(_MeterUnit):
 
     def run(self, session: Session) -> None:
         """Charge, take a ladder of exposures."""
-        self._meter(session, self.name, self.protocol.first_charge)
+        self._meter(session, self.protocol.first_charge)
+        self._require_glow(session, self.name)
+
+
+@dataclass(frozen=True)
+class BandMeter(_MeterUnit):
+    """Metering charge by a selected light, after which the sample need not glow.
+
+    Attributes
+    ----------
+    light
+        Name of the light.
+    is_first
+        Whether nothing has charged the sample before.
+    """
+
+    light: str
+    is_first: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the unit: `band-450 nm-meter`."""
+        return UnitKind.of_light(self.light, "meter")
+
+    @property
+    def light_on(self) -> Switch | LedSwitch:
+        """Action that switches the light on."""
+        return _selected(self.protocol).on(self.light)
+
+    @property
+    def light_off(self) -> Switch | LedSwitch:
+        """Action that switches it off."""
+        return _selected(self.protocol).off
+
+    def run(self, session: Session) -> None:
+        """Charge, take a ladder of exposures."""
+        if not self.is_first:
+            self.rest(session)
+        self._meter(session, self.protocol.charges[0])
 
 
 @dataclass(frozen=True)
@@ -370,7 +471,8 @@ class DirectMeter(_MeterUnit):
     def run(self, session: Session) -> None:
         """Charge, take a ladder of exposures."""
         self.rest(session)
-        self._meter(session, self.name, self.protocol.direct[0])
+        self._meter(session, self.protocol.direct[0])
+        self._require_glow(session, self.name)
 
 
 #: Largest expected ratio of the glow to that of the reference charge, for exposures.
@@ -389,10 +491,10 @@ class _ChargeUnit(ExcitationUnit):
         schedule = self._schedule(session, role, charge_s, lasting_s)
         longest_s = self.protocol.longest_exposures_s(offers, lasting_s)
         check_visible(session, self.protocol.first)
-        charge(session, charge_s)
+        charge(session, charge_s, self.light_on)
         session.run_sequence(
             [
-                *lights_out(session),
+                *lights_out(session, self.light_off),
                 *(
                     at(time_s, Shoot(role, self.protocol.settings(min(exposure_s, most_s))))
                     for (time_s, exposure_s), most_s in zip(
@@ -411,7 +513,7 @@ class _ChargeUnit(ExcitationUnit):
         def decide() -> Schedule:
             reference_s, frames = self._reference_charge(session, role)
             schedule = DecayMeter([self.measure(frame) for frame in frames]).schedule(
-                times_s, offers, longest_s, EXPOSURES_GROW, session.warn
+                times_s, offers, longest_s, EXPOSURES_GROW, self._warner(session)
             )
             shorter = max(charge_s / reference_s / HEADROOM, 1.0)
             exposures_s = [
@@ -426,17 +528,29 @@ class _ChargeUnit(ExcitationUnit):
         charges = self._charges_so_far(session, role)
         if charges:
             return max(charges, key=lambda charge: charge[0])
-        meter = f"{role}-meter"
-        return _lamp_on_s(session, meter), [
+        meter = self._meter_name(role)
+        return _light_on_s(session, meter), [
             frame for frame in session.frames(FrameRole.METER) if frame.unit == meter
         ]
+
+    def _warner(self, session: Session) -> Callable[[str], None]:
+        """Return the function that receives warnings of a glow too bright or too dim."""
+        return session.warn
+
+    def _meter_name(self, role: str) -> str:
+        """Return the name of the unit that metered the same kind of charge."""
+        return f"{role}-meter"
+
+    def _is_alike(self, frame: FrameRecord) -> bool:
+        """Whether a frame of the same role is after the same kind of charge."""
+        return True
 
     def _charges_so_far(self, session: Session, role: str) -> list[tuple[float, list[FrameRecord]]]:
         """Return charge time and frames of every charge of the kind so far."""
         units: dict[str, list[FrameRecord]] = {}
-        for frame in session.frames(role):
+        for frame in filter(self._is_alike, session.frames(role)):
             units.setdefault(frame.unit, []).append(frame)
-        return [(_lamp_on_s(session, unit), frames) for unit, frames in units.items()]
+        return [(_light_on_s(session, unit), frames) for unit, frames in units.items()]
 
     def _glow_by_charge(
         self, session: Session, charges: Sequence[tuple[float, list[FrameRecord]]]
@@ -448,10 +562,17 @@ class _ChargeUnit(ExcitationUnit):
         )
 
 
-def _lamp_on_s(session: Session, unit: str) -> float:
-    """Return the time for which the lamp shone in a unit, in seconds."""
-    times_s = [action.start_time for action in session.actions("lamp") if action.unit == unit]
+def _light_on_s(session: Session, unit: str) -> float:
+    """Return the time for which the lamp, or an LED, shone in a unit, in seconds."""
+    actions = [*session.actions(LAMP.key), *session.actions(LEDS.key)]
+    times_s = [action.start_time for action in actions if action.unit == unit]
     return times_s[1] - times_s[0]
+
+
+def _selected(protocol: ExcitationSettings) -> ExcitingLights:
+    """Return the lights that are selected one after another."""
+    assert protocol.select is not None, "a protocol without them has no units that use them"
+    return protocol.select
 
 
 @dataclass(frozen=True)
@@ -509,6 +630,44 @@ class RefiningUnit(_ChargeUnit):
 
 
 @dataclass(frozen=True)
+class BandUnit(_ChargeUnit):
+    """Charge by a selected light, which need not excite the sample."""
+
+    light: str
+    number: int
+
+    @property
+    def name(self) -> str:
+        """Name of the unit: `band-450 nm-1`, `band-450 nm-2`, …"""
+        return UnitKind.of_light(self.light, self.number)
+
+    @property
+    def light_on(self) -> Switch | LedSwitch:
+        """Action that switches the light on."""
+        return _selected(self.protocol).on(self.light)
+
+    @property
+    def light_off(self) -> Switch | LedSwitch:
+        """Action that switches it off."""
+        return _selected(self.protocol).off
+
+    def run(self, session: Session) -> None:
+        """Charge and photograph."""
+        session.wait_until_warm("camera")
+        charge_s = self.protocol.charges[self.number - 1]
+        self._charge(session, ExcitationFrames.BAND, charge_s, self.protocol.duration)
+
+    def _warner(self, session: Session) -> Callable[[str], None]:
+        return lambda text: None  # hardly any glow says that this light hardly excites
+
+    def _meter_name(self, role: str) -> str:
+        return UnitKind.of_light(self.light, "meter")
+
+    def _is_alike(self, frame: FrameRecord) -> bool:
+        return UnitKind.light_of(frame.unit) == self.light
+
+
+@dataclass(frozen=True)
 class DirectUnit(_ChargeUnit):
     """Charge by the lamp itself; after the last one, a longer decay."""
 
@@ -532,18 +691,33 @@ class Excitation(ExcitationSettings, ScenesProtocol):
     """Excitation protocol; `excitation.yaml` is the commented example."""
 
     def scenes(self) -> Sequence[Scene]:
-        """Return darks, then metering and charges through the filter, then the same without it."""
+        """Return darks, then metering and charges by bands, then the same by the lamp itself."""
+        direct: list[Unit] = [
+            DirectMeter(self),
+            *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
+        ]
+        by_itself = [Scene(unit, LVF_AWAY, BY_ITSELF) for unit in direct]
+        if self.select is not None:
+            return [
+                Scene(DarkUnit(self), LVF_AWAY, BY_ITSELF, is_dark=True),
+                *self._by_lights(self.select),
+                *by_itself,
+            ]
         through: list[Unit] = [
             StripMeter(self),
             *(DoublingUnit(self, number) for number in range(1, self.at_most + 1)),
             *(RefiningUnit(self, number) for number in range(1, self.refine + 1)),
         ]
-        direct: list[Unit] = [
-            DirectMeter(self),
-            *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
-        ]
         return [
             Scene(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
             *(Scene(unit, LVF_ON, THROUGH_IT) for unit in through),
-            *(Scene(unit, LVF_AWAY, BY_ITSELF) for unit in direct),
+            *by_itself,
         ]
+
+    def _by_lights(self, lights: ExcitingLights) -> Iterator[Scene]:
+        """Yield metering and charges by one light after another."""
+        for place, light in enumerate(lights.names()):
+            arrangement = lights.arrangement(light)
+            yield Scene(BandMeter(self, light, place == 0), arrangement, BY_ONE)
+            for number in range(1, len(self.charges) + 1):
+                yield Scene(BandUnit(self, light, number), arrangement, BY_ONE)

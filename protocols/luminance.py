@@ -272,9 +272,6 @@ class Luminance(ProtocolModel):
         Class of JIS Z 9107 to be met: `JA`, `JB`, `JC` or `JD`.
     require
         Least luminances, for example `[140 mcd/m2 at 10 min]`.
-    mass_per_area
-        Mass of the phosphor per area as free text, for example `300 g/m2`; it is stated with the
-        result. The thickness is a key of `sample`.
     adaptation
         Luminance to which eyes are adapted, for example `50 mcd/m2`, for mesopic luminances by CIE
         191. Default: none are given.
@@ -300,7 +297,6 @@ class Luminance(ProtocolModel):
     colours: str = ""
     rank: Class | None = Field(None, alias="class")
     require: tuple[Annotated[str, AfterValidator(_is_requirement)], ...] = ()
-    mass_per_area: str | None = None
     adaptation: Annotated[str, AfterValidator(_is_luminance)] | None = None
     patches: Patches = Field({"sample": CENTRE}, min_length=1)
     card_cd_per_m2: Annotated[float, Field(gt=0)] | Literal["auto"] = "auto"

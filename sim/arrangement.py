@@ -32,6 +32,12 @@ class Arrangement:
         Whether the filter was put there the wrong way round.
     filter
         Name of the colour filter before the lamp.
+    wheel
+        Name of the filter that the filter wheel has before the lamp.
+    is_monochromatic
+        Whether the monochromator is between lamp and sample.
+    monochromator_nm
+        Wavelength to which it is tuned, in nm; null while its shutter is closed.
     lamp
         Lamp that the relay feeds.
     lamp_m
@@ -54,6 +60,9 @@ class Arrangement:
     lvf: LvfPlace = "away"
     turned: bool = False
     filter: str | None = None
+    wheel: str | None = None
+    is_monochromatic: bool = False
+    monochromator_nm: float | None = None
     lamp: LampKind = "halogen"
     lamp_m: float = USUAL_LAMP_M
     tilt_deg: int = 0

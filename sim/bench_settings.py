@@ -93,6 +93,42 @@ class LedSettings(Part):
     warm_up: Annotated[DurationS, Field(gt=0)] = 20.0
 
 
+class FilterWheelSettings(Part):
+    """A filter wheel before the lamp, a Thorlabs FW102C at `sim://room/wheel`.
+
+    Attributes
+    ----------
+    filters
+        Name of the filter in each slot, from slot 1 on; null: an open slot. Slots that are not
+        named are open.
+    """
+
+    filters: Annotated[tuple[str | None, ...], Field(min_length=1, max_length=6)]
+
+
+class MonochromatorSettings(Part):
+    """A monochromator between lamp and sample, an Oriel Cornerstone at `sim://room/monochromator`.
+
+    The changer puts it there and takes it away.
+
+    Attributes
+    ----------
+    fwhm
+        Full width at half maximum of its slits' triangle in nm.
+    off_nm
+        Error of its wavelength scale in nm.
+    level
+        Transmittance at the blaze of its grating in the middle of the band.
+    stray
+        Stray light at all wavelengths as a fraction of that.
+    """
+
+    fwhm: Annotated[float, Field(ge=2, le=100)] = 20.0
+    off_nm: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    level: Annotated[Fraction, Field(gt=0, le=1)] = 0.5
+    stray: Annotated[Fraction, Field(ge=0, le=0.01)] = 1e-4
+
+
 class IlluminantSettings(Part):
     """A broadband lamp on a relay of the Numato board at `sim://room/lamps`.
 

@@ -56,6 +56,7 @@ class Changer:
     ) -> None:
         self._samples = len(simulation.patches)
         self._has_lvf = simulation.lvf is not None
+        self._has_monochromator = simulation.monochromator is not None
         self._turned = given(fault.lvf_turned for fault in simulation.faults)
         self._skipped = given(fault.filter_skipped for fault in simulation.faults)
         self._filters = filters
@@ -79,6 +80,8 @@ class Changer:
             "lvf away": lambda: self._put_lvf("away"),
             "lvf before camera": lambda: self._put_lvf("before camera"),
             "lvf on sample": lambda: self._put_lvf("on sample"),
+            "monochromator on": lambda: self._put_monochromator(True),
+            "monochromator away": lambda: self._put_monochromator(False),
             "no filter": lambda: self._put_filter(None),
             "filter NAME": self._put_filter,
             "lamp halogen": lambda: self._change_lamp("halogen"),
@@ -118,6 +121,19 @@ class Changer:
             raise UsageError("there is no LVF in this room, see 'simulation.lvf'")
         turned = any(span.is_on(self._clock.now()) for span in self._turned)
         self._change(lvf=place, turned=turned and place != "away")
+
+    def _put_monochromator(self, on: bool) -> None:
+        if on and not self._has_monochromator:
+            raise UsageError("there is none in this room, see 'simulation.monochromator'")
+        self._change(is_monochromatic=on)
+
+    def turn_wheel(self, name: str | None) -> None:
+        """Have another filter of the filter wheel before the lamp from now on."""
+        self._change(wheel=name)
+
+    def tune(self, wavelength_nm: float, is_open: bool) -> None:
+        """Have the monochromator tuned to another wavelength, its shutter open or closed."""
+        self._change(monochromator_nm=wavelength_nm if is_open else None)
 
     def _put_filter(self, name: str | None) -> None:
         if name is not None:

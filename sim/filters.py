@@ -12,8 +12,10 @@ from labrig import resources
 from labrig.errors import UsageError
 from labrig.yaml_file import did_you_mean
 
-from .arrangement import USUAL_LAMP_M, Arrangements
+from .arrangement import USUAL_LAMP_M, Arrangement, Arrangements
+from .bench_settings import MonochromatorSettings
 from .lamp import IS_VISIBLE, WAVELENGTH_NM
+from .monochromator import passed_by
 
 FloatArray = NDArray[np.float64]
 
@@ -34,6 +36,8 @@ class Filters:
         Root mean square difference of the true transmittances from the files'.
     seed
         Seed of that difference.
+    monochromator
+        Settings of the monochromator; None if there is none.
 
     Raises
     ------
@@ -41,13 +45,20 @@ class Filters:
         There is no such folder, or no curve in it.
     """
 
-    def __init__(self, folder: str | None, bent: float, seed: int) -> None:
+    def __init__(
+        self,
+        folder: str | None,
+        bent: float,
+        seed: int,
+        monochromator: MonochromatorSettings | None = None,
+    ) -> None:
         place = resources.folder(SHIPPED) if folder is None else Path(folder)
         if not place.is_dir():
             raise UsageError(f"{place}: expected a folder of colour filters ({SUFFIX})")
         self._files = {path.stem: path for path in sorted(place.glob(f"*{SUFFIX}"))}
         if not self._files:
             raise UsageError(f"{place}: expected a {SUFFIX} file for each colour filter, got none")
+        self._monochromator = monochromator
         self._bent = bent
         self._seed = seed
         self._transmissions: dict[str | None, FloatArray] = {None: np.ones_like(WAVELENGTH_NM)}
@@ -62,15 +73,22 @@ class Filters:
 
         A lamp that is further away than usual gives less light by the square of its distance.
         """
-        history: list[tuple[float, str | None, float]] = []
+        history: list[tuple[float, Arrangement]] = []
         for since_s, arrangement in zip(arrangements.since_s, arrangements.states, strict=True):
-            state = arrangement.filter, arrangement.lamp_m
-            if not history or history[-1][1:] != state:
-                history.append((since_s, *state))
-        return tuple(
-            (since_s, self.transmission(name) * (USUAL_LAMP_M / lamp_m) ** 2)
-            for since_s, name, lamp_m in history
-        )
+            if not history or _before_lamp(history[-1][1]) != _before_lamp(arrangement):
+                history.append((since_s, arrangement))
+        return tuple((since_s, self._passed(arrangement)) for since_s, arrangement in history)
+
+    def _passed(self, arrangement: Arrangement) -> FloatArray:
+        """Return what all that is before the lamp lets through, shape (wavelengths,)."""
+        passed = self.transmission(arrangement.filter) * (USUAL_LAMP_M / arrangement.lamp_m) ** 2
+        if arrangement.wheel is not None:
+            passed = passed * self.transmission(arrangement.wheel)
+        if not arrangement.is_monochromatic or self._monochromator is None:
+            return passed
+        if arrangement.monochromator_nm is None:
+            return np.zeros_like(passed)
+        return passed * passed_by(self._monochromator, arrangement.monochromator_nm)
 
     def transmission(self, name: str | None) -> FloatArray:
         """Return the filter's transmittance, shape (wavelengths,); no filter: 1."""
@@ -89,6 +107,18 @@ class Filters:
         factor /= np.sqrt(np.mean(factor[IS_VISIBLE] ** 2))
         bent: FloatArray = np.clip(curve * (1 + self._bent * factor), 0.0, 1.0)
         return bent
+
+
+def _before_lamp(arrangement: Arrangement) -> tuple[object, ...]:
+    """Return all that changes the lamp's light on its way."""
+    tuned = arrangement.monochromator_nm if arrangement.is_monochromatic else None
+    return (
+        arrangement.filter,
+        arrangement.wheel,
+        arrangement.lamp_m,
+        arrangement.is_monochromatic,
+        tuned,
+    )
 
 
 def read_curve(path: Path) -> FloatArray:

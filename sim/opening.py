@@ -15,7 +15,9 @@ from . import protocol_sim
 from .boards import (
     ArduinoBoard,
     ChangerBoard,
+    CornerstoneBoard,
     Dc4100Board,
+    Fw102cBoard,
     LcusBoard,
     MaestroBoard,
     NumatoBoard,
@@ -34,8 +36,9 @@ from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
 #: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`, `sim://room/spectrometer`; with
-#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`, and with a bank of lamps
-#: `sim://room/lamps`.
+#: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`, with a bank of lamps
+#: `sim://room/lamps`, with a filter wheel `sim://room/wheel`, with a monochromator
+#: `sim://room/monochromator`.
 NAME = "room"
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
@@ -98,12 +101,18 @@ class OpenRoom:
                 units[f"dc4100-{1 + (relay - 1) // OUTPUTS}"].states[(relay - 1) % OUTPUTS] = True
             else:
                 relay_boards[self._led_board].states[relay] = True
+        selectors: dict[str, Fw102cBoard | CornerstoneBoard] = {}
+        if simulation.filter_wheel is not None:
+            selectors["wheel"] = Fw102cBoard(self.room.turn_wheel, clock)
+        if simulation.monochromator is not None:
+            selectors["monochromator"] = CornerstoneBoard(self.room.tune, clock)
         changer = ChangerBoard(self.room.tasks)
         for task in simulation.initial.manual_steps:
             changer.do(task)
         self.boards = {
             "servo": SerialCable(servo, clock),
             "changer": SerialCable(changer, clock),
+            **{name: SerialCable(board, clock) for name, board in selectors.items()},
         } | {
             name: SerialCable(
                 board,

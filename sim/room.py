@@ -102,7 +102,12 @@ class Room:
         always = [leak(simulation.ambient, [FaultTime()])] if simulation.ambient else []
         self._leaks = (*always, *leaks)
         self._doors = Doors(simulation, clock, pulses)
-        self._filters = Filters(simulation.filters, simulation.filters_bent, simulation.seed)
+        self._filters = Filters(
+            simulation.filters,
+            simulation.filters_bent,
+            simulation.seed,
+            simulation.monochromator,
+        )
         lamps = simulation.illuminants
         filters = tuple(self._filters.transmission(lamp.filter) for lamp in lamps)
         self._illuminants = Illuminants(lamps=lamps, filters=filters)
@@ -176,6 +181,16 @@ class Room:
     def dim_led(self, relay: int, fraction: float) -> None:
         """Change the brightness of an LED now, as a fraction of its full light."""
         self._led_circuit.dim(relay, fraction)
+
+    def turn_wheel(self, slot: int) -> None:
+        """Have a slot of the filter wheel, from 1 on, before the lamp."""
+        wheel = self._simulation.filter_wheel
+        filters = () if wheel is None else wheel.filters
+        self._changer.turn_wheel(filters[slot - 1] if slot <= len(filters) else None)
+
+    def tune(self, wavelength_nm: float, is_open: bool) -> None:
+        """Have the monochromator tuned to a wavelength, its shutter open or closed."""
+        self._changer.tune(wavelength_nm, is_open)
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
         """Return the DNG of an exposure that is over.

@@ -17,11 +17,13 @@ from labrig.region import Region
 
 from .bench_settings import (
     DoorSettings,
+    FilterWheelSettings,
     IlluminantSettings,
     ImagingSettings,
     LedSettings,
     LensSettings,
     LvfSettings,
+    MonochromatorSettings,
     Part,
     ServoBoardSettings,
     TemperatureSettings,
@@ -253,6 +255,10 @@ class Simulation(Part):
     filters
         Folder with the colour filters' spectral transmittances, one file `NAME.csv` for each
         filter; null: the shipped folder.
+    filter_wheel
+        Filter wheel before the lamp; null: none.
+    monochromator
+        Monochromator that can be put between lamp and sample; null: none.
     filters_bent
         Root mean square by which the true transmittances differ from those of the files, for
         example `1 %`.
@@ -325,6 +331,8 @@ class Simulation(Part):
     lcus: Answers = "nothing"
     lvf: LvfSettings | None = None
     filters: str | None = None
+    filter_wheel: FilterWheelSettings | None = None
+    monochromator: MonochromatorSettings | None = None
     filters_bent: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     grey_card: Annotated[Fraction, Field(gt=0, le=0.95)] = 0.18
     grey_card_fluorescence: Annotated[Fraction, Field(ge=0, le=1)] = 0.0

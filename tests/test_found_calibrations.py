@@ -273,6 +273,13 @@ def test_a_corrupt_file_is_one_clear_line(name: str, tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_a_corrupt_file_does_not_stop_what_measures_it_anew(tmp_path: Path) -> None:
+    (kept(tmp_path, reference(None)) / "irradiance.yaml").write_text("kind: [")
+    anew = resources.find("protocols", "protocol", "calibration")
+    shipped = resources.find("config", "rig", "sim-phosphor")
+    assert Recording.prepare(anew, shipped, tmp_path).found.kept == {}
+
+
 def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) -> None:
     folder = kept(tmp_path, reference(unlike_any()))
     protocol = resources.find("protocols", "protocol", "phosphor")

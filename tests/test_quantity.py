@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.quantity import TIME_S, duration_text, parse
+from labrig.quantity import LENGTH_MM, MASS_PER_AREA_G_PER_M2, TIME_S, duration_text, parse
 
 
 @pytest.mark.parametrize(
@@ -22,6 +22,17 @@ from labrig.quantity import TIME_S, duration_text, parse
 )
 def test_durations(text: str, seconds: float) -> None:
     assert parse(text, TIME_S) == pytest.approx(seconds, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["300 g/m2", "300 g/m²", "30 mg/cm2", "30mg/cm²"])
+def test_masses_per_area(text: str) -> None:
+    assert parse(text, MASS_PER_AREA_G_PER_M2) == pytest.approx(300.0, rel=1e-15)
+
+
+def test_thicknesses() -> None:
+    assert parse("400 um", LENGTH_MM) == pytest.approx(0.4, rel=1e-15)
+    with pytest.raises(ValueError, match="um, µm, mm, cm"):
+        parse("0.4 g/m2", LENGTH_MM)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
@@ -11,6 +11,7 @@ from labrig.acquire.frame_regions import regions_in
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.calibration import CalibrationKind
+from labrig.quantity import LengthMm, MassPerArea
 from labrig.record import FrameRole, unit_in
 from labrig.region import Region
 
@@ -34,7 +35,10 @@ class Sample(BaseModel):
     name
         Name of the sample, which the material file takes over, for example `blue-paint`.
     thickness
-        Thickness of the sample as free text, for example `0.4 mm`. It is recorded, not used.
+        Thickness of the layer, for example `0.4 mm`, which the material file takes over. Several
+        patches count as equally thick.
+    mass_per_area
+        Mass of the phosphor per area, for example `300 g/m2`, which the material file takes over.
     batch
         Batch or lot of the sample as free text, for example `B-17`. It is recorded, not used.
     last_light
@@ -47,7 +51,8 @@ class Sample(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", coerce_numbers_to_str=True)
 
     name: str = Field("sample", min_length=1)
-    thickness: str | None = None
+    thickness: Annotated[LengthMm, Field(gt=0)] | None = None
+    mass_per_area: Annotated[MassPerArea, Field(gt=0)] | None = None
     batch: str | None = None
     last_light: str | None = Field(None, description="when and which light it saw last")
     notes: str | None = None

@@ -15,7 +15,7 @@ from labrig.analyse.frames import (
 from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
-from labrig.analyse.surface import with_reflectance
+from labrig.analyse.surface import with_layer, with_reflectance
 from labrig.analyse.temperature import drift_warnings
 from labrig.errors import FitError
 from labrig.fit import DecayFit
@@ -208,7 +208,9 @@ def _decay_patch(
         normalised_residuals=fit.normalised_residuals,
         noise=noise_budget(series, fit),
         material=with_reflectance(
-            _material(series, fit, name, part.run.name, temperature_c),
+            with_layer(
+                _material(series, fit, name, part.run.name, temperature_c), part.protocol.sample
+            ),
             patch,
             part.inputs.reflectance,
         ),

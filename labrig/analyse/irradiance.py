@@ -1,4 +1,4 @@
-"""Irradiance of the lamp on the sample, directly and through the LVF, from frames of a card."""
+"""Irradiance on the sample, of the lamp and through the LVF or of lights, from frames of a card."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from labrig.analyse.exciting_lights import ExcitingLight, exciting_lights
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
@@ -21,8 +22,9 @@ from labrig.optics import (
     band_integrals,
     quadrature,
 )
-from labrig.protocols.irradiance import CardFrames, Irradiance
-from labrig.reduce import FLICKER, sensor_layout, slice_values
+from labrig.protocols.irradiance import CardFrames, Irradiance, light_unit
+from labrig.protocols.steps.exciting_lights import ExcitingLights
+from labrig.reduce import FLICKER, region_values, sensor_layout, slice_values
 from labrig.results import CardRatio, FloatArray, IrradianceResult, SliceValues, StripScale
 
 #: Relative change of the lamp between rounds that causes a warning.
@@ -37,6 +39,11 @@ PARABOLA = (0.2, 0.3, 10.0)
 ROUGH = 0.02
 #: Least factor, for its logarithm.
 LEAST = 1e-6
+#: Error of a camera's curves for a light alone, which has no neighbours as the places of a strip
+#: have: published curves of one camera differ by 2 to 6 % of their peak (rms), 9 % of themselves.
+ALONE = CurveError(relative=0.09, added=0.015)
+#: Relative σ of a light from which a warning is given.
+HARDLY_KNOWN = 0.1
 #: Relative σ of a lux meter's reading, with its mismatch to the eye.
 LUX_SIGMA = 0.05
 #: Step of derivatives by a band's parameters, in their σ.
@@ -53,6 +60,8 @@ def analyse(part: Part) -> IrradianceResult:
     DataError
         Frames are missing or damaged, or some position was not lit.
     """
+    if part.protocol.select is not None:
+        return _of_lights(part, part.protocol.select)
     calibrated = part.inputs.lvf
     if calibrated is None or calibrated.on_sample is None:
         raise UsageError(
@@ -75,6 +84,120 @@ def analyse(part: Part) -> IrradianceResult:
         scale=scale,
         warnings=tuple(_warnings(ratio)),
     )
+
+
+def _of_lights(part: Part, select: ExcitingLights) -> IrradianceResult:
+    """Measure the irradiance in bands, by the lamp itself and by every selected light.
+
+    Raises
+    ------
+    UsageError
+        Curves are missing in the rig file, or nothing is known of a light.
+    DataError
+        Frames are missing or damaged, or some light was not seen.
+    """
+    frames, lamp = StripFrames(part), lamp_spectrum(part.rig)
+    lit = [*frames.of(CardFrames.DIRECT), *frames.of(CardFrames.THROUGH)]
+    regions = {"card": part.protocol.sites}
+    values = region_values(lit, regions, frames.dark, part.inputs.camera)
+    names = select.names()
+    ratio = mean_ratio(
+        [
+            (values[f"direct-{number}"], _stacked([values[unit] for unit in units]))
+            for number in range(1, part.protocol.rounds + 1)
+            if {f"direct-{number}", *(units := [light_unit(name, number) for name in names])}
+            <= set(values)
+        ]
+    )
+    lights = exciting_lights(part, select, lamp)
+    camera = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
+    scale = light_scale(ratio, lights, names, lamp, card_reflectance(part.rig), camera)
+    calibration = _file_of_lights(part, names, lights, lamp, ratio, scale)
+    return IrradianceResult(
+        calibration=calibration.model_copy(update={"card": _card_light(frames, values)}),
+        centre_nm=np.array(calibration.centre_nm),
+        card_ratio=ratio,
+        scale=scale,
+        warnings=(*_warnings(ratio), *_hardly_known(names, scale)),
+    )
+
+
+def _hardly_known(names: Sequence[str], scale: StripScale) -> Iterator[str]:
+    """Yield a line if the camera alone tells too little of some lights."""
+    unknown = [
+        f"{name} to {100 * sigma:.0f} %"
+        for name, sigma in zip(names, scale.relative_sigma, strict=True)
+        if sigma > HARDLY_KNOWN
+    ]
+    if unknown:
+        yield (
+            f"the irradiance of some lights is hardly known ({', '.join(unknown)}), nor are the "
+            "excitation rates of their bands: let a spectrometer read the card, too "
+            "('spectrometer' under 'devices'), or measure the camera's curves (camera_curves)"
+        )
+
+
+def _stacked(values: Sequence[SliceValues]) -> SliceValues:
+    """Return the values of one region in several scenes as those of as many regions."""
+    return SliceValues(
+        np.concatenate([one.value for one in values]), np.concatenate([one.sigma for one in values])
+    )
+
+
+def _file_of_lights(
+    part: Part,
+    names: tuple[str, ...],
+    lights: Sequence[ExcitingLight],
+    lamp: Spectrum,
+    card: CardRatio,
+    scale: StripScale,
+) -> IrradianceFile:
+    edges = np.array(part.protocol.bands_nm)
+    direct = band_integrals(lamp.wavelength_nm, lamp.value, edges)
+    norm = part.protocol.vector_length / float(np.linalg.norm(direct))
+    factor = scale.value[:, np.newaxis] * norm
+    through, moved = (
+        factor
+        * np.array(
+            [
+                band_integrals(one.spectrum.wavelength_nm + shift * one.wavelength_sigma_nm,
+                               one.spectrum.value, edges)
+                for one in lights
+            ]
+        )
+        for shift in (0, 1)
+    )  # fmt: skip
+    sigma = np.hypot(through * scale.relative_sigma[:, np.newaxis], moved - through)
+    ratio = norm * direct.sum() / through.sum(axis=1)
+    centre_nm, width_nm = np.array([_moments(one.spectrum, edges) for one in lights]).T
+    return IrradianceFile(
+        lamp=lamp.name,
+        bands_nm=part.protocol.bands_nm,
+        vector_length=part.protocol.vector_length,
+        direct=tuple((norm * direct).tolist()),
+        direct_sigma=tuple(_direct_sigma(lamp, edges, norm).tolist()),
+        lights=names,
+        centre_nm=tuple(centre_nm.tolist()),
+        width_nm=tuple(width_nm.tolist()),
+        through=tuple(tuple(row) for row in through.tolist()),
+        through_sigma=tuple(tuple(row) for row in sigma.tolist()),
+        through_shift=tuple(tuple(row) for row in (moved - through).tolist()),
+        scale_sigma=card.common_sigma,
+        ratio=tuple(ratio.tolist()),
+        ratio_sigma=tuple((ratio * np.hypot(scale.relative_sigma, card.common_sigma)).tolist()),
+        illuminance_lux=part.protocol.illuminance_lux,
+        illuminance_sigma_lux=_lux_sigma(part.protocol),
+        source=f"grey card by itself and by selected lights in {card.rounds} rounds, with labrig",
+        run=part.run.folder.resolve().name,
+    )
+
+
+def _moments(light: Spectrum, edges_nm: FloatArray) -> tuple[float, float]:
+    """Return mean and standard deviation in nm of the wavelengths of a light within the bands."""
+    grid_nm = np.arange(edges_nm[0], edges_nm[-1] + 0.5)
+    weight = light.at(grid_nm)
+    mean = float(np.average(grid_nm, weights=weight))
+    return mean, float(np.sqrt(np.average((grid_nm - mean) ** 2, weights=weight)))
 
 
 def _card_values(part: Part, frames: StripFrames, strip: Strip) -> Mapping[str, SliceValues]:
@@ -227,6 +350,90 @@ def strip_scale(
     )
     light = weights * lamp.at(nodes) * card.at(nodes)
     transmitted = lvf.transmission(nodes) * light
+    changes = _parameter_changes(lvf, nodes, light)
+    value, noise, curves = _factors(ratio, nodes, light, transmitted, changes, camera, curve_error)
+    covariance = np.diag(noise**2 + ROUGH**2) + curves @ curves.T
+    return _smooth(value, covariance, lvf)
+
+
+def light_scale(
+    ratio: CardRatio,
+    lights: Sequence[ExcitingLight],
+    names: Sequence[str],
+    lamp: Spectrum,
+    card: Transmittance,
+    camera: CameraResponse,
+) -> StripScale:
+    """Fit one factor for each selected light, such that light × factor explains the card's ratios.
+
+    What is known of a light beforehand, as of a filter by its transmittance, is weighted with it.
+
+    Parameters
+    ----------
+    ratio
+        Ratios of the card's light under every light to that under the lamp itself.
+    lights, names
+        What is known of the lights, and their names.
+    lamp, card
+        Spectrum of the lamp and reflectance of the card.
+    camera
+        Curves of the camera.
+
+    Raises
+    ------
+    DataError
+        Some light was not seen.
+    """
+    low, high = float(camera.wavelength_nm[0]), float(camera.wavelength_nm[-1])
+    knots = [one.spectrum.wavelength_nm for one in lights]
+    nodes, weights = quadrature(
+        low, high, camera.wavelength_nm, lamp.wavelength_nm, card.wavelength_nm, *knots
+    )
+    reflected = weights * card.at(nodes)
+    spectra = np.array([reflected * one.spectrum.at(nodes) for one in lights])
+    moved = np.array([reflected * one.shifted(nodes) for one in lights])
+    for name, measured in zip(names, ratio.value, strict=True):
+        if not np.isfinite(measured).any():
+            raise DataError(f"light '{name}': nothing was measured of it; expose longer")
+    value, noise, curves = _factors(
+        ratio, nodes, reflected * lamp.at(nodes), spectra, (moved - spectra)[np.newaxis], camera,
+        ALONE,
+    )  # fmt: skip
+    covariance = np.diag(noise**2) + curves @ curves.T
+    # Of the logarithm: an unknown level weighs nothing.
+    weight = np.diag([1 / one.level_sigma**2 for one in lights])
+    information = np.linalg.inv(covariance)
+    posterior = np.linalg.inv(information + weight)
+    return StripScale(
+        np.exp(posterior @ information @ np.log(value)),
+        posterior,
+        value,
+        np.sqrt(np.diag(covariance)),
+    )
+
+
+def _factors(
+    ratio: CardRatio,
+    nodes: FloatArray,
+    light: FloatArray,
+    transmitted: FloatArray,
+    changes: FloatArray,
+    camera: CameraResponse,
+    curve_error: CurveError,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return factors (p,), their relative σ by noise and figures, errors by the curves (p, modes).
+
+    Parameters
+    ----------
+    ratio
+        Ratios of the card at p places or under p lights.
+    nodes, light
+        Wavelengths in nm and the card's light under the lamp itself, shape (q,).
+    transmitted, changes
+        The card's light at every place (p, q), and its change by one σ of each figure (f, p, q).
+    camera, curve_error
+        Curves of the camera and their error model.
+    """
     sensitivity = camera.at(nodes)
     total = light @ sensitivity
     expected = transmitted @ sensitivity / total
@@ -235,7 +442,7 @@ def strip_scale(
     curve_errors = np.stack(
         [transmitted @ mode / total - expected * (light @ mode / total) for mode in modes]
     )
-    figure_changes = _parameter_changes(lvf, nodes, light) @ sensitivity / total
+    figure_changes = changes @ sensitivity / total
     value, noise, curve_factors = np.empty(len(expected)), np.empty(len(expected)), []
     for k in range(len(expected)):
         used = np.isfinite(ratio.value[k]) & (expected[k] > 0)
@@ -250,10 +457,9 @@ def strip_scale(
         value[k] = max(float(weight @ measured), LEAST)
         noise_variance = (weight**2) @ measured_sigma**2 / value[k] ** 2
         figure_variance = ((figure_changes[:, k, used] @ weight) ** 2).sum()
-        noise[k] = float(np.sqrt(noise_variance + figure_variance + ROUGH**2))
+        noise[k] = float(np.sqrt(noise_variance + figure_variance))
         curve_factors.append(position_errors @ weight)
-    curves = np.array(curve_factors)
-    return _smooth(value, np.diag(noise**2) + curves @ curves.T, lvf)
+    return value, noise, np.array(curve_factors)
 
 
 def _weights(

@@ -115,8 +115,8 @@ def analyse(part: Part) -> LuminanceResult:
     return LuminanceResult(
         patches=_with_ratios(patches),
         excitation=excitation,
-        thickness=protocol.sample.thickness or "",
-        mass_per_area=protocol.mass_per_area or "",
+        thickness_mm=protocol.sample.thickness,
+        mass_per_area_g_per_m2=protocol.sample.mass_per_area,
         adaptation_mcd_per_m2=protocol.adaptation_mcd_per_m2,
         warnings=tuple(dict.fromkeys(warnings)),
     )

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from labrig.acquire import Sample
 from labrig.calibration import PatchReflectance, ReflectanceFile
 from labrig.material import Albedo, Material, RadianceFactor
 
@@ -38,6 +39,16 @@ def with_reflectance(
                 value=measured.radiance_factor,
                 sigma=measured.radiance_factor_sigma,
             ),
+        }
+    )
+
+
+def with_layer(material: Material, sample: Sample) -> Material:
+    """Return the material with the thickness and mass per area that the protocol states."""
+    return material.model_copy(
+        update={
+            "thickness_mm": sample.thickness,
+            "mass_per_area_g_per_m2": sample.mass_per_area,
         }
     )
 

@@ -1,11 +1,12 @@
-"""The irradiance file: irradiance of the lamp on the sample, directly and through the LVF."""
+"""The irradiance file: the lamp on the sample, by itself, through the LVF or in selected bands."""
 
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from labrig.calibration.kind import CalibrationKind
+from labrig.errors import UsageError
 from labrig.finite import NotNegative, Positive
 from labrig.optics import Strip
 
@@ -43,7 +44,9 @@ class CardLight(BaseModel):
 
 
 class IrradianceFile(BaseModel):
-    """Irradiance E per band on one scale, directly under the lamp and through the LVF.
+    """Irradiance E per band on one scale, directly under the lamp, and of parts of its light.
+
+    These are the places behind the LVF, or lights that are selected one after another.
 
     Attributes
     ----------
@@ -56,15 +59,22 @@ class IrradianceFile(BaseModel):
     direct, direct_sigma
         Irradiance E = ∫ E dλ of each band directly under the lamp, and σ.
     position
-        Middles of `strip.slices()`: 0 at the blue end, 1 at the red end.
+        Middles of `strip.slices()`: 0 at the blue end, 1 at the red end; none of selected lights.
+    lights
+        Names of the selected lights; none of the LVF.
+    centre_nm, width_nm
+        Mean wavelength of each of `lights` and its standard deviation, in nm.
     through, through_sigma
-        Irradiance of each band behind the LVF, a row for each position, and σ.
+        Irradiance of each band behind the LVF, a row for each position, or of each of `lights`, and
+        σ.
+    through_shift
+        Change of `through` by one σ of the wavelengths of each of `lights`; none of the LVF.
     scale_sigma
-        Relative standard uncertainty of `through` over `direct`, common to all positions.
+        Relative standard uncertainty of `through` over `direct`, common to all rows.
     ratio, ratio_sigma
-        Ratio Σ `direct` over Σ `through` of each position, and σ.
+        Ratio Σ `direct` over Σ `through` of each row, and σ.
     strip
-        Position of the LVF on the sample, as the camera sees the sample.
+        Position of the LVF on the sample, as the camera sees the sample; null of selected lights.
     card
         Signal of the grey card under the lamp itself; null if it was not kept.
     illuminance_lux, illuminance_sigma_lux
@@ -93,13 +103,17 @@ class IrradianceFile(BaseModel):
     vector_length: Positive = 1.0
     direct: Numbers
     direct_sigma: Numbers
-    position: tuple[Annotated[float, Field(ge=0, le=1)], ...]
+    position: tuple[Annotated[float, Field(ge=0, le=1)], ...] = ()
+    lights: tuple[str, ...] = ()
+    centre_nm: tuple[Positive, ...] = ()
+    width_nm: Numbers = ()
     through: tuple[Numbers, ...]
     through_sigma: tuple[Numbers, ...]
+    through_shift: tuple[tuple[FiniteFloat, ...], ...] = ()
     scale_sigma: NotNegative
     ratio: tuple[Positive, ...]
     ratio_sigma: Numbers
-    strip: Strip
+    strip: Strip | None = None
     card: CardLight | None = None
     illuminance_lux: Positive | None = None
     illuminance_sigma_lux: NotNegative | None = None
@@ -109,17 +123,49 @@ class IrradianceFile(BaseModel):
     @model_validator(mode="after")
     def _one_number_each(self) -> Self:
         _rising(self.bands_nm, "bands_nm")
-        _rising(self.position, "position")
-        bands, places = len(self.bands_nm) - 1, len(self.position)
-        rows = (self.direct, self.direct_sigma, *self.through, *self.through_sigma)
+        if (self.strip is None) != (not self.position) or bool(self.lights) == bool(self.position):
+            raise ValueError("expected 'strip' with 'position' of the LVF, or 'lights'")
+        if self.position:
+            _rising(self.position, "position")
+        bands, places = len(self.bands_nm) - 1, len(self.position or self.lights)
+        rows = (
+            self.direct,
+            self.direct_sigma,
+            *self.through,
+            *self.through_sigma,
+            *self.through_shift,
+        )
         if any(len(row) != bands for row in rows):
             raise ValueError(f"expected {bands} numbers for each irradiance, one a band")
         columns = (self.through, self.through_sigma, self.ratio, self.ratio_sigma)
         if any(len(column) != places for column in columns):
             raise ValueError(
-                f"expected {places} entries, one a position, in 'through', 'ratio' and their σ"
+                f"expected {places} entries, one a position or light, in 'through', 'ratio' and "
+                "their σ"
+            )
+        of_lights = (self.through_shift, self.centre_nm, self.width_nm)
+        if any(len(column) != len(self.lights) for column in of_lights):
+            raise ValueError(
+                f"expected {len(self.lights)} entries, one a light, in 'through_shift', "
+                "'centre_nm' and 'width_nm'"
             )
         return self
+
+    def lvf_strip(self) -> Strip:
+        """Return the position of the LVF on the sample.
+
+        Raises
+        ------
+        UsageError
+            It is the irradiance of selected lights.
+        """
+        if self.strip is None:
+            raise UsageError(
+                "expected the irradiance behind the variable filter, got that of "
+                f"{', '.join(self.lights)}; run irradiance without 'select', or name another run "
+                "('optics: {irradiance: …}')"
+            )
+        return self.strip
 
 
 IRRADIANCE_KIND = CalibrationKind(

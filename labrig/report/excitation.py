@@ -1,6 +1,7 @@
 """Report of an excitation: rates by band, charging curves, residuals, and closure."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -142,6 +143,15 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
     fit, through, direct = patch.fit, patch.charging.through, patch.charging.direct
     position_nm, irradiance = result.position_nm, result.irradiance
     fitted = through.values - fit.residuals[0] * through.sigma
+    residuals = fit.residuals[0]
+    if through.is_by_light:
+        fitted, residuals = (_row_by_row(through, values) for values in (fitted, residuals))
+        through = replace(
+            through,
+            values=_row_by_row(through, through.values),
+            sigma=_row_by_row(through, through.sigma),
+        )
+    where = "by some of the lights" if through.is_by_light else "through the filter, at positions"
     figures = [
         Picture(
             "excitation-rates",
@@ -152,15 +162,14 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
         Picture(
             "charging",
             partial(_charging_figure, through, fitted, position_nm),
-            "Glow in the first photograph after each charge through the filter, brightest channel, "
-            "at some positions along it; lines join the fitted values of the same photographs, "
-            "whose times and exposures differ.",
+            f"Glow in the first photograph after each charge {where}, brightest channel; lines "
+            "join the fitted values of the same photographs, whose times and exposures differ.",
         ),
         Picture(
             "residuals",
-            partial(_residual_figure, fit.residuals[0], position_nm),
-            "Residuals at every position along the filter, rms in standard uncertainties of "
-            "single values; flicker is not removed.",
+            partial(_residual_figure, residuals, position_nm),
+            "Residuals at every position along the filter, or of every light, rms in standard "
+            "uncertainties of single values; flicker is not removed.",
         ),
     ]
     if fit.by_band is not None:
@@ -176,7 +185,8 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
     return Section(
         title,
         (
-            f"{len(through.charges)} charges through the variable filter and "
+            f"{len(through.charges)} charges "
+            f"{'by selected lights' if through.is_by_light else 'through the variable filter'} and "
             f"{len(direct.charges)} by the lamp itself, fitted together by the rate "
             "equation in exact steps. k_e belongs to an irradiance of vector length "
             f"{rounded(irradiance.vector_length)}.",
@@ -194,8 +204,20 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
     )
 
 
+def _row_by_row(series: ChargingSeries, values: FloatArray) -> FloatArray:
+    """Return values (n, 1, C) of a series by lights as (n, L, C), NaN at the other lights."""
+    is_own = series.row_of_shots() == np.arange(len(series.irradiance))
+    return np.where(is_own[..., None], values, np.nan)
+
+
 def _light_line(light: LightScatter) -> str:
     """Return the sentence on the errors of the light."""
+    if light.sites is None or light.wavelength_nm is None:
+        return (
+            "As the glow itself shows, and as is in all σ, the light scatters by "
+            f"{rounded(100 * light.lamp, 2)} % from charge to charge beyond what the calibrations "
+            "state."
+        )
     return (
         "As the glow itself shows, and as is in all σ, the lamp's brightness scatters by "
         f"{rounded(100 * light.lamp, 2)} % from charge to charge, the light on single places by "
@@ -333,6 +355,8 @@ def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: Fl
     for number, site in enumerate(dict.fromkeys(drawn_sites.tolist())):
         colour = OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
         first_frames = series.first_frames(np.isfinite(series.values[:, site, channel]))
+        if not first_frames:
+            continue
         order = sorted(first_frames, key=lambda number: charge_s[number])
         rows = [first_frames[number] for number in order]
         x, y = charge_s[order], series.values[rows, site, channel]

@@ -37,43 +37,66 @@ def _section(result: IrradianceResult) -> Section:
     rows = (
         ("Direct", *(rounded(value, 3) for value in file.direct)),
         *(
-            (f"p{k:02d}", *(rounded(value, 2) for value in file.through[k]))
-            for k in range(0, len(file.position), 5)
+            (_row_name(file, k), *(rounded(value, 2) for value in file.through[k]))
+            for k in range(0, len(file.through), 1 if file.lights else 5)
         ),
     )
+    if file.lights:
+        parts = (
+            "Of the selected lights, the rig file gives the shape and the grey card the scale, "
+            f"both with their σ; common to all are {100 * file.scale_sigma:.1f} % more."
+        )
+        caption = "Irradiance of every band by each light at its mean wavelength, with 1 σ"
+        scale = (
+            "Measured light of the card over that expected of each light: alone (points, 1 σ with "
+            "the camera's curves), and with what was known of the light (line and band)."
+        )
+    else:
+        parts = (
+            "Through the LVF, its calibration gives the shape and the grey card the scale at every "
+            f"position, both with their σ; common to all positions are {100 * file.scale_sigma:.1f}"
+            " % more."
+        )
+        caption = "Irradiance of every band along the strip behind the LVF, with 1 σ"
+        scale = (
+            "Measured light of the card over that expected from the calibration of the LVF: each "
+            "position by itself (points, 1 σ with the camera's curves), and with its neighbours "
+            "(line and band)."
+        )
     return Section(
         "Irradiance on the sample",
         (
             "E of every band is ∫ E dλ over it, scaled so that the lamp by itself has the length "
-            f"{rounded(file.vector_length)}: excitation rates belong to that. Through the LVF, its "
-            "calibration gives the shape and the grey card the scale at every position, both with "
-            f"their σ; common to all positions are {100 * file.scale_sigma:.1f} % more.",
+            f"{rounded(file.vector_length)}: excitation rates belong to that. {parts}",
         ),
         (
             Picture(
                 "irradiance",
-                partial(_irradiance_figure, file),
-                "Irradiance of every band along the strip behind the LVF, with 1 σ; where it is "
-                "less than 2 % of its highest, it is not drawn.",
+                partial(_irradiance_figure, result),
+                f"{caption}; where it is less than 2 % of its highest, it is not drawn.",
             ),
             Picture(
                 "scale",
                 partial(_scale_figure, result),
-                "Measured light of the card over that expected from the calibration of the LVF: "
-                "each position by itself (points, 1 σ with the camera's curves), and with its "
-                "neighbours (line and band).",
+                scale,
             ),
         ),
         (Table(head, rows, "Columns begin at the wavelength in their head."),),
     )
 
 
-def _irradiance_figure(file: IrradianceFile) -> Figure:
-    """Draw the irradiance E of every band along the strip."""
+def _row_name(file: IrradianceFile, row: int) -> str:
+    """Return the name of a place behind the LVF, or of a light."""
+    return file.lights[row] if file.lights else f"p{row:02d}"
+
+
+def _irradiance_figure(result: IrradianceResult) -> Figure:
+    """Draw the irradiance E of every band along the strip, or by every light."""
+    file = result.calibration
     figure = new_figure(240)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     through, sigma = np.array(file.through), np.array(file.through_sigma)
-    position = np.array(file.position)
+    position = result.centre_nm if file.lights else np.array(file.position)
     entries = []
     for band, (low, high) in enumerate(zip(file.bands_nm[:-1], file.bands_nm[1:], strict=True)):
         colour = OTHER_CHANNELS[band % len(OTHER_CHANNELS)]
@@ -82,7 +105,9 @@ def _irradiance_figure(file: IrradianceFile) -> Figure:
         axes.plot(position[drawn], through[drawn, band], color=colour, linewidth=1.0)
         entries.append(line_entry(f"{low:.0f}–{high:.0f} nm", colour))
     axes.set_ylim(0, None)
-    axes.set_xlabel("Position from blue end to red end")
+    axes.set_xlabel(
+        "Mean wavelength of the light / nm" if file.lights else "Position from blue end to red end"
+    )
     axes.set_ylabel("Irradiance E")
     legend_above(figure, entries, columns=4)
     return figure
@@ -108,14 +133,15 @@ def _scale_figure(result: IrradianceResult) -> Figure:
 
 
 def _lines(file: IrradianceFile) -> Iterator[str]:
-    """Yield the lines for the terminal: E of the lamp, and at three positions."""
+    """Yield the lines for the terminal: E of the lamp, and at three positions or of all lights."""
     direct = ", ".join(rounded(value, 3) for value in file.direct)
     yield f"the lamp by itself, E per band: {direct} (length {rounded(file.vector_length)})"
-    for k in (0, len(file.position) // 2, len(file.position) - 1):
+    rows = len(file.through)
+    for k in range(rows) if file.lights else (0, rows // 2, rows - 1):
         band = int(np.argmax(file.through[k]))
         low, high = file.bands_nm[band : band + 2]
         peak = plus_minus(file.through[k][band], file.through_sigma[k][band])
         yield (
-            f"p{k:02d}: E {peak} in {low:g}-{high:g} nm; direct : through "
+            f"{_row_name(file, k)}: E {peak} in {low:g}-{high:g} nm; direct : through "
             f"{plus_minus(file.ratio[k], file.ratio_sigma[k])}"
         )

@@ -7,7 +7,7 @@ from functools import partial
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from labrig.number_format import plus_minus
+from labrig.number_format import plus_minus, rounded
 from labrig.quantity import duration_text
 from labrig.report.figure_style import (
     DASHED,
@@ -66,12 +66,13 @@ def _section(result: LuminanceResult) -> Section:
     after = "a time that is not stated" if rested is None else duration_text(rested)
     temperature = excitation.temperature_c
     warmth = "temperature not measured" if temperature is None else f"{temperature:.1f} °C"
-    mass = result.mass_per_area or "not stated"
+    thickness = _stated(result.thickness_mm, "mm")
+    mass = _stated(result.mass_per_area_g_per_m2, "g/m²")
     stated = (
         f"Excited by: {f'{excitation.lamp} lamp' if excitation.lamp else 'a lamp not stated'}, "
         f"{lux} lx, for {duration_text(excitation.charged_s)}, after {after} in the dark.",
         f"{excitation.accordance[0].upper()}{excitation.accordance[1:]}.",
-        f"Sample: thickness {result.thickness or 'not stated'}, mass per area {mass}; {warmth}.",
+        f"Sample: thickness {thickness}, mass per area {mass}; {warmth}.",
         *(
             f"{f'{name}: marking' if several else 'Marking'} {patch.decay.marking or 'none'}."
             for name, patch in result.patches.items()
@@ -90,6 +91,11 @@ def _section(result: LuminanceResult) -> Section:
         (Picture("luminance", partial(_figure, result.patches), caption),),
         tuple(tables),
     )
+
+
+def _stated(value: float | None, unit: str) -> str:
+    """Return what the user stated of the sample."""
+    return "not stated" if value is None else f"{rounded(value)} {unit}"
 
 
 def _table(patches: Mapping[str, PatchLuminance]) -> Table:

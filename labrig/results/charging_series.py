@@ -89,6 +89,9 @@ class Charge:
     saturated
         Whether all states count as fully charged at lamp off, r = 1, as Nalbach et al. assume after
         90 minutes.
+    light
+        Row of the series' irradiance by which all sites are charged, where one light is selected
+        after another. None: every site has the row of its own.
     """
 
     on_s: float
@@ -99,6 +102,7 @@ class Charge:
     cold_deficit: float = 0.0
     fresh: bool = False
     saturated: bool = False
+    light: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,13 +112,17 @@ class EarlierCharges:
     Attributes
     ----------
     charges
-        The charges by rising time, by the same lamp and on the same clock.
+        The charges by rising time, on the same clock.
     irradiance
-        Irradiance of every site in every band, shape (P, B).
+        Irradiance of every site, or of every selected light, in every band, shape (P, B).
+    rise, fade
+        Turn-on and turn-off transients of their light.
     """
 
     charges: tuple[Charge, ...]
     irradiance: FloatArray
+    rise: Transient
+    fade: Transient
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +139,12 @@ class ChargingSeries:
         Turn-on and turn-off transients of the lamp.
     irradiance
         Irradiance E of every site in every band of the steady lamp, relative to the stated norm,
-        shape (P, B).
+        shape (P, B). Where one light is selected after another, E of every light, shape (L, B).
     values, sigma
         Mean signal per second of exposure and its independent standard uncertainty, shape (n, P,
         C); NaN where nothing was measured.
     site_modes
-        Error modes of the sites' irradiance, shape (M, P, B): its logarithm in every band may be
+        Error modes of the rows of `irradiance`, shape (M, P, B): its logarithm in every band may be
         off by Σ_m z_m site_modes[m], the z_m independent and of unit variance, the same at every
         charge. None: it is exact.
     mode_kind
@@ -170,6 +178,52 @@ class ChargingSeries:
     veil_shapes: FloatArray | None = None
     earlier: EarlierCharges | None = None
 
+    @property
+    def sites(self) -> int:
+        """Number P of sites."""
+        return int(self.values.shape[1] if self.is_by_light else len(self.irradiance))
+
+    @property
+    def is_by_light(self) -> bool:
+        """Whether one light after another charges all sites."""
+        return any(charge.light is not None for charge in self.charges)
+
+    def irradiance_of(self, charge: Charge) -> FloatArray:
+        """Return the irradiance of every site in a charge of the series, shape (P, B) or (1, B)."""
+        return self.irradiance if charge.light is None else self.irradiance[[charge.light]]
+
+    def row_of_shots(self) -> IntArray:
+        """Return the row of `irradiance` by which each photograph's charge was, shape (n, P)."""
+        own = np.arange(self.sites)
+        rows = [own if charge.light is None else 0 * own + charge.light for charge in self.charges]
+        return np.repeat(rows, [len(charge.start_s) for charge in self.charges], axis=0)
+
+    def by_light(self) -> list[Self]:
+        """Return the charges by each light as a series without its errors, or the series itself.
+
+        What earlier charges have left is not in them.
+        """
+        if not self.is_by_light:
+            return [self]
+        series, row = [], self.row_of_shots()[:, 0]
+        for light, irradiance in enumerate(self.irradiance):
+            own = tuple(
+                replace(charge, light=None) for charge in self.charges if charge.light == light
+            )
+            if own:
+                series.append(
+                    type(self)(
+                        self.name,
+                        own,
+                        self.rise,
+                        self.fade,
+                        np.tile(irradiance, (self.sites, 1)),
+                        self.values[row == light],
+                        self.sigma[row == light],
+                    )
+                )
+        return series
+
     def spread(self) -> Self:
         """Return the series with every place within the sites as a site, place by place."""
         if self.across is None:
@@ -192,6 +246,8 @@ class ChargingSeries:
             charges=tuple(
                 replace(charge, start_s=never, exposure_s=never) for charge in self.earlier.charges
             ),
+            rise=self.earlier.rise,
+            fade=self.earlier.fade,
             irradiance=self.earlier.irradiance,
             values=nothing,
             sigma=nothing,
@@ -229,7 +285,8 @@ class ChargingSeries:
             Charges or photographs overlap, or shapes do not agree.
         """
         shots = sum(len(charge.start_s) for charge in self.charges)
-        sites, bands = self.irradiance.shape
+        rows, bands = self.irradiance.shape
+        sites = self.sites
         lamp = (self.rise.fraction.shape[1], self.fade.fraction.shape[1])
         if (
             self.values.shape != self.sigma.shape
@@ -243,9 +300,9 @@ class ChargingSeries:
             )
         modes = self.site_modes
         if modes is not None and not (
-            modes.shape[1:] == (sites, bands) and np.isfinite(modes).all()
+            modes.shape[1:] == (rows, bands) and np.isfinite(modes).all()
         ):
-            raise FitError(f"{self.name}: expected finite 'site_modes' of {sites} x {bands}")
+            raise FitError(f"{self.name}: expected finite 'site_modes' of {rows} x {bands}")
         light = self.frame_light
         if light is not None and not (
             light.shape == self.values.shape and np.isfinite(light).all()
@@ -256,6 +313,11 @@ class ChargingSeries:
             )
         if self.mode_kind is not None and (modes is None or len(self.mode_kind) != len(modes)):
             raise FitError(f"{self.name}: expected a kind of each of the 'site_modes'")
+        lights = [-1 if charge.light is None else charge.light for charge in self.charges]
+        if self.is_by_light and not (
+            0 <= min(lights) <= max(lights) < rows and self.across is None
+        ):
+            raise FitError(f"{self.name}: expected one of {rows} lights at every charge")
         if not (self.irradiance >= 0).all():
             raise FitError(f"{self.name}: expected irradiances of 0 or more, got a smaller one")
         measured = np.isfinite(self.values) & np.isfinite(self.sigma)

@@ -87,13 +87,13 @@ def _rms(values: FloatArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PatchCharging:
-    """Charging of a patch at P places along the filter.
+    """Charging of a patch at P places along the filter, or as a whole by one light after another.
 
     Attributes
     ----------
     through, direct
-        Charges through the filter and by the lamp itself, at the same places. Their values are
-        divided by `evenness`.
+        Charges through the filter, or by selected lights, and by the lamp itself, at the same
+        places. Their values are divided by `evenness`.
     evenness
         Relative signal of each place in even light, by lens and sample, 1 on average, shape (P,).
     whole
@@ -115,14 +115,14 @@ class LightScatter:
     lamp
         Relative scatter of the lamp's brightness from charge to charge.
     wavelength_nm
-        Error of the filter's wavelengths in nm, smooth along it.
+        Error of the filter's wavelengths in nm, smooth along it; None of selected lights.
     sites
-        Relative scatter of the light on single places.
+        Relative scatter of the light on single places; None of selected lights.
     """
 
     lamp: float
-    wavelength_nm: float
-    sites: float
+    wavelength_nm: float | None
+    sites: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +181,7 @@ class ExcitationResult(RunResult):
 
     @property
     def position_nm(self) -> FloatArray:
-        """Mean wavelength of the light at every place behind the filter in nm, shape (P,)."""
+        """Mean wavelength at every place behind the filter, or of every light, in nm, (P,)."""
         edges, transmitted = np.array(self.irradiance.bands_nm), np.array(self.irradiance.through)
         middles = (edges[1:] + edges[:-1]) / 2
         # Squared, so that what leaks all over does not pull.

@@ -127,8 +127,8 @@ class LuminanceResult(RunResult):
         Luminance of each patch by its name.
     excitation
         Excitation of all patches.
-    thickness, mass_per_area
-        Of the sample, as the user states them; empty if not given.
+    thickness_mm, mass_per_area_g_per_m2
+        Of the sample, as the user states them; None if not given.
     adaptation_mcd_per_m2
         Luminance to which eyes are adapted in mcd/m²; None if not given.
 
@@ -143,8 +143,8 @@ class LuminanceResult(RunResult):
 
     patches: Mapping[str, PatchLuminance]
     excitation: ExcitationState
-    thickness: str
-    mass_per_area: str
+    thickness_mm: float | None
+    mass_per_area_g_per_m2: float | None
     adaptation_mcd_per_m2: float | None = None
 
     def ranked(self) -> tuple[str, ...]:

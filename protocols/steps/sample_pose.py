@@ -14,8 +14,10 @@ from labrig.acquire import (
     SHIELD,
     SHIELD_COVER,
     SHIELD_UNCOVER,
+    LedSwitch,
     Rig,
     Session,
+    Switch,
     TimedAction,
     at,
 )
@@ -53,16 +55,16 @@ def face_lamp(session: Session) -> None:
         session.wait(max(travels_s) + SETTLES_S, "door and shield move")
 
 
-def charge(session: Session, duration_s: float) -> None:
-    """Turn the sample to the lamp and light it for that long."""
+def charge(session: Session, duration_s: float, on: Switch | LedSwitch = LAMP_ON) -> None:
+    """Turn the sample to the lamp and light it for that long, by default by the lamp."""
     face_lamp(session)
-    session.perform(LAMP_ON)
+    session.perform(on)
     session.wait(duration_s, "charging")
 
 
-def lights_out(session: Session) -> Sequence[TimedAction]:
+def lights_out(session: Session, off: Switch | LedSwitch = LAMP_OFF) -> Sequence[TimedAction]:
     """Return the begin of a timed sequence: lamp off, shield before it, then the door opens."""
-    steps = [at(0.0, LAMP_OFF)]
+    steps = [at(0.0, off)]
     if SHIELD in session.rig:
         steps.append(at(0.0, SHIELD_COVER))
     if has_door(session):

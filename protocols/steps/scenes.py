@@ -9,6 +9,7 @@ import numpy as np
 
 from labrig.acquire import (
     CAMERA,
+    FILTER_WHEEL,
     LAMP,
     LAMP_OFF,
     LAMP_ON,
@@ -17,8 +18,11 @@ from labrig.acquire import (
     ManualStep,
     PartUnit,
     ProtocolModel,
+    Rig,
     Session,
     Shoot,
+    Tune,
+    TurnWheel,
     Unit,
 )
 from labrig.errors import DeviceError
@@ -50,7 +54,7 @@ _LVF = {
     "on sample": "put the variable filter between lamp and sample",
 }
 #: What is arranged, in the order in which it is asked for.
-THINGS = "lamp", "laid", "lvf", "filter"
+THINGS = "lamp", "laid", "lvf", "filter", "monochromator_nm"
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,8 @@ class Arrangement:
         Place of the linear variable filter.
     filter
         Name of the colour filter before the lamp.
+    monochromator_nm
+        Wavelength of the monochromator between lamp and sample in nm; None: it is not there.
     lamp
         Lamp that the relay switches.
     chart_patch
@@ -74,6 +80,7 @@ class Arrangement:
     stage: Stage = "sample"
     lvf: LvfPlace = "away"
     filter: str | None = None
+    monochromator_nm: float | None = None
     lamp: LampKind = "halogen"
     chart_patch: int = 0
 
@@ -83,7 +90,9 @@ class Arrangement:
         return self.stage, self.chart_patch
 
     def set_up(self, session: Session, before: "Arrangement", why: str) -> None:
-        """Ask for the manual steps from `before`; the lamp is switched off for another one.
+        """Ask for the manual steps from `before`, and set what devices set.
+
+        The lamp is switched off for another one.
 
         The bench may have been put to another use before a run is resumed: all that has been
         arranged in it is asked for again.
@@ -100,10 +109,24 @@ class Arrangement:
         again = _arranged_before_resuming(session)
         if self.lamp != before.lamp or "lamp" in again:
             _lamp_off(session)
+        now, then = self._by_hand(session.rig), before._by_hand(session.rig)
         for name in THINGS:
-            if getattr(self, name) != getattr(before, name) or name in again:
-                instruction, task = self._step(name)
+            if getattr(now, name) != getattr(then, name) or name in again:
+                instruction, task = now._step(name)
                 session.ask(ManualStep(instruction, why, task))
+        if FILTER_WHEEL in session.rig:
+            in_wheel = self.filter in session.rig[FILTER_WHEEL].filters()
+            session.perform(TurnWheel(self.filter if in_wheel else None))
+        if self.monochromator_nm is not None:
+            session.perform(Tune(self.monochromator_nm))
+
+    def _by_hand(self, rig: Rig) -> "Arrangement":
+        """Return the part of the arrangement that is made by hand."""
+        filter_name = self.filter
+        if FILTER_WHEEL in rig and filter_name in rig[FILTER_WHEEL].filters():
+            filter_name = None
+        tuned_nm = None if self.monochromator_nm is None else 0.0
+        return replace(self, filter=filter_name, monochromator_nm=tuned_nm)
 
     def _step(self, name: str) -> tuple[str, str]:
         """Return the text of a step for a person, and for a changer."""
@@ -121,6 +144,10 @@ class Arrangement:
                 return _STAGE[self.stage], self.stage
             case "lvf":
                 return _LVF[self.lvf], f"lvf {self.lvf}"
+            case "monochromator_nm" if self.monochromator_nm is None:
+                return "take the monochromator out of the lamp's light", "monochromator away"
+            case "monochromator_nm":
+                return "put the monochromator between lamp and sample", "monochromator on"
             case _ if self.filter is None:
                 return "take the colour filter out", "no filter"
             case _:
@@ -154,7 +181,13 @@ def _arranged_before_resuming(session: Session) -> set[str]:
 
 def _thing_of(task: str) -> str | None:
     """Return what a changer's task arranges; None for one of another protocol's own."""
-    words = {"lamp halogen": "lamp", "lamp mercury": "lamp", "no filter": "filter"}
+    words = {
+        "lamp halogen": "lamp",
+        "lamp mercury": "lamp",
+        "no filter": "filter",
+        "monochromator on": "monochromator_nm",
+        "monochromator away": "monochromator_nm",
+    }
     if task in _STAGE or task.startswith("colorchecker "):
         return "laid"
     if task.startswith(("lvf ", "filter ")):
@@ -449,7 +482,7 @@ class SceneUnit:
     name, role
         Name of the unit, and role of its frames.
     lamp
-        Lamp that the relay switches.
+        Lamp that the relay switches, or name of the light in messages.
     mercury_warm_up_s
         Warm-up time in seconds of the mercury lamp, which the rig file does not have.
     """
@@ -457,7 +490,7 @@ class SceneUnit:
     bracketing: Bracketing
     name: str
     role: str
-    lamp: LampKind = "halogen"
+    lamp: str = "halogen"
     mercury_warm_up_s: float = 0.0
 
     def run(self, session: Session) -> None:

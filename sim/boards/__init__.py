@@ -2,7 +2,9 @@
 
 from .arduino import ArduinoBoard
 from .changer import ChangerBoard
+from .cornerstone import CornerstoneBoard
 from .dc4100 import Dc4100Board
+from .fw102c import Fw102cBoard
 from .lcus import LcusBoard
 from .maestro import MaestroBoard, Pulse
 from .numato import NumatoBoard
@@ -11,7 +13,9 @@ from .serial_cable import SerialCable
 __all__ = [
     "ArduinoBoard",
     "ChangerBoard",
+    "CornerstoneBoard",
     "Dc4100Board",
+    "Fw102cBoard",
     "LcusBoard",
     "MaestroBoard",
     "NumatoBoard",

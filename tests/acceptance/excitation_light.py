@@ -200,7 +200,11 @@ def differ(tests: BandTests) -> bool:
 def line(outcomes: Sequence[Outcome]) -> str:
     """Return the figures of a paint."""
     lamp, nm, sites = np.mean(
-        [(one.light.lamp, one.light.wavelength_nm, one.light.sites) for one in outcomes], axis=0
+        [
+            [one.light.lamp, one.light.wavelength_nm or 0.0, one.light.sites or 0.0]
+            for one in outcomes
+        ],
+        axis=0,
     )
     return (
         f"pulls {_rms([one.off / one.sigma for one in outcomes]):5.2f}  "

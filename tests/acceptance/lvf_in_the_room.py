@@ -133,7 +133,7 @@ def main() -> None:
         at = np.array(lvf.on_sample.positions(sensor.width, sensor.height))
         read = np.interp(at, np.array(lvf.position), found.centre_nm)
         report("centre on sample / nm", read - there.centre_nm, sigma.centre_nm, inside)
-        expected = true_irradiance(simulation, light.strip, light.bands_nm).sum(axis=1)
+        expected = true_irradiance(simulation, light.lvf_strip(), light.bands_nm).sum(axis=1)
         through = np.array(light.through).sum(axis=1)
         relative = np.array(light.ratio_sigma) / np.array(light.ratio)
         report("irradiance / 1", through / expected - 1, relative, inside)

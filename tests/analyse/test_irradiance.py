@@ -124,7 +124,7 @@ def test_on_the_simulated_bench_it_is_the_rooms(tmp_path: Path) -> None:
     file = result.calibration
     assert IRRADIANCE_KIND.read(run / "result" / "irradiance.yaml") == file
     assert_read_back(result)
-    expected = true_irradiance(simulation_of(run), file.strip, file.bands_nm).sum(axis=1)
+    expected = true_irradiance(simulation_of(run), file.lvf_strip(), file.bands_nm).sum(axis=1)
     through = np.array(file.through).sum(axis=1)
     sigma = np.array(file.ratio_sigma) / np.array(file.ratio)
     assert np.abs(np.log(through / expected) / sigma).max() < 4

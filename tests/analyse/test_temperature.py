@@ -10,12 +10,14 @@ from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.material import read_material
 from labrig.process import process_run
 from labrig.record import read_run
+from labrig.report import describe_phosphor
 from tests.analyse.recorded import record
 from tests.quick_yaml import read_quickly, write_quickly
 
 DECAY: dict[str, Any] = {
     "protocol": "decay", "charge": "30 s", "first": "1 s", "every": "25 s", "for": "10 min",
     "exposure": "1/4 s", "daylight": False,
+    "sample": {"name": "paint", "thickness": "400 um", "mass_per_area": "300 g/m2"},
 }  # fmt: skip
 
 
@@ -55,6 +57,17 @@ def test_a_steady_room_is_shown_without_a_warning(tmp_path: Path) -> None:
     result = process_run(run)
     assert not [line for line in result.warnings if "temperature" in line]
     assert "<h2>Temperature</h2>" in (run / "result" / "report.html").read_text()
+
+
+def test_the_layer_that_the_protocol_states_is_that_of_the_material(tmp_path: Path) -> None:
+    run = recorded(tmp_path)
+    process_run(run)
+    material = read_material(run / "result" / "material.yaml")
+    assert material.thickness_mm == pytest.approx(0.4, rel=1e-12)
+    assert material.mass_per_area_g_per_m2 == 300.0
+    shown = describe_phosphor(material)
+    assert "thickness 0.4 mm" in " ".join(shown.split())
+    assert "mass per area 300 g/m²" in " ".join(shown.split())
 
 
 def test_a_slow_drift_is_told_where_rates_are_known_better(tmp_path: Path) -> None:

@@ -98,10 +98,16 @@ class Bench:
         shots: int = 12,
         every_s: float = 7.0,
         exposure_s: float = 0.5,
+        lights: Sequence[int] | None = None,
     ) -> ChargingSeries:
-        """Charges one after another, photographs after each, a wait in the dark before the next."""
+        """Charges one after another, photographs after each, a wait in the dark before the next.
+
+        With `lights`, one sample is charged through the window of that number, instead of samples
+        behind all windows at once.
+        """
         lamp, charges, at_s = Lamp.found(self.lamp, on=False), [], 10.0
-        for duration_s in charge_durations_s:
+        each_light: Sequence[int | None] = lights or [None] * len(charge_durations_s)
+        for duration_s, light in zip(charge_durations_s, each_light, strict=True):
             off_s = at_s + duration_s
             start_s: FloatArray = off_s + DOOR_S + every_s * np.arange(float(shots))
             lamp = lamp.switched(True, at_s).switched(False, off_s)
@@ -110,7 +116,9 @@ class Bench:
             brightness = lamp.exposure(hot_s, off_s).sum() / STEADY.sum() / (off_s - hot_s)
             lasting = np.full(shots, exposure_s)
             seen = brightness * (1 + self.lamp_scatter * self.lamp_random.normal())
-            charges.append(Charge(at_s, off_s, start_s, lasting, brightness=float(seen)))
+            charges.append(
+                Charge(at_s, off_s, start_s, lasting, brightness=float(seen), light=light)
+            )
             at_s = off_s + wait_s
         glow = self._glow(windows, lamp, charges)
         values = np.multiply.outer(glow, WEIGHTS)
@@ -158,10 +166,13 @@ class Bench:
 
     def _glow(self, windows: FloatArray, lamp: Lamp, charges: Sequence[Charge]) -> FloatArray:
         """(n, P) mean over each exposure."""
-        samples, sites = self._samples(windows), len(windows)
+        by_light = charges[0].light is not None
+        each = [self._samples(windows[[light]]) for light in range(len(windows))]
+        samples, sites = (each[0], 1) if by_light else (self._samples(windows), len(windows))
         level, since_s = np.zeros(len(samples.k_r_per_s)), 0.0
         found = []
         for charge in charges:
+            samples = samples if charge.light is None else each[charge.light]
             for start_s, exposure_s in zip(charge.start_s, charge.exposure_s, strict=True):
                 level, _ = samples.evolve(level, since_s, start_s, lamp)
                 since_s = start_s + exposure_s

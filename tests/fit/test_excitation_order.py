@@ -58,7 +58,9 @@ def test_the_first_order_is_that_of_the_affine_steps() -> None:
     before = tuple(
         Charge(off_s - 30.0, off_s, np.empty(0), np.empty(0)) for off_s in (-90.0, -20.0)
     )
-    series = replace(series, earlier=EarlierCharges(before, 2 * series.irradiance))
+    series = replace(
+        series, earlier=EarlierCharges(before, 2 * series.irradiance, series.rise, series.fade)
+    )
     k_r, k_e = np.array([0.08, 0.015]), np.linspace(0.001, 0.1, 16).reshape(2, 8)
     affine, general = (levels(series, k_r, k_e, order) for order in (None, np.ones(2)))
     for ours, theirs in zip(general[:3], affine[:3], strict=True):
@@ -177,7 +179,7 @@ def test_charges_of_the_series_before_are_not_forgotten(order: FloatArray | None
     *before, last = whole.charges
     later = replace(
         whole, charges=(last,), values=whole.values[6:], sigma=whole.sigma[6:],
-        earlier=EarlierCharges(tuple(before), whole.irradiance),
+        earlier=EarlierCharges(tuple(before), whole.irradiance, whole.rise, whole.fade),
     )  # fmt: skip
     rates = np.array([0.08, 0.015]), np.linspace(0.001, 0.1, 16).reshape(2, 8), order
     for name in ("value", "by_k_r", "by_k_e"):
@@ -194,7 +196,7 @@ def test_closure_knows_what_earlier_charges_left() -> None:
     whole = sample.series("bare lamp", BARE, (256.0, 4.0, 16.0, 64.0, 256.0), 400.0, shots=4)
     direct = replace(
         whole, charges=whole.charges[1:], values=whole.values[4:], sigma=whole.sigma[4:],
-        earlier=EarlierCharges(whole.charges[:1], whole.irradiance),
+        earlier=EarlierCharges(whole.charges[:1], whole.irradiance, whole.rise, whole.fade),
     )  # fmt: skip
     light = true_irradiance().model_copy(update={"direct": tuple(whole.irradiance[0])})
     through = sample.series("through LVF", LVF, (8.0, 64.0, 256.0), shots=5)

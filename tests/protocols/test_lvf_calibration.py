@@ -203,7 +203,7 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     ended = labrig("run", write("irradiance"), "--rig", rig, "--runs", tmp_path, "--yes")
     assert ended.code == 0, ended.err
     light = IRRADIANCE_KIND.read(ended.run_folder / "result" / "irradiance.yaml")
-    expected = true_irradiance(room, light.strip, light.bands_nm)
+    expected = true_irradiance(room, light.lvf_strip(), light.bands_nm)
     assert np.linalg.norm(light.direct) == pytest.approx(1.0)
     through, spread = np.array(light.through), np.array(light.through_sigma)
     total = through.sum(axis=1) / expected.sum(axis=1) - 1

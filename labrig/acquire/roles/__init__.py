@@ -22,6 +22,7 @@ from labrig.acquire.roles.door_and_shield import (
     Shield,
     TrapDoor,
 )
+from labrig.acquire.roles.filter_wheel import FILTER_WHEEL, FilterWheel, TurnWheel
 from labrig.acquire.roles.illuminants import (
     ILLUMINANTS,
     ILLUMINANTS_OFF,
@@ -32,6 +33,12 @@ from labrig.acquire.roles.illuminants import (
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
 from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedLight, LedSwitch
 from labrig.acquire.roles.light_bank import LightBank
+from labrig.acquire.roles.monochromator import (
+    MONOCHROMATOR,
+    Monochromator,
+    MonochromatorBand,
+    Tune,
+)
 from labrig.acquire.roles.role import (
     DARK,
     Checkable,
@@ -67,6 +74,8 @@ ROLES: dict[str, Role[Any]] = {
         ILLUMINANTS,
         SHIELD,
         DOOR,
+        FILTER_WHEEL,
+        MONOCHROMATOR,
         CHANGER,
         CAMERA,
         VIEWFINDER,
@@ -85,6 +94,7 @@ __all__ = [
     "DOOR",
     "DOOR_CLOSE",
     "DOOR_OPEN",
+    "FILTER_WHEEL",
     "ILLUMINANTS",
     "ILLUMINANTS_OFF",
     "LAMP",
@@ -93,6 +103,7 @@ __all__ = [
     "LEDS",
     "LEDS_OFF",
     "LIGHTS",
+    "MONOCHROMATOR",
     "ROLES",
     "SHIELD",
     "SHIELD_COVER",
@@ -108,6 +119,7 @@ __all__ = [
     "Door",
     "ExerciseContext",
     "Exercised",
+    "FilterWheel",
     "FrameReader",
     "Guarded",
     "Illuminant",
@@ -123,6 +135,8 @@ __all__ = [
     "LightBank",
     "LiveView",
     "Measured",
+    "Monochromator",
+    "MonochromatorBand",
     "PlannedDevice",
     "ReadSpectrum",
     "Role",
@@ -133,5 +147,7 @@ __all__ = [
     "Switch",
     "Thermometer",
     "TrapDoor",
+    "Tune",
+    "TurnWheel",
     "require_integration",
 ]

@@ -18,13 +18,14 @@ from labrig.analyse.excitation.lamp_light import (
     scale_sigma,
 )
 from labrig.analyse.excitation.material import excited_material
+from labrig.analyse.excitation.narrow_lights import narrow_light_warnings
 from labrig.analyse.excitation.orders import OrderFits
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.analyse.radiometric_scale import RadiometricScale, radiometric_scale
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
-from labrig.analyse.surface import with_reflectance
+from labrig.analyse.surface import with_layer, with_reflectance
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
@@ -133,6 +134,7 @@ def _patch_excitation(
     if spectrum is not None and (scale := _scale(part, charging, fit, irradiance, spectrum)):
         material = scale.of(material)
     material = with_reflectance(material, patch.folder, part.inputs.reflectance)
+    material = with_layer(material, part.protocol.sample)
     material = at_temperature(material, run, part.protocol.rate_frames)
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
@@ -141,6 +143,7 @@ def _patch_excitation(
             *(decay.warnings if fit.is_first_order else ()),
             *fit.warnings,
             *_light_warnings(fit),
+            *narrow_light_warnings(fit, irradiance),
             *_closure_warnings(closure),
             *no_spectrum,
         ),
@@ -163,12 +166,17 @@ def _scale(
 
 
 def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
-    if max(fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes) > AT_END * LARGEST_FACTOR:
+    if max((fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes)) > AT_END * LARGEST_FACTOR:
         light = light_scatter(fit)
+        places = (
+            ""
+            if light.sites is None or light.wavelength_nm is None
+            else f", {100 * light.sites:.1f} % from place to place and {light.wavelength_nm:.1f} "
+            "nm in wavelength"
+        )
         yield (
-            f"the light seems to be off by {100 * light.lamp:.1f} % from charge to charge, "
-            f"{100 * light.sites:.1f} % from place to place and {light.wavelength_nm:.1f} nm in "
-            "wavelength, which is about the most that is tried, so that σ may be too small: the "
+            f"the light seems to be off by {100 * light.lamp:.1f} % from charge to charge{places}, "
+            "which is about the most that is tried, so that σ may be too small: the "
             "irradiance is of another bench or filter, excitation changes much within a band (give "
             "narrower bands to irradiance), or the rate equation does not hold"
         )

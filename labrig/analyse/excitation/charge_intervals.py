@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from labrig.acquire import DARK, LAMP, LEDS
 from labrig.analyse.frames import left_out_lines
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
@@ -24,7 +25,9 @@ class ChargeInterval:
     unit
         Name of the unit.
     on_s, off_s
-        Times at which the lamp was switched on and off.
+        Times at which the lamp, or an LED, was switched on and off.
+    is_led
+        Whether an LED charged.
     cold_deficit
         Mean warm-up deficit during this charge as a fraction of a cold lamp's, 0 to 1.
     """
@@ -32,12 +35,18 @@ class ChargeInterval:
     unit: str
     on_s: float
     off_s: float
+    is_led: bool = False
     cold_deficit: float = 0.0
 
     @property
     def is_direct(self) -> bool:
         """Whether the lamp charged directly, without the filter."""
         return UnitKind.DIRECT.has(self.unit)
+
+    @property
+    def light(self) -> str | None:
+        """Name of the selected light; None of the variable filter and of the lamp itself."""
+        return UnitKind.light_of(self.unit)
 
 
 @dataclass(frozen=True)
@@ -94,7 +103,11 @@ def charge_frames(
     charges = sorted(
         (interval for interval in units if interval is not None), key=lambda interval: interval.on_s
     )
-    intervals = with_warmth(charges, time_constant_s)
+    by_lamp = [interval for interval in charges if not interval.is_led]
+    by_leds = [interval for interval in charges if interval.is_led]
+    intervals = sorted(
+        [*with_warmth(by_lamp, time_constant_s), *by_leds], key=lambda interval: interval.on_s
+    )
     frames = [
         frame for role in GLOWING for frame in run.frames(role) if not overrides.excludes(frame)
     ]
@@ -140,12 +153,13 @@ def with_warmth(
 
 
 def _interval(attempt: Attempt) -> ChargeInterval | None:
-    times = {
-        action.action: action.middle_time for action in attempt.actions if action.device == "lamp"
-    }
-    if not {"on", "off"} <= set(times):
+    switched = [action for action in attempt.actions if action.device in (LAMP.key, LEDS.key)]
+    off = [action for action in switched if action.action == DARK]
+    on = [action for action in switched if action.action != DARK]
+    if not on or not off:
         return None
-    return ChargeInterval(attempt.unit, times["on"], times["off"])
+    is_led = on[-1].device == LEDS.key
+    return ChargeInterval(attempt.unit, on[-1].middle_time, off[-1].middle_time, is_led)
 
 
 def _interval_before(

@@ -1,5 +1,6 @@
 """From a run's frames to charging series: every charge with the photographs after it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,12 @@ from numpy.polynomial.legendre import legvander
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
 from labrig.analyse.excitation.evenness import evenness
 from labrig.analyse.excitation.lamp_light import (
+    KNOWN,
     across_sites,
     lamp_transients,
+    light_modes,
     mode_kinds,
+    selected_light,
     site_modes,
 )
 from labrig.analyse.excitation.site_means import site_means, site_weights
@@ -18,6 +22,8 @@ from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions
 from labrig.calibration import IrradianceFile, Warming
+from labrig.errors import DataError
+from labrig.protocols.steps.exciting_lights import ExcitingLights
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches, sensor_layout
 from labrig.region import Region
@@ -29,10 +35,13 @@ from labrig.results import (
     FloatArray,
     PatchCharging,
     Series,
+    Transient,
 )
 
 #: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"
+#: Name of the sample where selected lights charge all of it.
+SAMPLE = "sample"
 #: Name of the frame among the regions.
 FRAME = "(whole frame)"
 WHOLE_FRAME: Region = (0.0, 0.0, 1.0, 1.0)
@@ -59,16 +68,22 @@ def patch_chargings(
     Raises
     ------
     DataError
-        Charges or frames are missing, no patch lies below the filter, or the camera is not the
-        calibrated one.
+        Charges or frames are missing, no patch lies below the filter, the irradiance is of other
+        lights, or the camera is not the calibrated one.
+    UsageError
+        The irradiance is that of selected lights and the run's charges went through the filter.
     """
     inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
     frames = charge_frames(part.run, overrides, warming.time_constant_s, inputs.blank)
     require_calibrated_camera(inputs.camera, part.run, list(frames.charge_of))
     layout = sensor_layout(next(iter(frames.charge_of)))
-    sites, reasons = slice_strip(
-        strip_regions(part), irradiance.strip, layout, len(irradiance.position)
-    )
+    if protocol.select is None:
+        strip = irradiance.lvf_strip()
+        sites, reasons = slice_strip(strip_regions(part), strip, layout, len(irradiance.position))
+    else:
+        _require_lights(protocol.select, irradiance)
+        sites = {patch: {SAMPLE: patch.region or protocol.sites} for patch in strip_regions(part)}
+        reasons = ()
     series = reduce_patches(
         [
             replace(timed(frame, frames.zero_s), unit=interval.unit)
@@ -101,21 +116,24 @@ def patch_chargings(
                 warming.deficit,
                 fresh=protocol.samples > 1,
                 saturated=protocol.saturated and interval is longest,
+                lights=irradiance.lights,
             )
             for interval in frames.intervals
             if interval.is_direct is direct
         )
 
-    through = ChargingSeries(
-        "through the filter", charges(False), rise, fade, np.array(irradiance.through),
-        NOTHING, NOTHING, site_modes(irradiance), mode_kinds(irradiance), across_sites(irradiance),
-    )  # fmt: skip
-    everywhere = np.tile(irradiance.direct, (len(irradiance.position), 1))
+    by_leds = any(interval.is_led for interval in frames.intervals)
+    through = _through(irradiance, charges(False), (rise, fade), by_leds=by_leds)
+    if by_leds:
+        at_once = Transient.none(len(irradiance.direct))
+        through = replace(through, rise=at_once, fade=at_once)
+    everywhere = np.tile(irradiance.direct, (len(irradiance.position) or 1, 1))
     direct_charges = charges(True)
+    earlier = EarlierCharges(through.charges, through.irradiance, through.rise, through.fade)
     is_earlier = through.charges[-1].off_s < direct_charges[0].on_s
     direct = ChargingSeries(
         "by the lamp itself", direct_charges, rise, fade, everywhere, NOTHING, NOTHING,
-        earlier=EarlierCharges(through.charges, through.irradiance) if is_earlier else None,
+        earlier=earlier if is_earlier else None,
     )  # fmt: skip
     chargings = {}
     for patch, slices in sites.items():
@@ -125,8 +143,11 @@ def patch_chargings(
             for name in ("values", "sigma")
         )
         usable = np.stack([each.usable for each in patch_series], axis=1)
-        weights = site_weights(slices, irradiance, layout)
-        values, sigma = site_means(values, sigma, usable, weights)
+        if irradiance.lights:
+            values = np.where(usable[..., None], values, np.nan)
+        else:
+            weights = site_weights(slices, irradiance, layout)
+            values, sigma = site_means(values, sigma, usable, weights)
         strip_series = series[_place_name(patch, WHOLE)]
         chargings[patch] = _divide_by_evenness(
             values, sigma, through, direct, strip_series, series[FRAME].values, frames
@@ -157,7 +178,7 @@ def _divide_by_evenness(
             values=values[~is_direct],
             sigma=sigma[~is_direct],
             frame_light=veils[~is_direct],
-            veil_shapes=_veil_shapes(values.shape[1]),
+            veil_shapes=None if through.is_by_light else _veil_shapes(values.shape[1]),
         ),
         replace(
             direct,
@@ -176,8 +197,45 @@ def _veil_shapes(sites: int) -> FloatArray:
     return np.asarray(legvander(along, VEIL_DEGREE)[:, 1:].T)
 
 
+def _through(
+    irradiance: IrradianceFile,
+    charges: tuple[Charge, ...],
+    transients: tuple[Transient, Transient],
+    *,
+    by_leds: bool,
+) -> ChargingSeries:
+    """Return the series through the filter or by selected lights, without its values."""
+    lit = (charges, *transients)
+    if irradiance.lights:
+        light, _ = selected_light(irradiance, by_leds=by_leds)
+        modes = light_modes(irradiance, by_leds=by_leds)
+        kinds = np.full(len(modes), KNOWN)
+        return ChargingSeries("by selected lights", *lit, light, NOTHING, NOTHING, modes, kinds)
+    return ChargingSeries(
+        "through the filter", *lit, np.array(irradiance.through), NOTHING, NOTHING,
+        site_modes(irradiance), mode_kinds(irradiance), across_sites(irradiance),
+    )  # fmt: skip
+
+
+def _require_lights(select: ExcitingLights, irradiance: IrradianceFile) -> None:
+    """Raise DataError if the irradiance of one of the lights is not known."""
+    unknown = [name for name in select.names() if name not in irradiance.lights]
+    if unknown:
+        raise DataError(
+            f"expected the irradiance of every light of 'select', got none of '{unknown[0]}' "
+            f"(known: {', '.join(irradiance.lights) or 'places behind the variable filter'}); run "
+            "irradiance with the same 'select', and name its run ('optics: {irradiance: …}')"
+        )
+
+
 def _charge(
-    interval: ChargeInterval, frames: ChargeFrames, deficit: float, *, fresh: bool, saturated: bool
+    interval: ChargeInterval,
+    frames: ChargeFrames,
+    deficit: float,
+    *,
+    fresh: bool,
+    saturated: bool,
+    lights: Sequence[str],
 ) -> Charge:
     after = frames.after(interval)
     return Charge(
@@ -189,6 +247,7 @@ def _charge(
         cold_deficit=interval.cold_deficit,
         fresh=fresh,
         saturated=saturated,
+        light=None if interval.light is None else lights.index(interval.light),
     )
 
 

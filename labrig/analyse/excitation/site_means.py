@@ -32,7 +32,7 @@ def site_weights(slices: Slices, irradiance: IrradianceFile, layout: SensorLayou
     layout
         Size and colours of the sensor.
     """
-    strip, position = irradiance.strip, np.array(irradiance.position)
+    strip, position = irradiance.lvf_strip(), np.array(irradiance.position)
     rising = np.argsort(position)
     integral = CubicSpline(position[rising], np.eye(len(position))[rising]).antiderivative()
     half = 0.5 / len(position)

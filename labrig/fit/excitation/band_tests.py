@@ -42,17 +42,18 @@ def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTes
     rates = problem.parameters.unpack(theta)
     through = problem.illuminated_series(rates)[0]
     growth = (rates.amplitude[:, None] * rates.k_e_per_s).sum(axis=0)
-    band_of_site: IntArray = np.argmax(growth * through.irradiance, axis=1)
-    bands = np.unique(band_of_site)
+    band_of_row: IntArray = np.argmax(growth * through.irradiance, axis=1)
+    bands = np.unique(band_of_row)
     if len(bands) < 2:
         return None
     residual, jacobian = problem.residuals(theta)
     basis = column_space(jacobian)
     reduced = max(solution.chi2 / max(problem.n_values - solution.rank, 1), 1.0)
-    masks = (band_of_site == bands[:, None]).astype(np.float64)
+    band_of_shot = band_of_row[through.row_of_shots()]
+    masks = (band_of_shot == bands[:, None, None]).astype(np.float64)
 
     def quantity(changes: Sequence[FloatArray], tolerance: float = 0.0) -> BandQuantity:
-        columns = np.stack([mask[:, None] * change for change in changes for mask in masks], -1)
+        columns = np.stack([mask[..., None] * change for change in changes for mask in masks], -1)
         whitened = np.zeros((len(residual), columns.shape[-1]))
         of_series = problem.whitened(0, columns)
         whitened[: len(of_series)] = of_series

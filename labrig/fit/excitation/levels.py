@@ -12,7 +12,7 @@ import numpy as np
 
 from labrig.fit.excitation import levels_of_order
 from labrig.fit.excitation.level_slopes import Levels
-from labrig.material import relaxation_with_slopes
+from labrig.material import phi1, relaxation_with_slopes
 from labrig.results import ChargingSeries, FloatArray
 
 
@@ -99,6 +99,41 @@ def levels_at_off(
     return levels_of_order.decayed(after_charges, k_r_per_s, order, back_s)
 
 
+def slopes_by_light(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+) -> FloatArray:
+    """Return the derivatives of the levels of all exposures by ln E of every charge and band.
+
+    Of first order, and with what a charge has left at those after it.
+
+    Returns
+    -------
+    ndarray
+        Derivatives, shape (n, K, P, N, B).
+    """
+    charges = _independent_charges(series, k_r_per_s, k_e_per_s)
+    dark_s = _dark_s(series)
+    own = charges.gained.by_k_e * k_e_per_s
+    after = np.zeros((len(series.charges), *own.shape))
+    value = charges.gained.value
+    for number, charge in enumerate(series.charges):
+        after[number, number] = own[number]
+        if number and not charge.fresh:
+            wait_s = charge.on_s - float(dark_s[number - 1])
+            kept = charges.kept[number] * np.exp(-k_r_per_s * wait_s)
+            left = kept * value[number - 1]
+            value[number] += left
+            after[number, :number] = kept[..., None] * after[number - 1, :number]
+            dose = charges.dose[number, :, None] * k_e_per_s
+            after[number, number] -= left[..., None] * dose
+    shots = [len(charge.start_s) for charge in series.charges]
+    of_charge = np.repeat(np.arange(len(shots)), shots)
+    starts_s = np.concatenate([charge.start_s for charge in series.charges]) - dark_s[of_charge]
+    exposure_s = np.concatenate([charge.exposure_s for charge in series.charges])
+    decay = np.exp(-k_r_per_s * starts_s[:, None]) * phi1(k_r_per_s * exposure_s[:, None])
+    return np.asarray(after[of_charge] * decay[:, None, None, :, None])
+
+
 def _dark_s(series: ChargingSeries) -> FloatArray:
     """Return the time at which the lamp is dark after each charge, in s, shape (K,)."""
     return np.array([charge.off_s for charge in series.charges]) + series.fade.total_s
@@ -146,12 +181,11 @@ def _independent_charges(
     """Compute the effect of every charge on its own."""
     duration_s, fraction = _steps(series)
     brightness = np.array([charge.brightness for charge in series.charges])
-    sites, bands = series.irradiance.shape
+    sites, bands = series.sites, series.irradiance.shape[1]
     shape = (len(brightness), sites, len(k_r_per_s))
     # Sites and states in one axis, and all charges' steps side by side: long rows for numpy.
     k_r = np.tile(k_r_per_s, sites)
-    steady_rates = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
-    kappa = brightness[:, None] * (fraction @ steady_rates.T)[:, None, :]
+    kappa = brightness[:, None] * _steady_and_changing(series, k_e_per_s, fraction)
     tau = duration_s[:, :, None]
     step, slopes = relaxation_with_slopes(kappa, k_r, tau)
     r_before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
@@ -164,7 +198,10 @@ def _independent_charges(
     by_kappa = after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_kappa)
     by_k_r = (after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
     by_fraction = (by_kappa.reshape(len(tau), -1).T @ fraction).reshape(*shape, bands)
-    light = brightness[:, None, None] * series.irradiance
+    irradiance = [
+        np.broadcast_to(series.irradiance_of(charge), (sites, bands)) for charge in series.charges
+    ]
+    light = brightness[:, None, None] * np.array(irradiance)
     return _Charges(
         duration_s.sum(axis=0),
         light * (duration_s.T @ fraction)[:, None, :],
@@ -176,6 +213,19 @@ def _independent_charges(
             np.zeros(shape),
         ),
     )
+
+
+def _steady_and_changing(
+    series: ChargingSeries, k_e_per_s: FloatArray, fraction: FloatArray
+) -> FloatArray:
+    """Return κ in every step at brightness 1, shape (m, K, P N); (m, 1, P N) if all are alike."""
+    bands = series.irradiance.shape[1]
+    rates = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
+    kappa = (fraction @ rates.T).reshape(len(fraction), -1, len(k_e_per_s))
+    if not series.is_by_light:
+        return np.asarray(kappa.reshape(len(fraction), 1, -1))
+    lights = [charge.light or 0 for charge in series.charges]
+    return np.tile(kappa[:, lights], (1, 1, series.sites))
 
 
 def _steps(series: ChargingSeries) -> tuple[FloatArray, FloatArray]:

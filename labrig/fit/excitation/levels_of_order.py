@@ -109,14 +109,14 @@ def levels_after_charges(
 
 def _after_charges(series: ChargingSeries, sample: _Sample) -> list[_State]:
     """Return the states after every charge, when the lamp is dark."""
-    shape = len(series.irradiance), len(sample.k_r_per_s)
+    shape = series.sites, len(sample.k_r_per_s)
     bands = series.irradiance.shape[1]
     empty = _State.of(np.zeros(shape), bands)
     transients = _parts(series.rise), _parts(series.fade)
     state, dark_s, ends = empty, -np.inf, []
     if (earlier := series.before()) is not None:
         state = _after_charges(earlier, sample._replace(irradiance=earlier.irradiance))[-1]
-        dark_s = earlier.charges[-1].off_s + series.fade.total_s
+        dark_s = earlier.charges[-1].off_s + earlier.fade.total_s
     for charge in series.charges:
         if charge.saturated:
             full = _State.of(np.ones(shape), bands)
@@ -124,7 +124,8 @@ def _after_charges(series: ChargingSeries, sample: _Sample) -> list[_State]:
         else:
             is_empty = charge.fresh or np.isinf(dark_s)
             state = empty if is_empty else sample.in_darkness(state, charge.on_s - dark_s)
-            state = _charged(sample, state, transients, charge)
+            lit = sample._replace(irradiance=series.irradiance_of(charge))
+            state = _charged(lit, state, transients, charge)
         dark_s = charge.off_s + series.fade.total_s
         ends.append(state)
     return ends

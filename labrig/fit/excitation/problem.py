@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from labrig.fit.excitation.level_slopes import Levels
-from labrig.fit.excitation.levels import levels
+from labrig.fit.excitation.levels import levels, slopes_by_light
 from labrig.fit.excitation.parameters import Parameters, Rates, RelativeSigmas, is_fitted
 from labrig.results import ChargingSeries, FloatArray
 
@@ -169,6 +169,9 @@ class ExcitationProblem:
         self, number: int, charging: ChargingSeries, rates: Rates, slopes: FloatArray
     ) -> None:
         """Set the derivatives by all parameters of the light, from those by A k_e."""
+        if charging.is_by_light and self.parameters.is_first_order:
+            self._set_selected_light_derivatives(number, charging, rates, slopes)
+            return
         columns, charges = self.parameters.columns, self.parameters.charges(number)
         growth = rates.gain[:, None] * rates.k_e_per_s
         by_growth = slopes[..., columns.growth].reshape(*slopes.shape[:2], *growth.shape)
@@ -191,8 +194,37 @@ class ExcitationProblem:
             shot = charge_shots.stop
         if charging.site_modes is not None:
             modes, first = self.parameters.modes(number), columns.off.start
+            of_rows = charging.site_modes[:, charging.row_of_shots()]
             slopes[..., first + modes.start : first + modes.stop] = np.einsum(
-                "fpb,mpb->fpm", by_band, charging.site_modes
+                "fpb,mfpb->fpm", by_band, of_rows
+            )
+
+    def _set_selected_light_derivatives(
+        self, number: int, charging: ChargingSeries, rates: Rates, slopes: FloatArray
+    ) -> None:
+        """Set the same exactly where one light follows another.
+
+        What a bright light has left may be most of the glow after a dim one.
+        """
+        columns, charges = self.parameters.columns, self.parameters.charges(number)
+        by_state = slopes_by_light(charging, rates.k_r_per_s, rates.k_e_per_s)
+        by_band = np.einsum("fkpnb,n->fkpb", by_state, rates.amplitude)
+        by_charge = by_band.sum(axis=3)
+        if is_fitted(columns.scale) and number:
+            slopes[..., columns.scale.start + number - 1] = by_charge.sum(axis=1)
+        if is_fitted(columns.brightness):
+            first = columns.brightness.start
+            own = slice(first + charges.start, first + charges.stop)
+            slopes[..., own] = np.moveaxis(by_charge, 1, 2)
+        if is_fitted(columns.lacking):
+            cold_deficit = np.array([charge.cold_deficit for charge in charging.charges])
+            lacking = -np.tensordot(by_charge, cold_deficit, axes=(1, 0))
+            slopes[..., columns.lacking.start] = lacking
+        if charging.site_modes is not None:
+            modes, first = self.parameters.modes(number), columns.off.start
+            lights = [charge.light or 0 for charge in charging.charges]
+            slopes[..., first + modes.start : first + modes.stop] = np.einsum(
+                "fkpb,mkb->fpm", by_band, charging.site_modes[:, lights]
             )
 
     def whitened(self, number: int, columns: FloatArray) -> FloatArray:

@@ -36,7 +36,11 @@ def starts(
     mean_rate = float(fractions @ k_r_per_s)
     for guess in GUESSED_LEVELS:
         total = peak / guess
-        site_kappas = [_kappa(charging, mean_rate, total, reference) for charging in problem.series]
+        site_kappas = [
+            _kappa(part, mean_rate, total, reference)
+            for charging in problem.series
+            for part in charging.by_light()
+        ]
         kappa, design = np.concatenate(site_kappas), _irradiances(problem)
         k_e = nonnegative_least_squares(design, kappa)
         # A state that decays faster charges no further by the same light.
@@ -53,7 +57,9 @@ def starts(
 
 
 def _irradiances(problem: ExcitationProblem) -> FloatArray:
-    return np.concatenate([charging.irradiance for charging in problem.series])
+    return np.concatenate(
+        [part.irradiance for charging in problem.series for part in charging.by_light()]
+    )
 
 
 def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: int) -> FloatArray:

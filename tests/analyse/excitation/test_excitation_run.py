@@ -166,7 +166,7 @@ def test_killed_in_the_middle_it_goes_on_with_the_filter_where_it_was(
     last = resumed.frames("strip")[-1]
     places = [
         measure(read_raw(last.path), region)
-        for region in true_irradiance().strip.slices(9).values()
+        for region in true_irradiance().lvf_strip().slices(9).values()
     ]
     glow = [place.channels["B"].mean for place in places]
     assert max(glow) > 5 * min(glow)

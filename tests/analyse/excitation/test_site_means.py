@@ -16,7 +16,7 @@ def glow(position: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("width", "height"), [(96, 64), (192, 128), (384, 48)])
 def test_a_steep_glow_is_that_of_the_sites_in_all_colours(width: int, height: int) -> None:
     irradiance = true_irradiance(width, height)
-    strip, layout = irradiance.strip, SensorLayout(width, height, "RGGB")
+    strip, layout = irradiance.lvf_strip(), SensorLayout(width, height, "RGGB")
     slices = strip.slices()
     about = np.linspace(-0.5, 0.5, 101)
     left, right = (end[0] * width for end in (strip.left, strip.right))

@@ -1,0 +1,72 @@
+"""Lights that excite a sample one after another: filters, a monochromator, narrow LEDs."""
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.acquire import LAMP_OFF, LAMP_ON, LEDS_OFF, LedSwitch, Switch
+
+from .scenes import Arrangement, Stage
+
+Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class ExcitingLights(BaseModel):
+    """Lights that are selected one after another, in one of three ways.
+
+    Attributes
+    ----------
+    filters
+        Colour filters before the lamp, by their names in the rig's folder of filters, for example
+        `[bandpass-450, bandpass-500]`. A filter wheel puts those before the lamp that it has, a
+        person all others.
+    monochromator
+        Wavelengths in nm to which the monochromator before the lamp is tuned, for example
+        `[420, 450, 480]`.
+    leds
+        LEDs of the rig's bank, which shine in place of the lamp, for example `[450 nm, 525 nm]`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    filters: tuple[str, ...] = ()
+    monochromator: tuple[Nanometres, ...] = ()
+    leds: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        given = [
+            name for name in ("filters", "monochromator", "leds") if len(getattr(self, name)) > 0
+        ]
+        if len(given) != 1:
+            raise ValueError(
+                "expected lights of one kind, 'filters', 'monochromator' or 'leds', got "
+                f"{' and '.join(given) or 'none'}"
+            )
+        names = self.names()
+        if len(set(names)) < len(names):
+            raise ValueError(f"expected every light once, got {', '.join(names)}")
+        return self
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the lights in order."""
+        tuned = tuple(f"{wavelength_nm:g} nm" for wavelength_nm in self.monochromator)
+        return self.filters or self.leds or tuned
+
+    def arrangement(self, name: str, stage: Stage = "sample") -> Arrangement:
+        """Return the arrangement of the bench for one light."""
+        if self.filters:
+            return Arrangement(stage, filter=name)
+        if self.monochromator:
+            wavelength_nm = self.monochromator[self.names().index(name)]
+            return Arrangement(stage, monochromator_nm=wavelength_nm)
+        return Arrangement(stage)
+
+    def on(self, name: str) -> Switch | LedSwitch:
+        """Return the action that switches the light on."""
+        return LedSwitch(name) if self.leds else LAMP_ON
+
+    @property
+    def off(self) -> Switch | LedSwitch:
+        """Action that switches any of the lights off."""
+        return LEDS_OFF if self.leds else LAMP_OFF
