@@ -54,8 +54,11 @@ from labrig.calibration.reflectance_file import (
     PatchReflectance,
     ReflectanceFile,
 )
+from labrig.calibration.sensitivity import Settings, relative_sensitivity
 
 __all__ = [
+    "Settings",
+    "relative_sensitivity",
     "BLANK_KIND",
     "CAMERA_KIND",
     "FADE_KIND",

@@ -1,11 +1,16 @@
 """Comparison of a run with photographs, other materials and the paper of Nalbach et al."""
 
 from labrig.compare.numbers import numbers
+from labrig.compare.rendered import GlowRatio, RenderedComparison, RenderedPatch, compare_rendered
 from labrig.compare.run import RunComparison, compare_run
 from labrig.compare.sections import sections
 from labrig.compare.three_channels import ThreeChannels, three_channels
 
 __all__ = [
+    "GlowRatio",
+    "RenderedComparison",
+    "RenderedPatch",
+    "compare_rendered",
     "RunComparison",
     "ThreeChannels",
     "compare_run",
