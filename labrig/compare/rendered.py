@@ -25,6 +25,7 @@ from labrig.fit import DecayFit
 from labrig.material import MAX_ORDER, Material, State, write_material
 from labrig.optics import CameraResponse
 from labrig.record import read_run
+from labrig.region import Region
 from labrig.reproduce import (
     CARD_NAME,
     Assumptions,
@@ -41,7 +42,7 @@ from labrig.results import Series, read_result
 #: Height of the frame in the rendering; its light is even on every sample.
 HEIGHT_PX, MOST_PX = 32, 512
 #: Gauss–Legendre nodes of an exposure, and their weights.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 #: Name of the rendering of the run's own material, and of that of Becquerel's law.
 MEASURED, BECQUEREL = "measured", "Becquerel"
@@ -187,7 +188,7 @@ def compare_rendered(
         for name, patch in patches.items():
             try:
                 fits = fits_by_states(patch.series, patch.flicker, refit)
-                fitted = bench.fitted(own[name], patch, fits)
+                fitted = bench.fitted(patch, fits)
             except DataError as error:
                 left_out.append(f"{name} is left out: {error}")
                 continue
@@ -263,14 +264,16 @@ class _Bench:
         """Render the run's materials, charged as the journal says, at all exposures."""
         room = self._room
         materials = {name: patch.material for name, patch in patches.items()}
-        scene = self._scene(materials, room.programme(list(materials.values())), levels=0.0)
+        regions = {name: room.regions[name] for name in patches}
+        programme = room.programme(list(materials.values()))
+        scene = self._scene(materials, regions, programme, levels=0.0)
         times = {name: self._times(patch.series) for name, patch in patches.items()}
         lights = {name: room.sample_reflected(name) for name in patches}
         burning_s = room.burning_s()
         moments = [each.ravel() for each in times.values()]
         moments.append(np.array([burning_s]))
         moments += [np.array([light.at_s]) for light in lights.values() if light is not None]
-        seen = self._seen(scene, np.unique(np.concatenate(moments)))
+        seen = self._seen(scene, regions, np.unique(np.concatenate(moments)))
         found = {}
         for name, patch in patches.items():
             reflected = []
@@ -281,9 +284,9 @@ class _Bench:
             found[name] = _SeenPatch(_exposed(seen, name, times[name]), tuple(reflected))
         return _Seen(found, scene.notes)
 
-    def fitted(self, name: str, patch: MeasuredPatch, fits: Mapping[int, DecayFit]) -> _Fitted:
+    def fitted(self, patch: MeasuredPatch, fits: Mapping[int, DecayFit]) -> _Fitted:
         """Render what was fitted to the decay of a patch, its states full at lamp off."""
-        series, glow, sigma, left_out = patch.series, {}, {}, []
+        series, left_out = patch.series, []
         each: dict[str, tuple[tuple[State, ...], tuple[FloatArray, FloatArray]]] = {}
         for number, fit in fits.items():
             if fit.n_states != number:
@@ -301,13 +304,26 @@ class _Bench:
             )
             signal = becquerel.signal(series.t_s, series.exposure_s)
             each[BECQUEREL] = ((state,), signal)
+        # All at once, side by side: nothing else lights them.
+        regions = {
+            prediction: (number / len(each), 0.0, 1 / len(each), 1.0)
+            for number, prediction in enumerate(each)
+        }
+        materials = {
+            prediction: patch.material.model_copy(update={"states": states})
+            for prediction, (states, _) in each.items()
+        }
+        scene = self._scene(materials, regions, [(0.0, 0.0)], levels=1.0)
         times = series.t_s[:, None] + series.exposure_s[:, None] * NODES
-        for prediction, (states, (signal, variance)) in each.items():
-            material = patch.material.model_copy(update={"states": states})
-            scene = self._scene({name: material}, [(0.0, 0.0)], levels=1.0)
-            glow[prediction] = _exposed(self._seen(scene, np.unique(times)), name, times)
-            sigma[prediction] = np.sqrt(variance) / np.maximum(np.abs(signal), 1e-300)
-        return _Fitted(glow, sigma, tuple(left_out))
+        seen = self._seen(scene, regions, np.unique(times))
+        return _Fitted(
+            {prediction: _exposed(seen, prediction, times) for prediction in each},
+            {
+                prediction: np.sqrt(variance) / np.maximum(np.abs(signal), 1e-300)
+                for prediction, (_, (signal, variance)) in each.items()
+            },
+            tuple(left_out),
+        )
 
     def _times(self, series: Series) -> FloatArray:
         """Return the nodes of the exposures on the room's clock, shape (n, nodes)."""
@@ -317,6 +333,7 @@ class _Bench:
     def _scene(
         self,
         materials: Mapping[str, Material],
+        regions: Mapping[str, Region],
         programme: Sequence[tuple[float, float]],
         levels: float,
     ) -> Scene:
@@ -325,7 +342,7 @@ class _Bench:
         file = dark_room(
             "dark room",
             {
-                name: (self._room.regions[name], MaterialEntry(file=f"{n}.yaml", levels=levels))
+                name: (regions[name], MaterialEntry(file=f"{n}.yaml", levels=levels))
                 for n, name in enumerate(materials)
             },
             self._room.lamp,
@@ -336,11 +353,12 @@ class _Bench:
         )
         return build_scene(file, self._folder, assumptions=self._assumptions)
 
-    def _seen(self, scene: Scene, times_s: FloatArray) -> dict[float, dict[str, FloatArray]]:
+    def _seen(
+        self, scene: Scene, regions: Mapping[str, Region], times_s: FloatArray
+    ) -> dict[float, dict[str, FloatArray]]:
         """Return the camera's values of each patch, and of the card, by time."""
-        renderer, edges_nm = Renderer(scene), scene.bands.edges_nm
-        pixels = {name: self._pixel(self._room.regions[name]) for name in scene.file.objects
-                  if name in self._room.regions}  # fmt: skip
+        renderer, edges_nm = Renderer(scene, threads=1), scene.bands.edges_nm
+        pixels = {name: self._pixel(region) for name, region in regions.items()}
         if CARD_NAME in scene.file.objects:
             pixels[CARD_NAME] = (-1, self._picture.width_px // 2)
         rows, columns = np.transpose(list(pixels.values()))
@@ -351,7 +369,7 @@ class _Bench:
             seen[t_s] = dict(zip(pixels, values, strict=True))
         return seen
 
-    def _pixel(self, region: tuple[float, float, float, float]) -> tuple[int, int]:
+    def _pixel(self, region: Region) -> tuple[int, int]:
         """Return row and column of the pixel in the middle of a region."""
         x, y, wide, high = region
         return (

@@ -1,0 +1,167 @@
+"""The dark room rendered from the files of simulated runs, beside their photographs.
+
+    python -m tests.acceptance.dark_room [NAME ...] [--keep DIR]
+
+Every case is a whole `labrig run phosphor` with `reflectance` in the simulated room, whose traps are
+integrated as they stand; the runs in DIR are used again. Per rendering: mean and largest ΔE2000 with
+L* = 50 of every photograph, mean with one exposure for all; glow over reflected light, rendered over
+photographed − 1, mean and furthest in % and furthest in σ. A case is right where the run's own
+material is within 3 % and 3 σ and its mean ΔE ≤ 2; of a material with several states or another
+order the single state must be off by twice as much.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from labrig import resources
+from labrig.analyse import fit_series
+from labrig.compare import RenderedPatch, compare_rendered
+from labrig.fit import DecayFit
+from labrig.material import Albedo, read_material, write_material
+from labrig.results import Series
+from tests.quick_yaml import read_quickly, write_quickly
+
+#: Albedo of all samples: a blue paint's.
+BLUE = {300: 0.35, 420: 0.45, 460: 0.6, 500: 0.35, 560: 0.15, 620: 0.12, 680: 0.2, 780: 0.4}
+MOST_PERCENT, MOST_SIGMAS, MOST_DELTA_E, WORSE = 3.0, 3.0, 2.0, 2.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A sample and its room."""
+
+    name: str
+    material: str
+    seed: int
+    kinetics: Mapping[str, Any] = field(default_factory=dict)
+    sensor: Mapping[str, Any] = field(default_factory=dict)
+    has_door: bool = True
+    is_one_state: bool = False
+
+
+CASES = (
+    Case("two-states", "double-medium-bright", 141),
+    Case("two-states-wide", "double-wide", 142),
+    Case("two-states-no-door", "double-medium-bright", 143, has_door=False),
+    Case("wide-no-door", "double-wide", 144, has_door=False),
+    Case("blue-paint", "blue-paint", 145, is_one_state=True),
+    Case("order-1.5", "blue-paint", 146, {"model": "general_order", "order": 1.5}),
+    Case("otor-0.5", "blue-paint", 147, {"model": "otor", "retrapping": 0.5}),
+    Case("known-camera", "double-medium-bright", 148, sensor={"curves": "canon_eos_5d_mark_ii"}),
+)
+
+
+def recorded(case: Case, folder: Path) -> Path:
+    """Return the folder of the case's run, recorded and processed unless it is there."""
+    place = folder / case.name
+    if not (place / "runs").is_dir():
+        place.mkdir(parents=True, exist_ok=True)
+        command = [
+            sys.executable, "-m", "labrig", "run", _protocol_file(place, case),
+            "--rig", _rig_file(place, case), "--runs", place / "runs", "--yes",
+        ]  # fmt: skip
+        subprocess.run(command, check=True, capture_output=True)
+    return next((place / "runs").iterdir())
+
+
+def _rig_file(place: Path, case: Case) -> Path:
+    known = Albedo(wavelength_nm=tuple(map(float, BLUE)), value=tuple(BLUE.values()))
+    coloured = read_material(case.material).model_copy(update={"albedo": known})
+    write_material(place / "sample.yaml", coloured)
+    rig = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
+    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
+    rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    sample = {"material": str(place / "sample.yaml"), "region": [0.03, 0.1, 0.94, 0.8]}
+    if case.kinetics:
+        sample["kinetics"] = dict(case.kinetics)
+    rig["simulation"] |= {"sample": [sample], "seed": case.seed}
+    rig["simulation"]["sensor"] |= dict(case.sensor)
+    for name in () if case.has_door else ("door", "shield", "servo"):
+        rig["devices"].pop(name, None)
+        rig["simulation"].pop(name, None)
+    path = place / "rig.yaml"
+    path.write_text(write_quickly(rig))
+    return path
+
+
+def _protocol_file(place: Path, case: Case) -> Path:
+    """Write the shipped chain with the sample's albedo, and without a door its daylight."""
+    chain = read_quickly((resources.folder("protocols") / "phosphor.yaml").read_text())
+    for part in chain["parts"]:
+        if part["protocol"] == "decay":
+            part["daylight"] = not case.has_door
+    chain["parts"].append({"protocol": "reflectance"})
+    path = place / "phosphor.yaml"
+    path.write_text(write_quickly(chain | {"sample": {"name": case.name}}))
+    return path
+
+
+def refit(series: Series, states: int, flicker: float) -> DecayFit:
+    """Fit a series as `labrig compare` does."""
+    return fit_series(series, states, flicker=flicker)
+
+
+def is_right(case: Case, patch: RenderedPatch) -> bool:
+    """Return whether a case's own material looks as it was photographed."""
+    off = 100 * np.abs(patch.ratio.excess("measured")).max()
+    sigmas = np.abs(patch.ratio.in_sigma("measured")).max()
+    mean = patch.each.mean("measured")
+    is_better = case.is_one_state or patch.each.mean("1 state") >= WORSE * mean
+    return bool(
+        off <= MOST_PERCENT and sigmas <= MOST_SIGMAS and mean <= MOST_DELTA_E and is_better
+    )
+
+
+def told(case: Case, run: Path, began: float) -> bool:
+    """Print the comparison of a case; return whether it is right."""
+    compared = compare_rendered(run, refit)
+    (patch,) = compared.patches
+    right, ratio = is_right(case, patch), patch.ratio
+    states = read_material(run / "result" / "material.yaml").states
+    orders = ", ".join(f"{state.kinetic_order:.2f}" for state in states)
+    print(
+        f"{case.name}: {case.material}, order {orders}, seed {case.seed}, light reflected by "
+        f"{ratio.reflected_by}, {ratio.photographed[0]:.3g} to {ratio.photographed[-1]:.3g} in "
+        f"{ratio.channel}; noise alone ΔE {patch.each.noise:.2f}; {time.monotonic() - began:.0f} s: "
+        f"{'right' if right else 'WRONG'}"
+    )
+    for name in patch.each.delta_e:
+        excess, pull = 100 * ratio.excess(name), ratio.in_sigma(name)
+        furthest = int(np.argmax(np.abs(excess)))
+        print(
+            f"    {name:10} ΔE {patch.each.mean(name):5.2f} ({patch.each.most(name):5.2f})  one "
+            f"exposure {patch.common.mean(name):5.2f}  ratio {excess.mean():+6.2f} %, furthest "
+            f"{excess[furthest]:+6.2f} %, {pull[np.argmax(np.abs(pull))]:+6.2f} σ",
+            flush=True,
+        )
+    for line in (*compared.notes, *compared.left_out):
+        print(f"    {line}")
+    return right
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print all cases."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="of the cases; all by default")
+    parser.add_argument("--keep", type=Path, help="folder of the runs, which are used again")
+    asked = parser.parse_args(arguments)
+    folder = (asked.keep or Path(tempfile.mkdtemp())).resolve()
+    right = []
+    for case in CASES:
+        if not asked.names or case.name in asked.names:
+            began = time.monotonic()
+            right.append(told(case, recorded(case, folder), began))
+    print(f"{sum(right)} of {len(right)} cases are right")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
