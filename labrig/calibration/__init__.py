@@ -57,8 +57,6 @@ from labrig.calibration.reflectance_file import (
 from labrig.calibration.sensitivity import Settings, relative_sensitivity
 
 __all__ = [
-    "Settings",
-    "relative_sensitivity",
     "BLANK_KIND",
     "CAMERA_KIND",
     "FADE_KIND",
@@ -88,10 +86,12 @@ __all__ = [
     "PatchReflectance",
     "ReferenceFile",
     "ReflectanceFile",
+    "Settings",
     "UvScale",
     "Warming",
     "WavelengthColumns",
     "keep_calibration",
     "kept_calibrations",
     "kinds",
+    "relative_sensitivity",
 ]

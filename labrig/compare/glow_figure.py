@@ -34,15 +34,18 @@ TITLE_PT, TIMES_PT, GAP_PT = 20.0, 16.0, 8.0
 BRIGHT = 0.18
 
 
-def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
-    """Draw a block for each patch: photographs above, predictions with their ΔE below."""
+def glow_figure(glows: Sequence[GlowComparison], notes: Sequence[str] = ()) -> Figure:
+    """Draw a block for each patch: photographs above, predictions with their ΔE below.
+
+    Notes stand under the times, a line each.
+    """
     times = [tuple(glow.t_s[shown_rows(glow)]) for glow in glows]
     # Patches of one run were mostly photographed together: their times stand once.
     timed = [
         current != following for current, following in zip(times, [*times[1:], ()], strict=True)
     ]
     tops = np.cumsum([0.0, *(_height(*block) for block in zip(glows, timed, strict=True))])
-    height = float(tops[-1]) + TIMES_PT
+    height = float(tops[-1]) + TIMES_PT * (1 + len(notes))
     figure = new_figure(height)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, WIDTH_PT), ylim=(height, 0))
@@ -50,7 +53,12 @@ def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
     for glow, top, with_times in zip(glows, tops, timed, strict=False):
         _block(axes, glow, float(top), with_times)
     centre = LABELS_PT + (WIDTH_PT - LABELS_PT) / 2
-    axes.text(centre, height - EDGE_PT, "Time after lamp off / s", ha="center", color=INK)
+    times_pt = float(tops[-1]) + TIMES_PT - EDGE_PT
+    axes.text(centre, times_pt, "Time after lamp off / s", ha="center", color=INK)
+    for number, note in enumerate(notes, start=1):
+        axes.text(
+            EDGE_PT, times_pt + number * TIMES_PT, note, color=MUTED, fontsize=SMALL_PT, wrap=True
+        )
     return figure
 
 

@@ -1,9 +1,10 @@
 """The dark room of a run, rendered through the measured camera, beside its photographs.
 
 What is compared is glow over reflected light: the photographs' by the settings of the camera, the
-rendering's by the measured curves. The dark room of the run's material is charged by the lamp as the
-journal says; beside it are the sums of one, two and three exponentials and Becquerel's law that were
-fitted to the decay, whose brightness is fitted, too.
+rendering's by the measured curves, whose channels have the ratios of the card under the lamp. The
+dark room of the run's material is charged by the lamp as the journal says; beside it are the sums
+of one, two and three exponentials and Becquerel's law that were fitted to the decay, whose
+brightness is fitted, too.
 """
 
 import tempfile
@@ -46,6 +47,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 #: Name of the rendering of the run's own material, and of that of Becquerel's law.
 MEASURED, BECQUEREL = "measured", "Becquerel"
+NOTHING_ASSUMED = Assumptions()
 #: Lightness of the photographed patch.
 LIGHTNESS = 50.0
 
@@ -127,7 +129,7 @@ class RenderedComparison:
 def compare_rendered(
     folder: Path,
     refit: Refit,
-    assumptions: Assumptions = Assumptions(),
+    assumptions: Assumptions = NOTHING_ASSUMED,
     white: str = DEFAULT_WHITE,
     camera: str | None = None,
 ) -> RenderedComparison:
@@ -167,8 +169,10 @@ def compare_rendered(
     Examples
     --------
     >>> from pathlib import Path
+    >>> import labrig
     >>> from labrig.compare import compare_rendered
-    >>> from labrig.fit import fit_series  # doctest: +SKIP
+    >>> def refit(series, states, flicker):
+    ...     return labrig.fit_series(series, states, flicker=flicker)
     >>> compared = compare_rendered(Path("runs/phosphor"), refit)  # doctest: +SKIP
     >>> compared.patches[0].each.mean("measured") < 2  # doctest: +SKIP
     True
@@ -193,12 +197,10 @@ def compare_rendered(
                 left_out.append(f"{name} is left out: {error}")
                 continue
             left_out += fitted.left_out
-            compared.append(
-                _compare(patch, measured.patches[own[name]], fitted, conversion, room)
-            )
+            compared.append(_compare(patch, measured.patches[own[name]], fitted, conversion, room))
     return RenderedComparison(
         tuple(compared),
-        _description(conversion, [each.ratio.reflected_by for each in compared]),
+        _description(conversion, [each.ratio.reflected_by for each in compared], left_out),
         tuple(dict.fromkeys(notes)),
         tuple(left_out),
     )
@@ -293,7 +295,8 @@ class _Bench:
                 left_out.append(f"{patch.name}: the decay does not support {number} states")
                 continue
             states = tuple(
-                _full_state(patch.material, state.amplitude, state.k_r_per_s) for state in fit.states
+                _full_state(patch.material, state.amplitude, state.k_r_per_s)
+                for state in fit.states
             )
             each[predicted_by(number)] = (states, fit.signal(series.t_s, series.exposure_s))
         becquerel = next((law for law in fits[1].laws if law.name == "becquerel"), None)
@@ -386,7 +389,9 @@ def _exposed(
     return np.asarray(np.einsum("k,nkc->nc", WEIGHTS, values))
 
 
-def _full_state(material: Material, amplitude: float, k_r_per_s: float, order: float = 1.0) -> State:
+def _full_state(
+    material: Material, amplitude: float, k_r_per_s: float, order: float = 1.0
+) -> State:
     """Return a state that is full at lamp off and then has an amplitude, in the material's colour.
 
     Λ has the mean spectrum of the material's states in its bands, Λ = a/k_r for r(0) = 1.
@@ -486,13 +491,16 @@ def _relative_sigma(material: Material, series: Series) -> FloatArray:
     return np.asarray(np.sqrt(variance))
 
 
-def _description(conversion: Viewing, reflected_by: Sequence[str]) -> str:
-    by = " and ".join(dict.fromkeys(reflected_by)) or "nothing"
-    camera = conversion.description.split("; ")[1]
-    return (
-        f"The dark room was rendered at the exposures of the photographs, in 48 bands, with the "
-        f"light of the lamp as {by} reflects it in the photographs. '{MEASURED}': the run's "
-        "material, charged as the journal says; the others: fits to the decay, whose brightness is "
-        f"fitted, too. {camera}. ΔE is CIEDE2000: with L* = {LIGHTNESS:g} of every photograph, and "
-        "with one exposure for all, the brightest at that; the rendering has the same factor."
-    )
+def _description(conversion: Viewing, reflected_by: Sequence[str], left_out: Sequence[str]) -> str:
+    by = " and ".join(dict.fromkeys(reflected_by))
+    sentences = [
+        "The dark room is rendered at the exposures of the photographs, in bands of 10 nm; its "
+        f"light is that of the lamp as {by} reflects it in the photographs.",
+        f"'{MEASURED}': the run's material, charged as the journal says; the others: fits to the "
+        "decay, whose brightness is fitted, too.",
+        f"CIELAB: {conversion.source}.",
+        f"ΔE is CIEDE2000 with L* = {LIGHTNESS:g} of every photograph, and with one exposure for "
+        "all, the brightest at that; a rendering has the factor of its photograph.",
+        *(f"Left out: {reason}." for reason in left_out),
+    ]
+    return " ".join(sentences)

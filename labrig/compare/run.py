@@ -266,7 +266,9 @@ def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Mat
     return by_patch
 
 
-def measured_camera(folder: Path, replacement: str | None) -> tuple[CameraResponse | None, list[str]]:
+def measured_camera(
+    folder: Path, replacement: str | None
+) -> tuple[CameraResponse | None, list[str]]:
     """Return the curves requested, else those of the processing, and why there are none."""
     rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), read_run(folder).camera_identity)
     try:

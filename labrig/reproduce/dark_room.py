@@ -48,8 +48,8 @@ class DarkRoomLamp:
     spectrum
         Its spectrum: a CIE illuminant, or the path of a file.
     illuminance_lux
-        Its illuminance at the sample in lux. Glow over reflected light does not depend on it, unless
-        the materials' scale is absolute.
+        Its illuminance at the sample in lux. Glow over reflected light does not depend on it,
+        unless the materials' scale is absolute.
     """
 
     spectrum: str
@@ -156,9 +156,7 @@ def dark_room(
         name=name,
         kind="scene",
         bands=BANDS,
-        bench_light=BenchLightEntry(
-            spectrum=lamp.spectrum, illuminance_lux=lamp.illuminance_lux
-        ),
+        bench_light=BenchLightEntry(spectrum=lamp.spectrum, illuminance_lux=lamp.illuminance_lux),
         materials=materials,
         lamps={
             LAMP: LampEntry(

@@ -2,12 +2,12 @@
 
     python -m tests.acceptance.dark_room [NAME ...] [--keep DIR]
 
-Every case is a whole `labrig run phosphor` with `reflectance` in the simulated room, whose traps are
-integrated as they stand; the runs in DIR are used again. Per rendering: mean and largest ΔE2000 with
-L* = 50 of every photograph, mean with one exposure for all; glow over reflected light, rendered over
-photographed − 1, mean and furthest in % and furthest in σ. A case is right where the run's own
-material is within 3 % and 3 σ and its mean ΔE ≤ 2; of a material with several states or another
-order the single state must be off by twice as much.
+Every case is a whole `labrig run phosphor` with `reflectance` in the simulated room, whose traps
+are integrated as they stand; the runs in DIR are used again. Per rendering: mean and largest ΔE2000
+with L* = 50 of every photograph, mean with one exposure for all; glow over reflected light,
+rendered over photographed − 1, mean and furthest in % and furthest in σ. A case is right where the
+run's own material is within 3 % and 3 σ and its mean ΔE ≤ 2; of a material with several states or
+another order the single state must be off by twice as much.
 """
 
 import argparse
@@ -66,8 +66,8 @@ def recorded(case: Case, folder: Path) -> Path:
     if not (place / "runs").is_dir():
         place.mkdir(parents=True, exist_ok=True)
         command = [
-            sys.executable, "-m", "labrig", "run", _protocol_file(place, case),
-            "--rig", _rig_file(place, case), "--runs", place / "runs", "--yes",
+            sys.executable, "-m", "labrig", "run", str(_protocol_file(place, case)),
+            "--rig", str(_rig_file(place, case)), "--runs", str(place / "runs"), "--yes",
         ]  # fmt: skip
         subprocess.run(command, check=True, capture_output=True)
     return next((place / "runs").iterdir())
@@ -80,7 +80,10 @@ def _rig_file(place: Path, case: Case) -> Path:
     rig = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-    sample = {"material": str(place / "sample.yaml"), "region": [0.03, 0.1, 0.94, 0.8]}
+    sample: dict[str, Any] = {
+        "material": str(place / "sample.yaml"),
+        "region": [0.03, 0.1, 0.94, 0.8],
+    }
     if case.kinetics:
         sample["kinetics"] = dict(case.kinetics)
     rig["simulation"] |= {"sample": [sample], "seed": case.seed}
@@ -131,8 +134,8 @@ def told(case: Case, run: Path, began: float) -> bool:
     print(
         f"{case.name}: {case.material}, order {orders}, seed {case.seed}, light reflected by "
         f"{ratio.reflected_by}, {ratio.photographed[0]:.3g} to {ratio.photographed[-1]:.3g} in "
-        f"{ratio.channel}; noise alone ΔE {patch.each.noise:.2f}; {time.monotonic() - began:.0f} s: "
-        f"{'right' if right else 'WRONG'}"
+        f"{ratio.channel}; noise alone ΔE {patch.each.noise:.2f}; "
+        f"{time.monotonic() - began:.0f} s: {'right' if right else 'WRONG'}"
     )
     for name in patch.each.delta_e:
         excess, pull = 100 * ratio.excess(name), ratio.in_sigma(name)
