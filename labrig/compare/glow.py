@@ -65,6 +65,26 @@ def state_signals(material: Material, series: Series) -> FloatArray:
     return np.asarray(means * _amplitudes(material))
 
 
+def glow_sigma(material: Material, series: Series) -> FloatArray:
+    """Return the relative σ of a material's glow over each exposure, shape (n,).
+
+    The scale is common to all states; amplitude and rate of each state count as independent.
+    """
+    scale = float(
+        np.linalg.norm([(each.sigma or 0.0) / each.value for each in material.scale_factors])
+    )
+    signals = state_signals(material, series)
+    share = signals / signals.sum(axis=1, keepdims=True)
+    middles_s = series.t_s + series.exposure_s / 2
+    variance = np.full(len(middles_s), scale**2)
+    for number, state in enumerate(material.states):
+        amplitude = (state.amplitude_sigma or 0.0) / (state.amplitude or np.inf)
+        of_amplitude = max(amplitude**2 - scale**2, 0.0)
+        of_rate = np.square((state.k_r_per_s_sigma or 0.0) * middles_s)
+        variance = variance + share[:, number] ** 2 * (of_amplitude + of_rate)
+    return np.asarray(np.sqrt(variance))
+
+
 def _means(state: State, series: Series) -> FloatArray:
     """Return the light of a state over that at lamp off, averaged over each exposure, (n,)."""
     if state.kinetic_order == 1:

@@ -30,6 +30,8 @@ SPREAD = 1.6
 WRITING_PT = 8.5
 LABELS_PT, CELL_HEIGHT_PT = 74.0, 24.0
 TITLE_PT, TIMES_PT, GAP_PT = 20.0, 16.0, 8.0
+#: Number of predictions whose means have a line of their own below the name, and its height.
+MANY, MEANS_PT = 4, 14.0
 #: Luminance from which black text has more contrast than white text.
 BRIGHT = 0.18
 
@@ -88,7 +90,12 @@ def screen_colours(glow: GlowComparison) -> dict[str, FloatArray]:
 
 def _height(glow: GlowComparison, with_times: bool) -> float:
     below = TIMES_PT if with_times else GAP_PT
-    return TITLE_PT + (1 + len(glow.predicted)) * CELL_HEIGHT_PT + below
+    return _title_pt(glow) + (1 + len(glow.predicted)) * CELL_HEIGHT_PT + below
+
+
+def _title_pt(glow: GlowComparison) -> float:
+    """Return the height of name and means: many means have a line of their own."""
+    return TITLE_PT if len(glow.predicted) < MANY else TITLE_PT + MEANS_PT
 
 
 def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> None:
@@ -96,9 +103,9 @@ def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> No
     width = (WIDTH_PT - LABELS_PT - EDGE_PT) / max(len(rows), 1)
     means = ", ".join(f"{name} {glow.mean(name):.2f}" for name in glow.predicted)
     axes.text(EDGE_PT, top + 14, glow.patch, color=INK, fontsize=FONT_PT, weight="bold")
-    axes.text(WIDTH_PT - EDGE_PT, top + 14, f"mean ΔE: {means}", ha="right", color=MUTED,
-              fontsize=SMALL_PT)  # fmt: skip
-    y = top + TITLE_PT
+    y = top + _title_pt(glow)
+    axes.text(WIDTH_PT - EDGE_PT, y - (TITLE_PT - 14), f"mean ΔE: {means}", ha="right",
+              color=MUTED, fontsize=SMALL_PT)  # fmt: skip
     for name, strip in screen_colours(glow).items():
         axes.text(LABELS_PT - 6, y + CELL_HEIGHT_PT / 2, name, ha="right", va="center", color=INK,
                   fontsize=SMALL_PT)  # fmt: skip

@@ -16,7 +16,7 @@ import numpy as np
 
 from labrig.acquire import read_rig_file
 from labrig.bench_optics import with_shipped_camera
-from labrig.compare.glow import GlowComparison, compare_scaled, predicted_by, state_signals
+from labrig.compare.glow import GlowComparison, compare_scaled, glow_sigma, predicted_by
 from labrig.compare.photographed_room import PhotographedRoom, ReflectedLight
 from labrig.compare.residuals import Refit, fits_by_states
 from labrig.compare.run import MeasuredPatch, measured_camera, read_patches
@@ -307,6 +307,11 @@ class _Bench:
             )
             signal = becquerel.signal(series.t_s, series.exposure_s)
             each[BECQUEREL] = ((state,), signal)
+        else:
+            left_out.append(
+                f"{patch.name}: Becquerel's law fits with no kinetic order from above 1 to "
+                f"{MAX_ORDER:g}"
+            )
         # All at once, side by side: nothing else lights them.
         regions = {
             prediction: (number / len(each), 0.0, 1 / len(each), 1.0)
@@ -429,7 +434,7 @@ def _compare(
     white, as_rendered = measured.reflected[-1]
     gain = white.values / as_rendered
     rendered = {MEASURED: gain * measured.glow}
-    sigma = {MEASURED: _relative_sigma(patch.material, series)}
+    sigma = {MEASURED: glow_sigma(patch.material, series)}
     for name, glow in fitted.glow.items():
         values = gain * glow
         rendered[name] = values * (np.sum(values * series.values) / np.sum(values**2))
@@ -469,26 +474,6 @@ def _ratio(
         rendered=ratios,
         rendered_sigma={name: sigma[name] * np.abs(ratio) for name, ratio in ratios.items()},
     )
-
-
-def _relative_sigma(material: Material, series: Series) -> FloatArray:
-    """Return the relative σ of a material's glow over each exposure, shape (n,).
-
-    The scale is common to all states; amplitude and rate of each state count as independent.
-    """
-    scale = float(
-        np.linalg.norm([(each.sigma or 0.0) / each.value for each in material.scale_factors])
-    )
-    signals = state_signals(material, series)
-    share = signals / signals.sum(axis=1, keepdims=True)
-    middles_s = series.t_s + series.exposure_s / 2
-    variance = np.full(len(middles_s), scale**2)
-    for number, state in enumerate(material.states):
-        amplitude = (state.amplitude_sigma or 0.0) / (state.amplitude or np.inf)
-        of_amplitude = max(amplitude**2 - scale**2, 0.0)
-        of_rate = np.square((state.k_r_per_s_sigma or 0.0) * middles_s)
-        variance = variance + share[:, number] ** 2 * (of_amplitude + of_rate)
-    return np.asarray(np.sqrt(variance))
 
 
 def _description(conversion: Viewing, reflected_by: Sequence[str], left_out: Sequence[str]) -> str:

@@ -6,8 +6,9 @@ Every case is a whole `labrig run phosphor` with `reflectance` in the simulated 
 are integrated as they stand; the runs in DIR are used again. Per rendering: mean and largest ΔE2000
 with L* = 50 of every photograph, mean with one exposure for all; glow over reflected light,
 rendered over photographed − 1, mean and furthest in % and furthest in σ. A case is right where the
-run's own material is within 3 % and 3 σ and its mean ΔE ≤ 2; of a material with several states or
-another order the single state must be off by twice as much.
+run's own material is within 3 % in the mean over all times and within 3 σ at each, and its mean ΔE
+is 2 or less; of a material with several states or another order the single state must be off by
+twice as much.
 """
 
 import argparse
@@ -115,7 +116,7 @@ def refit(series: Series, states: int, flicker: float) -> DecayFit:
 
 def is_right(case: Case, patch: RenderedPatch) -> bool:
     """Return whether a case's own material looks as it was photographed."""
-    off = 100 * np.abs(patch.ratio.excess("measured")).max()
+    off = 100 * abs(patch.ratio.excess("measured").mean())
     sigmas = np.abs(patch.ratio.in_sigma("measured")).max()
     mean = patch.each.mean("measured")
     is_better = case.is_one_state or patch.each.mean("1 state") >= WORSE * mean
