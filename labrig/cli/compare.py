@@ -25,7 +25,7 @@ def compare(
         typer.Option(
             metavar="[PATCH=]MATERIAL",
             help="Material to compare with the measured one: a shipped one such as blue-paint, "
-            "or a file. Repeatable.",
+            "or a file; with --rendered it is rendered instead of the run's own. Repeatable.",
         ),
     ] = None,
     white: Annotated[
@@ -91,7 +91,7 @@ def compare(
     content, pages = numbers(comparison), sections(comparison)
     if rendered:
         room = compare_rendered(
-            folder, _refit, Assumptions(assume_albedo, assume_scale), white, camera
+            folder, _refit, material or [], Assumptions(assume_albedo, assume_scale), white, camera
         )
         content |= {"rendered": rendered_numbers(room)}
         pages = (*pages, *rendered_sections(room))

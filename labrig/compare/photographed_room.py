@@ -39,6 +39,8 @@ FileT = TypeVar("FileT", bound=BaseModel)
 ANY_LUX = 1000.0
 #: Steps of the lamp's fade, and the light that is left when they end.
 FADE_STEPS, DARK = 12, 1e-3
+#: Edges of the steps in which the lamp's housing warms, in its time constants.
+WARMING_STEPS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
 #: Scatter of a photograph's light by shutter, aperture and lamp, and error of a shutter in s, where
 #: neither was calibrated (1 σ).
 FLICKER, SHUTTER_S = 0.007, 2e-4
@@ -149,20 +151,40 @@ class PhotographedRoom:
         )
 
     def programme(self, materials: Sequence[Material]) -> list[tuple[float, float]]:
-        """Return time and level of the lamp: charges, and the fade after each as steps.
+        """Return time and level of the lamp, whose warm-up and fade are steps.
 
         A scene's lamp fades at all wavelengths alike: the level is that of the light that excites
         these materials.
         """
         steps: list[tuple[float, float]] = []
-        fade = self._fade_steps(materials)
+        fade, warmth, before_s = self._fade_steps(materials), 0.0, self.switches[0][0]
         ends = [at_s for at_s, _ in self.switches[1:]] + [np.inf]
         for (at_s, is_on), end_s in zip(self.switches, ends, strict=True):
-            if is_on:
-                steps.append((at_s, 1.0))
-            else:
-                steps += [(at_s + late, level) for late, level in fade if at_s + late < end_s]
+            warmth = self._warmth_after(warmth, at_s - before_s, is_on=not is_on)
+            changes = self._warming_steps(warmth) if is_on else fade
+            steps += [(at_s + late, level) for late, level in changes if at_s + late < end_s]
+            before_s = at_s
         return steps
+
+    def _warmth_after(self, warmth: float, elapsed_s: float, *, is_on: bool) -> float:
+        """Return the warmth of the lamp's housing, 0 to 1, which follows its switches."""
+        if self._fade is None or self._fade.warming is None:
+            return 1.0
+        kept = np.exp(-elapsed_s / self._fade.warming.time_constant_s)
+        return float(is_on + (warmth - is_on) * kept)
+
+    def _warming_steps(self, warmth: float) -> list[tuple[float, float]]:
+        """Return times after lamp on and levels from then on, the last one 1."""
+        if self._fade is None or self._fade.warming is None:
+            return [(0.0, 1.0)]
+        warming = self._fade.warming
+        deficit, edges = warming.deficit * (1 - warmth), np.array(WARMING_STEPS)
+        means = -np.diff(np.exp(-edges)) / np.diff(edges)
+        times_s = edges * warming.time_constant_s
+        return [
+            *zip(times_s[:-1].tolist(), (1 - deficit * means).tolist(), strict=True),
+            (float(times_s[-1]), 1.0),
+        ]
 
     def _fade_steps(self, materials: Sequence[Material]) -> list[tuple[float, float]]:
         """Return times after lamp off and levels from then on, the last one 0."""

@@ -9,7 +9,7 @@ brightness is fitted, too.
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from labrig.bench_optics import with_shipped_camera
 from labrig.compare.glow import GlowComparison, compare_scaled, glow_sigma, predicted_by
 from labrig.compare.photographed_room import PhotographedRoom, ReflectedLight
 from labrig.compare.residuals import Refit, fits_by_states
-from labrig.compare.run import MeasuredPatch, measured_camera, read_patches
+from labrig.compare.run import MeasuredPatch, measured_camera, read_patches, references_by_patch
 from labrig.compare.viewing import DEFAULT_WHITE, FloatArray, Viewing, viewing
 from labrig.errors import DataError, UsageError
 from labrig.fit import DecayFit
@@ -129,6 +129,7 @@ class RenderedComparison:
 def compare_rendered(
     folder: Path,
     refit: Refit,
+    materials: Sequence[str] = (),
     assumptions: Assumptions = NOTHING_ASSUMED,
     white: str = DEFAULT_WHITE,
     camera: str | None = None,
@@ -141,6 +142,9 @@ def compare_rendered(
         Run folder with a result.
     refit
         Function that fits a series with a given number of states and a given relative flicker.
+    materials
+        Materials that take the place of the run's own, as `MATERIAL` or `PATCH=MATERIAL`, by
+        shipped name or path: those of a run that measured more than this one.
     assumptions
         Albedo and scale to assume where the material has none.
     white
@@ -178,6 +182,8 @@ def compare_rendered(
     True
     """
     patches = read_patches(folder)
+    given = references_by_patch(materials, list(patches))
+    patches |= {name: replace(patches[name], material=each) for name, each in given.items()}
     curves, reasons = measured_camera(folder, camera)
     if curves is None:
         raise UsageError(f"the dark room cannot be rendered: {reasons[0]}")
@@ -282,7 +288,8 @@ class _Bench:
             if (light := lights[name]) is not None and light.at_s is not None:
                 reflected.append((light, seen[light.at_s][name]))
             if (card := room.card_reflected(patch.series)) is not None:
-                reflected.append((card, seen[burning_s][CARD_NAME]))
+                # The card was photographed under a lamp that was warm.
+                reflected.append((card, seen[burning_s][CARD_NAME] / scene.levels(burning_s)[0]))
             found[name] = _SeenPatch(_exposed(seen, name, times[name]), tuple(reflected))
         return _Seen(found, scene.notes)
 
@@ -481,8 +488,8 @@ def _description(conversion: Viewing, reflected_by: Sequence[str], left_out: Seq
     sentences = [
         "The dark room is rendered at the exposures of the photographs, in bands of 10 nm; its "
         f"light is that of the lamp as {by} reflects it in the photographs.",
-        f"'{MEASURED}': the run's material, charged as the journal says; the others: fits to the "
-        "decay, whose brightness is fitted, too.",
+        f"'{MEASURED}': the measured material, charged as the journal says; the others: fits to "
+        "the decay, whose brightness is fitted, too.",
         f"CIELAB: {conversion.source}.",
         f"ΔE is CIEDE2000 with L* = {LIGHTNESS:g} of every photograph, and with one exposure for "
         "all, the brightest at that; a rendering has the factor of its photograph.",

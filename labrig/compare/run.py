@@ -211,7 +211,7 @@ def compare_run(
     {1: 1.0, 2: 0.01, 3: 0.01}
     """
     patches = read_patches(folder)
-    references = _by_patch(materials, list(patches))
+    references = references_by_patch(materials, list(patches))
     curves, left_out = measured_camera(folder, camera)
     conversion = viewing(curves, white, normalisation)
     glows: list[GlowComparison] = []
@@ -246,7 +246,7 @@ def compare_run(
     )
 
 
-def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Material]:
+def references_by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Material]:
     """Return the reference materials by patch.
 
     A material without a patch belongs to the patch of the same name or to the only one.
