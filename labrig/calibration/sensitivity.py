@@ -23,6 +23,11 @@ def relative_sensitivity(
     settings, reference
         ISO and f-number of the two.
 
+    Returns
+    -------
+    tuple of float
+        The ratio, and its relative σ: 0 where both settings are the same.
+
     Examples
     --------
     >>> from labrig.calibration import relative_sensitivity
