@@ -17,6 +17,7 @@ import numpy as np
 from labrig.acquire import read_rig_file
 from labrig.bench_optics import with_shipped_camera
 from labrig.compare.glow import GlowComparison, compare_scaled, glow_sigma, predicted_by
+from labrig.compare.nalbach2017 import emission
 from labrig.compare.photographed_room import PhotographedRoom, ReflectedLight
 from labrig.compare.residuals import Refit, fits_by_states
 from labrig.compare.run import MeasuredPatch, measured_camera, read_patches, references_by_patch
@@ -183,7 +184,10 @@ def compare_rendered(
     """
     patches = read_patches(folder)
     given = references_by_patch(materials, list(patches))
-    patches |= {name: replace(patches[name], material=each) for name, each in given.items()}
+    patches = {
+        name: replace(patch, material=_completed(given.get(name, patch.material)))
+        for name, patch in patches.items()
+    }
     curves, reasons = measured_camera(folder, camera)
     if curves is None:
         raise UsageError(f"the dark room cannot be rendered: {reasons[0]}")
@@ -210,6 +214,28 @@ def compare_rendered(
         tuple(dict.fromkeys(notes)),
         tuple(left_out),
     )
+
+
+def _completed(material: Material) -> Material:
+    """Return the material with Λ of states whose level, and therefore Λ, its file leaves open.
+
+    Level, rates and Λ of such a state have a common scale that its charge does not tell, and that
+    its glow after the same charge does not depend on: Λ k_r r(0)ᵇ is its amplitude.
+    """
+    emitted = [state.reradiation for state in material.states if state.reradiation is not None]
+    if not emitted or material.irradiance_norm is None:
+        return material
+    spectrum, bands_nm = emission(material), material.bands_nm
+    assert spectrum is not None
+    shape = np.asarray(spectrum.in_bands(bands_nm or ()))
+    states = []
+    for state in material.states:
+        light = state.k_r_per_s * (state.r0 or 0.0) ** state.kinetic_order
+        if state.reradiation is None and state.amplitude is not None and light > 0:
+            reradiation = tuple((state.amplitude / light * shape).tolist())
+            state = state.model_copy(update={"reradiation": reradiation})
+        states.append(state)
+    return material.model_copy(update={"states": tuple(states)})
 
 
 def _own_names(patches: Mapping[str, MeasuredPatch], room: PhotographedRoom) -> dict[str, str]:
