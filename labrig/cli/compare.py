@@ -89,6 +89,7 @@ def compare(
     folder = find_run(run, runs)
     comparison = compare_run(folder, _refit, material or [], white, normalise, camera)
     content, pages = numbers(comparison), sections(comparison)
+    room = None
     if rendered:
         room = compare_rendered(
             folder, _refit, material or [], Assumptions(assume_albedo, assume_scale), white, camera
@@ -100,9 +101,12 @@ def compare(
         return
     for line in comparison.left_out:
         typer.echo(f"warning: {line}", err=True)
+    drawn = figures or folder / "comparison"
     for section in pages:
         _print_section(section)
-        _save_figures(section, figures or folder / "comparison")
+        _save_figures(section, drawn)
+    if room is not None and room.scene is not None:
+        typer.echo(f"scene: {room.scene.write(drawn)}")
 
 
 def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":

@@ -35,11 +35,13 @@ from labrig.reproduce import (
     MaterialEntry,
     Renderer,
     Scene,
+    SceneFile,
     build_scene,
     camera_values,
     dark_room,
 )
 from labrig.results import Series, read_result
+from labrig.yaml_file import yaml_text
 
 #: Height of the frame in the rendering; its light is even on every sample.
 HEIGHT_PX, MOST_PX = 32, 512
@@ -48,6 +50,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 #: Name of the rendering of the run's own material, and of that of Becquerel's law.
 MEASURED, BECQUEREL = "measured", "Becquerel"
+#: Name of the scene's file, and number of its pictures of the glow.
+SCENE_FILE, PICTURES = "dark-room.yaml", 8
 NOTHING_ASSUMED = Assumptions()
 #: Lightness of the photographed patch.
 LIGHTNESS = 50.0
@@ -106,6 +110,32 @@ class RenderedPatch:
 
 
 @dataclass(frozen=True, eq=False)
+class DarkRoomScene:
+    """The dark room of a run as a scene of `labrig render`.
+
+    Attributes
+    ----------
+    file
+        The scene, with pictures under the lamp and of the glow.
+    materials
+        Materials by the names under which the scene names their files.
+    """
+
+    file: SceneFile
+    materials: Mapping[str, Material]
+
+    def write(self, folder: Path) -> Path:
+        """Write scene and materials into a folder, and return the path of the scene."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, material in self.materials.items():
+            write_material(folder / name, material)
+        path = folder / SCENE_FILE
+        content = self.file.model_dump(mode="json", exclude_none=True)
+        path.write_text(yaml_text(content), encoding="utf-8")
+        return path
+
+
+@dataclass(frozen=True, eq=False)
 class RenderedComparison:
     """The dark room of a run, rendered beside its photographs.
 
@@ -119,12 +149,15 @@ class RenderedComparison:
         What was assumed, one sentence each.
     left_out
         Renderings that are not possible, with the reason.
+    scene
+        The dark room with the measured materials; None if no patch could be compared.
     """
 
     patches: tuple[RenderedPatch, ...]
     description: str
     notes: tuple[str, ...]
     left_out: tuple[str, ...]
+    scene: DarkRoomScene | None = None
 
 
 def compare_rendered(
@@ -213,6 +246,7 @@ def compare_rendered(
         _description(conversion, [each.ratio.reflected_by for each in compared], left_out),
         tuple(dict.fromkeys(notes)),
         tuple(left_out),
+        measured.scene if compared else None,
     )
 
 
@@ -267,6 +301,7 @@ class _SeenPatch:
 class _Seen:
     patches: Mapping[str, _SeenPatch]
     notes: tuple[str, ...]
+    scene: DarkRoomScene
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +352,11 @@ class _Bench:
                 # The card was photographed under a lamp that was warm.
                 reflected.append((card, seen[burning_s][CARD_NAME] / scene.levels(burning_s)[0]))
             found[name] = _SeenPatch(_exposed(seen, name, times[name]), tuple(reflected))
-        return _Seen(found, scene.notes)
+        glow_s = np.unique(np.concatenate([each.mean(axis=1) for each in times.values()]))
+        shown = glow_s[np.unique(np.linspace(0, len(glow_s) - 1, PICTURES).astype(int))]
+        after = [at_s for at_s in shown.tolist() if at_s > burning_s]
+        file = scene.file.model_copy(update={"frames_s": (burning_s, *after)})
+        return _Seen(found, scene.notes, DarkRoomScene(file, _files(materials)))
 
     def fitted(self, patch: MeasuredPatch, fits: Mapping[int, DecayFit]) -> _Fitted:
         """Render what was fitted to the decay of a patch, its states full at lamp off."""
@@ -378,13 +417,23 @@ class _Bench:
         programme: Sequence[tuple[float, float]],
         levels: float,
     ) -> Scene:
-        for number, material in enumerate(materials.values()):
-            write_material(self._folder / f"{number}.yaml", material)
+        files = _files(materials)
+        for name, material in files.items():
+            write_material(self._folder / name, material)
+        assumed = self._assumptions
         file = dark_room(
-            "dark room",
+            "dark-room",
             {
-                name: (regions[name], MaterialEntry(file=f"{n}.yaml", levels=levels))
-                for n, name in enumerate(materials)
+                name: (
+                    regions[name],
+                    MaterialEntry(
+                        file=file_name,
+                        levels=levels,
+                        assume_albedo=assumed.albedo,
+                        assume_scale=assumed.scale,
+                    ),
+                )
+                for name, file_name in zip(materials, files, strict=True)
             },
             self._room.lamp,
             programme,
@@ -392,7 +441,7 @@ class _Bench:
             self._picture,
             self._room.card,
         )
-        return build_scene(file, self._folder, assumptions=self._assumptions)
+        return build_scene(file, self._folder)
 
     def _seen(
         self, scene: Scene, regions: Mapping[str, Region], times_s: FloatArray
@@ -417,6 +466,11 @@ class _Bench:
             int((y + high / 2) * self._picture.height_px),
             int((x + wide / 2) * self._picture.width_px),
         )
+
+
+def _files(materials: Mapping[str, Material]) -> dict[str, Material]:
+    """Return materials by the names of their files."""
+    return {f"material-{n}.yaml": each for n, each in enumerate(materials.values(), start=1)}
 
 
 def _exposed(

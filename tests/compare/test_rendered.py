@@ -25,6 +25,7 @@ from labrig.material import (
     read_material,
     write_material,
 )
+from labrig.reproduce import Renderer, load_scene
 from labrig.results import FloatArray, Series, read_result
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.optics import REFLECTED, emission
@@ -228,3 +229,9 @@ def test_the_assumption_is_in_the_picture(labrig: Labrig, measured: Path, tmp_pa
     assert (ended.code, ended.err) == (0, "")
     assert "assumed: 0.5 at all wavelengths" in " ".join(ended.out.split())
     assert {"rendered.png", "rendered-one-exposure.png"} <= {p.name for p in tmp_path.iterdir()}
+    # The same room for `labrig render`, with the assumption in it.
+    scene = load_scene(tmp_path / "dark-room.yaml")
+    assert scene.notes == ("the albedo of double-wide is assumed: 0.5 at all wavelengths",)
+    renderer = Renderer(scene.resized(width_px=12, height_px=8), threads=1)
+    lit, *glow = (float(frame.radiance.sum()) for frame in renderer.frames())
+    assert lit > glow[0] > glow[-1] > 0
