@@ -92,6 +92,8 @@ class PhotographedRoom:
         Times in s of the lamp's switches, rising, and whether it went on.
     off_s
         Time in s of the lamp off before each decay, by its unit.
+    is_lux_read
+        Whether the lamp's illuminance was read from a meter.
     """
 
     lamp: DarkRoomLamp
@@ -102,6 +104,7 @@ class PhotographedRoom:
     regions: Mapping[str, Region]
     switches: tuple[tuple[float, bool], ...]
     off_s: Mapping[str, float]
+    is_lux_read: bool
     _fade: FadeFile | None
     _run: RunRecord
     _began_s: float
@@ -130,8 +133,9 @@ class PhotographedRoom:
         layout = sensor_layout(_untimed(run, FrameRole.DECAY)[0])
         provided = result.provides()
         irradiance = _calibration(provided, rig, IRRADIANCE_KIND)
+        lux = _lux(rig, irradiance)
         return cls(
-            lamp=DarkRoomLamp(str(resources.curve_path(rig.optics.lamp)), _lux(rig, irradiance)),
+            lamp=DarkRoomLamp(str(resources.curve_path(rig.optics.lamp)), lux or ANY_LUX),
             card=None
             if rig.optics.grey_card is None
             else str(resources.curve_path(rig.optics.grey_card)),
@@ -145,6 +149,7 @@ class PhotographedRoom:
             },
             switches=tuple((at_s - began_s, is_on) for at_s, is_on in _switches(run)),
             off_s={unit: at_s - began_s for unit, at_s in off_s.items()},
+            is_lux_read=lux is not None,
             _fade=_calibration(provided, rig, FADE_KIND),
             _run=run,
             _began_s=began_s,
@@ -323,10 +328,11 @@ def _calibration(
     return found if isinstance(found, kind.model) else calibration(rig, kind)
 
 
-def _lux(rig: RigFile, irradiance: IrradianceFile | None) -> float:
+def _lux(rig: RigFile, irradiance: IrradianceFile | None) -> float | None:
+    """Return the reading of a luxmeter at the sample; None without one."""
     if irradiance is not None and irradiance.illuminance_lux is not None:
         return irradiance.illuminance_lux
-    return ANY_LUX if rig.optics.luminance is None else illuminance_lx(rig)
+    return None if rig.optics.luminance is None else illuminance_lx(rig)
 
 
 def _fractions(region: Region, layout: SensorLayout) -> Region:

@@ -50,8 +50,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 #: Name of the rendering of the run's own material, and of that of Becquerel's law.
 MEASURED, BECQUEREL = "measured", "Becquerel"
-#: Name of the scene's file, and number of its pictures of the glow.
-SCENE_FILE, PICTURES = "dark-room.yaml", 8
+#: Name of the scene's file, number of its pictures of the glow, and paths that make smooth edges.
+SCENE_FILE, PICTURES, SMOOTH = "dark-room.yaml", 8, 16
 NOTHING_ASSUMED = Assumptions()
 #: Lightness of the photographed patch.
 LIGHTNESS = 50.0
@@ -243,7 +243,7 @@ def compare_rendered(
             compared.append(_compare(patch, measured.patches[own[name]], fitted, conversion, room))
     return RenderedComparison(
         tuple(compared),
-        _description(conversion, [each.ratio.reflected_by for each in compared], left_out),
+        _description(conversion, [each.ratio.reflected_by for each in compared], room, left_out),
         tuple(dict.fromkeys(notes)),
         tuple(left_out),
         measured.scene if compared else None,
@@ -333,6 +333,7 @@ class _Bench:
         """Render the run's materials, charged as the journal says, at all exposures."""
         room = self._room
         materials = {name: patch.material for name, patch in patches.items()}
+        _require_known_light(materials, room)
         regions = {name: room.regions[name] for name in patches}
         programme = room.programme(list(materials.values()))
         scene = self._scene(materials, regions, programme, levels=0.0)
@@ -355,7 +356,8 @@ class _Bench:
         glow_s = np.unique(np.concatenate([each.mean(axis=1) for each in times.values()]))
         shown = glow_s[np.unique(np.linspace(0, len(glow_s) - 1, PICTURES).astype(int))]
         after = [at_s for at_s in shown.tolist() if at_s > burning_s]
-        file = scene.file.model_copy(update={"frames_s": (burning_s, *after)})
+        paths = scene.file.paths.model_copy(update={"per_pixel": SMOOTH})
+        file = scene.file.model_copy(update={"frames_s": (burning_s, *after), "paths": paths})
         return _Seen(found, scene.notes, DarkRoomScene(file, _files(materials)))
 
     def fitted(self, patch: MeasuredPatch, fits: Mapping[int, DecayFit]) -> _Fitted:
@@ -468,6 +470,17 @@ class _Bench:
         )
 
 
+def _require_known_light(materials: Mapping[str, Material], room: PhotographedRoom) -> None:
+    """Refuse glow in W beside light of which only the spectrum is known."""
+    absolute = [each.name for each in materials.values() if each.scale == "absolute"]
+    if absolute and not room.is_lux_read:
+        raise UsageError(
+            f"{absolute[0]}: the scale of its glow is absolute, and the lamp's illuminance is not "
+            "known on this bench; read it with a luxmeter (luminance: under 'optics:' of the rig "
+            "file, or illuminance_lux of labrig run irradiance)"
+        )
+
+
 def _files(materials: Mapping[str, Material]) -> dict[str, Material]:
     """Return materials by the names of their files."""
     return {f"material-{n}.yaml": each for n, each in enumerate(materials.values(), start=1)}
@@ -563,7 +576,12 @@ def _ratio(
     )
 
 
-def _description(conversion: Viewing, reflected_by: Sequence[str], left_out: Sequence[str]) -> str:
+def _description(
+    conversion: Viewing,
+    reflected_by: Sequence[str],
+    room: PhotographedRoom,
+    left_out: Sequence[str],
+) -> str:
     by = " and ".join(dict.fromkeys(reflected_by))
     sentences = [
         "The dark room is rendered at the exposures of the photographs, in bands of 10 nm; its "
@@ -573,6 +591,17 @@ def _description(conversion: Viewing, reflected_by: Sequence[str], left_out: Seq
         f"CIELAB: {conversion.source}.",
         f"ΔE is CIEDE2000 with L* = {LIGHTNESS:g} of every photograph, and with one exposure for "
         "all, the brightest at that; a rendering has the factor of its photograph.",
+        *_unread(room),
         *(f"Left out: {reason}." for reason in left_out),
     ]
     return " ".join(sentences)
+
+
+def _unread(room: PhotographedRoom) -> tuple[str, ...]:
+    """Return a sentence on the lamp's illuminance, where none was read."""
+    if room.is_lux_read:
+        return ()
+    return (
+        f"The illuminance of the lamp was not read; {room.lamp.illuminance_lux:g} lx are taken, on "
+        "which absolute luminances of the scene depend, but no ratio.",
+    )

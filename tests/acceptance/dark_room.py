@@ -64,6 +64,8 @@ CASES = (
     Case("blue-paint", "blue-paint", 145, is_one_state=True),
     Case("order-1.5", "blue-paint", 146, {"model": "general_order", "order": 1.5}),
     Case("otor-0.5", "blue-paint", 147, {"model": "otor", "retrapping": 0.5}),
+    Case("two-states-slow", "double-wide-slow", 149),
+    Case("two-states-faint", "double-medium-faint", 150),
     Case("known-camera", "double-medium-bright", 148, sensor={"curves": "canon_eos_5d_mark_ii"}),
 )
 

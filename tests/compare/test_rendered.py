@@ -204,6 +204,11 @@ def test_what_was_not_measured_is_one_clear_line_or_a_named_assumption(
     assert "--assume-albedo" in ended.err
     (note,) = rendered(labrig, measured, "--assume-albedo", 0.5)["notes"]
     assert "albedo" in note
+    absolute = of_the_room().model_copy(update={"scale": "absolute"})
+    write_material(measured / "result" / "material.yaml", absolute)
+    ended = labrig("compare", measured, "--rendered", "--json")
+    assert (ended.code, len(ended.err.splitlines())) == (2, 1)
+    assert "luxmeter" in ended.err
     unlit = bare.model_copy(
         update={
             "states": tuple(state.model_copy(update={"reradiation": None}) for state in bare.states)
