@@ -13,7 +13,7 @@ import numpy as np
 
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.calibration import CardLight, IrradianceFile
+from labrig.calibration import CardLight, IrradianceFile, relative_sensitivity
 from labrig.errors import UsageError
 from labrig.fit.spectrum import CurveError, curve_modes
 from labrig.material import Material, ScaleFactor, State
@@ -27,8 +27,6 @@ from labrig.optics import (
 )
 from labrig.results import EmissionSpectrum
 
-#: Relative σ of a nominal ISO and of a nominal f-number whose ratio was not calibrated.
-ISO_SIGMA, APERTURE_SIGMA = 0.02, 0.05
 #: Relative σ of a card's curve that has none.
 CARD_SIGMA = 0.01
 
@@ -227,18 +225,14 @@ def mean_irradiance(
 
 def _settings(part: Part, card: CardLight, iso: float, f_number: float | None) -> ScaleFactor:
     """Return the card's signal per that at the settings of the glow."""
-    name = "card's sensitivity and aperture over those of the glow"
-    camera = part.inputs.camera
-    if camera is not None:
-        at_card, card_sigma = camera.scale(card.iso, card.f_number)
-        at_glow, glow_sigma = camera.scale(iso, f_number)
-        sigma = float(np.hypot(card_sigma, glow_sigma)) if at_card != at_glow else 0.0
-        return ScaleFactor(name=name, value=at_card / at_glow, sigma=sigma * at_card / at_glow)
-    value, sigma = card.iso / iso, 0.0 if card.iso == iso else ISO_SIGMA
-    if f_number is not None and card.f_number is not None and f_number != card.f_number:
-        value *= (f_number / card.f_number) ** 2
-        sigma = float(np.hypot(sigma, APERTURE_SIGMA))
-    return ScaleFactor(name=name, value=value, sigma=sigma * value)
+    value, sigma = relative_sensitivity(
+        part.inputs.camera, (card.iso, card.f_number), (iso, f_number)
+    )
+    return ScaleFactor(
+        name="card's sensitivity and aperture over those of the glow",
+        value=value,
+        sigma=sigma * value,
+    )
 
 
 def _plain(number: Any) -> Any:

@@ -54,6 +54,7 @@ from labrig.calibration.reflectance_file import (
     PatchReflectance,
     ReflectanceFile,
 )
+from labrig.calibration.sensitivity import Settings, relative_sensitivity
 
 __all__ = [
     "BLANK_KIND",
@@ -85,10 +86,12 @@ __all__ = [
     "PatchReflectance",
     "ReferenceFile",
     "ReflectanceFile",
+    "Settings",
     "UvScale",
     "Warming",
     "WavelengthColumns",
     "keep_calibration",
     "kept_calibrations",
     "kinds",
+    "relative_sensitivity",
 ]

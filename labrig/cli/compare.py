@@ -1,14 +1,13 @@
 """`labrig compare`: comparison of a run with predictions, another material and the paper."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from labrig.cli.completion import complete_run
 
 if TYPE_CHECKING:
-    from labrig.compare import RunComparison
     from labrig.fit import DecayFit
     from labrig.report import Section
     from labrig.results import Series
@@ -26,7 +25,7 @@ def compare(
         typer.Option(
             metavar="[PATCH=]MATERIAL",
             help="Material to compare with the measured one: a shipped one such as blue-paint, "
-            "or a file. Repeatable.",
+            "or a file; with --rendered it is rendered instead of the run's own. Repeatable.",
         ),
     ] = None,
     white: Annotated[
@@ -41,6 +40,27 @@ def compare(
     camera: Annotated[
         str | None, typer.Option("--camera", help="Camera curves to use instead of the rig file's.")
     ] = None,
+    rendered: Annotated[
+        bool,
+        typer.Option(
+            "--rendered",
+            help="Render the dark room with the measured material, too, beside the photographs.",
+        ),
+    ] = False,
+    assume_albedo: Annotated[
+        float | None,
+        typer.Option(
+            "--assume-albedo",
+            help="With --rendered: albedo of a material whose file has none, 0 to below 1.",
+        ),
+    ] = None,
+    assume_scale: Annotated[
+        float | None,
+        typer.Option(
+            "--assume-scale",
+            help="With --rendered: factor from Λ to s/sr of a material whose file has no scale.",
+        ),
+    ] = None,
     figures: Annotated[
         Path | None,
         typer.Option(help="Folder for the figures; default: comparison in the run folder."),
@@ -53,18 +73,40 @@ def compare(
     With the paper's own numbers (Nalbach et al., fig. 8 and 9, section 4.4, Table 1).
     """
     from labrig.catalogue import find_run
-    from labrig.compare import compare_run, sections
+    from labrig.compare import (
+        compare_rendered,
+        compare_run,
+        numbers,
+        rendered_numbers,
+        rendered_sections,
+        sections,
+    )
+    from labrig.errors import UsageError
+    from labrig.reproduce import Assumptions
 
+    if not rendered and (assume_albedo is not None or assume_scale is not None):
+        raise UsageError("expected --assume-albedo and --assume-scale with --rendered only")
     folder = find_run(run, runs)
     comparison = compare_run(folder, _refit, material or [], white, normalise, camera)
+    content, pages = numbers(comparison), sections(comparison)
+    room = None
+    if rendered:
+        room = compare_rendered(
+            folder, _refit, material or [], Assumptions(assume_albedo, assume_scale), white, camera
+        )
+        content |= {"rendered": rendered_numbers(room)}
+        pages = (*pages, *rendered_sections(room))
     if json:
-        _print_json(comparison)
+        _print_json(content)
         return
     for line in comparison.left_out:
         typer.echo(f"warning: {line}", err=True)
-    for section in sections(comparison):
+    drawn = figures or folder / "comparison"
+    for section in pages:
         _print_section(section)
-        _save_figures(section, figures or folder / "comparison")
+        _save_figures(section, drawn)
+    if room is not None and room.scene is not None:
+        typer.echo(f"scene: {room.scene.write(drawn)}")
 
 
 def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
@@ -106,9 +148,7 @@ def _save_figures(section: "Section", folder: Path) -> None:
         typer.echo(f"figure: {folder / picture.name}.png")
 
 
-def _print_json(comparison: "RunComparison") -> None:
+def _print_json(content: dict[str, Any]) -> None:
     import json
 
-    from labrig.compare import numbers
-
-    typer.echo(json.dumps(numbers(comparison), ensure_ascii=False))
+    typer.echo(json.dumps(content, ensure_ascii=False))

@@ -1,15 +1,30 @@
 """Comparison of a run with photographs, other materials and the paper of Nalbach et al."""
 
-from labrig.compare.numbers import numbers
+from labrig.compare.numbers import numbers, rendered_numbers
+from labrig.compare.rendered import (
+    DarkRoomScene,
+    GlowRatio,
+    RenderedComparison,
+    RenderedPatch,
+    compare_rendered,
+)
+from labrig.compare.rendered_sections import rendered_sections
 from labrig.compare.run import RunComparison, compare_run
 from labrig.compare.sections import sections
 from labrig.compare.three_channels import ThreeChannels, three_channels
 
 __all__ = [
+    "DarkRoomScene",
+    "GlowRatio",
+    "RenderedComparison",
+    "RenderedPatch",
     "RunComparison",
     "ThreeChannels",
+    "compare_rendered",
     "compare_run",
     "numbers",
+    "rendered_numbers",
+    "rendered_sections",
     "sections",
     "three_channels",
 ]

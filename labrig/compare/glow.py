@@ -45,13 +45,44 @@ def glow_of(material: Material, series: Series, camera: CameraResponse | None) -
     UsageError
         If the material's file has neither amplitudes nor Λ.
     """
-    means = np.column_stack([_means(state, series) for state in material.states])
-    signal = means @ _amplitudes(material)
+    signal = state_signals(material, series).sum(axis=1)
     spectrum = emission(material)
     glow = np.multiply.outer(signal, signal @ series.values)
     if spectrum is not None and camera is not None:
         glow = in_colour(glow, spectrum, camera)
     return np.asarray(glow * (np.sum(glow * series.values) / np.sum(glow**2)))
+
+
+def state_signals(material: Material, series: Series) -> FloatArray:
+    """Return the relative mean light of each state over each exposure, shape (n, states).
+
+    Raises
+    ------
+    UsageError
+        The material's file has neither amplitudes nor Λ.
+    """
+    means = np.column_stack([_means(state, series) for state in material.states])
+    return np.asarray(means * _amplitudes(material))
+
+
+def glow_sigma(material: Material, series: Series) -> FloatArray:
+    """Return the relative σ of a material's glow over each exposure, shape (n,).
+
+    The scale is common to all states; amplitude and rate of each state count as independent.
+    """
+    scale = float(
+        np.linalg.norm([(each.sigma or 0.0) / each.value for each in material.scale_factors])
+    )
+    signals = state_signals(material, series)
+    share = signals / signals.sum(axis=1, keepdims=True)
+    middles_s = series.t_s + series.exposure_s / 2
+    variance = np.full(len(middles_s), scale**2)
+    for number, state in enumerate(material.states):
+        amplitude = (state.amplitude_sigma or 0.0) / (state.amplitude or np.inf)
+        of_amplitude = max(amplitude**2 - scale**2, 0.0)
+        of_rate = np.square((state.k_r_per_s_sigma or 0.0) * middles_s)
+        variance = variance + share[:, number] ** 2 * (of_amplitude + of_rate)
+    return np.asarray(np.sqrt(variance))
 
 
 def _means(state: State, series: Series) -> FloatArray:
@@ -170,33 +201,50 @@ def compare_glow(
             f"{series.region}: expected a camera with R, G, B, got {', '.join(series.channels)}; "
             "there is no colour to compare"
         )
+    scale = _scale(series, series.values @ viewing.to_xyz.T, viewing)
+    return compare_scaled(series, predicted, viewing, flicker, scale)
+
+
+def compare_scaled(
+    series: Series,
+    predicted: Mapping[str, FloatArray],
+    viewing: Viewing,
+    flicker: float,
+    scale: FloatArray,
+) -> GlowComparison:
+    """Compare photographs with predictions, both multiplied by given factors.
+
+    Parameters
+    ----------
+    series, predicted, viewing, flicker
+        As of `compare_glow`.
+    scale
+        Factors of X, Y, Z of each photograph and its prediction, shape (n, 1).
+    """
     xyz = series.values @ viewing.to_xyz.T
-    scale = _scale(series, xyz, viewing)
     photographed_lab = lab(scale * xyz, viewing.white)
     normalised = {name: scale * (values @ viewing.to_xyz.T) for name, values in predicted.items()}
     differences = {
         name: delta_e(photographed_lab, lab(values, viewing.white))
         for name, values in normalised.items()
     }
-    has_colour = _has_colour(series)
-    nearest = min(differences, key=lambda name: float(differences[name][has_colour].mean()))
+    seen = has_colour(series)
+    nearest = min(differences, key=lambda name: float(differences[name][seen].mean()))
     unit = np.array(series.unit)
     return GlowComparison(
         patch=series.region,
         t_s=exposure_middles_s(series),
         first=unit == unit[0],
-        seen=has_colour,
+        seen=seen,
         photographed=scale * xyz,
         predicted=normalised,
-        delta_e={
-            name: np.where(has_colour, values, np.nan) for name, values in differences.items()
-        },
+        delta_e={name: np.where(seen, values, np.nan) for name, values in differences.items()},
         noise=_noise(series, predicted[nearest], scale, viewing, flicker),
     )
 
 
-def _has_colour(series: Series) -> NDArray[np.bool_]:
-    """Whether each photograph is bright enough to have a colour, shape (n,); true without a σ."""
+def has_colour(series: Series) -> NDArray[np.bool_]:
+    """Return whether each photograph is bright enough for a colour (n,); true without a σ."""
     with np.errstate(invalid="ignore"):
         signal_to_noise = np.linalg.norm(series.values / series.sigma, axis=1)
     return np.asarray(~(signal_to_noise < MIN_FOR_COLOUR))
@@ -205,7 +253,7 @@ def _has_colour(series: Series) -> NDArray[np.bool_]:
 def _scale(series: Series, xyz: FloatArray, viewing: Viewing) -> FloatArray:
     """Return the factors of X, Y, Z of each photograph, shape (n, 1)."""
     reach = (xyz / viewing.white).max(axis=1)
-    brightest = float(reach[_has_colour(series)].max(initial=0.0))
+    brightest = float(reach[has_colour(series)].max(initial=0.0))
     if not brightest > 0:
         raise DataError(f"{series.region}: every photograph is too dim to have a colour")
     reached = np.maximum(reach, np.finfo(float).eps * brightest)
@@ -225,7 +273,7 @@ def _noise(
     draws = draws + series.sigma * rng.standard_normal((*shape, 3))
     drawn_lab = lab(scale * (draws @ viewing.to_xyz.T), viewing.white)
     expected_lab = lab(scale * (expected @ viewing.to_xyz.T), viewing.white)
-    return float(delta_e(drawn_lab, expected_lab[np.newaxis])[:, _has_colour(series)].mean())
+    return float(delta_e(drawn_lab, expected_lab[np.newaxis])[:, has_colour(series)].mean())
 
 
 def glow_table(glows: Sequence[GlowComparison]) -> Table:

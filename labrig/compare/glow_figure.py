@@ -30,19 +30,24 @@ SPREAD = 1.6
 WRITING_PT = 8.5
 LABELS_PT, CELL_HEIGHT_PT = 74.0, 24.0
 TITLE_PT, TIMES_PT, GAP_PT = 20.0, 16.0, 8.0
+#: Number of predictions whose means have a line of their own below the name, and its height.
+MANY, MEANS_PT = 4, 14.0
 #: Luminance from which black text has more contrast than white text.
 BRIGHT = 0.18
 
 
-def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
-    """Draw a block for each patch: photographs above, predictions with their ΔE below."""
+def glow_figure(glows: Sequence[GlowComparison], notes: Sequence[str] = ()) -> Figure:
+    """Draw a block for each patch: photographs above, predictions with their ΔE below.
+
+    Notes stand under the times, a line each.
+    """
     times = [tuple(glow.t_s[shown_rows(glow)]) for glow in glows]
     # Patches of one run were mostly photographed together: their times stand once.
     timed = [
         current != following for current, following in zip(times, [*times[1:], ()], strict=True)
     ]
     tops = np.cumsum([0.0, *(_height(*block) for block in zip(glows, timed, strict=True))])
-    height = float(tops[-1]) + TIMES_PT
+    height = float(tops[-1]) + TIMES_PT * (1 + len(notes))
     figure = new_figure(height)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, WIDTH_PT), ylim=(height, 0))
@@ -50,7 +55,12 @@ def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
     for glow, top, with_times in zip(glows, tops, timed, strict=False):
         _block(axes, glow, float(top), with_times)
     centre = LABELS_PT + (WIDTH_PT - LABELS_PT) / 2
-    axes.text(centre, height - EDGE_PT, "Time after lamp off / s", ha="center", color=INK)
+    times_pt = float(tops[-1]) + TIMES_PT - EDGE_PT
+    axes.text(centre, times_pt, "Time after lamp off / s", ha="center", color=INK)
+    for number, note in enumerate(notes, start=1):
+        axes.text(
+            EDGE_PT, times_pt + number * TIMES_PT, note, color=MUTED, fontsize=SMALL_PT, wrap=True
+        )
     return figure
 
 
@@ -80,7 +90,12 @@ def screen_colours(glow: GlowComparison) -> dict[str, FloatArray]:
 
 def _height(glow: GlowComparison, with_times: bool) -> float:
     below = TIMES_PT if with_times else GAP_PT
-    return TITLE_PT + (1 + len(glow.predicted)) * CELL_HEIGHT_PT + below
+    return _title_pt(glow) + (1 + len(glow.predicted)) * CELL_HEIGHT_PT + below
+
+
+def _title_pt(glow: GlowComparison) -> float:
+    """Return the height of name and means: many means have a line of their own."""
+    return TITLE_PT if len(glow.predicted) < MANY else TITLE_PT + MEANS_PT
 
 
 def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> None:
@@ -88,9 +103,9 @@ def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> No
     width = (WIDTH_PT - LABELS_PT - EDGE_PT) / max(len(rows), 1)
     means = ", ".join(f"{name} {glow.mean(name):.2f}" for name in glow.predicted)
     axes.text(EDGE_PT, top + 14, glow.patch, color=INK, fontsize=FONT_PT, weight="bold")
-    axes.text(WIDTH_PT - EDGE_PT, top + 14, f"mean ΔE: {means}", ha="right", color=MUTED,
-              fontsize=SMALL_PT)  # fmt: skip
-    y = top + TITLE_PT
+    y = top + _title_pt(glow)
+    axes.text(WIDTH_PT - EDGE_PT, y - (TITLE_PT - 14), f"mean ΔE: {means}", ha="right",
+              color=MUTED, fontsize=SMALL_PT)  # fmt: skip
     for name, strip in screen_colours(glow).items():
         axes.text(LABELS_PT - 6, y + CELL_HEIGHT_PT / 2, name, ha="right", va="center", color=INK,
                   fontsize=SMALL_PT)  # fmt: skip

@@ -1,9 +1,12 @@
 """Conversion of a comparison to plain numbers."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
+from labrig.compare.rendered import RenderedComparison
 from labrig.compare.run import RunComparison
+from labrig.compare.viewing import FloatArray
 
 
 def numbers(comparison: RunComparison) -> dict[str, Any]:
@@ -88,6 +91,60 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
         }
     )
     return plain
+
+
+def rendered_numbers(comparison: RenderedComparison) -> dict[str, Any]:
+    """Convert a rendered dark room to plain numbers for programs.
+
+    Parameters
+    ----------
+    comparison
+        The dark room of a run, rendered beside its photographs.
+
+    Returns
+    -------
+    dict
+        As of `numbers`.
+
+    Examples
+    --------
+    >>> from labrig.compare import RenderedComparison, rendered_numbers
+    >>> rendered_numbers(RenderedComparison((), "one exposure", (), ()))["description"]
+    'one exposure'
+    """
+    plain: dict[str, Any] = _plain(
+        {
+            "description": comparison.description,
+            "notes": list(comparison.notes),
+            "left_out": list(comparison.left_out),
+            "patches": {
+                patch.each.patch: {
+                    "t_s": patch.each.t_s.tolist(),
+                    "noise": patch.each.noise,
+                    "delta_e": _lists(patch.each.delta_e),
+                    "delta_e_one_exposure": _lists(patch.common.delta_e),
+                    "mean": {name: patch.each.mean(name) for name in patch.each.delta_e},
+                    "mean_one_exposure": {
+                        name: patch.common.mean(name) for name in patch.common.delta_e
+                    },
+                    "glow_over_reflected": {
+                        "channel": patch.ratio.channel,
+                        "reflected_by": patch.ratio.reflected_by,
+                        "photographed": patch.ratio.photographed.tolist(),
+                        "photographed_sigma": patch.ratio.photographed_sigma.tolist(),
+                        "rendered": _lists(patch.ratio.rendered),
+                        "rendered_sigma": _lists(patch.ratio.rendered_sigma),
+                    },
+                }
+                for patch in comparison.patches
+            },
+        }
+    )
+    return plain
+
+
+def _lists(by_name: Mapping[str, FloatArray]) -> dict[str, list[float]]:
+    return {name: values.tolist() for name, values in by_name.items()}
 
 
 def _plain(item: Any) -> Any:

@@ -211,8 +211,8 @@ def compare_run(
     {1: 1.0, 2: 0.01, 3: 0.01}
     """
     patches = read_patches(folder)
-    references = _by_patch(materials, list(patches))
-    curves, left_out = _camera(folder, camera)
+    references = references_by_patch(materials, list(patches))
+    curves, left_out = measured_camera(folder, camera)
     conversion = viewing(curves, white, normalisation)
     glows: list[GlowComparison] = []
     ratios: list[Residuals] = []
@@ -246,7 +246,7 @@ def compare_run(
     )
 
 
-def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Material]:
+def references_by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Material]:
     """Return the reference materials by patch.
 
     A material without a patch belongs to the patch of the same name or to the only one.
@@ -266,7 +266,9 @@ def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Mat
     return by_patch
 
 
-def _camera(folder: Path, replacement: str | None) -> tuple[CameraResponse | None, list[str]]:
+def measured_camera(
+    folder: Path, replacement: str | None
+) -> tuple[CameraResponse | None, list[str]]:
     """Return the curves requested, else those of the processing, and why there are none."""
     rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), read_run(folder).camera_identity)
     try:

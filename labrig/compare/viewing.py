@@ -33,6 +33,8 @@ class Viewing:
         White point X, Y, Z with Y = 1, shape (3,).
     normalisation
         Normalisation of the photographs, see `Normalisation`.
+    source
+        How X, Y, Z follow from raw values, for people.
     description
         Description of the conversion for people.
     """
@@ -40,6 +42,7 @@ class Viewing:
     to_xyz: FloatArray
     white: FloatArray
     normalisation: Normalisation
+    source: str
     description: str
 
 
@@ -86,6 +89,7 @@ def viewing(
         to_xyz=to_xyz,
         white=white_xyz(white, observer(CIE_1931)),
         normalisation="each" if each else "all",
+        source=f"white {white} of the CIE 1931 2° observer; {source}",
         description=(
             f"CIELAB with white {white} of the CIE 1931 2° observer; {source}; {factor} just "
             "reaches the white in X, Y or Z; the predictions have the same factor."

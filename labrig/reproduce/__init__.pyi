@@ -1,6 +1,12 @@
 from .bands import (
     Bands as Bands,
 )
+from .dark_room import (
+    CARD_NAME as CARD_NAME,
+    DarkRoomLamp as DarkRoomLamp,
+    DarkRoomPicture as DarkRoomPicture,
+    dark_room as dark_room,
+)
 from .display import (
     Display as Display,
     camera_values as camera_values,
@@ -74,6 +80,7 @@ from .scene_export import (
     exported_meshes as exported_meshes,
 )
 from .scene_file import (
+    MaterialEntry as MaterialEntry,
     SceneFile as SceneFile,
     read_scene as read_scene,
 )

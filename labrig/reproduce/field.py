@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
-from labrig.material import steady_concentration
+from labrig.material import dark_concentration, lit_concentration, steady_concentration
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.field_parameters import FieldParameters
 from labrig.reproduce.order_table import LONGEST, order_table
@@ -27,6 +27,8 @@ Float32Array = NDArray[np.float32]
 IMPROPER = "expected an irradiance that is finite and ≥ 0, got a negative or infinite one, or NaN"
 #: Samples below which several threads cost more than they gain.
 FEW_SAMPLES = 65_536
+#: Samples up to which a solution for each takes less than a table for all steps of one length.
+FEW_FOR_TABLES = 64
 
 
 class Field:
@@ -146,6 +148,9 @@ class Field:
                     np.float32(duration_s),
                 )  # fmt: skip
                 continue
+            if self.n_samples <= FEW_FOR_TABLES:
+                self._solve(state, self._kappa(light, base, state), duration_s)
+                continue
             phase = float(self._k_r[state, 0]) * duration_s
             parts = max(1, math.ceil(phase / LONGEST))
             table = order_table(float(order[state]), phase / parts)
@@ -156,6 +161,19 @@ class Field:
                     np.float32(table.compression), np.float32(table.root),
                     np.float32(duration_s / parts),
                 )  # fmt: skip
+
+    def _solve(self, state: int, kappa: Float32Array, duration_s: float) -> None:
+        """Advance the levels of a state of an order above 1, each by its own solution."""
+        order, k_r = float(self._parameters.order[state]), float(self._k_r[state, 0])
+        before, rates = self._levels[state].astype(np.float64), kappa.astype(np.float64)
+        if not (np.isfinite(rates).all() and rates.min(initial=0.0) >= 0):
+            raise UsageError(IMPROPER)
+        after = np.asarray(dark_concentration(before, k_r, order, duration_s))
+        is_lit = rates > 0
+        if is_lit.any():
+            lit = lit_concentration(before[is_lit], rates[is_lit], k_r, order, duration_s)
+            after[is_lit] = lit.value
+        self._levels[state] = after
 
     def charge_to_equilibrium(self, irradiance: ArrayLike) -> None:
         """Set all levels to those that the light reaches after a long time.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Self
 
@@ -316,14 +317,11 @@ def _material(
 
 
 def _lamp(name: str, entry: LampEntry, bands: Bands, folder: Path, t_s: float) -> Lamp:
-    spectrum = read_light(_beside(entry.spectrum, folder))
     of_eye, of_watt = STRENGTHS[entry.kind]
     strength = getattr(entry, of_eye)
-    if strength is not None:
-        light = absolute_irradiance(1.0, spectrum).in_bands(bands.edges_nm) * strength
-    else:
-        whole = float(np.trapezoid(spectrum.value, spectrum.wavelength_nm))
-        light = bands.means(spectrum) * getattr(entry, of_watt) / whole
+    is_to_eye = strength is not None
+    unit = _unit_light(_beside(entry.spectrum, folder), bands, is_to_eye)
+    light = unit * (strength if is_to_eye else getattr(entry, of_watt))
     if not light.any() and strength != 0:
         raise UsageError(
             f"lamp {name}: expected light between {bands.edges_nm[0]:g} and "
@@ -339,6 +337,16 @@ def _lamp(name: str, entry: LampEntry, bands: Bands, folder: Path, t_s: float) -
         x, y, z = (np.array(entry.towards) / np.linalg.norm(entry.towards)).tolist()
         vector = x, y, z
     return Lamp(name, entry.kind, light, vector)
+
+
+@lru_cache(maxsize=64)
+def _unit_light(named: str, bands: Bands, is_to_eye: bool) -> FloatArray:
+    """Return a spectrum in the bands of one scene, of 1 lm or of 1 W; read once for all times."""
+    spectrum = read_light(named)
+    if is_to_eye:
+        return absolute_irradiance(1.0, spectrum).in_bands(bands.edges_nm)
+    whole = float(np.trapezoid(spectrum.value, spectrum.wavelength_nm))
+    return np.asarray(bands.means(spectrum) / whole)
 
 
 def _surface(

@@ -1,0 +1,123 @@
+"""Layout of a rendered dark room as sections of a page: pictures, tables over time."""
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from labrig.compare.glow_figure import glow_figure, shown_rows
+from labrig.compare.rendered import MEASURED, RenderedComparison, RenderedPatch
+from labrig.compare.viewing import FloatArray
+from labrig.number_format import plus_minus, rounded
+from labrig.report import Picture, Section, Table
+
+
+def rendered_sections(comparison: RenderedComparison) -> tuple[Section, ...]:
+    """Lay out a rendered dark room as sections of a page.
+
+    Parameters
+    ----------
+    comparison
+        The dark room of a run, rendered beside its photographs.
+
+    Returns
+    -------
+    tuple of Section
+        One section with pictures and tables; none if no patch could be compared.
+
+    Examples
+    --------
+    >>> from labrig.compare import RenderedComparison, rendered_sections
+    >>> rendered_sections(RenderedComparison((), "", (), ()))
+    ()
+    """
+    if not comparison.patches:
+        return ()
+    text = (comparison.description, *(f"Assumed: {note}." for note in comparison.notes))
+    return (
+        Section(
+            "The dark room, photographed and rendered",
+            text,
+            tuple(_pictures(comparison)),
+            (_colours_table(comparison), *map(_ratio_table, comparison.patches)),
+        ),
+    )
+
+
+def _pictures(comparison: RenderedComparison) -> Iterator[Picture]:
+    patches, notes = comparison.patches, comparison.notes
+    below = "Numbers are CIEDE2000 to the photograph above; a dash: too dim to have a colour."
+    yield Picture(
+        "rendered",
+        partial(glow_figure, [patch.each for patch in patches], notes),
+        f"Photographed and rendered glow, every photograph with L* = 50. {below}",
+    )
+    yield Picture(
+        "rendered-one-exposure",
+        partial(glow_figure, [patch.common for patch in patches], notes),
+        f"Photographed and rendered glow with one exposure for all times. {below}",
+    )
+
+
+def _colours_table(comparison: RenderedComparison) -> Table:
+    """Return a table with a row for each patch and rendering."""
+    rows = [
+        (
+            patch.each.patch,
+            name,
+            f"{patch.each.mean(name):.2f} ({patch.each.most(name):.2f})",
+            f"{patch.common.mean(name):.2f} ({patch.common.most(name):.2f})",
+            f"{100 * float(np.mean(patch.ratio.excess(name))):+.2f}",
+            f"{_furthest(100 * patch.ratio.excess(name)):+.2f}",
+            f"{_furthest(patch.ratio.in_sigma(name)):+.1f}",
+        )
+        for patch in comparison.patches
+        for name in patch.each.delta_e
+    ]
+    return Table(
+        head=(
+            "patch",
+            "rendered",
+            "ΔE at L* 50",
+            "ΔE, one exposure",
+            "ratio off / %",
+            "furthest / %",
+            "furthest / σ",
+        ),
+        rows=tuple(rows),
+        caption="CIEDE2000 between photographs and renderings, mean over all times and, in "
+        "brackets, the largest; rendered over photographed ratio of glow to reflected light − 1, "
+        "mean and furthest over all times.",
+    )
+
+
+def _ratio_table(patch: RenderedPatch) -> Table:
+    """Return a table of glow over reflected light at the times that the pictures show."""
+    ratio = patch.ratio
+    rows = [
+        (
+            rounded(float(patch.each.t_s[row]), 3),
+            plus_minus(float(ratio.photographed[row]), float(ratio.photographed_sigma[row])),
+            plus_minus(
+                float(ratio.rendered[MEASURED][row]), float(ratio.rendered_sigma[MEASURED][row])
+            ),
+            f"{ratio.in_sigma(MEASURED)[row]:+.1f}",
+            _delta_e(patch.each.delta_e[MEASURED][row]),
+            _delta_e(patch.common.delta_e[MEASURED][row]),
+        )
+        for row in shown_rows(patch.each)
+    ]
+    return Table(
+        head=("t / s", "photographed", "rendered", "σ", "ΔE at L* 50", "ΔE, one exposure"),
+        rows=tuple(rows),
+        caption=f"{patch.each.patch}: glow over the light that {ratio.reflected_by} reflects, in "
+        f"{ratio.channel}, of photographs and of the run's own material.",
+    )
+
+
+def _furthest(values: FloatArray) -> float:
+    return float(values[np.argmax(np.abs(values))])
+
+
+def _delta_e(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:.2f}"
