@@ -41,13 +41,18 @@ def render(
     assume_albedo: Annotated[
         float | None,
         typer.Option(
-            "--assume-albedo", help="Albedo of phosphors whose file has none, 0 to below 1."
+            "--assume-albedo",
+            min=0,
+            max=0.99,
+            help="Albedo of phosphors whose file has none, 0 to below 1.",
         ),
     ] = None,
     assume_scale: Annotated[
         float | None,
         typer.Option(
-            "--assume-scale", help="Factor from Λ to s/sr of phosphors whose file has no scale."
+            "--assume-scale",
+            min=1e-9,
+            help="Factor from Λ to s/sr of phosphors whose file has no scale.",
         ),
     ] = None,
     exposure: Annotated[
@@ -83,10 +88,18 @@ def render(
     """
     from labrig.clock import SystemClock
     from labrig.quantity import duration_text
-    from labrig.reproduce import Assumptions, RenderFolder, load_scene, require_ffmpeg
+    from labrig.reproduce import (
+        Assumptions,
+        RenderFolder,
+        check_exposure,
+        load_scene,
+        require_ffmpeg,
+    )
 
+    check_exposure(exposure)
     if video is not None:
         require_ffmpeg(video)
+    _check_places(gltf, mitsuba)
     built = load_scene(scene, _pairs(materials or []), Assumptions(assume_albedo, assume_scale))
     built = _changed(built, times, size, paths)
     for note in built.notes:
@@ -133,6 +146,16 @@ def _export(
         typer.echo(f"wrote {written}: lamps and glow in sRGB, without re-radiation", err=True)
 
 
+def _check_places(gltf: Path | None, mitsuba: Path | None) -> None:
+    """Refuse places for exports before a picture is made."""
+    from labrig.errors import UsageError
+
+    if gltf is not None and (gltf.suffix.lower() != ".glb" or not gltf.absolute().parent.is_dir()):
+        raise UsageError(f"{gltf}: expected a file that ends in .glb in a folder that is there")
+    if mitsuba is not None and mitsuba.exists() and not mitsuba.is_dir():
+        raise UsageError(f"{mitsuba}: expected a folder, got a file")
+
+
 def _pairs(texts: list[str]) -> dict[str, str]:
     from labrig.errors import UsageError
 
@@ -152,7 +175,9 @@ def _changed(scene: "Scene", times: str | None, size: str | None, paths: int | N
     width = height = None
     if size is not None:
         parts = size.lower().split("x")
-        if len(parts) != 2 or not all(part.isdigit() and 0 < int(part) <= 8192 for part in parts):
+        if len(parts) != 2 or not all(
+            part.isascii() and part.isdigit() and 0 < int(part) <= 8192 for part in parts
+        ):
             raise UsageError(f"expected --size such as 640x480, up to 8192 each, got '{size}'")
         width, height = int(parts[0]), int(parts[1])
     scene = scene.resized(width, height, paths)

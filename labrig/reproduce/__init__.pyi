@@ -85,6 +85,7 @@ from .scene_file import (
     read_scene as read_scene,
 )
 from .shown import (
+    check_exposure as check_exposure,
     shown_frames as shown_frames,
 )
 from .surface_material import (

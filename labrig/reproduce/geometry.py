@@ -77,7 +77,7 @@ class StartPoints:
     Attributes
     ----------
     position_m, normal
-        Points in m, and unit normals there, shape (n, 3).
+        Points in m from the geometry's `origin_m`, and unit normals there, shape (n, 3).
     place
         Place of each point, shape (n,).
     """
@@ -96,7 +96,7 @@ class Geometry:
     surfaces
         Objects, in the order of the scene.
     triangles, normals
-        Corners in m (m, 3, 3), and unit normals (m, 3).
+        Corners in m from `origin_m` (m, 3, 3), and unit normals (m, 3).
     uv
         Texture coordinates of the corners, shape (m, 3, 2); zero where there are none.
     corner_place
@@ -107,6 +107,8 @@ class Geometry:
         A row for each surface: kind of its places, first place, columns, rows, lamp, two-sided.
     material_of_place
         Number of the material of each place, shape (places,); -1 is black.
+    origin_m
+        Middle of the scene, from which `triangles` are measured: single precision is finest there.
     """
 
     surfaces: tuple[Surface, ...]
@@ -117,6 +119,7 @@ class Geometry:
     surface_of_face: IntArray
     table: IntArray
     material_of_place: IntArray
+    origin_m: FloatArray
 
     @classmethod
     def of(cls, surfaces: Sequence[Surface]) -> Self:
@@ -154,15 +157,19 @@ class Geometry:
                 np.full(surface.n_places, surface.material) if own is None else own.ravel()
             )
             first += surface.n_places
+        corners_m = np.concatenate(triangles)
+        flat = corners_m.reshape(-1, 3)
+        origin_m = (flat.min(axis=0) + flat.max(axis=0)) / 2
         return cls(
             tuple(surfaces),
-            np.ascontiguousarray(np.concatenate(triangles), dtype=np.float32),
+            np.ascontiguousarray(corners_m - origin_m, dtype=np.float32),
             np.ascontiguousarray(np.concatenate(normals), dtype=np.float32),
             np.ascontiguousarray(np.concatenate(uvs), dtype=np.float32),
             np.ascontiguousarray(np.concatenate(corners), dtype=np.int32),
             np.concatenate(owners).astype(np.int32),
             np.array(rows, dtype=np.int32),
             np.concatenate(materials).astype(np.int32),
+            origin_m,
         )
 
     @property
@@ -178,9 +185,15 @@ class Geometry:
 
     @cached_property
     def is_room(self) -> bool:
-        """Whether some closed surface has its front inside: then no ray can leave the scene."""
+        """Whether a closed surface around all others has its front inside: no ray can leave it."""
+        flat = self.triangles.reshape(-1, 3)
+        low, high = flat.min(axis=0) + self.origin_m, flat.max(axis=0) + self.origin_m
+        nearly = 1e-5 * self.size_m
         return any(
-            surface.mesh.volume_m3 < 0 and surface.mesh.is_closed
+            (surface.mesh.vertices_m.min(axis=0) <= low + nearly).all()
+            and (surface.mesh.vertices_m.max(axis=0) >= high - nearly).all()
+            and surface.mesh.volume_m3 < 0
+            and surface.mesh.is_closed
             for surface in self.surfaces
             if surface.lamp < 0
         )
@@ -221,7 +234,7 @@ class Geometry:
             face, weights, place = _on_texels(own, per_place, rng, scattered)
         corners = own.mesh.vertices_m[own.mesh.faces[face]]
         return StartPoints(
-            np.einsum("nk,nkc->nc", weights, corners).astype(np.float32),
+            (np.einsum("nk,nkc->nc", weights, corners) - self.origin_m).astype(np.float32),
             own.mesh.normals[face].astype(np.float32),
             (place + first).astype(np.int32),
         )
@@ -328,6 +341,15 @@ def _on_texels(
     u = ((place % columns) + (part % LOOKUPS + even[:, 0]) / LOOKUPS) / columns
     v = ((place // columns) + (part // LOOKUPS + even[:, 1]) / LOOKUPS) / rows
     face, weights = kernels.located_in_texture(
-        corners, face_at, np.stack([u, v], axis=1).astype(np.float32)
+        corners,
+        face_at,
+        np.stack([u, v], axis=1).astype(np.float32),
+        np.stack(
+            [
+                place // columns * LOOKUPS + part // LOOKUPS,
+                place % columns * LOOKUPS + part % LOOKUPS,
+            ],
+            axis=1,
+        ).astype(np.int32),
     )
     return face, weights, place.astype(np.int32)

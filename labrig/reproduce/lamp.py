@@ -73,7 +73,13 @@ class LampTable:
             first.append(first[-1] + len(triangles))
         return cls(
             np.array([KINDS.index(lamp.kind) for lamp in lamps], dtype=np.int32),
-            np.array([lamp.vector for lamp in lamps], dtype=np.float32).reshape(-1, 3),
+            np.array(
+                [
+                    np.array(lamp.vector) - (geometry.origin_m if lamp.kind == "point" else 0.0)
+                    for lamp in lamps
+                ],
+                dtype=np.float32,
+            ).reshape(-1, 3),
             np.array(first, dtype=np.int32),
             np.concatenate([*faces, np.zeros(0)]).astype(np.int32),
             np.concatenate([*shares, np.zeros(0)]).astype(np.float32),

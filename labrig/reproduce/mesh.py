@@ -130,7 +130,7 @@ class Mesh:
     def sphere(
         cls, centre_m: ArrayLike, radius_m: float, rows: int = 48, inward: bool = False
     ) -> Self:
-        """Return a sphere of rows of triangles.
+        """Return a sphere of rows of triangles, of the same area.
 
         Parameters
         ----------
@@ -158,7 +158,10 @@ class Mesh:
         is_pole = at // columns
         faces = np.vstack([first[is_pole < rows - 1], second[is_pole > 0]]).astype(np.int32)
         uv = np.stack([around / (2 * np.pi), 1 - polar / np.pi], axis=1)
-        mesh = cls(np.asarray(centre_m, dtype=np.float64) + radius_m * unit, faces, uv)
+        # Flat triangles within a sphere have less area than it: they are moved outwards.
+        of_unit = cls(unit, faces, uv)
+        radius = radius_m * np.sqrt(4 * np.pi / of_unit.area_m2)
+        mesh = cls(np.asarray(centre_m, dtype=np.float64) + radius * unit, faces, uv)
         return mesh.turned_over() if inward else mesh
 
     @classmethod

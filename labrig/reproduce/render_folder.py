@@ -5,6 +5,8 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,8 @@ from labrig.reproduce.scene import Scene
 Float32Array = NDArray[np.float32]
 
 CONTENT = "render.json"
+#: What the names of materials follow in the file of levels.
+OF = "levels of "
 
 
 @dataclass(frozen=True)
@@ -163,9 +167,9 @@ class RenderFolder:
         """
         path = self._levels_path(number)
         try:
-            with np.load(path, allow_pickle=False) as content:
-                return {name: content[name] for name in content.files}
-        except (OSError, ValueError) as error:
+            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
+                return {name.removeprefix(OF): content[name] for name in content.files}
+        except (OSError, ValueError, TypeError, EOFError, BadZipFile) as error:
             raise UsageError(
                 f"{path}: expected the levels of a finished frame ({error}); remove {self.path} to "
                 "begin anew"
@@ -175,7 +179,8 @@ class RenderFolder:
         path = self._levels_path(number)
         partial = path.with_suffix(".part.npz")
         try:
-            np.savez(partial, **levels)  # type: ignore[arg-type]
+            named: dict[str, Any] = {f"{OF}{name}": level for name, level in levels.items()}
+            np.savez(partial, **named)
             partial.replace(path)
         except OSError as error:
             raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
@@ -195,10 +200,15 @@ def _identity(scene: Scene) -> str:
                 parameters.k_e_per_s,
                 parameters.reradiation,
                 parameters.order,
+                np.array(parameters.prompt),
             ):
                 digest.update(array.tobytes())
-    geometry = scene.geometry(scene.file.frames_s[-1])
-    digest.update(geometry.triangles.tobytes())
+    for t_s in (scene.file.programme[0].at_s, *scene.file.frames_s):
+        geometry = scene.geometry(t_s)
+        for each in (geometry.triangles, geometry.uv, geometry.table, geometry.material_of_place):
+            digest.update(each.tobytes())
+        for lamp in scene.lamps(t_s):
+            digest.update(lamp.light.tobytes())
     return digest.hexdigest()
 
 

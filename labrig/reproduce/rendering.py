@@ -6,17 +6,19 @@ other's glow; the picture is then the fold of the camera's paths.
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from labrig.errors import UsageError
 from labrig.reproduce.field import Field
 from labrig.reproduce.folding import Matrices, fold
-from labrig.reproduce.geometry import Geometry
+from labrig.reproduce.geometry import Geometry, Surface
 from labrig.reproduce.lamp import LampTable
 from labrig.reproduce.scene import Scene
 from labrig.reproduce.tracing import Paths, Tracer
@@ -28,7 +30,18 @@ IntArray = NDArray[np.int32]
 #: Part of the memory that paths and pictures may take, and copies of a picture at once.
 LARGEST_PART, MOST_COPIES = 0.7, 6
 #: First step after a change of light, as a part of the fastest relaxation; later ones grow.
-FIRST_STEP, GROWTH = 0.25, 1.5
+FIRST_STEP, GROWTH = 0.25, 2.0
+#: Change of the logarithm of all light at which steps grow no more; rounds and parts of a step.
+MOST_CHANGE, ROUNDS, PARTS = 0.7, 2, 8
+#: Relative change of light within a step that is none.
+UNCHANGED = 1e-5
+#: Rounds in which levels of a long charge settle, and their last change.
+CHARGING_ROUNDS, SETTLED = 100, 1e-5
+#: Rounds of what is emitted at once.
+PROMPT_ROUNDS = 6
+TINY = 1e-300
+#: Steps of a scene that moves.
+MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,14 +134,7 @@ class Renderer:
         self._advance(t_s)
         view = self._view_at(t_s)
         camera = self._scene.camera
-        light = fold(
-            view.of_camera(),
-            self._matrices,
-            self._material_of_place,
-            self._glow(view, t_s),
-            self._lamps(t_s),
-            self._threads,
-        )
+        light = self._fold_of(self._glow(view, t_s), t_s)(view.of_camera())
         return Frame(t_s, light.reshape(camera.height_px, camera.width_px, -1))
 
     def frames(self) -> Iterator[Frame]:
@@ -158,22 +164,45 @@ class Renderer:
 
     def _glow(self, view: "_View", t_s: float) -> Float32Array:
         """Return the emitted radiance with what the light makes emit at once."""
+        glow = self._emitted()
         if not any(state.field.parameters.prompt for state in self._states):
-            return self._emitted()
-        return self._emitted(self._irradiance(view, t_s, self._emitted()))
+            return glow
+        # What is emitted at once excites more of it.
+        for _ in range(PROMPT_ROUNDS):
+            glow = self._emitted(view.irradiance(self._fold_of(glow, t_s)))
+        return glow
 
-    def _irradiance(self, view: "_View", t_s: float, glow: Float32Array) -> FloatArray:
+    def _irradiance(self, view: "_View", t_s: float) -> FloatArray:
         """Return the irradiance at all places, zero where it is not needed (places, bands)."""
-        return view.irradiance(self._matrices, self._material_of_place, glow, self._lamps(t_s))
+        return view.irradiance(self._fold_of(self._glow(view, t_s), t_s))
+
+    def _fold_of(self, glow: Float32Array, t_s: float) -> Callable[..., Float32Array]:
+        """Return the fold of paths with a glow and the light of a time."""
+        return partial(
+            fold,
+            matrices=self._matrices,
+            material_of_place=self._material_of_place,
+            glow=glow,
+            lamps=self._lamps(t_s),
+            threads=self._threads,
+        )
 
     def _charge_at_first(self) -> None:
         charged = [state for state in self._states if state.is_charged]
         if not charged:
             return
         view = self._view_at(self._t_s)
-        light = self._irradiance(view, self._t_s, self._emitted())
-        for state in charged:
-            state.field.charge_to_equilibrium(light[state.places].T)
+        for _ in range(CHARGING_ROUNDS):
+            light = self._irradiance(view, self._t_s)
+            before = [state.field.levels.copy() for state in charged]
+            for state in charged:
+                state.field.charge_to_equilibrium(light[state.places].T)
+            changed = [
+                float(np.abs(state.field.levels - levels).max())
+                for state, levels in zip(charged, before, strict=True)
+            ]
+            if max(changed) < SETTLED:
+                return
 
     def _advance(self, to_s: float) -> None:
         """Step all levels to a time."""
@@ -190,34 +219,56 @@ class Renderer:
         self._t_s = to_s
 
     def _settle(self, begin_s: float, end_s: float) -> None:
-        """Step through a time in which the lamps are constant, and only the glow changes."""
+        """Step through a time in which the lamps are constant, and only the glow changes.
+
+        Light that fades does so nearly as an exponential: so it is taken between the beginning
+        and the end of a step, which is found in rounds. Steps grow while light hardly changes.
+        """
         view = self._view_at(begin_s)
         t_s, step_s = begin_s, 0.0
+        light = self._irradiance(view, begin_s)
         while t_s < end_s:
-            light = self._irradiance(view, begin_s, self._emitted())
-            step_s = max(step_s * GROWTH, FIRST_STEP / self._fastest(light))
+            step_s = max(step_s, FIRST_STEP / self._fastest(light))
             if end_s - t_s < 1.2 * step_s:
                 step_s = end_s - t_s
             before = [state.field.levels.copy() for state in self._states]
             self._step(light, step_s)
-            # The glow at the end of the step counts as much as that at its beginning.
-            light = (light + self._irradiance(view, begin_s, self._emitted())) / 2
-            for state, levels in zip(self._states, before, strict=True):
-                state.field.levels[:] = levels
-            self._step(light, step_s)
+            later = self._irradiance(view, begin_s)
+            for _ in range(ROUNDS):
+                if np.abs(later - light).max() <= UNCHANGED * light.max():
+                    break
+                for state, levels in zip(self._states, before, strict=True):
+                    state.field.levels[:] = levels
+                self._glide(light, later, step_s)
+                later = self._irradiance(view, begin_s)
             t_s = end_s if step_s == end_s - t_s else t_s + step_s
+            change = abs(math.log(max(float(later.sum()), TINY) / max(float(light.sum()), TINY)))
+            step_s *= min(GROWTH, MOST_CHANGE / max(change, TINY))
+            light = later
+
+    def _glide(self, light: FloatArray, later: FloatArray, step_s: float) -> None:
+        """Step through light that goes over into another, exponentially where both shine."""
+        both = (light > 0) & (later > 0)
+        ratio = np.divide(later, light, out=np.ones_like(light), where=both)
+        for part in range(PARTS):
+            x = (part + 0.5) / PARTS
+            self._step(
+                np.where(both, light * ratio**x, (1 - x) * light + x * later), step_s / PARTS
+            )
 
     def _follow(self, begin_s: float, end_s: float) -> None:
         """Step through a time in which something moves, which is where it is in mid-step."""
         longest = self._scene.file.step_s or math.inf
         parts = max(1, math.ceil((end_s - begin_s) / longest - 1e-9))
+        if parts > MOST_STEPS:
+            raise UsageError(
+                f"{self._scene.file.name}: expected at most {MOST_STEPS} steps between two "
+                f"pictures, got {parts:g}; give a longer 'step_s'"
+            )
         for low, high in pairwise(np.linspace(begin_s, end_s, parts + 1).tolist()):
             middle = (low + high) / 2
             view = _View(self._scene, middle, self._threads)
-            light = view.irradiance(
-                self._matrices, self._material_of_place, self._emitted(), self._lamps(middle)
-            )
-            self._step(light, high - low)
+            self._step(self._irradiance(view, middle), high - low)
 
     def _step(self, light: FloatArray, step_s: float) -> None:
         for state in self._states:
@@ -253,10 +304,7 @@ class _View:
         lamps = LampTable.of(scene.lamps(t_s), self._geometry)
         paths = scene.file.paths
         self._tracer = Tracer(self._geometry, lamps, scene.path_length, paths.seed)
-        self._of_places: list[Paths] = []
-        for number, surface in enumerate(self._geometry.surfaces):
-            if surface.samples is not None:
-                self._of_places += self._tracer.from_surface(number, paths.per_place, threads)
+        self._of_places: dict[int, list[Paths]] | None = None
         self._of_camera: list[Paths] = []
 
     def of_camera(self) -> list[Paths]:
@@ -269,31 +317,59 @@ class _View:
         return self._of_camera
 
     @property
+    def _all(self) -> list[Paths]:
+        of_places = (self._of_places or {}).values()
+        return [*(each for parts in of_places for each in parts), *self._of_camera]
+
+    @property
     def nbytes(self) -> int:
-        return sum(each.nbytes for each in (*self._of_places, *self._of_camera))
+        """Memory of all paths in bytes."""
+        return sum(each.nbytes for each in self._all)
 
     @property
     def n_escaped(self) -> int:
-        return sum(each.n_escaped for each in (*self._of_places, *self._of_camera))
+        """Rays that left a closed room."""
+        return sum(each.n_escaped for each in self._all)
 
-    def irradiance(
-        self,
-        matrices: Matrices,
-        material_of_place: IntArray,
-        glow: Float32Array,
-        lamps: Float32Array,
-    ) -> FloatArray:
-        """Return the irradiance at all places from which paths begin (places, bands)."""
-        light = np.zeros((self._geometry.n_places, glow.shape[1]))
-        if self._of_places:
-            places = np.concatenate(
-                [each.place[each.first[: -1 : each.per_target]] for each in self._of_places]
-            )
-            light[places] = fold(
-                self._of_places, matrices, material_of_place, glow, lamps, self._threads,
-                incident=True,
-            )  # fmt: skip
+    def irradiance(self, folded: Callable[..., Float32Array]) -> FloatArray:
+        """Return the irradiance at all places with states (places, bands).
+
+        Parameters
+        ----------
+        folded
+            The fold with a glow and lamps.
+        """
+        light = np.zeros((self._geometry.n_places, len(self._scene.bands)))
+        for number, paths in self._from_places().items():
+            surface, own = self._geometry.surfaces[number], self._geometry.places_of(number)
+            lit = np.concatenate([each.place[each.first[: -1 : each.per_target]] for each in paths])
+            sides = 2.0 if surface.is_two_sided else 1.0
+            # Noise of a measured matrix may make it negative.
+            light[lit] = sides * np.maximum(folded(paths, incident=True), 0.0)
+            light[own] = light[own][_nearest_lit(lit - own.start, surface)]
         return light
+
+    def _from_places(self) -> dict[int, list[Paths]]:
+        """Return the paths from the places of each surface with states."""
+        if self._of_places is None:
+            per_place = self._scene.file.paths.per_place
+            self._of_places = {
+                number: list(self._tracer.from_surface(number, per_place, self._threads))
+                for number, surface in enumerate(self._geometry.surfaces)
+                if surface.samples is not None
+            }
+        return self._of_places
+
+
+def _nearest_lit(lit: IntArray, surface: Surface) -> IntArray:
+    """Return for each place of a surface the nearest that lies on it, by its texture."""
+    if not isinstance(surface.samples, tuple) or len(lit) == surface.n_places:
+        return np.arange(surface.n_places, dtype=np.int32)
+    columns, rows = surface.samples
+    is_beside = np.ones((rows, columns), bool)
+    is_beside.ravel()[lit] = False
+    row, column = distance_transform_edt(is_beside, return_distances=False, return_indices=True)
+    return np.asarray((row * columns + column).ravel(), dtype=np.int32)
 
 
 def _states(scene: Scene, geometry: Geometry) -> list[_State]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Self
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +40,9 @@ from labrig.yaml_file import validate
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-#: Texels of a phosphor where nobody says otherwise.
-TEXELS = (64, 64)
+#: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
+TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
+MOST_AREA_M2 = 1e12
 
 
 @dataclass(frozen=True)
@@ -71,14 +73,11 @@ class Scene:
         Bands of the rendering.
     materials
         Materials by the numbers that surfaces name.
-    is_moving
-        Whether an object or a lamp moves.
     """
 
     file: SceneFile
     bands: Bands
     materials: tuple[SurfaceMaterial, ...]
-    is_moving: bool
     _surfaces: tuple[Callable[[float], Surface], ...] = field(repr=False)
     _folder: Path = field(repr=False)
 
@@ -90,6 +89,11 @@ class Scene:
             for note in material.notes:
                 of.setdefault(note, []).append(material.name)
         return tuple(f"{', '.join(names)}: {note}" for note, names in of.items())
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether an object or a lamp moves."""
+        return self.file.is_moving
 
     @property
     def camera(self) -> Pinhole:
@@ -170,7 +174,7 @@ def load_scene(
         Files of materials that take the place of the scene's, by the names of the materials;
         relative to the current folder.
     assumptions
-        What is taken for true where a measurement is missing and the scene says nothing.
+        What is taken for true where a measurement is missing, instead of what the scene says.
 
     Returns
     -------
@@ -244,13 +248,7 @@ def build_scene(
         _surface(name, entry, folder, numbers, lamps, materials)
         for name, entry in file.objects.items()
     )
-    is_moving = any(
-        entry.wave is not None
-        or entry.vertices_over_time is not None
-        or entry.particles is not None
-        for entry in file.objects.values()
-    ) or any(lamp.path is not None for lamp in file.lamps.values())
-    return Scene(file, bands, materials, is_moving, surfaces, folder)
+    return Scene(file, bands, materials, surfaces, folder)
 
 
 def _replaced(
@@ -278,8 +276,7 @@ def _replaced(
 
 def _beside(named: str, folder: Path) -> str:
     """Return a file's path beside the scene's, or the name of something shipped as it is."""
-    beside = folder / named
-    return str(beside) if Path(named).suffix and beside.is_file() else named
+    return str(folder / named) if Path(named).suffix else named
 
 
 def _material(
@@ -304,16 +301,24 @@ def _material(
     if not isinstance(material, Material):
         if not entry.is_fluorescent:
             material = replace(material, reradiation=np.zeros_like(material.reradiation))
-        return of_matrix(material, bands)
+        return _named(name, of_matrix(material, bands))
     albedo, scale = entry.assume_albedo, entry.assume_scale
-    return of_phosphor(
+    phosphor = of_phosphor(
         material,
         bands,
         bench,
-        assumptions.albedo if albedo is None else albedo,
-        assumptions.scale if scale is None else scale,
+        albedo if assumptions.albedo is None else assumptions.albedo,
+        scale if assumptions.scale is None else assumptions.scale,
         entry.prompt,
     )
+    return _named(name, phosphor)
+
+
+def _named(name: str, material: SurfaceMaterial) -> SurfaceMaterial:
+    """Return a material with its name in the scene before its own."""
+    if name == material.name:
+        return material
+    return replace(material, name=f"{name} ({material.name})")
 
 
 def _lamp(name: str, entry: LampEntry, bands: Bands, folder: Path, t_s: float) -> Lamp:
@@ -359,6 +364,8 @@ def _surface(
 ) -> Callable[[float], Surface]:
     """Return a function that gives an object at a time in s."""
     mesh = _mesh(name, entry, folder)
+    if not 0 < mesh.area_m2 < MOST_AREA_M2:
+        raise UsageError(f"{name}: expected a surface with an area, got {mesh.area_m2:g} m²")
     lamp = -1 if entry.lamp is None else lamps[entry.lamp]
     used = [numbers[entry.material]] if entry.material is not None else []
     if entry.material_map is not None:
@@ -387,7 +394,8 @@ def _samples(name: str, entry: ObjectEntry, mesh: Mesh, glows: bool) -> Samples:
         return None
     if entry.particles is not None:
         return "particles"
-    return entry.samples or ("vertices" if mesh.uv is None else TEXELS)
+    of_shape = TEXELS if entry.box is None else TEXELS_OF_BOX
+    return entry.samples or ("vertices" if mesh.uv is None else of_shape)
 
 
 def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
@@ -468,14 +476,14 @@ def _between(t_s: float, times_s: FloatArray, places_m: FloatArray) -> FloatArra
 def _over_time(path: Path, name: str) -> tuple[FloatArray, FloatArray]:
     """Return times (n,) and places (n, points, 3) from a file."""
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
             times_s = np.asarray(content["t_s"], dtype=np.float64)
             places_m = np.asarray(content[name], dtype=np.float64)
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
         raise UsageError(
             f"{path}: expected a .npz file with 't_s' and '{name}' ({error})"
         ) from None
-    is_series = places_m.ndim == 3 and places_m.shape[0] == times_s.size > 0
+    is_series = places_m.ndim == 3 and places_m.shape[0] == times_s.size and places_m.size > 0
     if not is_series or places_m.shape[2] != 3 or not np.isfinite(places_m).all():
         raise UsageError(
             f"{path}: expected finite '{name}' of shape ({times_s.size}, points, 3), got "

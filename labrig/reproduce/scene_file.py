@@ -10,7 +10,12 @@ from labrig import resources
 from labrig.finite import Finite, NotNegative, Positive
 from labrig.yaml_file import did_you_mean, read_model
 
-Vector = tuple[Finite, Finite, Finite]
+#: Lengths in m and times in s that single precision and a person can still tell apart.
+Length = Annotated[float, Field(gt=0, le=1e6)]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Time = Annotated[float, Field(ge=-1e9, le=1e9)]
+Vector = tuple[Coordinate, Coordinate, Coordinate]
+FileName = Annotated[str, Field(pattern=r"^\w[\w .-]*$")]
 Name = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=1, le=8192)]
 
@@ -62,7 +67,7 @@ class AlbedoCurve(_Part):
     """
 
     wavelength_nm: Annotated[tuple[Positive, ...], Field(min_length=2)]
-    value: tuple[NotNegative, ...]
+    value: tuple[Annotated[float, Field(ge=0, le=1)], ...]
 
     @model_validator(mode="after")
     def _same_lengths(self) -> Self:
@@ -133,7 +138,7 @@ class Waypoint(_Part):
         Position in m.
     """
 
-    at_s: Finite
+    at_s: Time
     position_m: Vector
 
 
@@ -184,6 +189,9 @@ class LampEntry(_Part):
             raise ValueError("expected times 'at_s' that rise along 'path'")
         if self.kind == "distant" and (self.towards is None or not any(self.towards)):
             raise ValueError("expected 'towards', a direction, for a lamp of kind distant")
+        for name, kind in (("position_m", "point"), ("path", "point"), ("towards", "distant")):
+            if getattr(self, name) is not None and self.kind != kind:
+                raise ValueError(f"expected '{name}' for a lamp of kind {kind}, got {self.kind}")
         return self
 
 
@@ -225,7 +233,13 @@ class DiskEntry(_Part):
 
     centre_m: Vector
     normal: Vector
-    radius_m: Positive
+    radius_m: Length
+
+    @model_validator(mode="after")
+    def _has_a_front(self) -> Self:
+        if not any(self.normal):
+            raise ValueError("expected a direction as 'normal', got [0, 0, 0]")
+        return self
 
 
 class BoxEntry(_Part):
@@ -242,7 +256,7 @@ class BoxEntry(_Part):
     """
 
     centre_m: Vector
-    size_m: tuple[Positive, Positive, Positive]
+    size_m: tuple[Length, Length, Length]
     turned_deg: Finite = 0.0
     inward: bool = False
 
@@ -259,7 +273,7 @@ class SphereEntry(_Part):
     """
 
     centre_m: Vector
-    radius_m: Positive
+    radius_m: Length
     inward: bool = False
 
 
@@ -281,7 +295,7 @@ class MeshEntry(_Part):
     """
 
     file: Name
-    size_m: Positive = 1.0
+    size_m: Length = 1.0
     turned_deg: Vector = (0.0, 0.0, 0.0)
     position_m: Vector = (0.0, 0.0, 0.0)
     inward: bool = False
@@ -300,7 +314,7 @@ class ParticlesEntry(_Part):
     """
 
     file: Name
-    radius_m: Positive
+    radius_m: Length
 
 
 class Wave(_Part):
@@ -316,7 +330,7 @@ class Wave(_Part):
         Period in s.
     """
 
-    amplitude_m: Positive
+    amplitude_m: Length
     wavelength: Positive = 1.0
     period_s: Positive
 
@@ -353,7 +367,8 @@ class ObjectEntry(_Part):
         Where a phosphor has states of its own: texels, `[columns, rows]`, or `vertices`. Default:
         64 × 64 texels where there are texture coordinates, else vertices.
     two_sided
-        Whether its back has the same material; else the back is black.
+        Whether its back has the same material; else the back is black. A phosphor is then a thin
+        sheet: light on either side charges the same states.
     wave
         How the surface moves.
     vertices_over_time
@@ -384,13 +399,17 @@ class ObjectEntry(_Part):
                 raise ValueError(f"expected one of {', '.join(names)}, got {got}")
         if self.particles is not None and (self.samples or self.material is None):
             raise ValueError("expected 'particles' of one 'material' and without 'samples'")
-        if self.wave is not None and self.rectangle is None:
-            raise ValueError("expected 'wave' with a rectangle only")
+        if self.wave is not None and (self.rectangle is None or self.rectangle.parts < LEAST_PARTS):
+            raise ValueError(f"expected 'wave' with a rectangle of {LEAST_PARTS} 'parts' or more")
+        if self.lamp is not None and self.two_sided:
+            raise ValueError("expected a lamp without 'two_sided': it shines from its front")
         if self.wave is not None and self.vertices_over_time is not None:
             raise ValueError("expected either 'wave' or 'vertices_over_time', got both")
         return self
 
 
+#: Parts of a rectangle of which a wave can be seen.
+LEAST_PARTS = 8
 SHAPES = ("rectangle", "disk", "box", "sphere", "mesh", "particles")
 
 
@@ -429,7 +448,7 @@ class ProgrammeEntry(_Part):
         Before the first entry all are off.
     """
 
-    at_s: Finite
+    at_s: Time
     lamps: dict[str, NotNegative]
 
 
@@ -454,7 +473,7 @@ class PathsEntry(_Part):
     per_place: Annotated[int, Field(ge=1, le=65536)] = 64
     vertices: Annotated[int, Field(ge=1, le=64)] = 4
     survival: Annotated[float, Field(ge=0, lt=1)] = 0.75
-    seed: int = 1
+    seed: Annotated[int, Field(ge=0)] = 1
 
 
 class SceneFile(_Part):
@@ -463,7 +482,7 @@ class SceneFile(_Part):
     Attributes
     ----------
     name
-        Name of the scene.
+        Name of the scene, also that of the folder of its pictures.
     kind
         Kind of the file: `scene`.
     bands
@@ -479,12 +498,12 @@ class SceneFile(_Part):
     frames_s
         Times of the pictures in s, rising.
     step_s
-        Longest step in s of a scene in which something moves. Default: the time to the next frame.
+        Longest step in s; needed where an object or a lamp moves.
     paths
         How finely light is traced.
     """
 
-    name: Name
+    name: FileName
     kind: Literal["scene"]
     bands: BandsEntry = BandsEntry()
     bench_light: BenchLightEntry = BenchLightEntry()
@@ -493,7 +512,7 @@ class SceneFile(_Part):
     objects: Annotated[dict[str, ObjectEntry], Field(min_length=1)]
     camera: CameraEntry
     programme: Annotated[tuple[ProgrammeEntry, ...], Field(min_length=1)]
-    frames_s: Annotated[tuple[Finite, ...], Field(min_length=1)]
+    frames_s: Annotated[tuple[Time, ...], Field(min_length=1)]
     step_s: Positive | None = None
     paths: PathsEntry = PathsEntry()
 
@@ -509,9 +528,31 @@ class SceneFile(_Part):
                 continue
             areas = [each for each, lamp in self.lamps.items() if lamp.kind == "area"]
             _must_be_known(f"objects.{name}", "lamp of kind area", entry.lamp, areas)
+        used_lamps = {entry.lamp for entry in self.objects.values()}
+        for name, lamp_entry in self.lamps.items():
+            if lamp_entry.kind == "area" and name not in used_lamps:
+                raise ValueError(f"lamps.{name}: expected an object that is this lamp, got none")
+        if sum(entry.kind == "sky" for entry in self.lamps.values()) > 1:
+            raise ValueError("expected at most one lamp of kind sky")
         for number, part in enumerate(self.programme):
             for lamp in part.lamps:
                 _must_be_known(f"programme.{number}", "lamp", lamp, list(self.lamps))
+        return self
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether an object or a lamp moves."""
+        return any(
+            entry.wave is not None
+            or entry.vertices_over_time is not None
+            or entry.particles is not None
+            for entry in self.objects.values()
+        ) or any(lamp.path is not None for lamp in self.lamps.values())
+
+    @model_validator(mode="after")
+    def _steps_follow_what_moves(self) -> Self:
+        if self.is_moving and self.step_s is None:
+            raise ValueError("expected 'step_s', the longest step in s, since something moves")
         return self
 
     @model_validator(mode="after")

@@ -70,6 +70,38 @@ def shown_frames(
     return pictures
 
 
+def check_exposure(exposure: str) -> None:
+    """Refuse what is no exposure.
+
+    Parameters
+    ----------
+    exposure
+        As `shown_frames` takes it.
+
+    Raises
+    ------
+    UsageError
+        It is none.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import check_exposure
+    >>> check_exposure("common")
+    """
+    if exposure not in (EACH, COMMON):
+        _given(exposure)
+
+
+def _given(exposure: str) -> Display:
+    try:
+        return Display(float(exposure))
+    except ValueError:
+        raise UsageError(
+            f"expected an exposure '{EACH}', '{COMMON}' or the luminance of white in cd/m², got "
+            f"'{exposure}'"
+        ) from None
+
+
 def _displays(xyz: Sequence[NDArray[np.float64]], exposure: str) -> list[Display]:
     if exposure == EACH:
         return [
@@ -82,10 +114,4 @@ def _displays(xyz: Sequence[NDArray[np.float64]], exposure: str) -> list[Display
             Display.automatic(brightest, UNCLIPPED_PER_CENT) if brightest.any() else Display(1.0)
         )
         return [display] * len(xyz)
-    try:
-        return [Display(float(exposure))] * len(xyz)
-    except ValueError:
-        raise UsageError(
-            f"expected an exposure '{EACH}', '{COMMON}' or the luminance of white in cd/m², got "
-            f"'{exposure}'"
-        ) from None
+    return [_given(exposure)] * len(xyz)

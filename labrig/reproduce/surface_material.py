@@ -265,7 +265,22 @@ def of_phosphor(
         rates.order,
         prompt,
     )
+    _require_fading(material, reflected, parameters)
     return SurfaceMaterial(material.name, reflected, parameters, tuple(notes))
+
+
+def _require_fading(material: Material, matrix: Float32Array, rates: FieldParameters) -> None:
+    """Refuse a phosphor that in a closed room of its own would glow ever more.
+
+    In weak light a state emits in the end Λ κ: all of it comes back to the walls of such a room.
+    """
+    glow = np.pi * rates.reradiation.T.astype(np.float64) @ rates.k_e_per_s
+    largest = float(np.abs(np.linalg.eigvals(matrix + glow)).max())
+    if not largest < 1:
+        raise UsageError(
+            f"{material.name}: expected a glow of less light than it takes, got {largest:.3g} "
+            "times as much; the scale of Λ or the bench's light (bench_light) is wrong"
+        )
 
 
 def _spread(material: Material, reradiation: FloatArray, bands: Bands) -> FloatArray:

@@ -132,7 +132,9 @@ class Pinhole:
     width_px: int = 256
     height_px: int = 256
 
-    def rays(self, pixels: IntArray, within: FloatArray) -> tuple[Float32Array, Float32Array]:
+    def rays(
+        self, pixels: IntArray, within: FloatArray, origin_m: FloatArray
+    ) -> tuple[Float32Array, Float32Array]:
         """Return origins and unit directions of rays.
 
         Parameters
@@ -141,6 +143,8 @@ class Pinhole:
             Numbers of pixels, row by row from the upper left (n,).
         within
             Where in each pixel, 0 to 1 from its upper left corner (n, 2).
+        origin_m
+            Point from which origins are measured, in m (3,).
         """
         eye = np.array(self.position_m, dtype=np.float64)
         forward = np.array(self.look_at_m) - eye
@@ -159,9 +163,8 @@ class Pinhole:
         y = (2 * (row + within[:, 1]) / self.height_px - 1) * half
         direction = forward + x[:, None] * right + y[:, None] * down
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        return np.broadcast_to(eye, direction.shape).astype(np.float32), direction.astype(
-            np.float32
-        )
+        begin = np.broadcast_to((eye - origin_m).astype(np.float32), direction.shape)
+        return np.ascontiguousarray(begin), direction.astype(np.float32)
 
 
 class Tracer:
@@ -222,7 +225,9 @@ class Tracer:
             rng = np.random.default_rng((self._seed, 0, number))
             even = _even(len(pixels), per_pixel, 4 + 2 * len(self._lamps), rng)
             origin, direction = camera.rays(
-                np.repeat(pixels, per_pixel).astype(np.int32), even[:, :2].astype(np.float64)
+                np.repeat(pixels, per_pixel).astype(np.int32),
+                even[:, :2].astype(np.float64),
+                self._geometry.origin_m,
             )
             return self._trace(origin, direction, per_pixel, even[:, 2:], rng)
 
@@ -230,6 +235,9 @@ class Tracer:
 
     def from_surface(self, surface: int, per_place: int, threads: int) -> Iterator[Paths]:
         """Trace paths from all places of a surface; their first vertex is the place itself.
+
+        From a two-sided one every other path begins at its back: the sum over both sides is twice
+        the mean.
 
         Parameters
         ----------
@@ -252,6 +260,10 @@ class Tracer:
         points = self._geometry.starts(surface, per_place, rng, scattered)
         at_once = max(1, CHUNK // per_place) * per_place
         lift = np.float32(LIFT * self._geometry.size_m)
+        if self._geometry.surfaces[surface].is_two_sided:
+            first = rng.integers(0, 2, len(points.place) // per_place).repeat(per_place)
+            turn = np.tile(np.arange(per_place), len(points.place) // per_place)
+            points.normal[(first + turn) % 2 == 1] *= -1
 
         def part(number: int) -> Paths:
             own = slice(number * at_once, (number + 1) * at_once)

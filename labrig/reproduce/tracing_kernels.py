@@ -187,6 +187,8 @@ def towards_lamps(
             b = c = np.float32(0)
             if kind[lamp] == 1:
                 low, high = first[lamp], first[lamp + 1]
+                if low == high:
+                    continue
                 f_at = low + np.searchsorted(share[low:high], chance[i, lamp, 0])
                 f_at = min(f_at, high - 1)
                 before = share[f_at - 1] if f_at > low else np.float32(0)
@@ -273,7 +275,7 @@ def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[IntArray
 
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def located_in_texture(
-    corners: Float32Array, face_at: IntArray, uv: Float32Array
+    corners: Float32Array, face_at: IntArray, uv: Float32Array, cell: IntArray
 ) -> tuple[IntArray, NDArray[np.float64]]:
     """Return the triangles in which points of the texture lie, and the weights of their corners.
 
@@ -286,8 +288,9 @@ def located_in_texture(
         Texture coordinates of triangles (m, 3, 2).
     face_at
         Triangle at each point of the grid, from `rasterised` (rows, columns).
-    uv
-        Points (n, 2), whose cells have a triangle.
+    uv, cell
+        Points (n, 2), and row and column of the cell of the grid of each (n, 2), which has a
+        triangle; by rounding the point may lie just beside it.
 
     Returns
     -------
@@ -299,8 +302,7 @@ def located_in_texture(
     weights = np.empty((len(uv), 3))
     near = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (-1, -1), (1, -1), (-1, 1))
     for i in range(len(uv)):
-        column = min(max(math.floor(uv[i, 0] * columns), 0), columns - 1)
-        row = min(max(math.floor(uv[i, 1] * rows), 0), rows - 1)
+        row, column = cell[i, 0], cell[i, 1]
         for k in range(len(near) + 1):
             # The last one is the triangle of the own cell again.
             down, right = near[k % len(near)]

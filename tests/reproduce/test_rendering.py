@@ -1,5 +1,6 @@
 """Scenes over time: what is charged by which light, and how it then glows."""
 
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,15 @@ from labrig.reproduce import (
 from labrig.yaml_file import write_yaml
 
 LUX = 800.0
+PAINT = {"file": "blue-paint", "assume_albedo": 0.6}
 HUGE = {"width_px": 8192, "height_px": 8192}
 MIRROR = {"wavelength_nm": [400, 500], "value": [1, 1]}
 SUN = {"kind": "distant", "irradiance_w_per_m2": 1, "towards": [0, 0, 1]}
+SKY = {"kind": "sky", "luminance_cd_per_m2": 1}
+FLAT = {"corner_m": [0, 0, 0], "edge_u_m": [1, 0, 0], "edge_v_m": [0, 1, 0]}
+MANY = {**FLAT, "parts": 16}
+DISK = {"centre_m": [0, 0, 0], "normal": [0, 0, 0], "radius_m": 1}
+WAVE = {"amplitude_m": 0.05, "period_s": 40.0}
 BENCH = {"spectrum": "A", "illuminance_lux": 1000.0}
 
 
@@ -105,7 +112,7 @@ def test_glow_charges_another_phosphor_in_the_dark(tmp_path: Path) -> None:
             kind="phosphor",
             bands_nm=(400.0, 440.0, 480.0),
             irradiance_norm={"kind": "vector_length", "value": 1.0},
-            states=(State(k_r_per_s=0.02, k_e_per_s=(1.0, 0.0), reradiation=(40.0, 0.0)),),
+            states=(State(k_r_per_s=0.02, k_e_per_s=(1.0, 0.0), reradiation=(0.4, 0.0)),),
         ),
     )
     built = scene(
@@ -128,7 +135,7 @@ def test_glow_charges_another_phosphor_in_the_dark(tmp_path: Path) -> None:
     unit = float(np.linalg.norm(bench.in_bands(edges) * 40))
     mean = float(bench.in_bands(edges[[0, 2]])[0])
     # κ of one by the level of the other: E = π F L, over 40 nm.
-    c = np.pi * view_factor * mean * 40.0 * 0.02 * 40.0 / unit
+    c = np.pi * view_factor * mean * 0.4 * 0.02 * 40.0 / unit
 
     def growth(_: float, r: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         return np.asarray((1 - r) * c * r[::-1] - 0.02 * r)
@@ -196,6 +203,10 @@ def test_levels_at_first_are_given_or_those_of_the_light(tmp_path: Path) -> None
         ),
         ({"materials": {"paint": {"albedo": MIRROR}}}, "eigenvalue"),
         ({"lamps": {"sun": {"spectrum": "900nm", **SUN}}}, "between 300 and 780 nm"),
+        (
+            {"materials": {"paint": {**PAINT, "assume_scale": 500.0}}},
+            "less light than it takes",
+        ),
         ({"bands": {"first_nm": 710, "last_nm": 780, "count": 4}}, "overlap"),
         ({"camera": {"position_m": [0, 0, 1], "look_at_m": [0, 0, 0]}}, "upwards"),
         (
@@ -279,7 +290,7 @@ def test_materials_are_replaced_and_assumptions_are_named(tmp_path: Path) -> Non
     built = load_scene(
         "cornell-box", {"phosphorescent": "pink-paint"}, Assumptions(albedo=0.5, scale=1.0)
     )
-    assert any("pink-paint" in note and "0.7" in note for note in built.notes)
+    assert any("phosphorescent (pink-paint)" in note and "0.5" in note for note in built.notes)
 
 
 @pytest.mark.parametrize("name", sorted(p.stem for p in Path("config/scenes").glob("*.yaml")))
@@ -321,3 +332,109 @@ def test_how_closed_a_mesh_is() -> None:
     assert drops.is_closed
     assert drops.volume_m3 == pytest.approx(2 * 4 / 3 * 0.1**3)
     assert not Mesh(box.vertices_m, box.faces[1:]).is_closed
+
+
+REFUSED = [
+    ({"lamps": {"sky": SKY, "sun": SKY}}, "at most one lamp of kind sky"),
+    ({"lamps": {"sun": {"kind": "area", "luminance_cd_per_m2": 1}}}, "an object that is this lamp"),
+    ({"lamps": {"sun": {**SUN, "position_m": [0, 0, 1]}}}, "kind point"),
+    ({"objects": {"a": {"material": "paint", "rectangle": FLAT, "wave": WAVE}}}, "'parts'"),
+    ({"objects": {"a": {"material": "paint", "rectangle": MANY, "wave": WAVE}}}, "step_s"),
+    ({"objects": {"a": {"material": "paint", "disk": DISK}}}, "direction"),
+    ({"name": "../../x"}, "name"),
+    ({"paths": {"seed": -1}}, "seed"),
+]
+
+
+@pytest.mark.parametrize(("changed", "says"), REFUSED, ids=[says for _, says in REFUSED])
+def test_a_scene_that_cannot_be_is_one_line(
+    tmp_path: Path, changed: dict[str, Any], says: str
+) -> None:
+    content = scene(tmp_path).file.model_dump(mode="json", exclude_unset=True)
+    (tmp_path / "scene.yaml").write_text(json.dumps({**content, **changed}))
+    with pytest.raises(UsageError, match=says) as raised:
+        load_scene(tmp_path / "scene.yaml")
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"PK\x03\x04 cut short", b"\x93NUMPY\x01\x00v\x00"],
+    ids=["empty", "cut", "npy"],
+)
+def test_a_damaged_trajectory_is_one_line(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "drops.npz").write_bytes(content)
+    drops = {"material": "paint", "particles": {"file": "drops.npz", "radius_m": 0.1}}
+    with pytest.raises(UsageError, match="position_m") as raised:
+        scene(tmp_path, objects={"drops": drops}, step_s=1.0)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_thin_sheet_is_charged_from_both_of_its_sides(tmp_path: Path) -> None:
+    sheet = {"corner_m": [0, 0, 0], "edge_u_m": [1, 0, 0], "edge_v_m": [0, 1, 0]}
+    levels = {}
+    for towards in ([0, 0, 1], [0, 0, -1]):
+        lamp = {"kind": "distant", "illuminance_lux": LUX, "towards": towards}
+        for two_sided in (True, False):
+            thing = {"material": "paint", "rectangle": sheet, "samples": [2, 2]}
+            renderer = Renderer(
+                scene(
+                    tmp_path,
+                    lamps={"sun": lamp},
+                    objects={"sheet": {**thing, "two_sided": two_sided}},
+                )
+            )
+            renderer.frame(0.0)
+            levels[towards[2], two_sided] = float(renderer.levels["paint"].mean())
+    assert levels[1, True] == pytest.approx(levels[1, False], rel=1e-4)
+    assert levels[-1, True] == pytest.approx(levels[1, True], rel=1e-4)
+    assert levels[-1, False] == 0
+
+
+def test_where_the_scene_stands_does_not_matter(tmp_path: Path) -> None:
+    """A square of 10 cm below a point lamp, at the origin and more than a kilometre from it."""
+    levels = []
+    for x in (0.0, 1000.0):
+        at = np.array([x, -x, x])
+        flat = {"corner_m": at.tolist(), "edge_u_m": [0.1, 0, 0], "edge_v_m": [0, 0.1, 0]}
+        lamp = [x + 0.05, -x + 0.05, x + 0.3]
+        renderer = Renderer(
+            scene(
+                tmp_path,
+                lamps={"sun": {"kind": "point", "intensity_cd": 10.0, "position_m": lamp}},
+                objects={"square": {"material": "paint", "rectangle": flat, "samples": [2, 2]}},
+            )
+        )
+        renderer.frame(0.0)
+        levels.append(float(renderer.levels["paint"].mean()))
+    assert levels[1] == pytest.approx(levels[0], rel=1e-3)
+    assert levels[0] > 0.05
+
+
+def test_glow_that_excites_another_colour_does_not_depend_on_the_frames(tmp_path: Path) -> None:
+    """Light that falls by decades between two pictures is followed in steps of its own."""
+    entry = {"assume_albedo": 0.7, "assume_scale": 0.2}
+    room = {"centre_m": [0, 0, 0], "size_m": [2, 2, 2], "inward": True}
+    levels = []
+    for frames_s in ([0, 300], [0, *range(2, 301, 2)]):
+        built = scene(
+            tmp_path,
+            materials={
+                "walls": {"file": "blue-paint", **entry},
+                "ball": {"file": "yellow-paint", **entry},
+            },
+            lamps={"lamp": {"kind": "point", "intensity_cd": 50.0, "position_m": [0, 0.5, 0.8]}},
+            objects={
+                "room": {"material": "walls", "box": room, "samples": [3, 2]},
+                "ball": {"material": "ball", "sphere": {"centre_m": [0, 0, 0], "radius_m": 0.5},
+                         "samples": [4, 2]},
+            },
+            programme=[{"at_s": -60, "lamps": {"lamp": 1}}, {"at_s": 0, "lamps": {"lamp": 0}}],
+            frames_s=frames_s,
+            paths={"per_pixel": 1, "per_place": 64},
+        )  # fmt: skip
+        renderer = Renderer(built)
+        for t_s in frames_s:
+            renderer._advance(float(t_s))  # the pictures between are not wanted
+        levels.append([float(renderer.levels[name].mean()) for name in ("walls", "ball")])
+    np.testing.assert_allclose(levels[0], levels[1], rtol=0.02)
