@@ -1,0 +1,28 @@
+from .appearance import (
+    key_differences as key_differences,
+)
+from .bands import (
+    DesignBands as DesignBands,
+    spectral_bands as spectral_bands,
+    three_bands as three_bands,
+)
+from .determined import (
+    Conflict as Conflict,
+    Estimate as Estimate,
+)
+from .keys import (
+    Keys as Keys,
+)
+from .light import (
+    LightProgramme as LightProgramme,
+)
+from .result import (
+    Design as Design,
+    Impossible as Impossible,
+)
+from .smooth_spectrum import (
+    smooth_spectrum as smooth_spectrum,
+)
+from .solver import (
+    solve as solve,
+)
