@@ -6,6 +6,9 @@ from .bands import (
     spectral_bands as spectral_bands,
     three_bands as three_bands,
 )
+from .conversion import (
+    Conversion as Conversion,
+)
 from .determined import (
     Conflict as Conflict,
     Estimate as Estimate,
@@ -15,6 +18,16 @@ from .keys import (
 )
 from .light import (
     LightProgramme as LightProgramme,
+)
+from .material_file import (
+    to_material as to_material,
+    written_differences as written_differences,
+)
+from .nearest import (
+    NearestMaterial as NearestMaterial,
+    material_radiance as material_radiance,
+    nearest_materials as nearest_materials,
+    presets as presets,
 )
 from .result import (
     Design as Design,

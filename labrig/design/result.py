@@ -122,9 +122,13 @@ class Design:
     @cached_property
     def delta_e2000(self) -> FloatArray:
         """ΔE2000 of each key, both sides scaled so that it has half a white's luminance (keys,)."""
+        return self.differences_to(self.got_rgb)
+
+    def differences_to(self, rgb: FloatArray) -> FloatArray:
+        """Return ΔE2000 of other colours (keys, 3), in linear sRGB per sr, to the wanted ones."""
         wanted = self.keys.rgb(self.bands)
         brightest = float((wanted @ RGB_TO_Y).max())
-        return key_differences(wanted, self.got_rgb, FLOOR * max(brightest, 1e-300))
+        return key_differences(wanted, rgb, FLOOR * max(brightest, 1e-300))
 
     @cached_property
     def emitted_over_absorbed(self) -> FloatArray:

@@ -33,9 +33,10 @@ def smooth_spectrum(rgb: FloatArray, colours_of_bands: FloatArray) -> FloatArray
     Parameters
     ----------
     rgb
-        Colour in linear sRGB, shape (3,); negative values are outside of sRGB, but may be seen.
+        Colour in linear sRGB, shape (3,), or other sums over the bands, shape (n,); negative values
+        are outside of sRGB, but may be seen.
     colours_of_bands
-        Linear sRGB of light by its bands, shape (3, bands).
+        Linear sRGB of light by its bands, shape (3, bands) or (n, bands).
 
     Returns
     -------
