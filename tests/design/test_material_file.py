@@ -24,7 +24,7 @@ from tests.design.scenes import COLOURED, Truth, keys_of
 
 THREE = three_bands()
 DAY = LightProgramme.checked(
-    [0.0, 30.0, 90.0, 95.0], [[1.0, 0.9, 0.8], [0.0] * 3, [0.0, 0, 2.0], [0.0] * 3]
+    [0.0, 30.0, 90.0, 95.0], [[1.0, 0.9, 0.8], [0.0] * 3, [0.7, 0.8, 1.3], [0.0] * 3]
 )
 TIMES_S = [31.0, 50.0, 80.0, 93.0, 97.0, 150.0]
 
