@@ -15,15 +15,16 @@ from pydantic_core import SchemaError, SchemaSerializer, core_schema
 
 from labrig import plugins
 from labrig.acquire import ROLES, DeviceEntry, RigFile
+from labrig.design import WishFile
 from labrig.errors import UsageError
 from labrig.material import FluorescentMaterial, Material
 from labrig.yaml_file import did_you_mean
 
-KINDS = ("protocol", "rig", "material")
+KINDS = ("protocol", "rig", "material", "design")
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """Return the JSON Schema of a `protocol`, a `rig` or a `material` file, as YAML loads it.
+    """Return the JSON Schema of a `protocol`, `rig`, `material` or `design` file, as YAML loads it.
 
     Raises
     ------
@@ -36,6 +37,7 @@ def schema(kind: str) -> dict[str, Any]:
         "protocol": _protocol,
         "rig": _rig,
         "material": lambda: _one_of("kind", [Material, FluorescentMaterial]),
+        "design": lambda: WishFile,
     }
     model = makers[kind]()
     json_schema = TypeAdapter(model).json_schema(by_alias=True, schema_generator=_Described)

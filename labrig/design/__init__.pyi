@@ -2,6 +2,7 @@ from .appearance import (
     key_differences as key_differences,
 )
 from .bands import (
+    RGB_TO_Y as RGB_TO_Y,
     DesignBands as DesignBands,
     spectral_bands as spectral_bands,
     three_bands as three_bands,
@@ -38,4 +39,12 @@ from .smooth_spectrum import (
 )
 from .solver import (
     solve as solve,
+)
+from .wish_file import (
+    LightChange as LightChange,
+    Wish as Wish,
+    WishedKey as WishedKey,
+    WishFile as WishFile,
+    read_wish as read_wish,
+    to_wish as to_wish,
 )

@@ -48,11 +48,6 @@ class Estimate:
     unit: str
     is_determined: bool
 
-    def __str__(self) -> str:
-        if not self.is_determined:
-            return f"{self.name} = {self.value:.3g} {self.unit}, undetermined".replace("  ", " ")
-        return f"{self.name} = {self.value:.3g} ± {self.sigma:.1g} {self.unit}".strip()
-
 
 @dataclass(frozen=True)
 class Conflict:

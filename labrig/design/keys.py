@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.design.bands import RGB_TO_Y, DesignBands
+from labrig.design.light import STRONGEST
 from labrig.errors import UsageError
 
 FloatArray = NDArray[np.float64]
 
 #: Floor of the luminance by which a key is weighted, as a part of the brightest key's.
 FLOOR = 1e-4
+#: Radiance below which a key is black.
+BLACK = 1e-15
 #: Relative difference below which two keys at one place and time want the same.
 SAME = 1e-9
 #: Largest number of keys: above it nobody has set them by hand, and the search takes minutes.
@@ -41,7 +44,7 @@ class Keys:
 
     @classmethod
     def checked(cls, place: ArrayLike, time_s: ArrayLike, radiance: ArrayLike) -> Self:
-        """Return keys that were checked, one for each place and time.
+        """Return keys that were checked, one for each place and time; below 1e-15 they are black.
 
         Parameters
         ----------
@@ -75,6 +78,9 @@ class Keys:
                 f"expected finite numbers, got NaN or an infinite one in key "
                 f"{int(np.argmin(is_proper)) + 1}"
             )
+        if np.abs(wanted).max() > STRONGEST:
+            raise UsageError(f"expected radiances up to {STRONGEST:g}, got {wanted.max():g}")
+        wanted = np.where(np.abs(wanted) < BLACK, 0.0, wanted)
         order = np.lexsort((time, where))
         for first, second in itertools.pairwise(order):
             if where[first] == where[second] and time[first] == time[second]:

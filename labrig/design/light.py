@@ -10,6 +10,9 @@ from labrig.errors import UsageError
 
 FloatArray = NDArray[np.float64]
 
+#: Irradiance below which it is dark, and largest one; 1 is a light that makes a card white.
+DARK, STRONGEST = 1e-12, 1e12
+
 
 @dataclass(frozen=True, eq=False)
 class LightProgramme:
@@ -29,7 +32,7 @@ class LightProgramme:
 
     @classmethod
     def checked(cls, begin_s: ArrayLike, irradiance: ArrayLike) -> Self:
-        """Return a programme whose shapes and ranges were checked.
+        """Return a programme whose shapes and ranges were checked; below 1e-12 it is dark.
 
         Parameters
         ----------
@@ -54,7 +57,9 @@ class LightProgramme:
             raise UsageError("expected rising times in the light programme, got others")
         if not (np.isfinite(light).all() and light.min() >= 0):
             raise UsageError("expected irradiances that are finite and ≥ 0, got others")
-        return cls(begin, light)
+        if light.max() > STRONGEST:
+            raise UsageError(f"expected irradiances up to {STRONGEST:g}, got {light.max():g}")
+        return cls(begin, np.where(light < DARK, 0.0, light))
 
     @property
     def n_places(self) -> int:

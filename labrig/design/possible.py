@@ -77,9 +77,9 @@ def _brighter_in_the_dark(design: Design) -> Iterator[Impossible]:
     """Yield pairs of neighbouring keys of which the later is brighter, with darkness between."""
     keys = design.keys
     # Sums of what only fades: bands, channels that are bands, or X, Y, Z of colours.
-    fading = keys.radiance
+    fading, names = keys.radiance, design.bands.names
     if keys.is_colour(design.bands):
-        fading = fading @ XYZ_OF_RGB.T
+        fading, names = fading @ XYZ_OF_RGB.T, ("X", "Y", "Z")
     weight = 1 / keys.luminance(design.bands) ** 2
     order = np.lexsort((keys.time_s, keys.place)).tolist()
     for first, second in itertools.pairwise(order):
@@ -96,8 +96,8 @@ def _brighter_in_the_dark(design: Design) -> Iterator[Impossible]:
             )
             yield Impossible(
                 (first, second),
-                f"{_named(design, second)} is brighter than {_named(design, first)} without light "
-                "between, where a glow only fades",
+                f"{_named(design, second)} is brighter in {names[int(excess.argmax())]} than "
+                f"{_named(design, first)} without light between, where a glow only fades",
                 f"{_numbers(np.maximum(both, 0) * np.pi)} at both, or light between them",
             )
 

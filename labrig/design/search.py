@@ -27,6 +27,8 @@ FloatArray = NDArray[np.float64]
 
 #: Range of k_r: the slowest decay over all of the time, the fastest over the shortest step.
 SLOWEST, FASTEST = 1e-3, 30.0
+#: Shortest step that counts for it, as a part of all of the time, and all of the time at least.
+SHORTEST, INSTANT_S = 1e-6, 1e-6
 #: κ under the strongest light of a band: times all of the time where only ratios of excitation
 #: rates matter, and its largest value over the largest k_r.
 FAINT, STRONGEST = 1e-3, 10.0
@@ -108,7 +110,7 @@ class Problem:
             for step in lit_steps
         )
         durations = np.concatenate([step.duration_s for step in merged])
-        longest = max((float(step.duration_s.sum()) for step in merged), default=0.0)
+        longest = max(*(float(step.duration_s.sum()) for step in merged), INSTANT_S)
         all_lights = np.concatenate([step.irradiance for step in merged])
         return cls(
             merged,
@@ -118,8 +120,8 @@ class Problem:
             n_states,
             groups,
             all_lights.max(axis=0, initial=0.0),
-            float(durations.min(initial=longest or 1.0)),
-            longest or 1.0,
+            max(float(durations.min(initial=longest)), SHORTEST * longest),
+            longest,
         )
 
     @property
