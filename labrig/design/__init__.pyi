@@ -30,6 +30,10 @@ from .nearest import (
     nearest_materials as nearest_materials,
     presets as presets,
 )
+from .propagation import (
+    Reach as Reach,
+    propagate as propagate,
+)
 from .result import (
     Design as Design,
     Impossible as Impossible,
