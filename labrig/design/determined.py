@@ -34,7 +34,8 @@ class Estimate:
     value
         Its value.
     sigma
-        Its σ if every key is meant to the stated relative σ; infinite if no key depends on it.
+        Its σ if every key is meant to the stated relative σ, or to that with which they are met if
+        it is larger; infinite if no key depends on it.
     unit
         Its unit.
     is_determined

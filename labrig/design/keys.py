@@ -106,8 +106,15 @@ class Keys:
         return bands.edges_nm is not None and width == 3
 
     def luminance(self, bands: DesignBands) -> FloatArray:
-        """Return the wanted luminances, at least the floor, shape (m,)."""
-        y = np.maximum(self.rgb(bands) @ RGB_TO_Y, 0.0)
+        """Return the wanted luminances in the unit of the radiances, at least the floor (m,).
+
+        That of light in bands is its mean, weighted as eyes see the bands.
+        """
+        seen = RGB_TO_Y if self.is_colour(bands) else RGB_TO_Y @ bands.to_rgb
+        weights = np.maximum(seen, 0.0)
+        if not weights.any():
+            weights = np.ones_like(weights)
+        y = np.maximum(self.radiance @ (weights / weights.sum()), 0.0)
         brightest = float(y.max())
         return np.maximum(y, FLOOR * brightest) if brightest > 0 else np.ones_like(y)
 

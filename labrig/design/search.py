@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,8 @@ LEVELS_OF_PAIRS = {1: (10, 12), 2: (5, 8), 3: (3, 7)}
 GRID_BANDS = 3
 #: Number of starts, and of those that are refined again where the grid ranks another problem.
 STARTS, REFINED = 8, 3
+#: Levels of a rate, and rounds over all rates, where starts are improved rate by rate.
+SWEPT_LEVELS, SWEEPS = 14, 2
 #: Entries of keys by steps of all searches that go on at once.
 MOST_ENTRIES = 2_000_000
 #: κ times all of the time under the strongest light that is preferred, and the weight of that.
@@ -189,6 +192,14 @@ class Problem:
         wanted = self.linear.wanted
         return float(((wanted.weight[:, np.newaxis] * wanted.target) ** 2).sum()) or 1.0
 
+    def at_once(self, states: int) -> int:
+        """Return how many candidates of `states` fit into the memory at once.
+
+        Products of keys and steps would fill it for thousands of keys.
+        """
+        entries = sum(len(steps.keys) * len(steps.duration_s) for steps in self.steps)
+        return max(1, MOST_ENTRIES // max(1, entries * states))
+
     def emission_of(self, x: FloatArray, order: float) -> Emission:
         """Return the emission of states of coordinates x, with slopes by coordinates."""
         rates = self.rates(x)
@@ -237,7 +248,10 @@ def search(problem: Problem, *, is_order_free: bool, order: float) -> tuple[Foun
     """Return where the searches from the grid's basins end, the lowest first."""
     if not problem.n_groups:
         return (_dark(problem),)
-    ends, costs = _descended(problem, np.array(list(_starts(problem))))
+    starts = np.array(list(_starts(problem)))
+    if problem.n_groups > GRID_BANDS or problem.n_states > 1:
+        starts = _swept(problem, starts)
+    ends, costs = _descended(problem, starts)
     ends = ends[np.argsort(costs, kind="stable")]
     if not isinstance(problem.linear, BandByBand):
         # They were ranked by channels; colours of bands are another problem.
@@ -249,6 +263,42 @@ def search(problem: Problem, *, is_order_free: bool, order: float) -> tuple[Foun
     else:
         found = [_found(problem, end, 1.0) for end in (lowest, *ends[1:])]
     return tuple(sorted(found, key=lambda each: each.cost))
+
+
+def _swept(problem: Problem, starts: FloatArray) -> FloatArray:
+    """Return starts (n, p) after searches along one rate after another over its whole range.
+
+    The grid has few levels of each rate, and none of their own of many bands.
+    """
+    size = problem.at_once(SWEPT_LEVELS + 1)
+    parts = [starts[first : first + size] for first in range(0, len(starts), size)]
+    swept = [_swept_at_once(problem, problem.rates(part)) for part in parts]
+    return np.unique(problem.coordinates(np.concatenate(swept)), axis=0)
+
+
+def _swept_at_once(problem: Problem, rates: FloatArray) -> FloatArray:
+    """Return rates (n, states, rates) after the searches of `_swept`."""
+    glow = np.moveaxis(_glow(problem, rates), 1, 2)
+    of_k_e, of_k_r = _axes(problem, (SWEPT_LEVELS - 1, SWEPT_LEVELS), 1)
+    kappa = np.append(0.0, np.exp(of_k_e))
+    ranges = [*(kappa / strongest for strongest in problem.strongest), np.exp(of_k_r)]
+    every = product(range(SWEEPS), range(problem.n_states), range(problem.n_rates))
+    for _, state, rate in every:
+        # The first candidate is what there is.
+        candidates = np.repeat(rates[:, state, np.newaxis], SWEPT_LEVELS + 1, axis=1)
+        candidates[:, 1:, rate] = ranges[rate]
+        emitted = np.repeat(glow[:, np.newaxis], SWEPT_LEVELS + 1, axis=1)
+        emitted[..., state] = _glow(problem, candidates)
+        costs = problem.surrogate.costs(emitted.reshape(-1, *glow.shape[1:]))
+        best = np.arange(len(rates)), costs.reshape(len(rates), -1).argmin(axis=1)
+        rates[:, state], glow = candidates[best], emitted[best]
+    return rates
+
+
+def _glow(problem: Problem, rates: FloatArray) -> FloatArray:
+    """Return the first-order emission of rates (…, rates) at the keys, shape (…, keys)."""
+    glow = emission(problem.steps, problem.n_keys, rates[..., :-1], rates[..., -1], 1.0)
+    return glow.value
 
 
 def _descended(problem: Problem, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -266,9 +316,7 @@ def _descended(problem: Problem, starts: FloatArray) -> tuple[FloatArray, FloatA
             at.matrix + weight * np.eye(x.shape[1]),
         )
 
-    # Products of keys and steps of all starts at once would fill the memory for thousands of keys.
-    entries = sum(len(steps.keys) * len(steps.duration_s) for steps in problem.steps)
-    size = max(1, MOST_ENTRIES // max(1, entries * problem.n_states))
+    size = problem.at_once(problem.n_states)
     parts = [
         descend(curvature, starts[first : first + size], *problem.bounds)
         for first in range(0, len(starts), size)

@@ -1,5 +1,6 @@
 """The material that best glows as wanted (section 6 of Nalbach et al., eq. 7)."""
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
@@ -183,7 +184,10 @@ def _judged(
         columns.append(whole)
         is_free.append(block.is_free)
     jacobian = np.concatenate(columns, axis=1)
-    sigma = key_sigma * np.sqrt(np.diag(covariance(jacobian)))
+    # Keys that are met worse than they are meant tell less.
+    dof = max(n_rows - int(np.concatenate(is_free).sum()), 1)
+    missed = math.sqrt(float(residuals @ residuals) / dof)
+    sigma = max(key_sigma, missed) * np.sqrt(np.diag(covariance(jacobian)))
     estimates = [
         *_rates(problem, best, sigma[:n_rates], bands),
         *_order(best, sigma[n_rates:n_nonlinear]),

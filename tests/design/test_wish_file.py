@@ -148,7 +148,7 @@ numbers = st.floats(0, 1e3, allow_subnormal=False)
 colours = st.tuples(numbers, numbers, numbers)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     st.lists(
         st.tuples(st.floats(0, 100), st.tuples(numbers, numbers, numbers)), min_size=1, max_size=5
