@@ -96,7 +96,7 @@ def test_a_noisy_glow_gives_parameters_within_three_sigma_or_undetermined(seed: 
 
 
 def test_sigma_is_the_spread_over_many_noisy_glows() -> None:
-    """A σ that is 20 % too large or too small fails: the pulls' spread is known to 6 %, and is 0.93."""
+    """A σ that is 20 % too large or too small fails: the pulls' spread is 0.93 ± 0.06."""
     exact = keys_of(ONE_STATE, COLOURED, OFTEN_S)
     sigma = 0.01 * exact.luminance(RGB)[:, np.newaxis]
     pulls = []
