@@ -13,8 +13,8 @@ from labrig.errors import UsageError
 
 FloatArray = NDArray[np.float64]
 
-#: Floor of the luminance by which a key is weighted, as a part of the brightest key's.
-FLOOR = 1e-4
+#: Luminance, as a part of the brightest key's, below which a key is black.
+FLOOR = 1e-6
 #: Radiance below which a key is black.
 BLACK = 1e-15
 #: Relative difference below which two keys at one place and time want the same.
@@ -106,17 +106,31 @@ class Keys:
         return bands.edges_nm is not None and width == 3
 
     def luminance(self, bands: DesignBands) -> FloatArray:
-        """Return the wanted luminances in the unit of the radiances, at least the floor (m,).
+        """Return the luminances by which keys count, in the unit of the radiances, shape (m,).
 
-        That of light in bands is its mean, weighted as eyes see the bands.
+        A black key counts as the faintest other one. That of light in bands is its mean, weighted
+        as eyes see the bands.
         """
         seen = RGB_TO_Y if self.is_colour(bands) else RGB_TO_Y @ bands.to_rgb
         weights = np.maximum(seen, 0.0)
         if not weights.any():
             weights = np.ones_like(weights)
-        y = np.maximum(self.radiance @ (weights / weights.sum()), 0.0)
-        brightest = float(y.max())
-        return np.maximum(y, FLOOR * brightest) if brightest > 0 else np.ones_like(y)
+        return _with_floor(self.radiance @ (weights / weights.sum()))
+
+    def screen_luminance(self, bands: DesignBands) -> FloatArray:
+        """Return the luminances by which differences of colours are judged, shape (m,).
+
+        They are those of linear sRGB; a black key is judged as the faintest other one.
+        """
+        return _with_floor(self.rgb(bands) @ RGB_TO_Y)
+
+
+def _with_floor(y: FloatArray) -> FloatArray:
+    """Return luminances, those of black keys replaced by the least of the others."""
+    is_black = y <= FLOOR * max(float(y.max()), 0.0)
+    if is_black.all():
+        return np.ones_like(y)
+    return np.where(is_black, y[~is_black].min(), y)
 
 
 def _refuse_contradiction(

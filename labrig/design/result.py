@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.design.appearance import key_differences
-from labrig.design.bands import RGB_TO_Y, DesignBands
+from labrig.design.bands import DesignBands
 from labrig.design.determined import Conflict, Estimate
 from labrig.design.glow import captures, emission
-from labrig.design.keys import FLOOR, Keys
+from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme, steps_to
 
 FloatArray = NDArray[np.float64]
@@ -126,9 +126,8 @@ class Design:
 
     def differences_to(self, rgb: FloatArray) -> FloatArray:
         """Return ΔE2000 of other colours (keys, 3), in linear sRGB per sr, to the wanted ones."""
-        wanted = self.keys.rgb(self.bands)
-        brightest = float((wanted @ RGB_TO_Y).max())
-        return key_differences(wanted, rgb, FLOOR * max(brightest, 1e-300))
+        luminance = self.keys.screen_luminance(self.bands)
+        return key_differences(self.keys.rgb(self.bands), rgb, luminance)
 
     @cached_property
     def emitted_over_absorbed(self) -> FloatArray:

@@ -24,6 +24,8 @@ FloatArray = NDArray[np.float64]
 MOST_STATES = 2
 #: Relative σ with which a key is meant: a luminance that differs by 2 % looks the same.
 KEY_SIGMA = 0.02
+#: Bands lit in proportion whose names are all written.
+MOST_JOINED = 3
 #: Factor within its range from which a rate is not held by an end of it.
 INSIDE = 1.01
 #: Keys above which it is not asked which work against each other.
@@ -216,7 +218,7 @@ def _rates(
         for group in np.unique(problem.groups).tolist():
             # Of bands that are always lit in proportion only a sum is known.
             members = np.flatnonzero(problem.groups == group)
-            name = f"k_e{label} {' + '.join(bands.names[band] for band in members)}"
+            name = f"k_e{label} {_joined([bands.names[band] for band in members])}"
             if group < 0:
                 estimates.append(Estimate(name, 0.0, np.inf, "1/s", False))
                 continue
@@ -224,6 +226,12 @@ def _rates(
             value, its_sigma = float(rates[group]), float(own[group])
             estimates.append(Estimate(name, value, its_sigma, "1/s", is_known))
     return estimates
+
+
+def _joined(names: Sequence[str]) -> str:
+    """Return the names of bands, of many the first and the last."""
+    many = len(names) > MOST_JOINED
+    return f"{names[0]} … {names[-1]}" if many else " + ".join(names)
 
 
 def _order(best: Found, sigma: FloatArray) -> Sequence[Estimate]:

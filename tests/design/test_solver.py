@@ -145,6 +145,15 @@ def test_faint_keys_count_unless_squares_are_plain() -> None:
     assert faint[0] < faint[1]
 
 
+def test_a_black_key_does_not_outweigh_the_others() -> None:
+    light = LightProgramme.checked([0.0, 60.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    glow = np.multiply.outer([1.0, 0.3, 0.0], [0.001, 0.01, 0.004])
+    keys = Keys.checked(0, [61.0, 90.0, 400.0], glow)
+    design = solve(light, keys, RGB, albedo=0.5)
+    assert design.delta_e2000[:2].max() < 1
+    assert design.got_rgb[2].max() < 1e-3 * glow.max()
+
+
 def test_colours_of_spectral_bands_are_met_by_smooth_spectra() -> None:
     bands = spectral_bands(np.linspace(400, 700, 9))
     irradiance = np.zeros((2, 8))
