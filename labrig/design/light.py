@@ -12,6 +12,8 @@ FloatArray = NDArray[np.float64]
 
 #: Irradiance below which it is dark, and largest one; 1 is a light that makes a card white.
 DARK, STRONGEST = 1e-12, 1e12
+#: Relative difference of two times that is rounding.
+ROUNDED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +113,10 @@ def steps_to(
         last = max(float(time_s[keys].max()), float(begin[0]))
         edges = np.unique(np.concatenate([begin[begin < last], time_s[keys], begin[:1]]))
         edges = edges[edges >= begin[0]]
-        at = np.searchsorted(begin, edges[:-1], side="right") - 1
-        taken = np.maximum(np.searchsorted(edges, time_s[keys]), 0)
+        # A key at a change of light may differ from it by rounding.
+        same = ROUNDED * (abs(begin[0]) + last)
+        edges = edges[np.concatenate([[True], np.diff(edges) > same])]
+        at = np.searchsorted(begin, edges[:-1] + same, side="right") - 1
+        taken = np.maximum(np.searchsorted(edges, time_s[keys] + same, side="right") - 1, 0)
         found.append(Steps(np.diff(edges), light[is_new][at], keys, taken))
     return tuple(found)

@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 #: Range of k_r: the slowest decay over all of the time, the fastest over the shortest step.
 SLOWEST, FASTEST = 1e-3, 30.0
 #: Shortest step that counts for it, as a part of all of the time, and all of the time at least.
-SHORTEST, INSTANT_S = 1e-6, 1e-6
+SHORTEST, INSTANT_S = 1e-4, 1e-6
 #: κ under the strongest light of a band: times all of the time where only ratios of excitation
 #: rates matter, and its largest value over the largest k_r.
 FAINT, STRONGEST = 1e-3, 10.0
@@ -41,8 +41,10 @@ LEVELS_OF_PAIRS = {1: (10, 12), 2: (5, 8), 3: (3, 7)}
 GRID_BANDS = 3
 #: Number of starts, and of those that are refined again where the grid ranks another problem.
 STARTS, REFINED = 8, 3
-#: Levels of a rate, and rounds over all rates, where starts are improved rate by rate.
-SWEPT_LEVELS, SWEEPS = 14, 2
+#: Levels of a rate, and passes over all rates, where ends are improved rate by rate.
+SWEPT_LEVELS, SWEEPS = 14, 1
+#: Rounds of searches rate by rate, each followed by descents.
+ROUNDS = 3
 #: Entries of keys by steps of all searches that go on at once.
 MOST_ENTRIES = 2_000_000
 #: κ times all of the time under the strongest light that is preferred, and the weight of that.
@@ -248,10 +250,13 @@ def search(problem: Problem, *, is_order_free: bool, order: float) -> tuple[Foun
     """Return where the searches from the grid's basins end, the lowest first."""
     if not problem.n_groups:
         return (_dark(problem),)
-    starts = np.array(list(_starts(problem)))
+    ends, costs = _descended(problem, np.array(list(_starts(problem))))
     if problem.n_groups > GRID_BANDS or problem.n_states > 1:
-        starts = _swept(problem, starts)
-    ends, costs = _descended(problem, starts)
+        for _ in range(ROUNDS):
+            others, their_costs = _descended(problem, _swept(problem, ends))
+            ends, costs = np.concatenate([ends, others]), np.concatenate([costs, their_costs])
+            best = np.argsort(costs, kind="stable")[:STARTS]
+            ends, costs = ends[best], costs[best]
     ends = ends[np.argsort(costs, kind="stable")]
     if not isinstance(problem.linear, BandByBand):
         # They were ranked by channels; colours of bands are another problem.
@@ -266,7 +271,7 @@ def search(problem: Problem, *, is_order_free: bool, order: float) -> tuple[Foun
 
 
 def _swept(problem: Problem, starts: FloatArray) -> FloatArray:
-    """Return starts (n, p) after searches along one rate after another over its whole range.
+    """Return points (n, p) after searches along one rate after another over its whole range.
 
     The grid has few levels of each rate, and none of their own of many bands.
     """
