@@ -15,16 +15,17 @@ from pydantic_core import SchemaError, SchemaSerializer, core_schema
 
 from labrig import plugins
 from labrig.acquire import ROLES, DeviceEntry, RigFile
+from labrig.design import WishFile
 from labrig.errors import UsageError
 from labrig.material import FluorescentMaterial, Material
 from labrig.reproduce import SceneFile
 from labrig.yaml_file import did_you_mean
 
-KINDS = ("protocol", "rig", "material", "scene")
+KINDS = ("protocol", "rig", "material", "scene", "design")
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """Return the JSON Schema of a `protocol`, `rig`, `material` or `scene` file, as YAML loads it.
+    """Return the JSON Schema of a kind of file, one of `KINDS`, as YAML loads it.
 
     Raises
     ------
@@ -38,6 +39,7 @@ def schema(kind: str) -> dict[str, Any]:
         "rig": _rig,
         "material": lambda: _one_of("kind", [Material, FluorescentMaterial]),
         "scene": lambda: SceneFile,
+        "design": lambda: WishFile,
     }
     model = makers[kind]()
     json_schema = TypeAdapter(model).json_schema(by_alias=True, schema_generator=_Described)

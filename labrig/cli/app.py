@@ -7,6 +7,7 @@ from typer.core import TyperGroup
 
 from labrig.cli import (
     compare,
+    design,
     driver,
     figures,
     fit,
@@ -41,6 +42,7 @@ app.command("frame")(frame.frame)
 app.command("compare")(compare.compare)
 app.command("render")(render.render)
 app.command("note")(runs.note)
+app.command("design")(design.design)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)
 app.add_typer(driver.app, name="driver")

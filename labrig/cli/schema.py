@@ -6,7 +6,7 @@ import typer
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(help="protocol, rig, material or scene")],
+    kind: Annotated[str, typer.Argument(help="protocol, rig, material, scene or design")],
 ) -> None:
     """Print the JSON Schema of a kind of file, for editors."""
     import json

@@ -23,6 +23,10 @@ from .decay import (
 from .decay_figures import (
     exposure_middles_s as exposure_middles_s,
 )
+from .design import (
+    describe_design as describe_design,
+    draw_design as draw_design,
+)
 from .figure_style import (
     DASHED as DASHED,
     EDGE_PT as EDGE_PT,

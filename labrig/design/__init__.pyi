@@ -1,0 +1,54 @@
+from .appearance import (
+    key_differences as key_differences,
+)
+from .bands import (
+    RGB_TO_Y as RGB_TO_Y,
+    DesignBands as DesignBands,
+    spectral_bands as spectral_bands,
+    three_bands as three_bands,
+)
+from .conversion import (
+    Conversion as Conversion,
+)
+from .determined import (
+    Conflict as Conflict,
+    Estimate as Estimate,
+)
+from .keys import (
+    Keys as Keys,
+)
+from .light import (
+    LightProgramme as LightProgramme,
+)
+from .material_file import (
+    to_material as to_material,
+    written_differences as written_differences,
+)
+from .nearest import (
+    NearestMaterial as NearestMaterial,
+    material_radiance as material_radiance,
+    nearest_materials as nearest_materials,
+    presets as presets,
+)
+from .propagation import (
+    Reach as Reach,
+    propagate as propagate,
+)
+from .result import (
+    Design as Design,
+    Impossible as Impossible,
+)
+from .smooth_spectrum import (
+    smooth_spectrum as smooth_spectrum,
+)
+from .solver import (
+    solve as solve,
+)
+from .wish_file import (
+    LightChange as LightChange,
+    Wish as Wish,
+    WishedKey as WishedKey,
+    WishFile as WishFile,
+    read_wish as read_wish,
+    to_wish as to_wish,
+)

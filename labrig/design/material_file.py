@@ -1,0 +1,166 @@
+"""A design as a material file."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.design.conversion import Conversion
+from labrig.design.light import LightProgramme
+from labrig.design.nearest import material_radiance
+from labrig.design.result import Design
+from labrig.errors import DataError
+from labrig.material import Albedo, IrradianceNorm, Material, Provenance, State
+
+FloatArray = NDArray[np.float64]
+
+#: Bands in nm of a design of three channels, as wide as its smooth spectra allow.
+EDGES_NM = np.arange(400.0, 701.0, 20.0)
+SOURCE = "Designed by labrig from wished-for colours, not measured"
+SMOOTH = (
+    "Designed in three channels (linear sRGB): re-radiation, excitation rates and albedo are the "
+    "smoothest non-negative spectra of their colours, one choice of many"
+)
+COLOURS = (
+    "Designed from colours in bands of wavelengths: re-radiation and a free albedo are the "
+    "smoothest non-negative spectra of their colours, one choice of many"
+)
+
+
+def _reference_light(design: Design, conversion: Conversion) -> FloatArray:
+    """Return the strongest light of a design in bands of wavelengths, shape (n,).
+
+    The excitation rates of the material belong to it, and Λ is relative to its mean.
+    """
+    lights = conversion.light(design.programme.irradiance).reshape(-1, len(conversion.of_light))
+    strongest = lights[int(np.linalg.norm(lights, axis=1).argmax())]
+    if not strongest.any():
+        raise DataError("expected light in the programme of a design to be kept, got none")
+    return np.asarray(strongest)
+
+
+def to_material(design: Design, name: str) -> Material:
+    """Return a design as a material, to be written by `write_material`.
+
+    Its scale is relative to the mean spectral irradiance of the programme's strongest light, to
+    which its excitation rates belong, too. Parameters that the keys do not determine are named in
+    its provenance.
+
+    Parameters
+    ----------
+    design
+        The design.
+    name
+        Name of the material.
+
+    Returns
+    -------
+    Material
+        Rates, re-radiation and albedo in bands of wavelengths: of three channels their smoothest
+        spectra.
+
+    Raises
+    ------
+    DataError
+        There is no light in the programme.
+
+    Examples
+    --------
+    >>> from labrig.design import Keys, LightProgramme, solve, three_bands, to_material
+    >>> light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    >>> keys = Keys.checked(0, [11.0, 30.0], [[0.001, 0.01, 0.002], [0.0001, 0.001, 0.0002]])
+    >>> material = to_material(solve(light, keys, three_bands(), albedo=0.5), "green")
+    >>> material.scale, len(material.states[0].reradiation)
+    ('relative', 15)
+    """
+    edges = EDGES_NM if design.bands.edges_nm is None else design.bands.edges_nm
+    conversion = Conversion.to(design.bands, edges)
+    light = _reference_light(design, conversion)
+    mean = float(light.mean())
+    lights = design.programme.irradiance.reshape(-1, design.bands.count)
+    states = tuple(
+        State(
+            k_r_per_s=float(k_r),
+            kinetic_order=design.order,
+            k_e_per_s=_numbers(conversion.excitation(k_e) * mean),
+            reradiation=_numbers(conversion.emission(emitted) / mean),
+        )
+        for k_r, k_e, emitted in zip(
+            design.k_r_per_s, design.k_e_per_s, design.reradiation, strict=True
+        )
+    )
+    material = Material(
+        name=name,
+        kind="phosphor",
+        bands_nm=_numbers(edges),
+        irradiance_norm=IrradianceNorm(
+            kind="vector_length", value=float(np.linalg.norm(light)) / mean
+        ),
+        states=states,
+        scale="relative",
+        albedo=Albedo(
+            wavelength_nm=_numbers((edges[1:] + edges[:-1]) / 2),
+            value=_numbers(conversion.albedo(design.albedo, lights)),
+        ),
+    )
+    differences = written_differences(design, material)
+    provenance = Provenance(source=SOURCE, note=_note(design, float(differences.max())))
+    return material.model_copy(update={"provenance": provenance})
+
+
+def written_differences(design: Design, material: Material) -> FloatArray:
+    """Return ΔE2000 of each key between what was wanted and how the written material looks.
+
+    Under strongly coloured light three channels and spectra reflect differently.
+
+    Parameters
+    ----------
+    design
+        The design.
+    material
+        The material that `to_material` made of it.
+
+    Returns
+    -------
+    ndarray
+        ΔE2000 as of a design, shape (keys,).
+
+    Examples
+    --------
+    >>> from labrig.design import (
+    ...     Keys, LightProgramme, solve, three_bands, to_material, written_differences
+    ... )
+    >>> light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    >>> keys = Keys.checked(0, [11.0, 30.0], [[0.001, 0.01, 0.002], [0.0001, 0.001, 0.0002]])
+    >>> design = solve(light, keys, three_bands(), albedo=0.5)
+    >>> bool(written_differences(design, to_material(design, "green")).max() < 0.1)
+    True
+    """
+    assert material.bands_nm is not None
+    assert material.albedo is not None
+    conversion = Conversion.to(design.bands, material.bands_nm)
+    mean = float(_reference_light(design, conversion).mean())
+    keys, programme = design.keys, design.programme
+    lit = LightProgramme(programme.begin_s, conversion.light(programme.irradiance) / mean)
+    radiance = mean * material_radiance(material, lit, keys.place, keys.time_s)
+    light = conversion.light(programme.at(keys.place, keys.time_s))
+    radiance += light * material.albedo.value / np.pi
+    return design.differences_to(radiance @ conversion.to_rgb.T)
+
+
+def _note(design: Design, largest_difference: float) -> str:
+    notes = []
+    if design.bands.edges_nm is None:
+        notes.append(SMOOTH)
+    elif design.keys.is_colour(design.bands):
+        notes.append(COLOURS)
+    unknown = [each.name for each in design.estimates if not each.is_determined]
+    if unknown:
+        notes.append(f"Not determined by the wishes: {', '.join(unknown)}")
+    notes += [f"Not possible: {wish}" for wish in design.impossible]
+    notes.append(f"Largest ΔE2000 of a wish: {math.ceil(10 * largest_difference) / 10:g}")
+    return ". ".join(notes) + "."
+
+
+def _numbers(values: FloatArray) -> tuple[float, ...]:
+    return tuple(float(f"{value:.6g}") for value in values)

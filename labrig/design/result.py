@@ -1,0 +1,157 @@
+"""A designed material: what it is made of, how it glows, and what could not be had."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from labrig.design.appearance import key_differences
+from labrig.design.bands import DesignBands
+from labrig.design.determined import Conflict, Estimate
+from labrig.design.glow import captures, emission
+from labrig.design.keys import Keys
+from labrig.design.light import LightProgramme, steps_to
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Impossible:
+    """A wish that no material of this kind can meet.
+
+    Attributes
+    ----------
+    keys
+        Indices of the keys that it is about; empty if it is about all of them.
+    reason
+        One sentence: what was wished for, and why it cannot be.
+    nearest
+        What is possible instead, in words.
+    """
+
+    keys: tuple[int, ...]
+    reason: str
+    nearest: str
+
+    def __str__(self) -> str:
+        return f"{self.reason}; the nearest that is possible is {self.nearest}"
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """The material that best glows as wanted.
+
+    Attributes
+    ----------
+    programme, keys, bands
+        What was wanted, under which light.
+    k_r_per_s
+        Re-radiation rates in 1/s, falling, shape (states,).
+    k_e_per_s
+        Excitation rates in 1/s per irradiance, 0 in bands without light, shape (states, bands).
+    order
+        Kinetic order b of the states.
+    reradiation
+        Λ in s/sr times the irradiance, shape (states, bands).
+    albedo
+        Albedo, 0 to 1, shape (bands,).
+    cost
+        Sum of the weighted squared residuals.
+    other_costs
+        Costs of the minima that searches in other basins reached, rising.
+    estimates
+        Parameters with σ, and whether the keys determine them.
+    conflicts
+        Keys that work against each other, the worst first.
+    impossible
+        Wishes that no material can meet.
+    """
+
+    programme: LightProgramme
+    keys: Keys
+    bands: DesignBands
+    k_r_per_s: FloatArray
+    k_e_per_s: FloatArray
+    order: float
+    reradiation: FloatArray
+    albedo: FloatArray
+    cost: float
+    other_costs: tuple[float, ...]
+    estimates: tuple[Estimate, ...]
+    conflicts: tuple[Conflict, ...]
+    impossible: tuple[Impossible, ...]
+
+    @property
+    def n_states(self) -> int:
+        """Number of states."""
+        return len(self.k_r_per_s)
+
+    def radiance_at(self, place: ArrayLike, time_s: ArrayLike) -> FloatArray:
+        """Return the radiance in the bands, reflected light included.
+
+        Parameters
+        ----------
+        place
+            Numbers of places, shape (n,) or one for all times.
+        time_s
+            Times in s on the clock of the light programme, shape (n,).
+
+        Returns
+        -------
+        ndarray
+            Radiance in the unit of the irradiance per sr, shape (n, bands).
+        """
+        times = np.asarray(time_s, dtype=np.float64)
+        places = np.broadcast_to(np.asarray(place, dtype=np.intp), times.shape)
+        steps = steps_to(self.programme, places, times)
+        radiance = self.albedo * self.programme.at(places, times) / np.pi
+        glow = emission(steps, len(times), self.k_e_per_s, self.k_r_per_s, self.order).value
+        radiance = radiance + glow.T @ self.reradiation
+        return radiance
+
+    def rgb_at(self, place: ArrayLike, time_s: ArrayLike) -> FloatArray:
+        """Return linear sRGB of the radiance that `radiance_at` returns, per sr, shape (n, 3)."""
+        return self.radiance_at(place, time_s) @ self.bands.to_rgb.T
+
+    @cached_property
+    def got_rgb(self) -> FloatArray:
+        """Linear sRGB at the keys, per sr, shape (keys, 3)."""
+        return self.rgb_at(self.keys.place, self.keys.time_s)
+
+    @cached_property
+    def delta_e2000(self) -> FloatArray:
+        """ΔE2000 of each key, both sides scaled so that it has half a white's luminance (keys,)."""
+        return self.differences_to(self.got_rgb)
+
+    def differences_to(self, rgb: FloatArray) -> FloatArray:
+        """Return ΔE2000 of other colours (keys, 3), in linear sRGB per sr, to the wanted ones."""
+        luminance = self.keys.screen_luminance(self.bands)
+        return key_differences(self.keys.rgb(self.bands), rgb, luminance)
+
+    @cached_property
+    def emitted_over_absorbed(self) -> FloatArray:
+        """Energy that each place emits after the light of the programme over what it absorbs.
+
+        π ∫∫ L dλ dt over (1 − albedo) ∫∫ E dλ dt, shape (places,); above 1 it is not possible. The
+        light counts up to the last key, the glow to its end.
+        """
+        programme = self.programme
+        end = max(float(self.keys.time_s.max()), float(programme.begin_s[0]))
+        places = np.arange(programme.n_places)
+        ratios = np.zeros(len(places))
+        per_state = np.pi * self.reradiation @ self.bands.energy
+        for steps in steps_to(programme, places, np.full(len(places), end)):
+            light = (1 - self.albedo) * self.bands.energy * steps.irradiance
+            absorbed = float(steps.duration_s @ light.sum(axis=1))
+            emitted = sum(
+                float(energy) * captures(steps, k_e, float(k_r), self.order)
+                for energy, k_e, k_r in zip(per_state, self.k_e_per_s, self.k_r_per_s, strict=True)
+            )
+            # Of no emission nothing has to be absorbed.
+            ratios[steps.keys[0]] = emitted / absorbed if absorbed > 0 else np.inf * (emitted > 0)
+        return ratios
+
+    def with_impossible(self, impossible: tuple[Impossible, ...]) -> "Design":
+        """Return the design with wishes that cannot be met."""
+        return replace(self, impossible=impossible)

@@ -1,0 +1,240 @@
+"""A design in words, and in a picture of what was wanted and what is possible over time."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.design import RGB_TO_Y, Design, NearestMaterial
+from labrig.number_format import rounded
+from labrig.quantity import duration_text
+from labrig.report.colours import css_colour, into_gamut
+from labrig.report.figure_style import INK, MUTED, figure_style
+from labrig.report.picture_file import require_picture, save_picture
+from labrig.results import with_uncertainty
+
+# matplotlib is slow to load.
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+
+#: Lines of keys, conflicts and wishes that are written one by one.
+MOST_LINES = 20
+#: Keys that work against each other and are named, and the ΔE2000 from which one is.
+MOST_CONFLICTS, SEEN = 3, 1.0
+#: Luminance of a screen's white with which a wanted patch is shown, its faintness taken away.
+SHOWN_Y = 0.5
+#: Times at which a curve is drawn.
+POINTS = 600
+#: Part of the time beyond the last key that is drawn.
+AFTER = 0.1
+
+
+def describe_design(
+    design: Design,
+    places: Sequence[str],
+    nearest: Sequence[NearestMaterial] = (),
+) -> str:
+    """Describe a design: parameters, keys, and what is not possible.
+
+    Parameters
+    ----------
+    design
+        The design.
+    places
+        Names of the places.
+    nearest
+        Measured materials that come near.
+
+    Returns
+    -------
+    str
+        Lines of text.
+
+    Examples
+    --------
+    >>> from labrig.design import Keys, LightProgramme, solve, three_bands
+    >>> from labrig.report import describe_design
+    >>> light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    >>> keys = Keys.checked(0, [11.0, 30.0], [[0.001, 0.01, 0.002], [0.0001, 0.001, 0.0002]])
+    >>> text = describe_design(solve(light, keys, three_bands(), albedo=0.5), ["patch"])
+    >>> text.splitlines()[0]
+    'k_r            0.1212(11) s⁻¹'
+    """
+    return "\n".join(
+        [
+            *_parameters(design),
+            *_keys(design, places),
+            *_conflicts(design),
+            *_impossible(design),
+            *_nearest(nearest),
+        ]
+    )
+
+
+def draw_design(design: Design, places: Sequence[str], path: Path) -> None:
+    """Draw the luminance over time with the keys, and patches of what was wanted and what is got.
+
+    Parameters
+    ----------
+    design
+        The design.
+    places
+        Names of the places.
+    path
+        Path of the picture, which ends in `.png`, `.svg` or `.pdf`.
+
+    Raises
+    ------
+    UsageError
+        The file name is not that of a picture.
+    DiskError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.design import Keys, LightProgramme, solve, three_bands
+    >>> from labrig.report import draw_design
+    >>> light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    >>> keys = Keys.checked(0, [11.0, 30.0], [[0.001, 0.01, 0.002], [0.0001, 0.001, 0.0002]])
+    >>> draw_design(solve(light, keys, three_bands(), albedo=0.5), ["patch"], Path("glow.svg"))
+    """
+    from matplotlib.figure import Figure
+
+    require_picture(path)
+    numbers = sorted(set(design.keys.place.tolist()))
+    with figure_style():
+        figure = Figure(figsize=(7.5, 3.2 * len(numbers)), layout="constrained")
+        rows = figure.subplots(2 * len(numbers), 1, height_ratios=[4, 1.2] * len(numbers))
+        for row, number in enumerate(numbers):
+            _draw_curve(rows[2 * row], design, number, places[number])
+            _draw_patches(rows[2 * row + 1], design, number)
+        save_picture(figure, path)
+
+
+def _parameters(design: Design) -> Iterator[str]:
+    width = max(len(each.name) for each in design.estimates)
+    units = {"1/s": " s⁻¹", "s/sr": " s sr⁻¹", "": ""}
+    for each in design.estimates:
+        if each.is_determined:
+            value = with_uncertainty(each.value, each.sigma)
+        else:
+            value = f"{rounded(each.value, 3)}, undetermined"
+        unit = units[each.unit] if each.is_determined else ""
+        yield f"{each.name:{width}}  {value}{unit}"
+
+
+def _keys(design: Design, places: Sequence[str]) -> Iterator[str]:
+    """Yield a line for each key, in units in which a white card under a light of 1 is 1, 1, 1."""
+    keys = design.keys
+    wanted, got = np.pi * keys.rgb(design.bands), np.pi * design.got_rgb
+    name = f" {'place':12}" if len(places) > 1 else ""
+    yield f"{'key':4}{'at':>10}{name}  {'wanted R, G, B':27} {'got':27} ΔE2000"
+    for key, (first, second) in enumerate(zip(wanted, got, strict=True)):
+        if key == MOST_LINES:
+            worst = int(design.delta_e2000.argmax())
+            yield (
+                f"{keys.count - key} more; the largest difference of all is "
+                f"{design.delta_e2000[worst]:.1f} of key {worst + 1}"
+            )
+            return
+        where = f" {places[keys.place[key]]:12}" if len(places) > 1 else ""
+        yield (
+            f"{key + 1:<4}{duration_text(float(keys.time_s[key])):>10}{where}  "
+            f"{_numbers(first):27} {_numbers(second):27} {design.delta_e2000[key]:6.1f}"
+        )
+
+
+def _conflicts(design: Design) -> Iterator[str]:
+    named: set[frozenset[int]] = set()
+    for conflict in design.conflicts:
+        pair = frozenset((conflict.key, conflict.other))
+        if pair in named or design.delta_e2000[conflict.other] < SEEN:
+            continue
+        named.add(pair)
+        yield (
+            f"key {conflict.key + 1} works against key {conflict.other + 1}: without it "
+            f"{100 * conflict.part:.0f} % of the other's squared residual would go"
+        )
+        if len(named) == MOST_CONFLICTS:
+            return
+
+
+def _impossible(design: Design) -> Iterator[str]:
+    for wish in design.impossible[:MOST_LINES]:
+        yield f"! {wish}"
+    if len(design.impossible) > MOST_LINES:
+        yield f"! {len(design.impossible) - MOST_LINES} more wishes are not possible"
+
+
+def _nearest(nearest: Sequence[NearestMaterial]) -> Iterator[str]:
+    for found in nearest:
+        parts = " and ".join(
+            f"{name} on {100 * part:.0f} % of the area" if len(found.names) > 1 else name
+            for name, part in zip(found.names, found.fractions, strict=True)
+        )
+        yield (
+            f"nearest measured: {parts}, ΔE2000 {found.delta_e2000.mean():.1f} in the mean, "
+            f"{found.delta_e2000.max():.1f} at most"
+        )
+
+
+def _draw_curve(axes: "Axes", design: Design, number: int, name: str) -> None:
+    """Draw the luminance of one place over time, with the keys and the time of light."""
+    programme, keys = design.programme, design.keys
+    own = keys.place == number
+    begin = float(programme.begin_s[0])
+    end = float(keys.time_s[own].max())
+    end += AFTER * max(end - begin, 1.0)
+    times = np.linspace(begin, end, POINTS)
+    axes.plot(times, np.pi * design.rgb_at(number, times) @ RGB_TO_Y, color=INK, linewidth=1.2)
+    wanted = np.pi * keys.rgb(design.bands)[own]
+    colours = [_shown(rgb, rgb) for rgb in wanted]
+    axes.scatter(
+        keys.time_s[own], wanted @ RGB_TO_Y, c=colours, s=36, edgecolors=INK, linewidths=0.8,
+        zorder=3,
+    )  # fmt: skip
+    ends = np.append(programme.begin_s[1:], end)
+    is_lit = programme.irradiance[number].any(axis=1)
+    for first, last in zip(programme.begin_s[is_lit], ends[is_lit], strict=True):
+        axes.axvspan(first, min(last, end), color=MUTED, alpha=0.15, linewidth=0)
+    axes.set(xlabel="time / s", ylabel="luminance over a white's", xlim=(begin, end))
+    if (wanted @ RGB_TO_Y > 0).any():
+        axes.set_yscale("log")
+    axes.set_title(name, fontsize="medium", color=INK)
+
+
+def _draw_patches(axes: "Axes", design: Design, number: int) -> None:
+    """Draw what was wanted above what is got, both brightened so that the first is bright."""
+    own = np.flatnonzero(design.keys.place == number)
+    own = own[np.argsort(design.keys.time_s[own])][:MOST_LINES]
+    wanted, got = design.keys.rgb(design.bands)[own], design.got_rgb[own]
+    for column, (first, second) in enumerate(zip(wanted, got, strict=True)):
+        for row, rgb in ((0.5, first), (0.0, second)):
+            axes.add_patch(_patch(column, row, _shown(rgb, first)))
+        time = duration_text(float(design.keys.time_s[own[column]]))
+        axes.text(column + 0.5, -0.1, time, ha="center", va="top", fontsize="x-small", color=INK)
+    axes.set(xlim=(0, len(own)), ylim=(0, 1), yticks=[0.25, 0.75], xticks=[])
+    axes.set_yticklabels(["got", "wanted"], fontsize="small")
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+def _patch(column: int, row: float, colour: str) -> Any:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((column + 0.05, row + 0.02), 0.9, 0.46, color=colour, linewidth=0)
+
+
+def _shown(rgb: FloatArray, wanted: FloatArray) -> str:
+    """Return the colour of a patch with the brightness that shows the wanted one at half."""
+    y = float(wanted @ RGB_TO_Y)
+    return css_colour(into_gamut(rgb * (SHOWN_Y / y if y > 0 else 0.0)))
+
+
+def _numbers(values: FloatArray) -> str:
+    return ", ".join(f"{value:.3g}" for value in values.tolist())
