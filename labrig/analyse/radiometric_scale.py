@@ -16,7 +16,7 @@ from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CardLight, IrradianceFile, relative_sensitivity
 from labrig.errors import UsageError
 from labrig.fit.spectrum import CurveError, curve_modes
-from labrig.material import Material, ScaleFactor, State
+from labrig.material import SEEN_FACTOR, Material, ScaleFactor, State
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -188,7 +188,7 @@ def scale_of(
             unit="s/DN",
         ),
         ScaleFactor(
-            name="card's reflected light, as the channel sees it, over a glow of peak 1",
+            name=SEEN_FACTOR,
             value=ratio,
             sigma=ratio * float(np.hypot(np.linalg.norm(changes), card_sigma)),
             unit="1",

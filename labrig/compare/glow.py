@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 from labrig.compare.nalbach2017 import DELTA_E, emission
 from labrig.compare.viewing import FloatArray, Viewing
 from labrig.errors import DataError, UsageError
-from labrig.material import DECAY_LAWS, Material, State, becquerel_of, exponential_means
+from labrig.material import (
+    DECAY_LAWS,
+    SEEN_FACTOR,
+    Material,
+    ScaleFactor,
+    State,
+    becquerel_of,
+    exponential_means,
+)
 from labrig.optics import CameraResponse, Spectrum, delta_e, lab
 from labrig.report import Table, exposure_middles_s
 from labrig.results import Series
@@ -65,24 +73,39 @@ def state_signals(material: Material, series: Series) -> FloatArray:
     return np.asarray(means * _amplitudes(material))
 
 
-def glow_sigma(material: Material, series: Series) -> FloatArray:
+def glow_sigma(material: Material, series: Series, *, is_same_camera: bool) -> FloatArray:
     """Return the relative σ of a material's glow over each exposure, shape (n,).
 
     The scale is common to all states; amplitude and rate of each state count as independent.
+
+    Parameters
+    ----------
+    material
+        The material.
+    series
+        Photographs, of which only the times matter.
+    is_same_camera
+        Whether the glow is seen through the curves by which its scale was found: their error then
+        is not in what is seen.
     """
-    scale = float(
-        np.linalg.norm([(each.sigma or 0.0) / each.value for each in material.scale_factors])
-    )
+    factors = [each for each in material.scale_factors if each.sigma is not None]
+    whole = _relative(factors)
+    scale = _relative([each for each in factors if each.name != SEEN_FACTOR or not is_same_camera])
     signals = state_signals(material, series)
     share = signals / signals.sum(axis=1, keepdims=True)
     middles_s = series.t_s + series.exposure_s / 2
     variance = np.full(len(middles_s), scale**2)
     for number, state in enumerate(material.states):
         amplitude = (state.amplitude_sigma or 0.0) / (state.amplitude or np.inf)
-        of_amplitude = max(amplitude**2 - scale**2, 0.0)
+        of_amplitude = max(amplitude**2 - whole**2, 0.0)
         of_rate = np.square((state.k_r_per_s_sigma or 0.0) * middles_s)
         variance = variance + share[:, number] ** 2 * (of_amplitude + of_rate)
     return np.asarray(np.sqrt(variance))
+
+
+def _relative(factors: Sequence[ScaleFactor]) -> float:
+    """Return the relative σ of a product."""
+    return float(np.linalg.norm([(each.sigma or 0.0) / each.value for each in factors]))
 
 
 def _means(state: State, series: Series) -> FloatArray:

@@ -18,7 +18,7 @@ from labrig.acquire import read_rig_file
 from labrig.bench_optics import with_shipped_camera
 from labrig.compare.glow import GlowComparison, compare_scaled, glow_sigma, predicted_by
 from labrig.compare.nalbach2017 import emission
-from labrig.compare.photographed_room import PhotographedRoom, ReflectedLight
+from labrig.compare.photographed_room import SAMPLE, PhotographedRoom, ReflectedLight
 from labrig.compare.residuals import Refit, fits_by_states
 from labrig.compare.run import MeasuredPatch, measured_camera, read_patches, references_by_patch
 from labrig.compare.viewing import DEFAULT_WHITE, FloatArray, Viewing, viewing
@@ -240,7 +240,16 @@ def compare_rendered(
                 left_out.append(f"{name} is left out: {error}")
                 continue
             left_out += fitted.left_out
-            compared.append(_compare(patch, measured.patches[own[name]], fitted, conversion, room))
+            compared.append(
+                _compare(
+                    patch,
+                    measured.patches[own[name]],
+                    fitted,
+                    conversion,
+                    room,
+                    is_same_camera=camera is None,
+                )
+            )
     return RenderedComparison(
         tuple(compared),
         _description(conversion, [each.ratio.reflected_by for each in compared], room, left_out),
@@ -521,6 +530,8 @@ def _compare(
     fitted: _Fitted,
     conversion: Viewing,
     room: PhotographedRoom,
+    *,
+    is_same_camera: bool,
 ) -> RenderedPatch:
     """Compare photographs of a patch with the renderings, in the photographs' unit."""
     series = patch.series
@@ -534,7 +545,10 @@ def _compare(
     white, as_rendered = measured.reflected[-1]
     gain = white.values / as_rendered
     rendered = {MEASURED: gain * measured.glow}
-    sigma = {MEASURED: glow_sigma(patch.material, series)}
+    own = glow_sigma(patch.material, series, is_same_camera=is_same_camera)
+    if measured.reflected[0][0].name == SAMPLE:
+        own = np.hypot(own, _albedo_sigma(patch.material))
+    sigma = {MEASURED: own}
     for name, glow in fitted.glow.items():
         values = gain * glow
         rendered[name] = values * (np.sum(values * series.values) / np.sum(values**2))
@@ -548,6 +562,14 @@ def _compare(
     )
     light, lit = measured.reflected[0]
     return RenderedPatch(each, common, _ratio(patch, light, gain * lit, rendered, sigma, room))
+
+
+def _albedo_sigma(material: Material) -> float:
+    """Return the relative σ of the light that a material reflects, the mean over its albedo."""
+    albedo = material.albedo
+    if albedo is None or albedo.sigma is None:
+        return 0.0
+    return float(np.sum(albedo.sigma) / np.sum(albedo.value))
 
 
 def _ratio(

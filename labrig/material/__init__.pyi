@@ -13,6 +13,7 @@ from .decay_laws import (
 )
 from .file import (
     MAX_ORDER as MAX_ORDER,
+    SEEN_FACTOR as SEEN_FACTOR,
     Albedo as Albedo,
     IrradianceNorm as IrradianceNorm,
     Material as Material,

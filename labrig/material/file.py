@@ -32,6 +32,9 @@ Series = tuple[NotNegative, ...]
 #: A surface that does not fluoresce may look brighter than a white by its gloss, but not by much.
 Reflectance = Annotated[float, Field(ge=0, le=1.2)]
 
+#: Name of the scale factor that depends on the camera's curves: what is seen through the same
+#: curves again does not depend on it.
+SEEN_FACTOR = "card's reflected light, as the channel sees it, over a glow of peak 1"
 #: Fields of a state that may have an uncertainty.
 MEASURED = (
     "k_r_per_s",

@@ -18,6 +18,7 @@ from labrig.cli.exit_codes import guarded
 from labrig.compare.glow import glow_sigma, state_signals
 from labrig.compare.photographed_room import PhotographedRoom
 from labrig.material import (
+    SEEN_FACTOR,
     Albedo,
     Material,
     ScaleFactor,
@@ -141,7 +142,8 @@ def test_the_glow_over_reflected_light_is_the_photographs(labrig: Labrig, measur
     assert said["notes"] == []
 
 
-def test_the_sigma_of_the_glow_is_that_of_scale_amplitudes_and_rates() -> None:
+@pytest.mark.parametrize("is_same_camera", [False, True])
+def test_the_sigma_of_the_glow_is_that_of_scale_amplitudes_and_rates(is_same_camera: bool) -> None:
     rng = np.random.default_rng(62)
     t_s = np.arange(1.0, 120.0, 12.0)
     series = made_series(t_s, np.full_like(t_s, 0.5))
@@ -160,7 +162,7 @@ def test_the_sigma_of_the_glow_is_that_of_scale_amplitudes_and_rates() -> None:
                 (0.1, 0.02), rate, amplitude, np.array(factors), np.array(rates), strict=True
             )
         )
-        factor = ScaleFactor(name="card", value=1.0, sigma=scale)
+        factor = ScaleFactor(name=SEEN_FACTOR, value=1.0, sigma=scale)
         return Material(
             name="drawn", kind="phosphor", states=states, scale="relative", scale_factors=(factor,)
         )
@@ -170,14 +172,15 @@ def test_the_sigma_of_the_glow_is_that_of_scale_amplitudes_and_rates() -> None:
             material(
                 1 + np.array(amplitude) * rng.standard_normal(2),
                 1 + np.array(rate) * rng.standard_normal(2),
-                1 + scale * rng.standard_normal(),
+                1.0 if is_same_camera else 1 + scale * rng.standard_normal(),
             ),
             series,
         ).sum(axis=1)
         for _ in range(1500)
     ]
     relative = np.std(drawn, axis=0) / np.mean(drawn, axis=0)
-    np.testing.assert_allclose(glow_sigma(material((1, 1), (1, 1), 1), series), relative, rtol=0.1)
+    stated = glow_sigma(material((1, 1), (1, 1), 1), series, is_same_camera=is_same_camera)
+    np.testing.assert_allclose(stated, relative, rtol=0.1)
 
 
 def test_the_lamps_fade_is_the_measured_one(measured: Path) -> None:

@@ -102,6 +102,17 @@ def test_steps_against_an_integrator(
     assert field.radiance() == pytest.approx(emitted, rel=1e-3, abs=1e-4 * emitted.max())
 
 
+def test_few_samples_of_a_higher_order_need_no_table() -> None:
+    of, some = parameters((1.0, 1.5)), 20
+    field = Field(of, some)
+    levels = np.zeros((2, SAMPLES))
+    for step, t_s in enumerate(STEPS_S):
+        light = light_of(step) * min(1.0, 20 / t_s)
+        levels = integrated(of, levels, light, t_s)
+        field.step(light[:, :some], t_s)
+        assert np.abs(field.levels - levels[:, :some]).max() < 1e-6
+
+
 @given(
     order=st.sampled_from([1.0, 1.3, 3.0]),
     light=st.floats(0, 1e4),
