@@ -189,7 +189,7 @@ def load_scene(
     Examples
     --------
     >>> from labrig.reproduce import Assumptions, load_scene
-    >>> scene = load_scene("cornell-box", assumptions=Assumptions(albedo=0.8, scale=1.0))
+    >>> scene = load_scene("cornell-box", assumptions=Assumptions(albedo=0.8, scale=0.2))
     >>> len(scene.bands), scene.is_moving
     (24, False)
     """
