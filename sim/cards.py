@@ -84,7 +84,9 @@ def surfaces(
 
 def _colorchecker() -> FloatArray:
     """Return BabelColor's means over 30 ColorCheckers, constant at the ends, (24, wavelengths)."""
-    import colour  # takes seconds to load
+    # Takes seconds to load, and would change how NumPy prints.
+    with np.printoptions():
+        import colour
 
     patches = colour.SDS_COLOURCHECKERS["BabelColor Average"].values()
     return np.array(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labrig import colour_science
 from labrig.results import read_series
 from tests.conftest import Ended
 
@@ -24,7 +25,7 @@ NEUTRALS_Y = 930
 
 
 def test_the_neutrals_of_a_colour_checker_are_linear(labrig: Callable[..., Ended]) -> None:
-    import colour  # slow, and only this test compares with tables
+    colour = colour_science.load()
 
     chart = colour.SDS_COLOURCHECKERS["BabelColor Average"]
     names = [

@@ -101,8 +101,9 @@ def fold(
     >>> paths = list(tracer.from_camera(camera, per_pixel=1, threads=1))
     >>> walls = Matrices.of([of_albedo("grey", 0.5, Bands.even(400, 700, 3))])
     >>> no_lamps = np.zeros((0, 3), np.float32)
-    >>> fold(paths, walls, room.material_of_place, np.ones((1, 3), np.float32), no_lamps, 1)[0]
-    array([2., 2., 2.], dtype=float32)
+    >>> glow = np.ones((1, 3), np.float32)
+    >>> fold(paths, walls, room.material_of_place, glow, no_lamps, 1)[0].tolist()
+    [2.0, 2.0, 2.0]
     """
     fold_paths = compiled("folding_kernels").fold_paths
     arguments = (

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from labrig import colour_science
 from labrig.sim.cards import COLUMNS, ROWS, reflectances, surfaces
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.optics import bent_curves
@@ -75,7 +76,7 @@ def test_a_fresh_sample_takes_the_cards_away_and_does_not_glow() -> None:
 
 def test_a_colorchecker_has_its_patches_row_by_row() -> None:
     """What the camera sees is ∫ lamp × reflectance × sensitivity, relative to the white patch."""
-    import colour  # slow, and only this test compares with tables
+    colour = colour_science.load()
 
     bench = lit("colorchecker", chart=[0, 0, 96, 64], seed=3)
     cells = colours(bench.shoot(1 / 100, 100, 5.6))

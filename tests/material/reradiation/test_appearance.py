@@ -1,14 +1,15 @@
 """Colours of surfaces under lights, against colour-science and by hand."""
 
-import colour
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from labrig import colour_science
 from labrig.errors import DataError
 from labrig.material import ReradiationMatrix, appearance, compare_colours
 from labrig.optics import read_light
 
+colour = colour_science.load()
 NM = np.arange(300.0, 781.0, 10.0)
 
 
