@@ -268,6 +268,8 @@ def test_materials_are_replaced_and_assumptions_are_named(tmp_path: Path) -> Non
 @pytest.mark.parametrize("name", sorted(p.stem for p in Path("config/scenes").glob("*.yaml")))
 def test_shipped_scenes_are_rendered(name: str) -> None:
     built = load_scene(name).resized(12, 9, 4)
+    if built.is_moving:
+        built = built.at_times(built.file.frames_s[:2])
     for frame in Renderer(built, threads=1).frames():
         assert frame.radiance.shape == (9, 12, 24)
         assert np.isfinite(frame.radiance).all()
