@@ -1,6 +1,7 @@
 """Packages are used through their faces: what their `__init__` exports."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,8 @@ HOME = Path(__file__).parents[1]
 BESIDE = ("drivers", "protocols", "sim")
 #: A protocol's module is its face: its model, units and frame roles, for its analysis.
 OPEN = ("labrig.protocols",)
+#: What a source that imports from deep within has somewhere; most have not, and are not parsed.
+DEEP = re.compile(r"labrig\.\w+\.\w")
 
 
 def modules() -> Iterator[Path]:
@@ -29,6 +32,8 @@ def dotted(path: Path) -> str:
 
 def past_faces(source: str, importer: str, packages: set[str]) -> Iterator[str]:
     """Imports in `source` of what lies deeper in another package than its face."""
+    if DEEP.search(source) is None:
+        return
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom) and node.level == 0:
             names = [node.module or ""]

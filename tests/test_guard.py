@@ -82,7 +82,6 @@ def test_ctrl_z_stops_it_safely_and_after_kill_9_the_guard_switches_off(tmp_path
     assert "a process of its own" in record.attempts[0].start["guard"]
 
 
-@pytest.mark.campaign
 def test_after_kill_9_the_guard_sends_the_commands_of_the_rig_file(tmp_path: Path) -> None:
     with lit_bench(tmp_path, BoardProcess()) as bench:
         path = tmp_path / "rig.yaml"

@@ -23,6 +23,7 @@ from labrig.record import RunFolder, read_run
 from labrig.record.journal import read_journal
 from labrig.recording import Recording, resume_run
 from tests.acquire.fakes import Watching
+from tests.conftest import Ended
 
 CAMPAIGN = pytest.mark.campaign
 UNITS = ["dark", "decay-1", "decay-2"]
@@ -196,6 +197,29 @@ def test_after_kill_9_the_run_is_resumed(
         assert record.completed()[name].uid == attempt.uid
 
 
+def test_ctrl_c_ends_it_with_its_code_and_one_line(
+    labrig: Callable[..., Ended],
+    make_protocol: Callable[..., Path],
+    make_rig: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waits = 0
+    pause = VirtualClock._pause_until
+
+    def stopping_pause(clock: VirtualClock, deadline_s: float) -> None:
+        nonlocal waits
+        waits += 1
+        if 100 <= waits < 110:
+            os.kill(os.getpid(), signal.SIGINT)
+        pause(clock, deadline_s)
+
+    monkeypatch.setattr(VirtualClock, "_pause_until", stopping_pause)
+    ended = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path / "runs")
+    assert ended.code == 130
+    assert_stopped_in_one_line(ended.err)
+
+
 @pytest.mark.parametrize(
     ("signum", "code"),
     [pytest.param(signal.SIGINT, 130, marks=CAMPAIGN), (signal.SIGTERM, 143)],
@@ -223,11 +247,15 @@ def test_a_stopped_process_leaves_with_its_code_and_one_line(
         process.send_signal(signum)
     out, err = process.communicate(timeout=60)
     assert process.returncode == code
+    assert_stopped_in_one_line(err)
+    assert "Traceback" not in out
+
+
+def assert_stopped_in_one_line(err: str) -> None:
     complaints = [line for line in err.splitlines() if not line.startswith("[")]
     assert len(complaints) == 1, err
     assert "safe state reached" in complaints[0]
     assert "labrig resume" in complaints[0]
-    assert "Traceback" not in out + err
 
 
 def make_folder(protocol: Path, tmp_path: Path) -> Path:

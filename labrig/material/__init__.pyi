@@ -32,12 +32,13 @@ from .fluorescent import (
 )
 from .general_order import (
     BecquerelDecay as BecquerelDecay,
-    Charged as Charged,
     DarkStep as DarkStep,
+    LitStep as LitStep,
     becquerel_of as becquerel_of,
     dark_concentration as dark_concentration,
     dark_step as dark_step,
     lit_concentration as lit_concentration,
+    lit_step as lit_step,
     mean_emission as mean_emission,
     steady_concentration as steady_concentration,
 )

@@ -268,7 +268,44 @@ def steady_concentration(
     return np.asarray(level)
 
 
-class Charged(NamedTuple):
+def lit_concentration(
+    start: ArrayLike,
+    kappa_per_s: ArrayLike,
+    k_r_per_s: ArrayLike,
+    order: ArrayLike,
+    duration_s: ArrayLike,
+) -> FloatArray:
+    """Return the concentration of a state of general order after constant light.
+
+    All arguments broadcast.
+
+    Parameters
+    ----------
+    start
+        Concentration at the begin, 0 to 1.
+    kappa_per_s, k_r_per_s
+        Excitation κ > 0 and re-radiation rate k ≥ 0 in 1/s.
+    order
+        Kinetic order b ≥ 1.
+    duration_s
+        Duration ≥ 0 in seconds.
+
+    Returns
+    -------
+    ndarray
+        Concentration at the end in the broadcast shape.
+
+    Examples
+    --------
+    >>> from labrig.material import lit_concentration
+    >>> lit_concentration(0.0, 0.01, 0.02, [1.0, 1.5, 2.0], 60.0).round(4).tolist()
+    [0.2782, 0.3456, 0.3855]
+    """
+    approach, t = _approach(start, kappa_per_s, k_r_per_s, order, duration_s)
+    return approach.level(approach.position(t))
+
+
+class LitStep(NamedTuple):
     """Concentration after constant light, and its derivatives.
 
     Attributes
@@ -288,47 +325,37 @@ class Charged(NamedTuple):
     by_order: FloatArray
 
 
-def lit_concentration(
+def lit_step(
     start: ArrayLike,
     kappa_per_s: ArrayLike,
     k_r_per_s: ArrayLike,
     order: ArrayLike,
     duration_s: ArrayLike,
-) -> Charged:
-    """Return the concentration of a state of general order after constant light.
-
-    All arguments broadcast.
+) -> LitStep:
+    """Return `lit_concentration` and its derivatives.
 
     Parameters
     ----------
-    start
-        Concentration at the begin, 0 to 1.
-    kappa_per_s, k_r_per_s
-        Excitation κ > 0 and re-radiation rate k ≥ 0 in 1/s.
-    order
-        Kinetic order b ≥ 1.
-    duration_s
-        Duration ≥ 0 in seconds.
+    start, kappa_per_s, k_r_per_s, order, duration_s
+        As for `lit_concentration`.
 
     Returns
     -------
-    Charged
+    LitStep
         Concentration at the end and its derivatives, each in the broadcast shape.
 
     Examples
     --------
-    >>> from labrig.material import lit_concentration
-    >>> lit_concentration(0.0, 0.01, 0.02, [1.0, 1.5, 2.0], 60.0).value.round(4).tolist()
-    [0.2782, 0.3456, 0.3855]
+    >>> from labrig.material import lit_step
+    >>> step = lit_step(0.2, 0.01, 0.02, 2.0, 60.0)
+    >>> f"{step.value:.3f}, {step.by_start:.3f} of what there was"
+    '0.440, 0.238 of what there was'
     """
-    arguments = (start, kappa_per_s, k_r_per_s, order, duration_s)
-    first, kappa, k, b, t = np.broadcast_arrays(
-        *(np.asarray(each, dtype=np.float64) for each in arguments)
-    )
-    steady = steady_concentration(kappa, k, b)
-    approach = _Approach(first, kappa, b, steady)
+    approach, t = _approach(start, kappa_per_s, k_r_per_s, order, duration_s)
+    kappa, b, steady = approach.kappa, approach.order, approach.steady
+    k = np.asarray(k_r_per_s, dtype=np.float64)
     y = approach.position(t)
-    value = steady - (steady - first) * np.exp(-y)
+    value = approach.level(y)
     # r = r∞ − (r∞ − r(0)) e^(−y) depends on a parameter by r∞ and, at a given time, by y.
     to_steady = kappa + b * k * steady ** (b - 1)
     power = steady**b
@@ -350,7 +377,15 @@ def lit_concentration(
         -np.expm1(-y) * steady_slope - (steady - value) * speed * time_slope
         for steady_slope, time_slope in zip(steady_by, time_by, strict=True)
     )
-    return Charged(value, by_start, *slopes)
+    return LitStep(value, by_start, *slopes)
+
+
+def _approach(*arguments: ArrayLike) -> tuple["_Approach", FloatArray]:
+    """Return the approach of r∞ from a start by κ, k and b, and the times; all broadcast."""
+    first, kappa, k, b, t = np.broadcast_arrays(
+        *(np.asarray(each, dtype=np.float64) for each in arguments)
+    )
+    return _Approach(first, kappa, b, steady_concentration(kappa, k, b)), t
 
 
 def _phi(delta: FloatArray, order: FloatArray) -> FloatArray:
@@ -413,6 +448,11 @@ class _Approach:
         """Return m = dy/dt."""
         delta = self._part_missing * np.exp(-y)
         return self.kappa + self.filling * _phi(delta, self.order)
+
+    def level(self, y: FloatArray) -> FloatArray:
+        """Return the concentration r."""
+        level: FloatArray = self.steady - (self.steady - self.start) * np.exp(-y)
+        return level
 
     def position(self, t: FloatArray) -> FloatArray:
         """Return y at a time."""

@@ -176,7 +176,7 @@ def _concentrations(material: Material, charge_s: float) -> FloatArray:
     k_r, order = _rates_and_orders(material)
     if math.isinf(charge_s):
         return steady_concentration(kappa, k_r, order)
-    return lit_concentration(0.0, kappa, k_r, order, charge_s).value
+    return lit_concentration(0.0, kappa, k_r, order, charge_s)
 
 
 def _rates_and_orders(material: Material) -> tuple[FloatArray, FloatArray]:

@@ -15,6 +15,7 @@ COMPILED: dict[str, Any] = {
     "cache": True,
     "error_model": "numpy",
     "fastmath": {"nsz", "contract", "reassoc"},
+    "no_cfunc_wrapper": True,
 }
 
 

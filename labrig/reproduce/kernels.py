@@ -16,6 +16,15 @@ Float32Array = NDArray[np.float32]
 CHUNK = 2048
 #: Sums may be reordered; values are finite.
 FAST = {"nnan", "ninf", "nsz", "contract", "reassoc", "arcp"}
+COMPILED: dict[str, Any] = {
+    "nogil": True,
+    "cache": True,
+    "error_model": "numpy",
+    "fastmath": FAST,
+    "no_cfunc_wrapper": True,
+}
+#: Functions that only compiled ones call.
+INNER = COMPILED | {"no_cpython_wrapper": True}
 HALF, ONE, TINY = np.float32(0.5), np.float32(1), np.float32(1e-30)
 LOG2_E, LARGEST = np.float32(1.4426950408889634), np.float32(125)
 #: Taylor's series of 2ˣ from the seventh power down, for |x| ≤ 1/2: errs by 1e-8.
@@ -26,7 +35,7 @@ ZERO_EXPONENT, MANTISSA_BITS = np.int32(127), np.int32(23)
 INFINITY_BITS = np.uint32(0x7F800000)
 
 
-@numba.njit(nogil=True, fastmath=FAST, error_model="numpy", cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def step_first_order(
     levels: Float32Array,
     irradiance: Float32Array,
@@ -95,7 +104,7 @@ def step_first_order(
     return True
 
 
-@numba.njit(nogil=True, fastmath=FAST, error_model="numpy", cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def step_by_table(
     levels: Float32Array,
     irradiance: Float32Array,
@@ -129,7 +138,7 @@ def step_by_table(
     return True
 
 
-@numba.njit(nogil=True, fastmath=FAST, error_model="numpy", cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def excitation(
     kappa: Float32Array,
     irradiance: Float32Array,
@@ -145,11 +154,12 @@ def excitation(
         size = min(CHUNK, last - begin)
         if not _excite(chunk, irradiance, k_e, base, state, ONE, begin, size):
             return False
-        kappa[begin : begin + size] = chunk[:size]
+        for s in range(size):
+            kappa[begin + s] = chunk[s]
     return True
 
 
-@numba.njit(nogil=True, fastmath=FAST, error_model="numpy", cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(**INNER)  # type: ignore[untyped-decorator]
 def _excite(
     kappa: Float32Array,
     irradiance: Float32Array,
@@ -181,7 +191,7 @@ def _excite(
     return bool(largest < INFINITY_BITS)
 
 
-@numba.njit(nogil=True, fastmath=FAST, error_model="numpy", cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", **INNER)  # type: ignore[untyped-decorator]
 def _interpolated(table: Any, x: Any, y: Any) -> Any:
     """Return the cubic through the four by four nearest nodes."""
     most = table.shape[0] - 4
@@ -199,7 +209,7 @@ def _interpolated(table: Any, x: Any, y: Any) -> Any:
     return min(max(total, np.float32(0)), ONE)
 
 
-@numba.njit(nogil=True, fastmath=FAST, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", **INNER)  # type: ignore[untyped-decorator]
 def _weight(x: Any, node: Any) -> Any:
     """Return Lagrange's polynomial of a node 0 to 3 at a place."""
     if node == 0:

@@ -63,6 +63,5 @@ def order_table(order: float, phase: float) -> OrderTable:
         dose = (even / (1 - even)) ** power
     values = np.ones((SIZE, SIZE))
     values[:, 0] = dark_concentration(level, phase, order, 1.0)
-    lit = lit_concentration(level[:, None], dose[1:-1], phase, order, 1.0)
-    values[:, 1:-1] = lit.value
+    values[:, 1:-1] = lit_concentration(level[:, None], dose[1:-1], phase, order, 1.0)
     return OrderTable(values.astype(np.float32), compression, 1 / power)

@@ -97,8 +97,21 @@ class Tables(NamedTuple):
     uniform: float
 
 
+COMPILED: dict[str, Any] = {
+    "nogil": True,
+    "cache": True,
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+}
+
+
 def _njit(function: Any) -> Any:
-    return numba.njit(nogil=True, error_model="numpy", cache=True)(function)
+    return numba.njit(**COMPILED)(function)
+
+
+def _inner(function: Any) -> Any:
+    """Compile a function that only compiled ones call."""
+    return numba.njit(no_cpython_wrapper=True, **COMPILED)(function)
 
 
 @_njit
@@ -185,7 +198,7 @@ def parts(tables: Tables, given_nm: FloatArray, reflected: FloatArray, shifted: 
         shifted[n] = _selection(tables, given, low, high, mixed)
 
 
-@_njit
+@_inner
 def _range(tables: Tables, given: float) -> Any:
     """Return the range of the other wavelength on the Stokes side; empty if high ≤ low."""
     low, high = tables.other_low_nm, tables.other_high_nm
@@ -196,7 +209,7 @@ def _range(tables: Tables, given: float) -> Any:
     return max(low, given - tables.overlap_nm), high
 
 
-@_njit
+@_inner
 def _masses(tables: Tables, given: float, low: float, high: float, mass: FloatArray) -> float:
     """Write each component's integral over the range, and return their sum."""
     total = 0.0
@@ -216,7 +229,7 @@ def _masses(tables: Tables, given: float, low: float, high: float, mass: FloatAr
     return total
 
 
-@_njit
+@_inner
 def _selection(tables: Tables, given: float, low: float, high: float, mixed: float) -> float:
     """Return by what a shift is selected: the integral of what is re-radiated, signs left out."""
     if tables.is_mixture:
@@ -226,13 +239,13 @@ def _selection(tables: Tables, given: float, low: float, high: float, mixed: flo
     return float(_at(tables.given_edges_nm, tables.absolute, given))
 
 
-@_njit
+@_inner
 def _uniform(tables: Tables, mixed: float) -> float:
     """Return the part of uniform draws: all if no component reaches the given wavelength."""
     return tables.uniform if mixed > 0 else 1.0
 
 
-@_njit
+@_inner
 def _pdf(
     tables: Tables, given: float, other: float, low: float, high: float, mixed: float
 ) -> float:
@@ -243,7 +256,7 @@ def _pdf(
     return float(density)
 
 
-@_njit
+@_inner
 def _joint(tables: Tables, given: float, other: float) -> float:
     """Return the mixture's density times its scale, in 1/nm of output."""
     total = 0.0
@@ -260,7 +273,7 @@ def _joint(tables: Tables, given: float, other: float) -> float:
     return total
 
 
-@_njit
+@_inner
 def _matrix(tables: Tables, given: float, other: float) -> float:
     """Return the matrix's re-radiation in 1/nm of output; none outside of its bands."""
     row = _band(tables.given_edges_nm, given)
@@ -270,7 +283,7 @@ def _matrix(tables: Tables, given: float, other: float) -> float:
     return float(tables.reradiation[row, column])
 
 
-@_njit
+@_inner
 def _reached(mass: FloatArray, select: float) -> int:
     """Return the component at which the running sum exceeds `select`, one that is not empty."""
     running, chosen = 0.0, 0
@@ -283,7 +296,7 @@ def _reached(mass: FloatArray, select: float) -> int:
     return chosen
 
 
-@_njit
+@_inner
 def _inverted(c: Any, given: float, low: float, high: float, probability: float) -> float:
     """Return the wavelength at a probability of one component between two others."""
     u = _variate(given, c.given_median, c.given_sd, c.given_cosh, c.given_sinh)
@@ -301,7 +314,7 @@ def _inverted(c: Any, given: float, low: float, high: float, probability: float)
     return float(min(max(other, low), high))
 
 
-@_njit
+@_inner
 def _cuts(c: Any, u: float, low: float, high: float) -> Any:
     """Return the ends of the range in the standard variate of the other wavelength, given u."""
     sd = math.sqrt((1 - c.correlation) * (1 + c.correlation))
@@ -310,41 +323,47 @@ def _cuts(c: Any, u: float, low: float, high: float) -> Any:
     return (first - c.correlation * u) / sd, (last - c.correlation * u) / sd
 
 
-@_njit
+@_inner
 def _variate(nm: float, median: float, sd: float, cosh: float, sinh: float) -> float:
     y = (nm - median) / sd * cosh + sinh
     return y * cosh - math.sqrt(1 + y * y) * sinh
 
 
-@_njit
+@_inner
 def _rate(nm: float, median: float, sd: float, cosh: float, sinh: float) -> float:
     """Return the derivative of the variate by the wavelength in 1/nm."""
     y = (nm - median) / sd * cosh + sinh
     return cosh * (cosh - sinh * y / math.sqrt(1 + y * y)) / sd
 
 
-@_njit
+@_inner
 def _at(edges: FloatArray, values: FloatArray, nm: float) -> float:
     band = _band(edges, nm)
     return 0.0 if band < 0 else float(values[band])
 
 
-@_njit
+@_inner
 def _band(edges: FloatArray, nm: float) -> int:
     """Return the band of a wavelength, its lower edge included; −1 outside of all."""
-    band = np.searchsorted(edges, nm, side="right") - 1
     if nm == edges[-1]:
-        return int(len(edges) - 2)
-    return int(band) if band < len(edges) - 1 else -1
+        return len(edges) - 2
+    low, high = 0, len(edges)
+    while low < high:
+        middle = (low + high) // 2
+        if edges[middle] <= nm:
+            low = middle + 1
+        else:
+            high = middle
+    return low - 1 if low < len(edges) else -1
 
 
-@_njit
+@_inner
 def _below(x: float) -> float:
     """Return the standard normal distribution function."""
     return 0.5 * math.erfc(-x * SQRT_HALF)
 
 
-@_njit
+@_inner
 def _quantile(p: float) -> float:
     """Return where the standard normal distribution function is `p`; infinite at 0 and 1."""
     q = p - 0.5
@@ -359,7 +378,7 @@ def _quantile(p: float) -> float:
     return math.copysign(z, q)
 
 
-@_njit
+@_inner
 def _ratio(numerator: Any, denominator: Any, x: float) -> float:
     above, below = 0.0, 0.0
     for k in range(7, -1, -1):

@@ -19,7 +19,12 @@ POINT, AREA, DISTANT, SKY = 0, 1, 2, 3
 NOTHING, BACK, FIRST_LAMP = -1, -2, -3
 #: Part of the way to a lamp beyond which a surface is the lamp itself.
 NEARLY = np.float32(0.9999)
-COMPILED: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+COMPILED: dict[str, Any] = {
+    "nogil": True,
+    "cache": True,
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+}
 
 
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
@@ -189,8 +194,7 @@ def towards_lamps(
                 low, high = first[lamp], first[lamp + 1]
                 if low == high:
                     continue
-                f_at = low + np.searchsorted(share[low:high], chance[i, lamp, 0])
-                f_at = min(f_at, high - 1)
+                f_at = min(_first_not_below(share, low, high, chance[i, lamp, 0]), high - 1)
                 before = share[f_at - 1] if f_at > low else np.float32(0)
                 rest = (chance[i, lamp, 0] - before) / (share[f_at] - before)
                 root = math.sqrt(min(max(rest, np.float32(0)), np.float32(1)))
@@ -232,6 +236,18 @@ def towards_lamps(
                 factor[i, lamp] = cosine * facing / (np.float32(math.pi) * square)
 
 
+@numba.njit(no_cpython_wrapper=True, **COMPILED)  # type: ignore[untyped-decorator]
+def _first_not_below(values: Float32Array, low: int, high: int, wanted: np.float32) -> int:
+    """Return where in the ascending `values[low:high]` the first is that is not below `wanted`."""
+    while low < high:
+        middle = (low + high) // 2
+        if values[middle] < wanted:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[IntArray, int]:
     """Return the triangle at each point of a grid over the texture, and how many have several.
@@ -257,8 +273,11 @@ def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[IntArray
         det = (s[1] - s[0]) * (t[2] - t[0]) - (s[2] - s[0]) * (t[1] - t[0])
         if det == 0:
             continue
-        left, right = math.floor(s.min() - 0.5), math.ceil(s.max() - 0.5)
-        low, high = math.floor(t.min() - 0.5), math.ceil(t.max() - 0.5)
+        # Functions of arrays take longer to compile than all of this.
+        left = math.floor(min(s[0], s[1], s[2]) - 0.5)
+        right = math.ceil(max(s[0], s[1], s[2]) - 0.5)
+        low = math.floor(min(t[0], t[1], t[2]) - 0.5)
+        high = math.ceil(max(t[0], t[1], t[2]) - 0.5)
         for row in range(max(low, 0), min(high + 1, rows)):
             for column in range(max(left, 0), min(right + 1, columns)):
                 x, y = column + np.float32(0.5) - s[0], row + np.float32(0.5) - t[0]

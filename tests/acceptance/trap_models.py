@@ -188,7 +188,7 @@ def predicted_ratios(material: Material, fit: dict[str, Any]) -> tuple[FloatArra
         rate, amplitude = theta[:n], theta[n : 2 * n]
         own = theta[-1 - n : -1] if is_fitted else order
         kappa = theta[2 * n : n * (2 + b)].reshape(n, b) @ direct * np.exp(theta[-1])
-        level = lit_concentration(0.0, np.maximum(kappa, 1e-12), rate, own, charge_s).value
+        level = lit_concentration(0.0, np.maximum(kappa, 1e-12), rate, own, charge_s)
         begin = dark_concentration(level, rate, own, dark_s)
         return float(amplitude @ mean_emission(begin, rate, own, EXPOSURE_S).value)
 

@@ -18,7 +18,7 @@ T_S = np.arange(0.0, 600.0, 3.0)
 def table(tmp_path: Path) -> Path:
     """A state of order 1.7 that is charged from 30 s to 200 s."""
     lit_s, dark_s = np.clip(T_S - 30, 0, 170), np.maximum(T_S - 200, 0)
-    charged = lit_concentration(0.0, 0.02, 0.05, 1.7, lit_s).value
+    charged = lit_concentration(0.0, 0.02, 0.05, 1.7, lit_s)
     level = dark_concentration(charged, 0.05, 1.7, dark_s)
     light = 0.05 * level**1.7 + np.where(dark_s == 0, 0.02 * level, 0)
     counts = np.random.default_rng(4).poisson(1e5 * light)
@@ -94,7 +94,7 @@ def test_out_has_page_files_and_material(labrig: Labrig, table: Path, tmp_path: 
 def test_without_saturation_there_is_no_material(labrig: Labrig, tmp_path: Path) -> None:
     """A charge that stays straight tells k_r and r(0) of a general order only together."""
     lit_s, dark_s = np.clip(T_S - 30, 0, 170), np.maximum(T_S - 200, 0)
-    charged = lit_concentration(0.0, 1e-5, 40.0, 2.0, lit_s).value
+    charged = lit_concentration(0.0, 1e-5, 40.0, 2.0, lit_s)
     level = dark_concentration(charged, 40.0, 2.0, dark_s)
     light = 1e10 * (40.0 * level**2 + np.where(dark_s == 0, 1e-5 * level, 0))
     table, out = tmp_path / "weak.csv", tmp_path / "weak"

@@ -12,6 +12,7 @@ from labrig.material import (
     dark_concentration,
     dark_step,
     lit_concentration,
+    lit_step,
     mean_emission,
     steady_concentration,
 )
@@ -38,7 +39,7 @@ def integrated(start: float, kappa: float, k: float, b: float, duration_s: float
 @settings(max_examples=30)
 @given(concentrations, rates, rates, orders, durations)
 def test_steps_under_light(start: float, kappa: float, k: float, b: float, t_s: float) -> None:
-    value = lit_concentration(start, kappa, k, b, t_s).value
+    value = lit_concentration(start, kappa, k, b, t_s)
     assert value == pytest.approx(integrated(start, kappa, k, b, t_s), rel=1e-6, abs=1e-10)
 
 
@@ -53,9 +54,9 @@ def test_steps_in_the_dark(start: float, k: float, b: float, t_s: float) -> None
 def test_two_steps_are_one(
     start: float, kappa: float, k: float, b: float, first_s: float, second_s: float
 ) -> None:
-    between = lit_concentration(start, kappa, k, b, first_s).value
-    after = lit_concentration(between, kappa, k, b, second_s).value
-    whole = lit_concentration(start, kappa, k, b, first_s + second_s).value
+    between = lit_concentration(start, kappa, k, b, first_s)
+    after = lit_concentration(between, kappa, k, b, second_s)
+    whole = lit_concentration(start, kappa, k, b, first_s + second_s)
     assert after == pytest.approx(whole, rel=1e-8)
 
 
@@ -64,9 +65,9 @@ def test_the_first_order_is_the_rate_equation(
     start: float, kappa: float, k: float, t_s: float
 ) -> None:
     expected = concentration(start, kappa, k, t_s)
-    assert lit_concentration(start, kappa, k, 1.0, t_s).value == pytest.approx(expected, rel=1e-10)
+    assert lit_concentration(start, kappa, k, 1.0, t_s) == pytest.approx(expected, rel=1e-10)
     # b is no special case at 1, neither under light nor in the dark.
-    near = lit_concentration(start, kappa, k, 1 + 1e-9, t_s).value
+    near = lit_concentration(start, kappa, k, 1 + 1e-9, t_s)
     assert near == pytest.approx(expected, rel=1e-6)
     dark = dark_concentration(start, k, [1.0, 1 + 1e-12], t_s)
     assert dark[0] == pytest.approx(float(concentration(start, 0.0, k, t_s)), rel=1e-12)
@@ -79,15 +80,15 @@ def test_the_second_order_is_riccati_s_equation() -> None:
     spread = np.sqrt(kappa**2 + 4 * kappa * k)
     tanh = np.tanh(spread * t_s / 2)
     expected = 2 * kappa * tanh / (spread + kappa * tanh)
-    value = lit_concentration(0.0, kappa, k, 2.0, t_s).value
+    value = lit_concentration(0.0, kappa, k, 2.0, t_s)
     assert value == pytest.approx(expected, rel=1e-12)
 
 
 @given(concentrations, rates, rates, st.floats(1.01, 3.9), durations)
 def test_derivatives(start: float, kappa: float, k: float, b: float, t_s: float) -> None:
-    charged = lit_concentration(start, kappa, k, b, t_s)
+    charged = lit_step(start, kappa, k, b, t_s)
     step = 1e-4
-    ends = [lit_concentration(start + by, kappa, k, b, t_s).value for by in (0.0, 1e-7)]
+    ends = [lit_concentration(start + by, kappa, k, b, t_s) for by in (0.0, 1e-7)]
     assert charged.by_start == pytest.approx((ends[1] - ends[0]) / 1e-7, rel=1e-3, abs=1e-6)
     analytic = (charged.by_kappa * kappa, charged.by_k_r * k, charged.by_order)
     for slope, (up, down) in zip(
@@ -99,7 +100,7 @@ def test_derivatives(start: float, kappa: float, k: float, b: float, t_s: float)
         ),
         strict=True,
     ):
-        ends = [lit_concentration(start, *each, t_s).value for each in (up, down)]
+        ends = [lit_concentration(start, *each, t_s) for each in (up, down)]
         numeric = (ends[0] - ends[1]) / (2 * step)
         assert slope == pytest.approx(numeric, rel=1e-4, abs=1e-6 * float(charged.value))
 
@@ -108,7 +109,7 @@ def test_derivatives(start: float, kappa: float, k: float, b: float, t_s: float)
 def test_long_light_ends_in_balance(kappa: float, k: float, b: float) -> None:
     steady = steady_concentration(kappa, k, b)
     assert kappa * (1 - steady) == pytest.approx(k * steady**b, rel=1e-9)
-    assert lit_concentration(0.3, kappa, k, b, 1e7).value == pytest.approx(steady, rel=1e-9)
+    assert lit_concentration(0.3, kappa, k, b, 1e7) == pytest.approx(steady, rel=1e-9)
 
 
 @pytest.mark.parametrize("b", [1.0, 1.3, 2.0, 3.0])

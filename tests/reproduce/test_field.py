@@ -116,7 +116,7 @@ def test_few_samples_of_a_higher_order_need_no_table() -> None:
 @given(
     order=st.sampled_from([1.0, 1.3, 3.0]),
     light=st.floats(0, 1e4),
-    first=st.sampled_from([0.0, 7.0, 200.0]),
+    first=st.sampled_from([0.0, 200.0]),
     second=st.sampled_from([0.3, 200.0]),
     start=st.floats(0, 1),
 )

@@ -195,7 +195,7 @@ def test_the_glow_of_a_wall_between_its_texels_and_its_vertices_is_interpolated(
 
 
 def test_the_same_seed_gives_the_same_light_with_any_number_of_threads() -> None:
-    geometry = Geometry.of([Surface("room", ROOM, 0, samples=(16, 16))])
+    geometry = Geometry.of([Surface("room", ROOM, 0, samples=(8, 8))])
     tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(), 7)
     one, two = (
         [*tracer.from_camera(INSIDE, 512, threads), *tracer.from_surface(0, 512, threads)]

@@ -2,9 +2,8 @@
 
 import http.client
 import json
+import os
 import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -275,23 +274,30 @@ class TestStatistics:
 
 
 class TestCommand:
-    @pytest.mark.campaign
-    def test_ctrl_c_ends_it_in_one_line(self, make_rig: Callable[..., Path]) -> None:
-        command = [sys.executable, "-m", "labrig", "rig", "view", str(make_rig()), "--no-browser"]
-        with subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        ) as process:
-            assert process.stdout
-            assert process.stderr
-            url = process.stdout.readline().strip()
+    def test_ctrl_c_ends_it_in_one_line(
+        self,
+        labrig: Callable[..., Ended],
+        make_rig: Callable[..., Path],
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        seen = []
+
+        def look_and_interrupt(url: str) -> None:
             parts = urlsplit(url)
             line = http.client.HTTPConnection(parts.hostname or "", parts.port or 0, timeout=20)
             line.request("GET", f"{parts.path}frame.jpg")
-            assert decode(line.getresponse().read()).shape == (32, 48, 3)
+            seen.append(decode(line.getresponse().read()).shape)
             line.close()
-            process.send_signal(signal.SIGINT)
-            assert process.wait(20) == 130
-            assert process.stderr.read() == "labrig: interrupted\n"
+            os.kill(os.getpid(), signal.SIGINT)
+
+        def open_in_another_thread(url: str) -> None:
+            threading.Thread(target=look_and_interrupt, args=(url,), daemon=True).start()
+
+        monkeypatch.setattr("webbrowser.open", open_in_another_thread)
+        ended = labrig("rig", "view", make_rig())
+        assert seen == [(32, 48, 3)]
+        assert ended.code == 130
+        assert ended.err == "labrig: interrupted\n"
 
     @pytest.mark.parametrize(
         ("more", "said"),

@@ -111,7 +111,7 @@ def fit_charge_and_decay(
     >>> from labrig.fit import fit_charge_and_decay
     >>> from labrig.material import dark_concentration, lit_concentration
     >>> t_s = np.arange(1.0, 900.0, 2.0)
-    >>> charged = lit_concentration(0.0, 0.01, 0.05, 1.8, np.minimum(t_s, 200.0)).value
+    >>> charged = lit_concentration(0.0, 0.01, 0.05, 1.8, np.minimum(t_s, 200.0))
     >>> level = dark_concentration(charged, 0.05, 1.8, np.maximum(t_s - 200, 0.0))
     >>> light = 0.05 * level**1.8 + np.where(t_s < 200, 0.01 * level, 0.0)
     >>> light += 1e-5 * np.random.default_rng(1).standard_normal(len(t_s))

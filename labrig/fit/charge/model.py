@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from labrig.fit.least_squares import FloatArray
-from labrig.material import DECAY_LAWS, becquerel_of, lit_concentration
+from labrig.material import DECAY_LAWS, becquerel_of, lit_concentration, lit_step
 
 #: Parameters of a state: log κ, log s, b, log g.
 STATE_PARAMETERS = 4
@@ -42,7 +42,7 @@ def rates_of(state: FloatArray) -> StateRates:
 
 def level_at_off(rates: StateRates, charge_s: float) -> float:
     """Return r(0), the concentration at lamp off."""
-    return float(lit_concentration(0.0, rates.kappa, rates.k_r, rates.order, charge_s).value)
+    return float(lit_concentration(0.0, rates.kappa, rates.k_r, rates.order, charge_s))
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class ChargeAndDecay:
         """Return the light of one state and its derivatives."""
         kappa, k_r, b, reradiation = rates_of(state)
         n, steady = len(self.lit_s), reradiation * kappa
-        charged = lit_concentration(0.0, kappa, k_r, b, np.append(self.lit_s, self.charge_s))
+        charged = lit_step(0.0, kappa, k_r, b, np.append(self.lit_s, self.charge_s))
         r = np.maximum(charged.value, np.finfo(float).tiny)
         # By log κ, log s and b, on which log k depends.
         k_by = (1 - b, b, (np.log(k_r) - np.log(kappa)) / b)

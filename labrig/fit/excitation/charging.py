@@ -55,7 +55,7 @@ class Charging:
         """
         kappa = np.maximum(self.k_e_per_s @ self.irradiance, LEAST_KAPPA)
         k_r, order = self.k_r_per_s, self.kinetic_order
-        charged = lit_concentration(r0, kappa, k_r, order, charge_s[:, np.newaxis]).value
+        charged = lit_concentration(r0, kappa, k_r, order, charge_s[:, np.newaxis])
         begins = dark_concentration(charged, k_r, order, dark_s[:, np.newaxis])
         emitted = mean_emission(begins, k_r, order, exposure_s[:, np.newaxis]).value
         return np.asarray((emitted @ self.full_level).reshape(-1, len(charge_s)).mean(axis=0))

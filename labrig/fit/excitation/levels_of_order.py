@@ -11,7 +11,7 @@ import numpy as np
 
 from labrig.fit.excitation.charging import LEAST_KAPPA
 from labrig.fit.excitation.level_slopes import Levels
-from labrig.material import dark_step, lit_concentration, mean_emission, relaxation_with_slopes
+from labrig.material import dark_step, lit_step, mean_emission, relaxation_with_slopes
 from labrig.results import Charge, ChargingSeries, FloatArray, Transient
 
 #: Parts of a transient, each with its mean light.
@@ -61,7 +61,7 @@ class _Sample(NamedTuple):
         """Return the state after constant light."""
         light = brightness * self.irradiance
         kappa = np.maximum(light @ self.k_e_per_s.T, LEAST_KAPPA)
-        step = lit_concentration(state.value, kappa, self.k_r_per_s, self.order, duration_s)
+        step = lit_step(state.value, kappa, self.k_r_per_s, self.order, duration_s)
         by_k_e = step.by_kappa[..., None] * light[:, None, :]
         return state.stepped(step.value, step.by_start, step.by_k_r, step.by_order, by_k_e)
 
