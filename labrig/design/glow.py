@@ -149,8 +149,8 @@ def captures(steps: Steps, k_e: FloatArray, k_r: float, order: float) -> float:
         # The level is nearly a parabola in each of many parts: Simpson's rule.
         ends = duration * np.linspace(0, 1, PARTS + 1) ** 2
         middles = (ends[1:] + ends[:-1]) / 2
-        levels = lit_concentration(level, rate, k_r, order, ends).value
-        inside = lit_concentration(level, rate, k_r, order, middles).value
+        levels = lit_concentration(level, rate, k_r, order, ends)
+        inside = lit_concentration(level, rate, k_r, order, middles)
         total += float(np.diff(ends) @ (rate * (1 - (levels[1:] + levels[:-1] + 4 * inside) / 6)))
         level = float(levels[-1])
     return total
@@ -208,7 +208,7 @@ def _by_steps(
             levels[now], by_start, by_k_r, by_order = (float(each) for each in dark)
             slopes[now] = by_start * slopes[number]
         else:
-            lit = lit_concentration(level, kappa[number], k_r, order, duration)
+            lit = lit_step(level, kappa[number], k_r, order, duration)
             levels[now], by_start, by_kappa, by_k_r, by_order = (float(each) for each in lit)
             slopes[now] = by_start * slopes[number]
             slopes[now, :-2] += by_kappa * steps.irradiance[number]

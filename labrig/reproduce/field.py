@@ -171,8 +171,7 @@ class Field:
         after = np.asarray(dark_concentration(before, k_r, order, duration_s))
         is_lit = rates > 0
         if is_lit.any():
-            lit = lit_concentration(before[is_lit], rates[is_lit], k_r, order, duration_s)
-            after[is_lit] = lit.value
+            after[is_lit] = lit_concentration(before[is_lit], rates[is_lit], k_r, order, duration_s)
         self._levels[state] = after
 
     def charge_to_equilibrium(self, irradiance: ArrayLike) -> None:
