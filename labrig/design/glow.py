@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.design.light import Steps
-from labrig.material import dark_step, lit_concentration, phi1, phi2, relaxation_with_slopes
+from labrig.material import (
+    dark_step,
+    lit_concentration,
+    lit_step,
+    phi1,
+    phi2,
+    relaxation_with_slopes,
+)
 
 FloatArray = NDArray[np.float64]
 
