@@ -33,7 +33,7 @@ def rendered_sections(comparison: RenderedComparison) -> tuple[Section, ...]:
     """
     if not comparison.patches:
         return ()
-    text = (comparison.description, *(f"Assumed: {note}." for note in comparison.notes))
+    text = (comparison.description, *(f"Note: {note}." for note in comparison.notes))
     return (
         Section(
             "The dark room, photographed and rendered",

@@ -235,11 +235,13 @@ def test_the_assumption_is_in_the_picture(labrig: Labrig, measured: Path, tmp_pa
     write_material(measured / "result" / "material.yaml", bare)
     ended = labrig("compare", measured, "--rendered", "--assume-albedo", 0.5, "--figures", tmp_path)
     assert (ended.code, ended.err) == (0, "")
-    assert "assumed: 0.5 at all wavelengths" in " ".join(ended.out.split())
+    assert "assumed to be 0.5 at all wavelengths" in " ".join(ended.out.split())
     assert {"rendered.png", "rendered-one-exposure.png"} <= {p.name for p in tmp_path.iterdir()}
     # The same room for `labrig render`, with the assumption in it.
     scene = load_scene(tmp_path / "dark-room.yaml")
-    assert scene.notes == ("the albedo of double-wide is assumed: 0.5 at all wavelengths",)
+    assert scene.notes == (
+        "sample (double-wide): its albedo is assumed to be 0.5 at all wavelengths",
+    )
     renderer = Renderer(scene.resized(width_px=12, height_px=8), threads=1)
     lit, *glow = (float(frame.radiance.sum()) for frame in renderer.frames())
     assert lit > glow[0] > glow[-1] > 0
