@@ -100,6 +100,8 @@ def test_densities_are_the_conditional_ones_within_the_range(seed: int, given_nm
     mixture = random_mixture(seed)
     surface = WavelengthShift(mixture.to_matrix(NM, NM), mixture)
     others = np.arange(302.5, 780.0, 5.0)
+    # On the diagonal itself the density jumps.
+    others = others[np.abs(others - given_nm) > 1e-6]
     for start in STARTS:
         conditional = mixture.input_given_output if start == "eye" else mixture.output_given_input
         reached = conditional.cdf([300.0, 780.0], given_nm)
