@@ -21,6 +21,7 @@ from labrig.reproduce import (
     Tracer,
     fold,
 )
+from labrig.reproduce.tracing_kernels import located_in_texture, rasterised
 
 FloatArray = NDArray[np.float64]
 
@@ -218,3 +219,31 @@ def test_the_front_of_a_wall_has_light_and_its_back_is_black() -> None:
             paths = list(tracer.from_camera(camera, 4, 1))
             light = folded(paths, geometry, black, np.ones(BANDS), np.zeros(0))
             np.testing.assert_array_equal(light, seen)
+
+
+def test_a_point_that_rounding_moves_beside_its_triangle_stays_on_it() -> None:
+    """In single precision a point near the edge of a cell may fall into the empty next one."""
+    corners = np.array([[[0, 0], [0.5, 0], [0.5, 1]], [[0, 0], [0.5, 1], [0, 1]]], np.float32)
+    face_at, _ = rasterised(corners, 8, 4)
+    assert (face_at[:, 4:] == -1).all()
+    uv = np.array([[0.5000001, 0.3], [0.5000001, 1.0000001]], np.float32)
+    cell = np.array([[1, 3], [3, 3]], np.int32)
+    faces, weights = located_in_texture(corners, face_at, uv, cell)
+    assert np.isin(faces, [0, 1]).all()
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+    back = np.einsum("nk,nkc->nc", weights, corners[faces])
+    np.testing.assert_allclose(back, uv, atol=1e-6)
+
+
+def test_a_ball_far_away_that_shows_its_inside_makes_no_room() -> None:
+    """Rays that leave the scene are lost, and the sky is seen, unless the room is around all."""
+    floor = Surface("floor", Mesh.rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), 0, samples=(1, 1))
+    ball = Surface("ball", Mesh.sphere((5, 0, 0), 0.1, inward=True), 0)
+    geometry = Geometry.of([floor, ball])
+    assert not geometry.is_room
+    lamps = LampTable.of([Lamp("sky", "sky", np.ones(BANDS))], geometry)
+    paths = list(Tracer(geometry, lamps, PathLength(2, 0.0)).from_surface(0, 256, 1))
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    seen = folded(paths, geometry, black, np.zeros(BANDS), np.ones(BANDS), incident=True)
+    assert seen[0, 0] == pytest.approx(np.pi, rel=0.01)
+    assert sum(each.n_escaped for each in paths) == 0
