@@ -17,6 +17,7 @@ from queue import SimpleQueue
 from typing import IO, Any
 
 from labrig.errors import DataError
+from labrig.processors import n_processors
 from labrig.reduce.decoding import Reduction
 from labrig.signals import name_of
 
@@ -46,7 +47,7 @@ def worker_count(groups: Sequence[Paths]) -> int:
     largest = max(max(group, default=0) for group in sizes)
     worker_bytes = WORKER_BYTES + BYTES_PER_FILE_BYTE * largest
     fitting = (MEMORY_BYTES - OWN_BYTES) // worker_bytes
-    return min(_cpus(), fitting, len(groups))
+    return min(n_processors(), fitting, len(groups))
 
 
 def _size_bytes(path: Path) -> int:
@@ -54,13 +55,6 @@ def _size_bytes(path: Path) -> int:
         return path.stat().st_size
     except OSError:  # reading it says what is wrong
         return 0
-
-
-def _cpus() -> int:
-    """Return the number of CPUs that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def texts_from_workers(

@@ -6,7 +6,6 @@ long the history.
 """
 
 import math
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -18,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
 from labrig.material import dark_concentration, lit_concentration, steady_concentration
+from labrig.processors import n_processors
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.field_parameters import FieldParameters
 from labrig.reproduce.order_table import LONGEST, order_table
@@ -249,7 +249,7 @@ class Field:
 
     def _in_threads(self, kernel: Callable[..., bool], *arguments: Any) -> None:
         """Run a kernel on parts of the samples at the same time."""
-        threads = 1 if self.n_samples < FEW_SAMPLES else _n_threads()
+        threads = 1 if self.n_samples < FEW_SAMPLES else n_processors()
         edges = np.linspace(0, self.n_samples, threads + 1).astype(int)
         parts = list(pairwise(edges.tolist()))
         run = map if len(parts) == 1 else _pool().map
@@ -258,10 +258,5 @@ class Field:
 
 
 @cache
-def _n_threads() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(_n_threads(), thread_name_prefix="field")
+    return ThreadPoolExecutor(n_processors(), thread_name_prefix="field")

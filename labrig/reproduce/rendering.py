@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from labrig.errors import UsageError
+from labrig.processors import n_processors
 from labrig.reproduce.field import Field
 from labrig.reproduce.folding import Matrices, fold
 from labrig.reproduce.geometry import Geometry, Surface
@@ -82,7 +83,7 @@ class Renderer:
 
     def __init__(self, scene: Scene, threads: int | None = None) -> None:
         self._scene = scene
-        self._threads = threads or _n_processors()
+        self._threads = threads or n_processors()
         _require_memory(scene)
         self._matrices = Matrices.of(scene.materials)
         self._t_s = scene.file.programme[0].at_s
@@ -412,7 +413,3 @@ def _require_memory(scene: Scene) -> None:
             f"of {there / 1e9:.1f} GB of memory, got {needed / 1e9:.1f} GB; take fewer paths "
             "(--paths), a smaller picture (--size) or fewer texels"
         )
-
-
-def _n_processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
