@@ -13,7 +13,7 @@ from labrig.reproduce import Field, FieldParameters, WavelengthShift
 @pytest.fixture
 def without_numba(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numba", None)
-    for name in ("kernels", "shift_kernels"):
+    for name in ("surface.field_kernels", "transport.shift_kernels"):
         monkeypatch.delitem(sys.modules, f"labrig.reproduce.{name}", raising=False)
 
 

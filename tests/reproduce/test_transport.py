@@ -21,7 +21,7 @@ from labrig.reproduce import (
     Tracer,
     fold,
 )
-from labrig.reproduce.tracing_kernels import located_in_texture, rasterised
+from labrig.reproduce.transport.tracing_kernels import located_in_texture, rasterised
 
 FloatArray = NDArray[np.float64]
 

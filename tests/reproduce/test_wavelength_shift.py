@@ -18,7 +18,7 @@ from labrig.reproduce import (
     direct_light,
     rotated_wavelengths,
 )
-from labrig.reproduce.wavelength_shift import Start
+from labrig.reproduce.transport.wavelength_shift import Start
 from tests.material.reradiation import bfc450
 from tests.material.reradiation.test_mixture import random_mixture
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.reproduce.compiled import compiled
-from labrig.reproduce.geometry import Geometry
-from labrig.reproduce.lamp import LampTable
+from labrig.reproduce.transport.geometry import Geometry
+from labrig.reproduce.transport.lamp import LampTable
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
@@ -192,7 +192,7 @@ class Tracer:
         self, geometry: Geometry, lamps: LampTable, length: PathLength, seed: int = 1
     ) -> None:
         self._geometry, self._lamps, self._length, self._seed = geometry, lamps, length, seed
-        self._kernels = compiled("tracing_kernels")
+        self._kernels = compiled("transport.tracing_kernels")
         self._scene = _embree_scene(geometry.triangles)
         self._sky = (
             int(np.argmax(lamps.kind == self._kernels.SKY))

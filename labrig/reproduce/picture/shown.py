@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.reproduce.display import Display, tristimulus
-from labrig.reproduce.exr import SpectralFrame
-from labrig.reproduce.night import NightLook, night_view
+from labrig.reproduce.picture.display import Display, tristimulus
+from labrig.reproduce.picture.exr import SpectralFrame
+from labrig.reproduce.picture.night import NightLook, night_view
 
 Bytes = NDArray[np.uint8]
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import DiskError, UsageError
 from labrig.optics import srgb_bytes
-from labrig.reproduce.exported_scene import (
+from labrig.reproduce.export.exported_scene import (
     ExportedCamera,
     ExportedMesh,
     Glow,

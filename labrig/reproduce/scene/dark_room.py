@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from labrig.region import Region
-from labrig.reproduce.scene_file import (
+from labrig.reproduce.scene.scene_file import (
     BandsEntry,
     BenchLightEntry,
     CameraEntry,

@@ -7,7 +7,7 @@ from typing import Literal, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.reproduce.geometry import Geometry
+from labrig.reproduce.transport.geometry import Geometry
 
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int32]

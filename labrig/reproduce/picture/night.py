@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
 from labrig.optics import band_integrals, scotopic_efficacy
-from labrig.reproduce.display import Display, tristimulus, weighted_bands
+from labrig.reproduce.picture.display import Display, tristimulus, weighted_bands
 
 FloatArray = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
-from labrig.reproduce.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
-from labrig.reproduce.rendering import Frame, Renderer
-from labrig.reproduce.scene import Scene
+from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
+from labrig.reproduce.picture.rendering import Frame, Renderer
+from labrig.reproduce.scene.built_scene import Scene
 
 Float32Array = NDArray[np.float32]
 

@@ -17,12 +17,12 @@ from scipy.ndimage import distance_transform_edt
 
 from labrig.errors import UsageError
 from labrig.processors import n_processors
-from labrig.reproduce.field import Field
-from labrig.reproduce.folding import Matrices, fold
-from labrig.reproduce.geometry import Geometry, Surface
-from labrig.reproduce.lamp import LampTable
-from labrig.reproduce.scene import Scene
-from labrig.reproduce.tracing import Paths, Tracer
+from labrig.reproduce.scene.built_scene import Scene
+from labrig.reproduce.surface.field import Field
+from labrig.reproduce.transport.folding import Matrices, fold
+from labrig.reproduce.transport.geometry import Geometry, Surface
+from labrig.reproduce.transport.lamp import LampTable
+from labrig.reproduce.transport.tracing import Paths, Tracer
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.reproduce.compiled import compiled
-from labrig.reproduce.surface_material import SurfaceMaterial
-from labrig.reproduce.tracing import Paths
+from labrig.reproduce.surface.surface_material import SurfaceMaterial
+from labrig.reproduce.transport.tracing import Paths
 
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int32]
@@ -105,7 +105,7 @@ def fold(
     >>> fold(paths, walls, room.material_of_place, glow, no_lamps, 1)[0].tolist()
     [2.0, 2.0, 2.0]
     """
-    fold_paths = compiled("folding_kernels").fold_paths
+    fold_paths = compiled("transport.folding_kernels").fold_paths
     arguments = (
         matrices.values, matrices.first, matrices.last, matrices.is_diagonal,
         np.ascontiguousarray(material_of_place, dtype=np.int32),

@@ -14,8 +14,8 @@ from labrig.material import (
     physical_warnings,
 )
 from labrig.optics import Spectrum, Transmittance
-from labrig.reproduce.bands import Bands
-from labrig.reproduce.field_parameters import FieldParameters
+from labrig.reproduce.surface.bands import Bands
+from labrig.reproduce.surface.field_parameters import FieldParameters
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]

@@ -19,8 +19,8 @@ from labrig.errors import UsageError
 from labrig.material import dark_concentration, lit_concentration, steady_concentration
 from labrig.processors import n_processors
 from labrig.reproduce.compiled import compiled
-from labrig.reproduce.field_parameters import FieldParameters
-from labrig.reproduce.order_table import LONGEST, order_table
+from labrig.reproduce.surface.field_parameters import FieldParameters
+from labrig.reproduce.surface.order_table import LONGEST, order_table
 
 Float32Array = NDArray[np.float32]
 
@@ -64,7 +64,7 @@ class Field:
     def __init__(
         self, parameters: FieldParameters, n_samples: int | None = None, levels: ArrayLike = 0.0
     ) -> None:
-        compiled("kernels")
+        compiled("surface.field_kernels")
         of_textures = parameters.n_samples
         if n_samples is None:
             n_samples = of_textures
@@ -132,7 +132,7 @@ class Field:
         if method == "euler":
             self._euler(light, base, duration_s)
             return
-        kernels, order = compiled("kernels"), self._parameters.order
+        kernels, order = compiled("surface.field_kernels"), self._parameters.order
         if (order == 1).all():
             self._in_threads(
                 kernels.step_first_order,
@@ -237,7 +237,9 @@ class Field:
     def _kappa(self, light: Float32Array, base: Float32Array, state: int) -> Float32Array:
         """Return κ of a state in 1/s (samples,)."""
         kappa = np.empty(self.n_samples, np.float32)
-        self._in_threads(compiled("kernels").excitation, kappa, light, self._k_e, base, state)
+        self._in_threads(
+            compiled("surface.field_kernels").excitation, kappa, light, self._k_e, base, state
+        )
         return kappa
 
     def _euler(self, light: Float32Array, base: Float32Array, duration_s: float) -> None:

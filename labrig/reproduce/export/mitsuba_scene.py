@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
-from labrig.reproduce.exported_scene import (
+from labrig.reproduce.export.exported_scene import (
     ExportedCamera,
     ExportedMesh,
     Glow,

@@ -17,7 +17,7 @@ from labrig.errors import DiskError, UsageError
 from labrig.input_file import read_bytes
 from labrig.material import read_spectral_image
 from labrig.optics import XYZ_TO_SRGB, edges_from_centres
-from labrig.reproduce.display import tristimulus
+from labrig.reproduce.picture.display import tristimulus
 
 FloatArray = NDArray[np.float64]
 Pixels = NDArray[np.float32]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.reproduce.compiled import compiled
-from labrig.reproduce.mesh import Mesh
+from labrig.reproduce.transport.mesh import Mesh
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
@@ -311,7 +311,7 @@ def _on_texels(
     surface: Surface, per_place: int, rng: np.random.Generator, scattered: FloatArray
 ) -> tuple[IntArray, FloatArray, IntArray]:
     """Return triangles, weights of their corners, and texels, for points on each texel."""
-    kernels = compiled("tracing_kernels")
+    kernels = compiled("transport.tracing_kernels")
     assert isinstance(surface.samples, tuple)
     assert surface.mesh.uv is not None
     columns, rows = surface.samples

@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.optics import XYZ_TO_SRGB, illuminant
-from labrig.reproduce.display import Display, tristimulus
-from labrig.reproduce.exported_scene import ExportedCamera, ExportedMesh, Glow
-from labrig.reproduce.geometry import Geometry
-from labrig.reproduce.render_folder import RenderFolder
-from labrig.reproduce.rendering import Renderer
-from labrig.reproduce.scene import Scene
+from labrig.reproduce.export.exported_scene import ExportedCamera, ExportedMesh, Glow
+from labrig.reproduce.picture.display import Display, tristimulus
+from labrig.reproduce.picture.render_folder import RenderFolder
+from labrig.reproduce.picture.rendering import Renderer
+from labrig.reproduce.scene.built_scene import Scene
+from labrig.reproduce.transport.geometry import Geometry
 
 FloatArray = NDArray[np.float64]
 

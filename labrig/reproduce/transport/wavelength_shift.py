@@ -92,7 +92,7 @@ class WavelengthShift:
         mixture: ReradiationMixture | None,
         reradiates: Literal["mixture", "matrix"] = "mixture",
     ) -> None:
-        compiled("shift_kernels")
+        compiled("transport.shift_kernels")
         if matrix.unit == "relative":
             raise UsageError(
                 f"{matrix.name}: expected re-radiation per nm of the light, got a relative one; "
@@ -142,7 +142,7 @@ class WavelengthShift:
         drawn = ShiftedWavelengths(
             np.empty_like(given), np.empty_like(given), np.empty(given.shape, np.bool_)
         )
-        compiled("shift_kernels").draw(
+        compiled("transport.shift_kernels").draw(
             self._tables(start), given, np.ascontiguousarray(random, dtype=np.float64),
             drawn.wavelength_nm, drawn.weight, drawn.is_reflected,
         )  # fmt: skip
@@ -183,7 +183,7 @@ class WavelengthShift:
     def _parts(self, given_nm: ArrayLike, start: Start) -> tuple[FloatArray, FloatArray]:
         given = np.ascontiguousarray(given_nm, dtype=np.float64)
         reflected, shifted = np.empty_like(given), np.empty_like(given)
-        compiled("shift_kernels").parts(self._tables(start), given, reflected, shifted)
+        compiled("transport.shift_kernels").parts(self._tables(start), given, reflected, shifted)
         return reflected, shifted
 
     def _densities(
@@ -196,7 +196,7 @@ class WavelengthShift:
             )
         )
         pdf, value = np.empty_like(given), np.empty_like(given)
-        compiled("shift_kernels").densities(self._tables(start), given, other, pdf, value)
+        compiled("transport.shift_kernels").densities(self._tables(start), given, other, pdf, value)
         return pdf, value
 
     def _tables(self, start: Start) -> Any:
@@ -211,7 +211,7 @@ class WavelengthShift:
         return self._made_tables(is_output_given=False)
 
     def _made_tables(self, *, is_output_given: bool) -> Any:
-        matrix, kernels = self._matrix, compiled("shift_kernels")
+        matrix, kernels = self._matrix, compiled("transport.shift_kernels")
         edges = (matrix.input_edges_nm, matrix.output_edges_nm)
         given, other = edges[::-1] if is_output_given else edges
         reradiation = self._stokes if is_output_given else self._stokes.T
@@ -238,7 +238,7 @@ class WavelengthShift:
         return float(np.max(reach, initial=0.0, where=self._stokes != 0))
 
     def _components(self, given: int) -> NDArray[np.void]:
-        mixture, dtype = self._mixture, compiled("shift_kernels").COMPONENT
+        mixture, dtype = self._mixture, compiled("transport.shift_kernels").COMPONENT
         if mixture is None:
             return np.empty(0, dtype)
         found = np.empty(len(mixture.weights), dtype)

@@ -13,11 +13,7 @@ from numpy.typing import NDArray
 from labrig.errors import UsageError
 from labrig.material import Albedo, Material, read_any_material
 from labrig.optics import absolute_irradiance, read_colour_chart, read_light, read_transmittance
-from labrig.reproduce.bands import Bands
-from labrig.reproduce.geometry import Geometry, Samples, Surface
-from labrig.reproduce.lamp import Lamp
-from labrig.reproduce.mesh import Mesh, read_mesh, rotation
-from labrig.reproduce.scene_file import (
+from labrig.reproduce.scene.scene_file import (
     STRENGTHS,
     AlbedoCurve,
     LampEntry,
@@ -27,14 +23,18 @@ from labrig.reproduce.scene_file import (
     SceneFile,
     read_scene,
 )
-from labrig.reproduce.surface_material import (
+from labrig.reproduce.surface.bands import Bands
+from labrig.reproduce.surface.surface_material import (
     BenchLight,
     SurfaceMaterial,
     of_albedo,
     of_matrix,
     of_phosphor,
 )
-from labrig.reproduce.tracing import PathLength, Pinhole
+from labrig.reproduce.transport.geometry import Geometry, Samples, Surface
+from labrig.reproduce.transport.lamp import Lamp
+from labrig.reproduce.transport.mesh import Mesh, read_mesh, rotation
+from labrig.reproduce.transport.tracing import PathLength, Pinhole
 from labrig.yaml_file import validate
 
 FloatArray = NDArray[np.float64]

@@ -1,0 +1,1 @@
+"""Paths of light over meshes: traced once without wavelength, folded by the materials."""
