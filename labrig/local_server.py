@@ -23,7 +23,6 @@ from urllib.parse import parse_qs, urlsplit
 from labrig.errors import DiskError, LabrigError, UsageError
 
 LOOPBACK = "127.0.0.1"
-MAX_BODY_BYTES = 64 * 1024
 #: No content from other origins, and no embedding in another page.
 CONTENT_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'"
 KINDS = {
@@ -88,6 +87,8 @@ class LocalConversation(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     #: Seconds without a request after which a connection is closed.
     timeout: ClassVar[int] = 60
+    #: Longest request that is read.
+    max_body_bytes: ClassVar[int] = 64 * 1024
     #: Files beside the class's module by path.
     pages: ClassVar[Mapping[str, Path]] = {}
 
@@ -145,7 +146,7 @@ class LocalConversation(BaseHTTPRequestHandler):
     def body(self) -> bytes:
         """Read the request's body, also of a refused request, to keep the connection usable."""
         length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > MAX_BODY_BYTES:
+        if not length.isdecimal() or int(length) > self.max_body_bytes:
             self.close_connection = True
             return b""
         return self.rfile.read(int(length))

@@ -201,7 +201,12 @@ def _is_indented_by_tab(text: str, line: int) -> bool:
 
 def write_yaml(path: Path, model: BaseModel) -> None:
     """Write `model` so that `read_model` reads it."""
-    path.write_text(yaml_text(model.model_dump(mode="json", exclude_none=False)), encoding="utf-8")
+    path.write_text(model_text(model), encoding="utf-8")
+
+
+def model_text(model: BaseModel) -> str:
+    """Return the text that `write_yaml` writes."""
+    return yaml_text(model.model_dump(mode="json", exclude_none=False))
 
 
 def yaml_text(content: Mapping[str, Any]) -> str:

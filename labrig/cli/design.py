@@ -1,4 +1,4 @@
-"""`labrig design`: the material that glows as someone wants it to."""
+"""`labrig design`: the material that glows as someone wants it to, on a page or from a file."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,25 +8,72 @@ import typer
 
 def design(
     constraints: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             "--constraints",
             help="A .yaml that says how it should glow when, under which light (labrig schema "
-            "design).",
+            "design): it is solved, and no page is opened.",
         ),
-    ],
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Material file to write (.yaml).")
+        Path | None,
+        typer.Option("--out", help="With --constraints: material file to write (.yaml)."),
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", help="File for a figure over time (.png, .svg, .pdf)."),
+        typer.Option(
+            "--picture", help="With --constraints: file for a figure over time (.png, .svg, .pdf)."
+        ),
     ] = None,
     nearest: Annotated[
-        bool, typer.Option("--nearest", help="Name the nearest measured materials, too.")
+        bool,
+        typer.Option(
+            "--nearest", help="With --constraints: name the nearest measured materials, too."
+        ),
+    ] = False,
+    begin_with: Annotated[
+        Path | None,
+        typer.Option("--open", help="A .yaml of wishes with which the page begins."),
+    ] = None,
+    port: Annotated[
+        int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
+    ] = 0,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only print the page's address.")
     ] = False,
 ) -> None:
-    """Find the phosphorescent material that glows as a file wants it to."""
+    """Find the phosphorescent material that glows as you want it to: on a page, or from a file."""
+    if constraints is not None:
+        _solve(constraints, out, picture, nearest)
+        return
+    if out is not None or picture is not None or nearest:
+        from labrig.errors import UsageError
+
+        raise UsageError(
+            "expected --constraints with --out, --picture and --nearest, got none; on the page the "
+            "same is behind its buttons"
+        )
+    _serve(begin_with, port, no_browser)
+
+
+def _serve(begin_with: Path | None, port: int, no_browser: bool) -> None:
+    from labrig.clock import SystemClock
+    from labrig.signals import interrupting
+    from labrig.studio import design_on_page
+
+    def tell(url: str) -> None:
+        typer.echo(url)
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(url)
+
+    clock = SystemClock()
+    with interrupting(clock):
+        design_on_page(begin_with, port, clock, tell)
+
+
+def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: bool) -> None:
     from labrig.design import nearest_materials, read_wish, to_material
     from labrig.errors import DiskError
     from labrig.material import write_material

@@ -7,6 +7,10 @@ from .bands import (
     spectral_bands as spectral_bands,
     three_bands as three_bands,
 )
+from .by_hand import (
+    Parameters as Parameters,
+    judge as judge,
+)
 from .conversion import (
     Conversion as Conversion,
 )

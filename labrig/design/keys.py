@@ -2,7 +2,7 @@
 
 import itertools
 from dataclasses import dataclass
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,6 +87,11 @@ class Keys:
                 _refuse_contradiction(first, second, time, wanted)
         return cls(where, time, wanted)
 
+    @classmethod
+    def none(cls) -> Self:
+        """Return no keys: nothing is wanted yet, and a material can only be looked at."""
+        return cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros((0, 3)))
+
     @property
     def count(self) -> int:
         """Number of keys."""
@@ -117,6 +122,21 @@ class Keys:
             weights = np.ones_like(weights)
         return _with_floor(self.radiance @ (weights / weights.sum()))
 
+    def weights(self, bands: DesignBands, kind: Literal["luminance", "plain"]) -> FloatArray:
+        """Return by what differences to the keys are multiplied, shape (m,).
+
+        Parameters
+        ----------
+        bands
+            Bands of the design.
+        kind
+            `luminance`: relative to each key's own luminance; `plain`: all alike, as in eq. 7.
+        """
+        luminance = self.luminance(bands)
+        if kind == "plain":
+            return np.full_like(luminance, 1 / luminance.max(initial=1e-300))
+        return 1 / luminance
+
     def screen_luminance(self, bands: DesignBands) -> FloatArray:
         """Return the luminances by which differences of colours are judged, shape (m,).
 
@@ -127,7 +147,7 @@ class Keys:
 
 def _with_floor(y: FloatArray) -> FloatArray:
     """Return luminances, those of black keys replaced by the least of the others."""
-    is_black = y <= FLOOR * max(float(y.max()), 0.0)
+    is_black = y <= FLOOR * max(float(y.max(initial=0.0)), 0.0)
     if is_black.all():
         return np.ones_like(y)
     return np.where(is_black, y[~is_black].min(), y)

@@ -93,7 +93,7 @@ def nearest_materials(
     Raises
     ------
     UsageError
-        No material has excitation rates and re-radiation in bands.
+        There is no key, or no material has excitation rates and re-radiation in bands.
 
     Examples
     --------
@@ -104,6 +104,8 @@ def nearest_materials(
     >>> one.names
     ('blue-paint',)
     """
+    if not design.keys.count:
+        raise UsageError("expected at least one key to be near to, got none")
     usable = [each for each in (presets() if materials is None else materials) if _is_whole(each)]
     if not usable:
         raise UsageError(

@@ -137,7 +137,7 @@ class Design:
         light counts up to the last key, the glow to its end.
         """
         programme = self.programme
-        end = max(float(self.keys.time_s.max()), float(programme.begin_s[0]))
+        end = float(self.keys.time_s.max(initial=programme.begin_s[0 if self.keys.count else -1]))
         places = np.arange(programme.n_places)
         ratios = np.zeros(len(places))
         per_state = np.pi * self.reradiation @ self.bands.energy
@@ -151,6 +151,10 @@ class Design:
             # Of no emission nothing has to be absorbed.
             ratios[steps.keys[0]] = emitted / absorbed if absorbed > 0 else np.inf * (emitted > 0)
         return ratios
+
+    def with_cost(self, cost: float) -> "Design":
+        """Return the design with another sum of squares."""
+        return replace(self, cost=cost)
 
     def with_impossible(self, impossible: tuple[Impossible, ...]) -> "Design":
         """Return the design with wishes that cannot be met."""

@@ -103,9 +103,9 @@ def solve(
     if given is not None:
         light = given * reflected
         target = target - (light if seen is None else light @ seen.T)
-    luminance = keys.luminance(bands)
-    weight = 1 / (luminance if weights == "luminance" else np.full_like(luminance, luminance.max()))
-    linear = linear_part(Wanted(target, weight, reflected if given is None else None, seen))
+    linear = linear_part(
+        Wanted(target, keys.weights(bands, weights), reflected if given is None else None, seen)
+    )
     problem = Problem.of(programme, keys.place, keys.time_s, linear, n_states)
     ends = search(problem, is_order_free=order is None, order=order or 1.0)
     best = ends[0]
@@ -140,6 +140,8 @@ def _check(
     order: float | None,
     key_sigma: float,
 ) -> None:
+    if not keys.count:
+        raise UsageError("expected at least one key, got none; say when it should glow how")
     if not 1 <= n_states <= MOST_STATES:
         raise UsageError(f"expected 1 or {MOST_STATES} states, got {n_states}")
     if order is not None and not 1 <= order <= MAX_ORDER:

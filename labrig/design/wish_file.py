@@ -141,7 +141,7 @@ class WishFile(_Part):
     places
         Instead of `light`: a light programme for each of several places, by name.
     keys
-        How it should look when.
+        How it should look when; none yet is no wish to be solved, but one to go on with.
     """
 
     name: Annotated[str, Field(min_length=1)] = "design"
@@ -153,7 +153,7 @@ class WishFile(_Part):
     key_sigma: Annotated[Fraction, Field(gt=0, lt=1)] = KEY_SIGMA
     light: tuple[LightChange, ...] | None = None
     places: dict[str, tuple[LightChange, ...]] | None = None
-    keys: Annotated[tuple[WishedKey, ...], Field(min_length=1)]
+    keys: tuple[WishedKey, ...] = ()
 
     @model_validator(mode="after")
     def _has_light(self) -> Self:
@@ -312,6 +312,8 @@ def _irradiance(change: LightChange, bands: DesignBands) -> FloatArray:
 
 
 def _keys(file: WishFile, places: tuple[str, ...], bands: DesignBands) -> Keys:
+    if not file.keys:
+        return Keys.none()
     kinds = {key.spectrum is None for key in file.keys}
     if len(kinds) > 1:
         raise UsageError("expected keys that are all colours or all spectra, got both")

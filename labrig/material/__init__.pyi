@@ -22,6 +22,7 @@ from .file import (
     ScaleFactor as ScaleFactor,
     Spectrum as Spectrum,
     State as State,
+    material_text as material_text,
     read_material as read_material,
     write_material as write_material,
 )

@@ -21,7 +21,7 @@ from pydantic import (
 
 from labrig import resources
 from labrig.finite import NotNegative
-from labrig.yaml_file import read_model, write_yaml
+from labrig.yaml_file import model_text, read_model, write_yaml
 
 Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 #: Largest kinetic order; above 2 it is empirical.
@@ -483,6 +483,28 @@ def write_material(path: Path, material: Material) -> None:
     'mine'
     """
     write_yaml(path, material)
+
+
+def material_text(material: Material) -> str:
+    """Return the text of the file that `write_material` writes.
+
+    Parameters
+    ----------
+    material
+        The material.
+
+    Returns
+    -------
+    str
+        YAML.
+
+    Examples
+    --------
+    >>> from labrig.material import material_text, read_material
+    >>> material_text(read_material("blue-paint")).splitlines()[0]
+    'name: blue-paint'
+    """
+    return model_text(material)
 
 
 def _one_each(

@@ -25,6 +25,7 @@ from .decay_figures import (
 )
 from .design import (
     describe_design as describe_design,
+    describe_nearest as describe_nearest,
     draw_design as draw_design,
 )
 from .figure_style import (

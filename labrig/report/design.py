@@ -70,8 +70,41 @@ def describe_design(
             *_keys(design, places),
             *_conflicts(design),
             *_impossible(design),
-            *_nearest(nearest),
+            *(describe_nearest(found) for found in nearest),
         ]
+    )
+
+
+def describe_nearest(found: NearestMaterial) -> str:
+    """Say which measured material comes near, and how near.
+
+    Parameters
+    ----------
+    found
+        A measured material, or two in small areas side by side.
+
+    Returns
+    -------
+    str
+        One line.
+
+    Examples
+    --------
+    >>> from labrig.design import Keys, LightProgramme, nearest_materials, solve, three_bands
+    >>> from labrig.report import describe_nearest
+    >>> light = LightProgramme.checked([0.0, 60.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    >>> keys = Keys.checked(0, [61.0, 90.0], [[0.0, 0.003, 0.010], [0.0, 0.0012, 0.004]])
+    >>> one, two = nearest_materials(solve(light, keys, three_bands(), albedo=0.5))
+    >>> describe_nearest(one)[:28]
+    'nearest measured: blue-paint'
+    """
+    parts = " and ".join(
+        f"{name} on {100 * part:.0f} % of the area" if len(found.names) > 1 else name
+        for name, part in zip(found.names, found.fractions, strict=True)
+    )
+    return (
+        f"nearest measured: {parts}, ΔE2000 {found.delta_e2000.mean():.1f} in the mean, "
+        f"{found.delta_e2000.max():.1f} at most"
     )
 
 
@@ -169,18 +202,6 @@ def _impossible(design: Design) -> Iterator[str]:
         yield f"! {wish}"
     if len(design.impossible) > MOST_LINES:
         yield f"! {len(design.impossible) - MOST_LINES} more wishes are not possible"
-
-
-def _nearest(nearest: Sequence[NearestMaterial]) -> Iterator[str]:
-    for found in nearest:
-        parts = " and ".join(
-            f"{name} on {100 * part:.0f} % of the area" if len(found.names) > 1 else name
-            for name, part in zip(found.names, found.fractions, strict=True)
-        )
-        yield (
-            f"nearest measured: {parts}, ΔE2000 {found.delta_e2000.mean():.1f} in the mean, "
-            f"{found.delta_e2000.max():.1f} at most"
-        )
 
 
 def _draw_curve(axes: "Axes", design: Design, number: int, name: str) -> None:

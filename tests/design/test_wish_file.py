@@ -105,7 +105,6 @@ def test_the_manuals_example_prints_what_the_manual_shows(
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ({"keys": []}, "keys"),
         ({"keys": [{"at": "1 s"}]}, "colour"),
         ({"keys": [{"at": "1 s", "colour": "green"}]}, "#20c060"),
         ({"keys": [{"at": "1 s", "colour": [float("nan"), 0, 0]}]}, "finite"),
@@ -175,3 +174,8 @@ def test_any_wish_has_an_answer_or_one_line(
     assert (design.reradiation >= 0).all()
     assert ((design.albedo >= 0) & (design.albedo <= 1)).all()
     assert all("\n" not in str(wish) for wish in design.impossible)
+
+
+def test_without_keys_there_is_nothing_to_solve(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="at least one key"):
+        read_wish(written(tmp_path, keys=[])).solve()

@@ -1,0 +1,8 @@
+"""The page of `labrig design`: dots that say how it should glow, and the material that does.
+
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,3 @@
+from .server import (
+    design_on_page as design_on_page,
+)

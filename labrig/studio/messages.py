@@ -1,0 +1,158 @@
+"""What the page asks and is answered: wishes in the words of their file, designs as numbers."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from labrig.design import RGB_TO_Y, Design, Parameters, Wish, WishFile, to_wish
+from labrig.finite import NotNegative, Positive, UnitFraction
+from labrig.studio.timeline import timeline_of
+from labrig.yaml_file import validate
+
+FloatArray = NDArray[np.float64]
+
+#: Name of the page in messages about what it sent.
+SOURCE = "the page"
+#: Digits of the numbers that are sent.
+DIGITS = 5
+
+
+class SetByHand(BaseModel):
+    """Parameters of a material that were set with the sliders.
+
+    Attributes
+    ----------
+    k_r_per_s, k_e_per_s, reradiation, albedo, order
+        As of `labrig.design.Parameters`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    k_r_per_s: tuple[Positive, ...]
+    k_e_per_s: tuple[tuple[NotNegative, ...], ...]
+    reradiation: tuple[tuple[NotNegative, ...], ...]
+    albedo: tuple[UnitFraction, ...]
+    order: Positive = 1.0
+
+    def parameters(self) -> Parameters:
+        """Return the parameters, checked."""
+        return Parameters.checked(
+            self.k_r_per_s, self.k_e_per_s, self.reradiation, self.albedo, self.order
+        )
+
+
+class Asked(BaseModel):
+    """What the page asks about.
+
+    Attributes
+    ----------
+    wish
+        Content of a file of wishes.
+    by_hand
+        Parameters that were set by hand; None to solve for those that meet the wishes best.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    wish: dict[str, Any]
+    by_hand: SetByHand | None = None
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Asked":
+        """Return a checked message.
+
+        Raises
+        ------
+        UsageError
+            A key is missing, unknown or of the wrong kind.
+        """
+        return validate(content, cls, SOURCE)
+
+    def to_wish(self) -> Wish:
+        """Return the wish, checked as one from a file.
+
+        Raises
+        ------
+        UsageError
+            It is malformed.
+        """
+        return to_wish(validate(self.wish, WishFile, SOURCE), SOURCE)
+
+
+def wish_content(file: WishFile) -> dict[str, Any]:
+    """Return a file of wishes as the page keeps it: its light by places, without empty keys."""
+    content = file.model_dump(mode="json", exclude_none=True, exclude={"light"})
+    if file.light is not None:
+        light = file.model_dump(mode="json", exclude_none=True)["light"]
+        content["places"] = dict.fromkeys(file.programmes, light)
+    return content
+
+
+def answer(design: Design, wish: Wish) -> dict[str, Any]:
+    """Return a design as the page shows it, with colours of every place in all frames.
+
+    A colour is linear R, G, B; 1, 1, 1 is a white card under D65 of strength 1.
+    """
+    timeline = timeline_of(wish)
+    n_frames = len(timeline.frames_s)
+    places = np.repeat(np.arange(len(wish.places)), n_frames)
+    times = np.tile(timeline.frames_s, len(wish.places))
+    rgb = np.pi * design.rgb_at(places, times).reshape(len(wish.places), n_frames, 3)
+    card = wish.programme.at(places, times) @ wish.bands.to_rgb.T
+    return {
+        "frames_s": _numbers(timeline.frames_s),
+        "first": timeline.first,
+        "bands": wish.bands.names,
+        "places": [
+            {"name": name, "rgb": _numbers(own), "card": _numbers(lit)}
+            for name, own, lit in zip(wish.places, rgb, card.reshape(rgb.shape), strict=True)
+        ],
+        "parameters": {
+            "k_r_per_s": _numbers(design.k_r_per_s),
+            "k_e_per_s": _numbers(design.k_e_per_s),
+            "reradiation": _numbers(design.reradiation),
+            "albedo": _numbers(design.albedo),
+            "order": design.order,
+        },
+        "open": [each.name for each in design.estimates if not each.is_determined],
+        "sigma": {
+            each.name: _number(each.sigma) for each in design.estimates if each.is_determined
+        },
+        "keys": _keys(design),
+        "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
+        "conflicts": [[fight.key, fight.other] for fight in design.conflicts],
+    }
+
+
+def _keys(design: Design) -> list[dict[str, Any]]:
+    if not design.keys.count:
+        return []
+    wanted, got = np.pi * design.keys.rgb(design.bands), np.pi * design.got_rgb
+    return [
+        {
+            "place": int(place),
+            "at_s": float(time_s),
+            "wanted": _numbers(first),
+            "got": _numbers(second),
+            "luminance": [_number(first @ RGB_TO_Y), _number(second @ RGB_TO_Y)],
+            "delta_e": round(float(difference), 2),
+        }
+        for place, time_s, first, second, difference in zip(
+            design.keys.place, design.keys.time_s, wanted, got, design.delta_e2000, strict=True
+        )
+    ]
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
+
+
+def _numbers(values: FloatArray | Sequence[Any]) -> Any:
+    array = np.asarray(values)
+    if array.ndim:
+        return [_numbers(each) for each in array]
+    return float(f"{float(array):.{DIGITS}g}")

@@ -1,0 +1,363 @@
+// Asks labrig for the material that meets the keys, and shows it: at most one question is on its
+// way, and the last change is always answered.
+
+import { luminance } from "./studio_colour.js";
+import { History } from "./studio_document.js";
+import { Keys, summary, withLuminance } from "./studio_dots.js";
+import { Light } from "./studio_light.js";
+import { Material } from "./studio_material.js";
+import { drawStage, exposureAt, keyColour, placeAt } from "./studio_stage.js";
+import { Timeline, frameOf, timeOf } from "./studio_timeline.js";
+import { $, duration, seconds, short, tag, written } from "./studio_words.js";
+
+const PLAY_MS = 50;
+const DEFAULT_GREEN = [0.014, 0.527, 0.117];
+/** Frames around a key at which its ring is shown. */
+const NEAR = 1.5;
+const MOST_FIGHTS = 3;
+const DRIVEN = 8; // frames by which PageUp and PageDown go
+
+const view = { frame: 0, chosen: -1, chosenPlace: 0, chosenLight: 0, ev: null };
+let answer = null;
+let history = null;
+let isAsking = false;
+let isStale = false;
+let playing = 0;
+
+async function post(path, content) {
+  const reply = await fetch(path, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(content),
+  });
+  if (reply.ok) return reply;
+  throw new Error((await reply.json()).error);
+}
+
+function say(text) {
+  $("message").hidden = !text;
+  $("message").textContent = text ?? "";
+}
+
+async function ask() {
+  isStale = true;
+  if (isAsking) return;
+  isAsking = true;
+  document.body.dataset.busy = "yes";
+  while (isStale) {
+    isStale = false;
+    const begin = performance.now();
+    try {
+      const next = await (await post("look", history.now)).json();
+      const isFirst = answer === null;
+      const shownAt = answer && timeOf(answer.frames_s, view.frame);
+      answer = next;
+      // The frames of another programme are others: the time that is shown stays.
+      if (shownAt !== null) view.frame = Math.round(frameOf(answer.frames_s, shownAt));
+      if (isFirst) view.frame = Math.min(answer.first.at(-1) + 12, answer.frames_s.length - 1);
+      say();
+      draw();
+      performance.measure("answer", { start: begin, end: performance.now() });
+      $("speed").textContent = `Answered in ${Math.round(performance.now() - begin)} ms.`;
+    } catch (error) {
+      say(error instanceof TypeError ? "labrig does not answer; is it still running?" : error.message);
+    }
+  }
+  isAsking = false;
+  delete document.body.dataset.busy;
+}
+
+function changed() {
+  $("undo").disabled = !history.canUndo;
+  $("redo").disabled = !history.canRedo;
+  ask();
+}
+
+/** Changes the wish; what was set by hand is given up if `keepsHand` is not said. */
+function wish(change, gesture = null, keepsHand = false) {
+  const now = history.now;
+  const next = change(now.wish) ?? now.wish;
+  history.set({ wish: next, by_hand: keepsHand ? now.by_hand : null }, gesture);
+}
+
+function changeKey(number, change, gesture = null) {
+  wish((now) => {
+    now.keys[number] = change(now.keys[number], answer.keys[number]);
+  }, gesture, true);
+}
+
+function near(keys) {
+  return keys.flatMap((key, i) =>
+    Math.abs(frameOf(answer.frames_s, seconds(key.at)) - view.frame) <= NEAR ? [i] : [],
+  );
+}
+
+function draw() {
+  const { wish: now, by_hand } = history.now;
+  view.chosen = Math.min(view.chosen, now.keys.length - 1);
+  view.chosenPlace = Math.min(view.chosenPlace, answer.places.length - 1);
+  const changes = now.places[answer.places[view.chosenPlace].name];
+  view.chosenLight = Math.min(view.chosenLight, changes.length - 1);
+  view.frame = Math.min(view.frame, answer.frames_s.length - 1);
+  const all = { answer, wish: now, ...view };
+  if (document.activeElement !== $("name")) $("name").value = now.name ?? "design";
+  drawTime(all);
+  timeline.draw(all);
+  keys.draw(all);
+  light.draw(all);
+  material.draw({ answer, wish: now, byHand: by_hand });
+  $("remove-place").hidden = answer.places.length < 2;
+  $("impossible-section").hidden = !answer.impossible.length && !answer.conflicts.length;
+  const pairs = new Set(answer.conflicts.map((pair) => [...pair].sort((a, b) => a - b).map((i) => i + 1).join(" and ")));
+  const fights = [...pairs].slice(0, MOST_FIGHTS).map((pair) => `Keys ${pair} work against each other.`);
+  $("impossible").replaceChildren(
+    ...[...answer.impossible.map((each) => each.text[0].toUpperCase() + each.text.slice(1)), ...fights].map((text) => tag("li", text)),
+  );
+  const result = summary(answer.keys);
+  $("status").textContent = result || "No keys yet: a plain green glow to look at.";
+  $("save-material").disabled = false;
+  $("save-picture").disabled = !now.keys.length;
+  $("find-nearest").disabled = !now.keys.length;
+}
+
+function drawTime(all = { answer, wish: history.now.wish, ...view }) {
+  const exposure = exposureAt(answer, view.frame, view.ev);
+  drawStage({ ...all, exposure, near: near(all.wish.keys), keys: all.wish.keys });
+  const t_s = answer.frames_s[view.frame];
+  const change = lastChange(all.wish, t_s);
+  $("frame").max = answer.frames_s.length - 1;
+  $("frame").value = view.frame;
+  $("frame").setAttribute("aria-valuetext", duration(t_s));
+  const lit = change?.light === "none" ? "dark" : (change?.light ?? "light");
+  $("time-said").textContent = change ? `${duration(t_s)}: ${duration(t_s - seconds(change.at))} of ${lit}` : duration(t_s);
+  $("ev-said").textContent = `${Math.log2(exposure) >= 0 ? "+" : "−"}${Math.abs(Math.log2(exposure)).toFixed(1)} stops`;
+  if (view.ev === null) $("ev").value = Math.log2(exposure);
+}
+
+function lastChange(now, t_s) {
+  const changes = now.places[answer.places[view.chosenPlace].name];
+  return changes.filter((each) => seconds(each.at) <= t_s).at(-1);
+}
+
+function show(frame) {
+  view.frame = Math.min(Math.max(frame, 0), answer.frames_s.length - 1);
+  const { wish: now } = history.now;
+  drawTime();
+  timeline.draw({ answer, wish: now, ...view });
+}
+
+function choose(number) {
+  view.chosen = number;
+  const judged = answer.keys[number];
+  if (judged) {
+    view.chosenPlace = judged.place;
+    view.frame = Math.round(frameOf(answer.frames_s, judged.at_s));
+  }
+  draw();
+}
+
+/** Sets a key that wants what is there: a beginning, to be changed. */
+function addKey(place) {
+  const t_s = answer.frames_s[view.frame];
+  const exposure = exposureAt(answer, view.frame, view.ev);
+  const there = answer.places[place].rgb[view.frame];
+  const isDark = !(luminance(there) > 0);
+  const colour = keyColour(isDark ? DEFAULT_GREEN.map((x) => x / exposure) : there, exposure);
+  const name = answer.places[place].name;
+  const { keys: before } = history.now.wish;
+  const same = before.findIndex((key) => (key.place ?? answer.places[0].name) === name && Math.abs(seconds(key.at) - t_s) < 1e-9);
+  if (same >= 0) {
+    choose(same);
+    return;
+  }
+  view.chosen = before.length;
+  view.chosenPlace = place;
+  wish((now) => {
+    now.keys.push({ at: written(t_s), place: name, ...colour });
+  });
+}
+
+function removeKey(number) {
+  view.chosen = -1;
+  wish((now) => {
+    now.keys.splice(number, 1);
+  });
+}
+
+async function save(path, name) {
+  try {
+    const reply = await post(path, history.now);
+    const link = tag("a");
+    link.href = URL.createObjectURL(await reply.blob());
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    say();
+  } catch (error) {
+    say(error.message);
+  }
+}
+
+const fileName = () => (history.now.wish.name || "design").replace(/[^\p{L}\p{N}_-]+/gu, "-");
+
+const timeline = new Timeline({
+  onFrame: show,
+  onChosen: choose,
+  onLight: (number) => {
+    view.chosenLight = number;
+    draw();
+  },
+  onKey: (number, { t_s, luminance: y, isTime, isLuminance }) => {
+    changeKey(
+      number,
+      (key, judged) => ({
+        ...(isLuminance ? withLuminance(key, judged, y) : key),
+        at: isTime ? written(Number(t_s.toPrecision(4))) : key.at,
+      }),
+      `drag ${number}`,
+    );
+  },
+  onSettled: () => history.settle(),
+});
+const keys = new Keys({
+  onChosen: choose,
+  onChange: changeKey,
+  onRemove: removeKey,
+  onSettled: () => history.settle(),
+});
+const light = new Light({
+  timeShown: () => Number(answer.frames_s[view.frame].toPrecision(4)),
+  onChosen: (number) => {
+    view.chosenLight = number;
+    draw();
+  },
+  onChange: (name, changes) => wish((now) => {
+    now.places[name] = changes;
+  }, null, true),
+  onSettled: () => history.settle(),
+});
+const material = new Material({
+  onWish: (content) => wish((now) => ({ ...now, ...content })),
+  onByHand: (parameters, gesture) => history.set({ wish: history.now.wish, by_hand: parameters }, `slider ${gesture}`),
+  onSolve: () => history.set({ wish: history.now.wish, by_hand: null }),
+  onSettled: () => {
+    history.settle();
+    draw();
+  },
+});
+
+$("undo").addEventListener("click", () => history.undo());
+$("redo").addEventListener("click", () => history.redo());
+$("name").addEventListener("change", (event) => {
+  const name = event.target.value.trim();
+  if (name) wish((now) => ({ ...now, name }), null, true);
+});
+$("frame").addEventListener("input", (event) => show(event.target.valueAsNumber));
+$("add-key").addEventListener("click", () => addKey(view.chosenPlace));
+$("picture").addEventListener("click", (event) => {
+  const box = event.target.getBoundingClientRect();
+  const place = placeAt(answer, (event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+  if (place >= 0) addKey(place);
+});
+$("picture").addEventListener("keydown", (event) => {
+  const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -DRIVEN, PageDown: DRIVEN }[event.key];
+  if (step) show(view.frame + step);
+  else if (event.key === "Enter") addKey(view.chosenPlace);
+  else if (event.key === "Delete" && view.chosen >= 0) removeKey(view.chosen);
+  else return;
+  event.preventDefault();
+});
+$("timeline").addEventListener("keydown", (event) => {
+  const key = event.target.closest("[data-key]");
+  if (key && event.key === "Delete") removeKey(Number(key.dataset.key));
+  else if (key && event.key === "Enter") choose(Number(key.dataset.key));
+});
+addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.target.matches("input:not([type=range]), select")) return;
+  const isRedo = event.key === "y" || (event.shiftKey && event.key.toLowerCase() === "z");
+  if (isRedo) history.redo();
+  else if (event.key === "z") history.undo();
+  else return;
+  event.preventDefault();
+});
+$("exposure").addEventListener("change", (event) => {
+  const isFixed = event.target.value === "fixed";
+  $("ev").hidden = !isFixed;
+  view.ev = isFixed ? $("ev").valueAsNumber : null;
+  drawTime();
+});
+$("ev").addEventListener("input", (event) => {
+  view.ev = event.target.valueAsNumber;
+  drawTime();
+});
+$("play").addEventListener("click", () => {
+  if (playing) {
+    clearInterval(playing);
+    playing = 0;
+  } else {
+    if (view.frame >= answer.frames_s.length - 1) view.frame = 0;
+    playing = setInterval(() => {
+      if (view.frame >= answer.frames_s.length - 1) $("play").click();
+      else show(view.frame + 1);
+    }, PLAY_MS);
+  }
+  $("play").textContent = playing ? "Stop" : "Play";
+});
+$("add-place").addEventListener("click", () => {
+  wish((now) => {
+    const from = answer.places[view.chosenPlace].name;
+    let number = answer.places.length + 1;
+    while (`patch ${number}` in now.places) number += 1;
+    // A key that names no place would no longer be at one.
+    now.keys = now.keys.map((key) => ({ ...key, place: key.place ?? from }));
+    now.places[`patch ${number}`] = now.places[from];
+    view.chosenPlace = answer.places.length;
+  }, null, true);
+});
+$("remove-place").addEventListener("click", () => {
+  const name = answer.places[view.chosenPlace].name;
+  view.chosen = -1;
+  wish((now) => {
+    delete now.places[name];
+    now.keys = now.keys.filter((key) => key.place !== name);
+  });
+});
+$("save-material").addEventListener("click", () => save("material.yaml", `${fileName()}.yaml`));
+$("save-constraints").addEventListener("click", () => save("constraints.yaml", `${fileName()}-keys.yaml`));
+$("save-picture").addEventListener("click", () => save("picture.png", `${fileName()}.png`));
+$("open").addEventListener("change", async (event) => {
+  const [file] = event.target.files;
+  if (!file) return;
+  try {
+    const { wish: opened } = await (await post("open", { text: await file.text() })).json();
+    view.chosen = -1;
+    view.chosenPlace = 0;
+    history.set({ wish: opened, by_hand: null });
+  } catch (error) {
+    say(error.message);
+  }
+  event.target.value = "";
+});
+$("find-nearest").addEventListener("click", async () => {
+  $("nearest").replaceChildren(tag("li", "…"));
+  try {
+    const { nearest } = await (await post("nearest", history.now)).json();
+    $("nearest").replaceChildren(...nearest.map((text) => tag("li", text.replace("nearest measured: ", ""))));
+  } catch (error) {
+    $("nearest").replaceChildren();
+    say(error.message);
+  }
+});
+
+function useTheme(isRed) {
+  document.documentElement.dataset.theme = isRed ? "red" : "dark";
+  $("theme").setAttribute("aria-pressed", String(isRed));
+  localStorage.setItem("theme", isRed ? "red" : "dark");
+  if (answer) draw();
+}
+$("theme").addEventListener("click", () => useTheme(document.documentElement.dataset.theme !== "red"));
+useTheme(localStorage.getItem("theme") === "red");
+
+const { wish: first } = await (await fetch("start")).json();
+history = new History({ wish: first, by_hand: null }, changed);
+changed();

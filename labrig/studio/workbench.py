@@ -1,0 +1,133 @@
+"""Answers to the page: designs, and the files that are made of them."""
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from labrig.design import (
+    Design,
+    DesignBands,
+    Parameters,
+    Wish,
+    WishFile,
+    judge,
+    nearest_materials,
+    read_wish,
+    smooth_spectrum,
+    to_material,
+    to_wish,
+)
+from labrig.material import material_text
+from labrig.report import describe_nearest, draw_design
+from labrig.studio.messages import SOURCE, Asked, answer, wish_content
+from labrig.yaml_file import parse_yaml, validate, yaml_text
+
+#: Name of a file that was opened, in messages.
+OPENED = "the opened file"
+#: What a page begins with: five minutes of daylight, then darkness.
+START: Mapping[str, Any] = {
+    "name": "design",
+    # Keys in the dark say nothing about it.
+    "albedo": 0.6,
+    "places": {
+        "patch": [{"at": "0 s", "light": "D65"}, {"at": "300 s", "light": "none"}],
+    },
+}
+#: A glow to look at before anything is wished for: its colour, Λ, k_r, k_e and albedo.
+GREEN, BRIGHTNESS, K_R_PER_S, K_E_PER_S, ALBEDO = (0.1, 1.0, 0.3), 0.1, 0.02, 1e-3, 0.6
+
+
+class Workbench:
+    """What answers a page about patches under a light of their own."""
+
+    def start(self) -> dict[str, Any]:
+        """Return the wish with which a page begins."""
+        return wish_content(validate(START, WishFile, SOURCE))
+
+    def read(self, path: Path) -> dict[str, Any]:
+        """Return the wish of a file.
+
+        Raises
+        ------
+        UsageError
+            It is malformed.
+        """
+        return wish_content(read_wish(path).file)
+
+    def open(self, text: str) -> dict[str, Any]:
+        """Return the wish of a file's text.
+
+        Raises
+        ------
+        UsageError
+            It is malformed.
+        """
+        file = validate(parse_yaml(text, OPENED), WishFile, OPENED)
+        return wish_content(to_wish(file, OPENED).file)
+
+    def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the material that meets the page's wishes, or that was set by hand."""
+        design, wish = self.design(content)
+        return answer(design, wish)
+
+    def design(self, content: Mapping[str, Any]) -> tuple[Design, Wish]:
+        """Return the design that a page asks for, and its wish.
+
+        Raises
+        ------
+        UsageError
+            The message or the wish is malformed.
+        """
+        asked = Asked.of(content)
+        wish = asked.to_wish()
+        if asked.by_hand is not None:
+            given = asked.by_hand.parameters()
+        elif wish.keys.count:
+            return wish.solve(), wish
+        else:
+            given = _to_begin_with(wish.bands, wish.file)
+        weights = wish.file.weights
+        return judge(given, wish.programme, wish.keys, wish.bands, weights), wish
+
+    def material(self, content: Mapping[str, Any]) -> str:
+        """Return the text of the material file of a design."""
+        design, wish = self.design(content)
+        return material_text(to_material(design, wish.file.name))
+
+    def constraints(self, content: Mapping[str, Any]) -> str:
+        """Return the text of a file of wishes, as `labrig design --constraints` reads it."""
+        file = Asked.of(content).to_wish().file
+        return yaml_text(file.model_dump(mode="json", exclude_none=True, exclude_defaults=True))
+
+    def picture(self, content: Mapping[str, Any]) -> bytes:
+        """Return a figure of a design over time as a PNG."""
+        design, wish = self.design(content)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "design.png"
+            draw_design(design, wish.places, path)
+            return path.read_bytes()
+
+    def nearest(self, content: Mapping[str, Any]) -> list[str]:
+        """Return the measured materials that come nearest to the wishes, one sentence each."""
+        design, _ = self.design(content)
+        return [describe_nearest(each) for each in nearest_materials(design) if each]
+
+
+def _to_begin_with(bands: DesignBands, file: WishFile) -> Parameters:
+    """Return a plain green glow in as many states as are wished for."""
+    emitted = np.array(GREEN)
+    if bands.edges_nm is not None:
+        emitted = smooth_spectrum(emitted, bands.to_rgb)
+    states = file.states
+    order = 1.0 if isinstance(file.order, str) else file.order
+    albedo = ALBEDO if isinstance(file.albedo, str) else file.albedo
+    return Parameters.checked(
+        K_R_PER_S / 10.0 ** np.arange(states),
+        np.full((states, bands.count), K_E_PER_S / bands.count),
+        np.tile(BRIGHTNESS * emitted / states, (states, 1)),
+        np.broadcast_to(np.asarray(albedo, dtype=np.float64), (bands.count,)),
+        order,
+    )
