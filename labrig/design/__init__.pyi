@@ -42,6 +42,12 @@ from .result import (
     Design as Design,
     Impossible as Impossible,
 )
+from .scene_light import (
+    SceneLight as SceneLight,
+)
+from .scene_spectra import (
+    SceneSpectra as SceneSpectra,
+)
 from .smooth_spectrum import (
     smooth_spectrum as smooth_spectrum,
 )

@@ -88,13 +88,13 @@ class Conversion:
             lit = lit[:: math.ceil(len(lit) / MOST_LIGHTS) or 1]
             lit = lit / lit.max(axis=1, keepdims=True, initial=1e-300)
             seen = np.concatenate([self.to_rgb * light for light in self.light(lit)])
-            return _smooth_reflectance((albedo * lit).ravel(), seen)
+            return smooth_reflectance((albedo * lit).ravel(), seen)
         covered = np.maximum(self.of_light.sum(axis=1), 1e-300)
         return np.asarray(np.minimum(self.light(albedo) / covered, 1.0))
 
 
-def _smooth_reflectance(wanted: FloatArray, seen: FloatArray) -> FloatArray:
-    """Return the smooth reflectance of 0 to 1 (n,) that is seen (m, n) as is wanted (m,)."""
+def smooth_reflectance(wanted: FloatArray, seen: FloatArray, highest: float = 1.0) -> FloatArray:
+    """Return the smooth reflectance from 0 on (n,) that is seen (m, n) as is wanted (m,)."""
     bends = SMOOTHNESS * np.diff(np.eye(seen.shape[1]), 2, axis=0)
     system, target = np.vstack([seen, bends]), np.concatenate([wanted, np.zeros(len(bends))])
-    return np.asarray(lsq_linear(system, target, (0.0, 1.0)).x)
+    return np.asarray(lsq_linear(system, target, (0.0, highest)).x)

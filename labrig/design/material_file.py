@@ -9,6 +9,7 @@ from labrig.design.conversion import Conversion
 from labrig.design.light import LightProgramme
 from labrig.design.nearest import material_radiance
 from labrig.design.result import Design
+from labrig.design.scene_spectra import SceneSpectra
 from labrig.errors import DataError
 from labrig.material import Albedo, IrradianceNorm, Material, Provenance, State
 
@@ -39,12 +40,12 @@ def _reference_light(design: Design, conversion: Conversion) -> FloatArray:
     return np.asarray(strongest)
 
 
-def to_material(design: Design, name: str) -> Material:
+def to_material(design: Design, name: str, light: SceneSpectra | None = None) -> Material:
     """Return a design as a material, to be written by `write_material`.
 
     Its scale is relative to the mean spectral irradiance of the programme's strongest light, to
-    which its excitation rates belong, too. Parameters that the keys do not determine are named in
-    its provenance.
+    which its excitation rates belong, too; in a scene it is absolute. Parameters that the keys do
+    not determine are named in its provenance.
 
     Parameters
     ----------
@@ -52,6 +53,8 @@ def to_material(design: Design, name: str) -> Material:
         The design.
     name
         Name of the material.
+    light
+        Spectral light of a scene on the places of the design, from `SceneLight.spectra`.
 
     Returns
     -------
@@ -73,6 +76,15 @@ def to_material(design: Design, name: str) -> Material:
     >>> material.scale, len(material.states[0].reradiation)
     ('relative', 15)
     """
+    if light is not None:
+        material = _in_scene(design, name, light)
+        return _with_provenance(design, material, light)
+    material = _under_own_light(design, name)
+    return _with_provenance(design, material, None)
+
+
+def _under_own_light(design: Design, name: str) -> Material:
+    """Return a material whose rates and Λ are relative to the programme's strongest light."""
     edges = EDGES_NM if design.bands.edges_nm is None else design.bands.edges_nm
     conversion = Conversion.to(design.bands, edges)
     light = _reference_light(design, conversion)
@@ -89,7 +101,7 @@ def to_material(design: Design, name: str) -> Material:
             design.k_r_per_s, design.k_e_per_s, design.reradiation, strict=True
         )
     )
-    material = Material(
+    return Material(
         name=name,
         kind="phosphor",
         bands_nm=_numbers(edges),
@@ -103,12 +115,44 @@ def to_material(design: Design, name: str) -> Material:
             value=_numbers(conversion.albedo(design.albedo, lights)),
         ),
     )
-    differences = written_differences(design, material)
+
+
+def _in_scene(design: Design, name: str, light: SceneSpectra) -> Material:
+    """Return a material in the units of a scene."""
+    states = tuple(
+        State(
+            k_r_per_s=float(k_r),
+            kinetic_order=design.order,
+            k_e_per_s=_numbers(light.excitation(k_e)),
+            reradiation=_numbers(light.emission(emitted)),
+        )
+        for k_r, k_e, emitted in zip(
+            design.k_r_per_s, design.k_e_per_s, design.reradiation, strict=True
+        )
+    )
+    edges = light.edges_nm
+    return Material(
+        name=name,
+        kind="phosphor",
+        bands_nm=_numbers(edges),
+        states=states,
+        scale="absolute",
+        albedo=Albedo(
+            wavelength_nm=_numbers((edges[1:] + edges[:-1]) / 2),
+            value=_numbers(light.albedo(design.albedo)),
+        ),
+    )
+
+
+def _with_provenance(design: Design, material: Material, light: SceneSpectra | None) -> Material:
+    differences = written_differences(design, material, light)
     provenance = Provenance(source=SOURCE, note=_note(design, float(differences.max())))
     return material.model_copy(update={"provenance": provenance})
 
 
-def written_differences(design: Design, material: Material) -> FloatArray:
+def written_differences(
+    design: Design, material: Material, light: SceneSpectra | None = None
+) -> FloatArray:
     """Return ΔE2000 of each key between what was wanted and how the written material looks.
 
     Under strongly coloured light three channels and spectra reflect differently.
@@ -119,6 +163,8 @@ def written_differences(design: Design, material: Material) -> FloatArray:
         The design.
     material
         The material that `to_material` made of it.
+    light
+        Spectral light of a scene on the places of the design.
 
     Returns
     -------
@@ -138,13 +184,19 @@ def written_differences(design: Design, material: Material) -> FloatArray:
     """
     assert material.bands_nm is not None
     assert material.albedo is not None
+    keys, programme = design.keys, design.programme
+    if light is not None:
+        spectral = LightProgramme(light.begin_s, light.irradiance)
+        in_bands = LightProgramme(light.begin_s, light.irradiance * np.diff(light.edges_nm))
+        radiance = material_radiance(material, in_bands, keys.place, keys.time_s)
+        radiance += spectral.at(keys.place, keys.time_s) * material.albedo.value / np.pi
+        return design.differences_to(light.rgb(radiance) / np.pi)
     conversion = Conversion.to(design.bands, material.bands_nm)
     mean = float(_reference_light(design, conversion).mean())
-    keys, programme = design.keys, design.programme
     lit = LightProgramme(programme.begin_s, conversion.light(programme.irradiance) / mean)
     radiance = mean * material_radiance(material, lit, keys.place, keys.time_s)
-    light = conversion.light(programme.at(keys.place, keys.time_s))
-    radiance += light * material.albedo.value / np.pi
+    falling = conversion.light(programme.at(keys.place, keys.time_s))
+    radiance += falling * material.albedo.value / np.pi
     return design.differences_to(radiance @ conversion.to_rgb.T)
 
 

@@ -351,8 +351,8 @@ class Material(_Part):
         Edges of the wavelength bands in nm, rising; one more than there are bands. They are needed
         for excitation rates and re-radiation.
     irradiance_norm
-        Norm of the irradiance to which the excitation rates belong. It is needed as soon as a state
-        has excitation rates, which mean nothing without it.
+        Norm of the irradiance to which the excitation rates belong. A state with excitation rates
+        needs it; without it they are per W m⁻² in their band, where `scale` is `absolute`.
     states
         Excited states of the material, at least one.
     spectrum
@@ -426,7 +426,8 @@ class Material(_Part):
                         f"states.{number}.{name}: expected {bands} values, one for each band of "
                         f"'bands_nm', got {len(series)}"
                     )
-            if state.k_e_per_s is not None and self.irradiance_norm is None:
+            is_relative = self.irradiance_norm is None and self.scale != "absolute"
+            if state.k_e_per_s is not None and is_relative:
                 raise ValueError(
                     f"expected 'irradiance_norm' beside states.{number}.k_e_per_s, got nothing"
                 )

@@ -39,6 +39,8 @@ def measured_table(material: Material) -> Table:
             f"that the root of the sum of their squares is {length:g}"
             + ("; Λ is relative radiance." if material.scale is None else ".")
         )
+    elif any(state.k_e_per_s for state in states):
+        caption += " k_e is per W m⁻² of irradiance in the band."
     caption += SCALES.get(material.scale or "", "")
     if any(state.decay_time_of_rate_s is not None for state in states):
         caption += (

@@ -40,6 +40,7 @@ from .picture.render_folder import (
 from .picture.rendering import (
     Frame as Frame,
     Renderer as Renderer,
+    Seen as Seen,
 )
 from .picture.shown import (
     check_exposure as check_exposure,
@@ -63,6 +64,7 @@ from .scene.dark_room import (
 )
 from .scene.scene_file import (
     MaterialEntry as MaterialEntry,
+    ProgrammeEntry as ProgrammeEntry,
     SceneFile as SceneFile,
     read_scene as read_scene,
 )

@@ -213,6 +213,11 @@ def test_refusals_say_what_was_expected(change: str, said: str, tmp_path: Path) 
     assert str(path) in str(refusal.value)
 
 
+def test_excitation_rates_of_an_absolute_material_are_per_irradiance() -> None:
+    whole = {**WHOLE, "irradiance_norm": None, "scale": "absolute"}
+    assert Material.model_validate(whole).irradiance_norm is None
+
+
 def test_unknown_name_gets_a_suggestion() -> None:
     with pytest.raises(UsageError, match="did you mean 'blue-paint'"):
         read_material("blu-paint")

@@ -12,7 +12,7 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 
 from labrig.errors import UsageError
@@ -61,6 +61,25 @@ class Frame:
     radiance: Float32Array
 
 
+@dataclass(frozen=True)
+class Seen:
+    """What a pixel shows.
+
+    Attributes
+    ----------
+    name
+        Name of the object or the lamp; `nothing` where there is none.
+    material
+        Name of its material there; None of a lamp or of nothing.
+    place
+        Number of the place, among all of the scene; -1 of what has no material.
+    """
+
+    name: str
+    material: str | None
+    place: int
+
+
 class Renderer:
     """Renders a scene, frame after frame.
 
@@ -70,6 +89,9 @@ class Renderer:
         The scene.
     threads
         Threads that trace and fold. Default: one for each processor.
+    traced
+        Renderer of a scene with the same objects, lamps and camera, where nothing moves: its paths
+        are taken over.
 
     Examples
     --------
@@ -81,7 +103,9 @@ class Renderer:
     ((8, 8, 24), True)
     """
 
-    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+    def __init__(
+        self, scene: Scene, threads: int | None = None, traced: "Renderer | None" = None
+    ) -> None:
         self._scene = scene
         self._threads = threads or n_processors()
         _require_memory(scene)
@@ -90,7 +114,7 @@ class Renderer:
         geometry = scene.geometry(self._t_s)
         self._material_of_place = geometry.material_of_place
         self._states = _states(scene, geometry)
-        self._view: _View | None = None
+        self._view: _View | None = None if traced is None else traced._view
         self._charge_at_first()
 
     @property
@@ -144,6 +168,92 @@ class Renderer:
             if t_s >= self._t_s:
                 yield self.frame(t_s)
 
+    def places_of(self, name: str) -> IntArray:
+        """Return the places of a phosphor of the scene, none if it is nowhere (places,)."""
+        own = [state.places for state in self._states if state.name == name]
+        return own[0] if own else np.zeros(0, np.int32)
+
+    def irradiance_of_lamps(self) -> FloatArray:
+        """Return the irradiance by each lamp at its full strength, after all reflections.
+
+        Returns
+        -------
+        ndarray
+            Irradiance in W m⁻² nm⁻¹ at the places with states, zero elsewhere, shape (lamps,
+            places, bands).
+        """
+        view = self._view_at(self._t_s)
+        dark = np.zeros((len(self._material_of_place), len(self._scene.bands)), np.float32)
+        return np.array(
+            [
+                view.irradiance(self._fold_with(dark, self._light_of_lamps(levels)))
+                for levels in np.eye(len(self._scene.file.lamps))
+            ]
+        ).reshape(-1, *dark.shape)
+
+    def emitted(self) -> Float32Array:
+        """Return the radiance that each place emits by itself at the time that was reached.
+
+        Returns
+        -------
+        ndarray
+            Radiance in W m⁻² sr⁻¹ nm⁻¹, shape (places, bands).
+        """
+        return self._emitted()
+
+    def advance(self, t_s: float) -> None:
+        """Step all levels to a time in s."""
+        self._advance(t_s)
+
+    def picture(self, glow: Float32Array, levels: ArrayLike) -> Float32Array:
+        """Return the picture of any glow under lamps of any levels.
+
+        Parameters
+        ----------
+        glow
+            Radiance that each place emits by itself, shape (places, bands).
+        levels
+            Level of each lamp, as a factor of its strength, shape (lamps,).
+
+        Returns
+        -------
+        ndarray
+            Spectral radiance in W m⁻² sr⁻¹ nm⁻¹, shape (height, width, bands).
+        """
+        camera = self._scene.camera
+        lamps = self._light_of_lamps(np.asarray(levels, dtype=np.float64))
+        light = self._fold_with(glow, lamps)(self._view_at(self._t_s).of_camera())
+        return light.reshape(camera.height_px, camera.width_px, -1)
+
+    def seen_at(self, x: float, y: float) -> Seen:
+        """Return what most paths of a pixel meet first.
+
+        Parameters
+        ----------
+        x, y
+            Where the pixel is, as fractions of the picture's width and height from its upper left.
+        """
+        camera = self._scene.camera
+        column, row = int(x * camera.width_px), int(y * camera.height_px)
+        pixel = min(row, camera.height_px - 1) * camera.width_px + min(column, camera.width_px - 1)
+        view = self._view_at(self._t_s)
+        first = view.first_places(pixel)
+        values, counts = np.unique(first, return_counts=True)
+        found = int(values[counts.argmax()])
+        if found < 0:
+            lamp = -2 - found
+            return Seen(list(self._scene.file.lamps)[lamp] if lamp >= 0 else "nothing", None, -1)
+        geometry = view.geometry
+        number = int(np.searchsorted(geometry.table[:, 1], found, side="right")) - 1
+        material = int(self._material_of_place[found])
+        named = list(self._scene.file.materials)[material] if material >= 0 else None
+        return Seen(geometry.surfaces[number].name, named, found)
+
+    @property
+    def seen_places(self) -> IntArray:
+        """Places that some pixel shows, rising."""
+        return self._view_at(self._t_s).seen_places()
+
     def _view_at(self, t_s: float) -> "_View":
         """Return paths; they are traced anew only where something moves."""
         if self._view is None or (self._scene.is_moving and self._view.t_s != t_s):
@@ -151,9 +261,13 @@ class Renderer:
         return self._view
 
     def _lamps(self, t_s: float) -> Float32Array:
-        lamps = self._scene.lamps(t_s)
+        return self._light_of_lamps(self._scene.levels(t_s))
+
+    def _light_of_lamps(self, levels: FloatArray) -> Float32Array:
+        # A lamp may move, but shines alike everywhere.
+        lamps = self._scene.lamps(self._t_s)
         light = np.array([lamp.light for lamp in lamps]).reshape(len(lamps), len(self._scene.bands))
-        return np.asarray(self._scene.levels(t_s)[:, None] * light, dtype=np.float32)
+        return np.asarray(levels[:, None] * light, dtype=np.float32)
 
     def _emitted(self, irradiance: FloatArray | None = None) -> Float32Array:
         """Return the radiance that each place emits by itself, shape (places, bands)."""
@@ -179,12 +293,16 @@ class Renderer:
 
     def _fold_of(self, glow: Float32Array, t_s: float) -> Callable[..., Float32Array]:
         """Return the fold of paths with a glow and the light of a time."""
+        return self._fold_with(glow, self._lamps(t_s))
+
+    def _fold_with(self, glow: Float32Array, lamps: Float32Array) -> Callable[..., Float32Array]:
+        """Return the fold of paths with a glow and lamps."""
         return partial(
             fold,
             matrices=self._matrices,
             material_of_place=self._material_of_place,
             glow=glow,
-            lamps=self._lamps(t_s),
+            lamps=lamps,
             threads=self._threads,
         )
 
@@ -316,6 +434,25 @@ class _View:
                 self._tracer.from_camera(self._scene.camera, per_pixel, self._threads)
             )
         return self._of_camera
+
+    @property
+    def geometry(self) -> Geometry:
+        """Surfaces in this arrangement."""
+        return self._geometry
+
+    def first_places(self, pixel: int) -> IntArray:
+        """Return the places that the paths of a pixel meet first, -2 - n of lamp n (paths,)."""
+        for paths in self.of_camera():
+            if pixel < paths.n_targets:
+                own = slice(pixel * paths.per_target, (pixel + 1) * paths.per_target)
+                return paths.first_places[own]
+            pixel -= paths.n_targets
+        raise AssertionError("a pixel within the picture")
+
+    def seen_places(self) -> IntArray:
+        """Return the places that some path meets first, rising."""
+        found = np.unique(np.concatenate([paths.first_places for paths in self.of_camera()]))
+        return found[found >= 0]
 
     @property
     def _all(self) -> list[Paths]:

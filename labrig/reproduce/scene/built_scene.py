@@ -20,6 +20,7 @@ from labrig.reproduce.scene.scene_file import (
     MaterialEntry,
     MaterialMap,
     ObjectEntry,
+    ProgrammeEntry,
     SceneFile,
     read_scene,
 )
@@ -35,7 +36,7 @@ from labrig.reproduce.transport.geometry import Geometry, Samples, Surface
 from labrig.reproduce.transport.lamp import Lamp
 from labrig.reproduce.transport.mesh import Mesh, read_mesh, rotation
 from labrig.reproduce.transport.tracing import PathLength, Pinhole
-from labrig.yaml_file import validate
+from labrig.yaml_file import did_you_mean, validate
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -101,6 +102,11 @@ class Scene:
         return Pinhole(**self.file.camera.model_dump())
 
     @property
+    def bench_light(self) -> BenchLight:
+        """Light by which measured phosphors were charged."""
+        return _bench_light(self.file, self._folder)
+
+    @property
     def path_length(self) -> PathLength:
         """How paths end."""
         return PathLength(self.file.paths.vertices, self.file.paths.survival)
@@ -138,6 +144,36 @@ class Scene:
         content = self.file.model_dump(exclude_unset=True)
         content["frames_s"] = tuple(frames_s)
         return replace(self, file=validate(content, SceneFile, "--times"))
+
+    def with_material(self, name: str, material: SurfaceMaterial) -> Self:
+        """Return the scene with another material in place of one, on the same surfaces.
+
+        Raises
+        ------
+        UsageError
+            There is no such material, or one of both glows and the other does not.
+        """
+        names = list(self.file.materials)
+        if name not in names:
+            raise UsageError(f"there is no material '{name}'; {did_you_mean(name, names)}")
+        number = names.index(name)
+        if (material.parameters is None) != (self.materials[number].parameters is None):
+            raise UsageError(f"{name}: expected a material with states like the one that it is for")
+        changed = (*self.materials[:number], material, *self.materials[number + 1 :])
+        return replace(self, materials=changed)
+
+    def with_programme(self, programme: Sequence[ProgrammeEntry]) -> Self:
+        """Return the scene with other light over time, and one picture when it begins.
+
+        Raises
+        ------
+        UsageError
+            There is none, its times do not rise, or it names a lamp that is not there.
+        """
+        content = self.file.model_dump(exclude_unset=True)
+        content["programme"] = [part.model_dump() for part in programme]
+        content["frames_s"] = [part.at_s for part in programme][:1]
+        return replace(self, file=validate(content, SceneFile, self.file.name))
 
     def geometry(self, t_s: float) -> Geometry:
         """Return the surfaces at a time in s."""
@@ -202,6 +238,7 @@ def build_scene(
     folder: Path,
     replaced: Mapping[str, str] | None = None,
     assumptions: Assumptions = Assumptions(),
+    made: Mapping[str, SurfaceMaterial] | None = None,
 ) -> Scene:
     """Return the scene of a file's content; see `load_scene`.
 
@@ -213,6 +250,8 @@ def build_scene(
         Folder to which its paths are relative.
     replaced, assumptions
         As of `load_scene`.
+    made
+        Materials in the bands of the scene that take the place of the scene's, by their names.
 
     Returns
     -------
@@ -233,13 +272,11 @@ def build_scene(
     (0.0, 1.0, 2.0)
     """
     bands = Bands.even(file.bands.first_nm, file.bands.last_nm, file.bands.count)
-    light = file.bench_light
-    bench = BenchLight(
-        absolute_irradiance(light.illuminance_lux, read_light(_beside(light.spectrum, folder)))
-    )
+    bench = _bench_light(file, folder)
     entries = _replaced(file.materials, replaced or {}, folder)
+    given = made or {}
     materials = tuple(
-        _material(name, entry, place, bands, bench, assumptions)
+        given[name] if name in given else _material(name, entry, place, bands, bench, assumptions)
         for name, (entry, place) in entries.items()
     )
     numbers = {name: number for number, name in enumerate(entries)}
@@ -249,6 +286,12 @@ def build_scene(
         for name, entry in file.objects.items()
     )
     return Scene(file, bands, materials, surfaces, folder)
+
+
+def _bench_light(file: SceneFile, folder: Path) -> BenchLight:
+    light = file.bench_light
+    spectrum = read_light(_beside(light.spectrum, folder))
+    return BenchLight(absolute_irradiance(light.illuminance_lux, spectrum))
 
 
 def _replaced(

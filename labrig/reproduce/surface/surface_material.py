@@ -183,7 +183,8 @@ def of_phosphor(
     """Return a phosphorescent surface, with rates in the units of the scene.
 
     Excitation rates belong to a light E of stated length in the material's own bands: here to the
-    bench's light; outside of the measured bands they are zero. Λ is spread in its bands as the
+    bench's light, or are per W m⁻² where no length is stated; outside of the measured bands they
+    are zero. Λ is spread in its bands as the
     finer emission spectrum where all states have its shape, else evenly.
 
     Parameters

@@ -108,6 +108,14 @@ class Paths:
         """Number of pixels or places."""
         return (len(self.first) - 1) // self.per_target
 
+    @property
+    def first_places(self) -> IntArray:
+        """Place that each path meets first; -1 is black or nothing, -2 - n lamp n (paths,)."""
+        found = np.full(len(self.first) - 1, -1, np.int32)
+        meets = self.first[1:] > self.first[:-1]
+        found[meets] = self.place[self.first[:-1][meets]]
+        return np.where(self.seen_lamp >= 0, -2 - self.seen_lamp, found).astype(np.int32)
+
 
 @dataclass(frozen=True)
 class Pinhole:
