@@ -1,8 +1,7 @@
 // The material: what is searched for, and its parameters as sliders with units.
 
 import { shown } from "./studio_colour.js";
-import { field } from "./studio_dots.js";
-import { $, duration, short, tag } from "./studio_words.js";
+import { $, duration, field, short, tag } from "./studio_words.js";
 
 /** Powers of ten from which to which a slider goes; its left end is 0 where that is possible. */
 const RANGES = { k_r: [-6, 3], k_e: [-8, 3], reradiation: [-9, 3] };

@@ -3,12 +3,14 @@
 
 import { luminance } from "./studio_colour.js";
 import { History } from "./studio_document.js";
-import { Keys, summary, withLuminance } from "./studio_dots.js";
-import { Light } from "./studio_light.js";
+import { Keys } from "./studio_key_list.js";
+import { keyColour, summary, withLuminance } from "./studio_keys.js";
+import { Light, changesOf } from "./studio_light.js";
 import { Material } from "./studio_material.js";
-import { drawStage, exposureAt, keyColour, placeAt } from "./studio_stage.js";
+import { drawPatches, exposureAt, placeAt } from "./studio_patches.js";
+import { ScenePicture, dotAt, newDot } from "./studio_scene.js";
 import { Timeline, frameOf, timeOf } from "./studio_timeline.js";
-import { $, duration, seconds, short, tag, written } from "./studio_words.js";
+import { $, duration, seconds, tag, written } from "./studio_words.js";
 
 const PLAY_MS = 50;
 const DEFAULT_GREEN = [0.014, 0.527, 0.117];
@@ -17,7 +19,7 @@ const NEAR = 1.5;
 const MOST_FIGHTS = 3;
 const DRIVEN = 8; // frames by which PageUp and PageDown go
 
-const view = { frame: 0, chosen: -1, chosenPlace: 0, chosenLight: 0, ev: null };
+const view = { frame: 0, chosen: -1, chosenPlace: 0, chosenLight: 0, ev: null, asked: null, wasDragged: false };
 let answer = null;
 let history = null;
 let isAsking = false;
@@ -61,6 +63,7 @@ async function ask() {
       $("speed").textContent = `Answered in ${Math.round(performance.now() - begin)} ms.`;
     } catch (error) {
       say(error instanceof TypeError ? "labrig does not answer; is it still running?" : error.message);
+      if (answer === null) break;
     }
   }
   isAsking = false;
@@ -96,8 +99,7 @@ function draw() {
   const { wish: now, by_hand } = history.now;
   view.chosen = Math.min(view.chosen, now.keys.length - 1);
   view.chosenPlace = Math.min(view.chosenPlace, answer.places.length - 1);
-  const changes = now.places[answer.places[view.chosenPlace].name];
-  view.chosenLight = Math.min(view.chosenLight, changes.length - 1);
+  view.chosenLight = Math.min(view.chosenLight, changesOf(now, placeShown()).length - 1);
   view.frame = Math.min(view.frame, answer.frames_s.length - 1);
   const all = { answer, wish: now, ...view };
   if (document.activeElement !== $("name")) $("name").value = now.name ?? "design";
@@ -106,7 +108,9 @@ function draw() {
   keys.draw(all);
   light.draw(all);
   material.draw({ answer, wish: now, byHand: by_hand });
-  $("remove-place").hidden = answer.places.length < 2;
+  for (const id of ["add-place", "remove-place"]) $(id).hidden = Boolean(answer.scene);
+  $("remove-place").disabled = answer.places.length < 2;
+  $("again").hidden = !answer.scene;
   $("impossible-section").hidden = !answer.impossible.length && !answer.conflicts.length;
   const pairs = new Set(answer.conflicts.map((pair) => [...pair].sort((a, b) => a - b).map((i) => i + 1).join(" and ")));
   const fights = [...pairs].slice(0, MOST_FIGHTS).map((pair) => `Keys ${pair} work against each other.`);
@@ -120,23 +124,35 @@ function draw() {
   $("find-nearest").disabled = !now.keys.length;
 }
 
+const placeShown = () => answer.places[view.chosenPlace].name;
+
+function exposure() {
+  return answer.scene ? picture.exposure : exposureAt(answer, view.frame, view.ev);
+}
+
 function drawTime(all = { answer, wish: history.now.wish, ...view }) {
-  const exposure = exposureAt(answer, view.frame, view.ev);
-  drawStage({ ...all, exposure, near: near(all.wish.keys), keys: all.wish.keys });
   const t_s = answer.frames_s[view.frame];
-  const change = lastChange(all.wish, t_s);
+  const drawn = { ...all, keys: all.wish.keys, near: near(all.wish.keys), exposure: exposure() };
+  if (answer.scene) {
+    picture.draw({ ...drawn, pixels: all.wish.pixels });
+    askPicture(t_s);
+  } else drawPatches(drawn);
+  const change = changesOf(all.wish, placeShown()).filter((each) => each.at_s <= t_s).at(-1);
   $("frame").max = answer.frames_s.length - 1;
   $("frame").value = view.frame;
   $("frame").setAttribute("aria-valuetext", duration(t_s));
-  const lit = change?.light === "none" ? "dark" : (change?.light ?? "light");
-  $("time-said").textContent = change ? `${duration(t_s)}: ${duration(t_s - seconds(change.at))} of ${lit}` : duration(t_s);
-  $("ev-said").textContent = `${Math.log2(exposure) >= 0 ? "+" : "−"}${Math.abs(Math.log2(exposure)).toFixed(1)} stops`;
-  if (view.ev === null) $("ev").value = Math.log2(exposure);
+  $("time-said").textContent = change ? `${duration(t_s)}: ${duration(t_s - change.at_s)} of ${change.label}` : duration(t_s);
+  const stops = Math.log2(exposure());
+  $("ev-said").textContent = `${stops >= 0 ? "+" : "−"}${Math.abs(stops).toFixed(1)} stops`;
+  if (view.ev === null) $("ev").value = stops;
 }
 
-function lastChange(now, t_s) {
-  const changes = now.places[answer.places[view.chosenPlace].name];
-  return changes.filter((each) => seconds(each.at) <= t_s).at(-1);
+/** Asks for the picture of a scene, unless it is the one that was asked for last. */
+function askPicture(t_s) {
+  const question = JSON.stringify([history.now, t_s, view.ev]);
+  if (question === view.asked) return;
+  view.asked = question;
+  picture.ask(history.now, t_s, view.ev);
 }
 
 function show(frame) {
@@ -158,29 +174,59 @@ function choose(number) {
 
 /** Sets a key that wants what is there: a beginning, to be changed. */
 function addKey(place) {
-  const t_s = answer.frames_s[view.frame];
-  const exposure = exposureAt(answer, view.frame, view.ev);
-  const there = answer.places[place].rgb[view.frame];
-  const isDark = !(luminance(there) > 0);
-  const colour = keyColour(isDark ? DEFAULT_GREEN.map((x) => x / exposure) : there, exposure);
   const name = answer.places[place].name;
-  const { keys: before } = history.now.wish;
-  const same = before.findIndex((key) => (key.place ?? answer.places[0].name) === name && Math.abs(seconds(key.at) - t_s) < 1e-9);
-  if (same >= 0) {
-    choose(same);
+  if (answer.scene && !(name in history.now.wish.pixels)) {
+    say("Click on the material in the picture: a key belongs to a place.");
     return;
   }
-  view.chosen = before.length;
-  view.chosenPlace = place;
+  const t_s = answer.frames_s[view.frame];
+  const { keys: before } = history.now.wish;
+  const same = before.findIndex((key) => (key.place ?? answer.places[0].name) === name && Math.abs(seconds(key.at) - t_s) < 1e-9);
+  if (same >= 0) choose(same);
+  else push(name, answer.places[place].rgb[view.frame]);
+}
+
+/** Adds a key of a colour, at a new dot of the picture if a point of it is given. */
+function push(name, rgb, point = null) {
+  const t_s = answer.frames_s[view.frame];
+  const factor = exposure();
+  const isDark = !(luminance(rgb) > 0);
+  const colour = keyColour(isDark ? DEFAULT_GREEN.map((x) => x / factor) : rgb, factor);
+  view.chosen = history.now.wish.keys.length;
   wish((now) => {
+    if (point) now.pixels[name] = point;
+    view.chosenPlace = point ? Object.keys(now.pixels).indexOf(name) : answer.places.findIndex((each) => each.name === name);
     now.keys.push({ at: written(t_s), place: name, ...colour });
   });
+}
+
+/** Sets a key where somebody clicked. */
+async function addKeyAt(u, v) {
+  if (!answer.scene) {
+    const place = placeAt(answer, u, v);
+    if (place >= 0) addKey(place);
+    return;
+  }
+  const { pixels } = history.now.wish;
+  const dot = dotAt(answer, pixels, u, v);
+  if (dot) {
+    addKey(answer.places.findIndex((each) => each.name === dot));
+    return;
+  }
+  try {
+    const seen = await (await post("seen", { ...history.now, x: u, y: v, t_s: answer.frames_s[view.frame] })).json();
+    say();
+    push(newDot(pixels), seen.rgb, [u, v].map((x) => Number(x.toFixed(4))));
+  } catch (error) {
+    say(error.message);
+  }
 }
 
 function removeKey(number) {
   view.chosen = -1;
   wish((now) => {
-    now.keys.splice(number, 1);
+    const [{ place }] = now.keys.splice(number, 1);
+    if (now.pixels && !now.keys.some((key) => key.place === place)) delete now.pixels[place];
   });
 }
 
@@ -231,11 +277,9 @@ const light = new Light({
     view.chosenLight = number;
     draw();
   },
-  onChange: (name, changes) => wish((now) => {
-    now.places[name] = changes;
-  }, null, true),
-  onSettled: () => history.settle(),
+  onWish: (change) => wish(change, null, true),
 });
+const picture = new ScenePicture(post, () => drawTime());
 const material = new Material({
   onWish: (content) => wish((now) => ({ ...now, ...content })),
   onByHand: (parameters, gesture) => history.set({ wish: history.now.wish, by_hand: parameters }, `slider ${gesture}`),
@@ -254,10 +298,36 @@ $("name").addEventListener("change", (event) => {
 });
 $("frame").addEventListener("input", (event) => show(event.target.valueAsNumber));
 $("add-key").addEventListener("click", () => addKey(view.chosenPlace));
+const pointOf = (event) => {
+  const box = $("picture").getBoundingClientRect();
+  return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+};
 $("picture").addEventListener("click", (event) => {
-  const box = event.target.getBoundingClientRect();
-  const place = placeAt(answer, (event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
-  if (place >= 0) addKey(place);
+  if (view.wasDragged) view.wasDragged = false;
+  else addKeyAt(...pointOf(event));
+});
+// A dot of a scene is dragged to another place of the material.
+$("picture").addEventListener("pointerdown", (event) => {
+  if (!answer?.scene) return;
+  const start = pointOf(event);
+  const dot = dotAt(answer, history.now.wish.pixels, ...start);
+  if (!dot) return;
+  view.wasDragged = false;
+  const follow = (next) => {
+    const point = pointOf(next);
+    if (!view.wasDragged && Math.hypot(point[0] - start[0], point[1] - start[1]) < 0.008) return;
+    view.wasDragged = true;
+    wish((now) => {
+      now.pixels[dot] = point.map((x) => Number(Math.min(Math.max(x, 0), 1).toFixed(4)));
+    }, `dot ${dot}`, true);
+  };
+  const end = () => {
+    removeEventListener("pointermove", follow);
+    removeEventListener("pointerup", end);
+    history.settle();
+  };
+  addEventListener("pointermove", follow);
+  addEventListener("pointerup", end);
 });
 $("picture").addEventListener("keydown", (event) => {
   const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -DRIVEN, PageDown: DRIVEN }[event.key];
@@ -337,6 +407,16 @@ $("open").addEventListener("change", async (event) => {
     say(error.message);
   }
   event.target.value = "";
+});
+$("render-again").addEventListener("click", async () => {
+  $("rendered-again").replaceChildren(tag("li", "The scene is rendered with the light of the glow itself …"));
+  try {
+    const { lines } = await (await post("again", history.now)).json();
+    $("rendered-again").replaceChildren(...lines.map((text) => tag("li", text)));
+  } catch (error) {
+    $("rendered-again").replaceChildren();
+    say(error.message);
+  }
 });
 $("find-nearest").addEventListener("click", async () => {
   $("nearest").replaceChildren(tag("li", "…"));

@@ -2,13 +2,16 @@
 // shorter it has been on. Above it stands how bright each place is, in its colour, and the keys.
 
 import { luminance, shown } from "./studio_colour.js";
-import { swatch, wantedLuminance } from "./studio_stage.js";
+import { changesOf } from "./studio_light.js";
+import { swatch, wantedLuminance } from "./studio_keys.js";
 import { $, duration, powerOfTen, short, svg } from "./studio_words.js";
 
 const [WIDTH, HEIGHT, TRACK, LEFT, RIGHT, TOP] = [1000, 240, 34, 50, 10, 8];
 const FLOOR = HEIGHT - TRACK - 26;
 const DECADES = 7;
 const RADIUS = 9;
+/** Width from which a light's name stands in it. */
+const NAMED = 60;
 
 /** Frame, with a part, of a time. */
 export function frameOf(frames_s, t_s) {
@@ -165,33 +168,27 @@ export class Timeline {
   }
 
   #lights(answer, wish, chosenPlace, chosenLight) {
-    const name = answer.places[chosenPlace].name;
-    const changes = wish.places[name];
+    const place = answer.places[chosenPlace];
+    const changes = changesOf(wish, place.name);
     const y = HEIGHT - TRACK;
-    return changes.map((change, i) => {
-      const begin = this.#x(frameOf(answer.frames_s, Number.parseFloat(change.at)));
-      const next = changes[i + 1];
-      const end = next ? this.#x(frameOf(answer.frames_s, Number.parseFloat(next.at))) : WIDTH - RIGHT;
-      const middle = Math.min(Math.round(frameOf(answer.frames_s, Number.parseFloat(change.at))) + 1, answer.frames_s.length - 1);
-      const card = answer.places[chosenPlace].card[middle];
-      const isDark = !(luminance(card) > 0) && (change.light === "none" || change.strength === 0);
-      const what = change.light ?? "irradiance";
-      const label = `${isDark ? "dark" : what}${change.strength !== undefined && change.strength !== 1 && !isDark ? ` × ${short(change.strength)}` : ""}`;
+    return changes.map(({ at_s, isDark, label }, i) => {
+      const frame = frameOf(answer.frames_s, at_s);
+      const begin = this.#x(frame);
+      const end = changes[i + 1] ? this.#x(frameOf(answer.frames_s, changes[i + 1].at_s)) : WIDTH - RIGHT;
+      const lit = place.card[Math.min(Math.round(frame) + 1, answer.frames_s.length - 1)];
       const group = svg("g", {
         class: `light${i === chosenLight ? " chosen" : ""}`,
         "data-light": i,
         tabindex: 0,
         role: "button",
-        "aria-label": `Light from ${change.at}: ${label}`,
+        "aria-label": `Light from ${duration(at_s)}: ${label}`,
       });
       group.append(
-        svg("rect", { x: begin, y, width: Math.max(end - begin, 2), height: TRACK - 14, fill: isDark ? "#000" : shown(card, 0.6), rx: 3 }),
-        svg("text", { x: begin, y: HEIGHT - 2 }, duration(Number.parseFloat(change.at))),
+        svg("rect", { x: begin, y, width: Math.max(end - begin, 2), height: TRACK - 14, fill: isDark ? "#000" : shown(lit, 0.6), rx: 3 }),
+        svg("text", { x: begin, y: HEIGHT - 2 }, duration(at_s)),
       );
-      if (end - begin > 60) {
-        group.append(
-          svg("text", { class: isDark ? "name dark" : "name", x: begin + 8, y: y + 14 }, label),
-        );
+      if (end - begin > NAMED) {
+        group.append(svg("text", { class: isDark ? "name dark" : "name", x: begin + 8, y: y + 14 }, label));
       }
       return group;
     });

@@ -9,6 +9,13 @@ export function tag(name, text, kind) {
   return made;
 }
 
+export function field(kind, attributes) {
+  const made = tag("input");
+  made.type = kind;
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  return made;
+}
+
 export function svg(name, attributes, text) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);

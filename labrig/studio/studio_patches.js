@@ -1,8 +1,8 @@
 // The picture: patches of the material in the light of the time that is shown, each with a white
 // card in the same light, and the keys of that time as rings filled with what is wanted.
 
-import { hexOf, linearOf, luminance, scaled, shown } from "./studio_colour.js";
-import { $, short } from "./studio_words.js";
+import { hexOf, luminance, scaled } from "./studio_colour.js";
+import { $ } from "./studio_words.js";
 
 /** Luminance of a screen that automatic exposure gives the brightest patch. */
 const EXPOSED = 0.45;
@@ -40,7 +40,7 @@ export function placeAt(answer, u, v) {
 }
 
 /** Draws what is seen at a frame. `near` are the numbers of the keys that belong to it. */
-export function drawStage({ answer, frame, exposure, keys, near, chosen, chosenPlace }) {
+export function drawPatches({ answer, frame, exposure, keys, near, chosen, chosenPlace }) {
   const canvas = $("picture");
   const pen = canvas.getContext("2d");
   const ink = getComputedStyle(document.documentElement).getPropertyValue("--ink");
@@ -87,25 +87,3 @@ export function drawStage({ answer, frame, exposure, keys, near, chosen, chosenP
     });
   });
 }
-
-/** A key's colour and brightness, for a colour that the screen shows at an exposure. */
-export function keyColour(rgb, exposure) {
-  const bright = scaled(rgb, exposure);
-  const most = Math.max(1, ...bright);
-  const hex = hexOf(scaled(bright, 1 / most));
-  return { colour: hex, brightness: Number((most / exposure).toPrecision(4)) };
-}
-
-/** What a key wants, for its swatch: the colour of its file, or of what the server made of it. */
-export function swatch(key, judged) {
-  if (typeof key.colour === "string") return key.colour;
-  return judged ? shown(judged.wanted) : "#000000";
-}
-
-/** Luminance that a key wants, as a part of white. */
-export function wantedLuminance(key, judged) {
-  if (typeof key.colour === "string") return luminance(linearOf(key.colour)) * (key.brightness ?? 1);
-  return judged ? luminance(judged.wanted) : 0;
-}
-
-export const ofWhite = (y) => (y > 0 ? `${short(y, 3)} of white` : "black");

@@ -1,8 +1,8 @@
 // The list of keys: what is wanted when, what comes out, and the fields of the chosen one.
 
 import { besides, linearOf, luminance, shown } from "./studio_colour.js";
-import { ofWhite, swatch, wantedLuminance } from "./studio_stage.js";
-import { $, duration, seconds, short, tag, written } from "./studio_words.js";
+import { ofWhite, swatch, wantedLuminance, withLuminance } from "./studio_keys.js";
+import { $, duration, field, seconds, tag, written } from "./studio_words.js";
 
 const [FAINTEST, BRIGHTEST] = [-8, 1];
 
@@ -10,21 +10,6 @@ function labelled(text, field) {
   const label = tag("label", text);
   label.append(field);
   return label;
-}
-
-export function field(kind, attributes) {
-  const made = tag("input");
-  made.type = kind;
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  return made;
-}
-
-/** Gives a key another luminance and keeps its colour. */
-export function withLuminance(key, judged, y) {
-  const hex = swatch(key, judged);
-  const own = luminance(linearOf(hex)) || 1;
-  const { xyz, spectrum, ...rest } = key;
-  return { ...rest, colour: hex, brightness: Number((y / own).toPrecision(4)) };
 }
 
 export class Keys {
@@ -144,11 +129,3 @@ export class Keys {
     box.replaceChildren(...parts);
   }
 }
-
-export const summary = (keys) => {
-  if (!keys.length) return "";
-  const worst = keys.reduce((most, key, i) => (key.delta_e > keys[most].delta_e ? i : most), 0);
-  const most = keys[worst].delta_e;
-  if (most <= 1) return `${keys.length === 1 ? "The key is" : `All ${keys.length} keys are`} met, ΔE2000 ${short(most, 2)} at most.`;
-  return `The largest difference is ΔE2000 ${short(most, 2)}, at key ${worst + 1}.`;
-};
