@@ -7,6 +7,18 @@ import typer
 
 
 def design(
+    scene: Annotated[
+        str | None,
+        typer.Argument(
+            help="A scene file, or the name of a shipped scene, to design in. Default: a patch.",
+        ),
+    ] = None,
+    material: Annotated[
+        str | None,
+        typer.Option(
+            "--material", help="The material of the scene to design. Default: the one that glows."
+        ),
+    ] = None,
     constraints: Annotated[
         Path | None,
         typer.Option(
@@ -53,10 +65,12 @@ def design(
             "expected --constraints with --out, --picture and --nearest, got none; on the page the "
             "same is behind its buttons"
         )
-    _serve(begin_with, port, no_browser)
+    _serve(begin_with, scene, material, port, no_browser)
 
 
-def _serve(begin_with: Path | None, port: int, no_browser: bool) -> None:
+def _serve(
+    begin_with: Path | None, scene: str | None, material: str | None, port: int, no_browser: bool
+) -> None:
     from labrig.clock import SystemClock
     from labrig.signals import interrupting
     from labrig.studio import design_on_page
@@ -70,7 +84,7 @@ def _serve(begin_with: Path | None, port: int, no_browser: bool) -> None:
 
     clock = SystemClock()
     with interrupting(clock):
-        design_on_page(begin_with, port, clock, tell)
+        design_on_page(begin_with, scene, material, port, clock, tell)
 
 
 def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: bool) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from labrig.design import RGB_TO_Y, Design, Parameters, Wish, WishFile, to_wish
+from labrig.design import RGB_TO_Y, Design, Parameters, Wish, WishFile
 from labrig.finite import NotNegative, Positive, UnitFraction
 from labrig.studio.timeline import timeline_of
 from labrig.yaml_file import validate
@@ -72,15 +72,15 @@ class Asked(BaseModel):
         """
         return validate(content, cls, SOURCE)
 
-    def to_wish(self) -> Wish:
-        """Return the wish, checked as one from a file.
+    def file(self) -> WishFile:
+        """Return the content of the file of wishes.
 
         Raises
         ------
         UsageError
             It is malformed.
         """
-        return to_wish(validate(self.wish, WishFile, SOURCE), SOURCE)
+        return validate(self.wish, WishFile, SOURCE)
 
 
 def wish_content(file: WishFile) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Never
 from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.local_server import LocalConversation, LocalServer
+from labrig.studio.scene_bench import SceneBench
 from labrig.studio.workbench import Workbench
 
 #: Longest real time until Ctrl-C is answered.
@@ -35,6 +36,10 @@ PAGES: Mapping[str, Path] = {
         )
     },
 }
+
+
+#: What only a page about a scene asks for.
+SCENE_PATHS = ("scene.png", "seen", "again")
 
 
 class StudioServer(LocalServer):
@@ -86,6 +91,8 @@ class _Conversation(LocalConversation):
                 self.send_json(HTTPStatus.OK, bench.look(content))
             elif path == "open":
                 self.send_json(HTTPStatus.OK, {"wish": bench.open(_text(content))})
+            elif isinstance(bench, SceneBench) and path in SCENE_PATHS:
+                self._answer_of_scene(bench, path, content)
             elif path == "nearest":
                 self.send_json(HTTPStatus.OK, {"nearest": bench.nearest(content)})
             elif path == "material.yaml":
@@ -98,6 +105,17 @@ class _Conversation(LocalConversation):
                 self.refuse(HTTPStatus.NOT_FOUND, "no such thing here")
 
 
+    def _answer_of_scene(self, bench: SceneBench, path: str, content: Mapping[str, Any]) -> None:
+        if path == "scene.png":
+            picture = bench.picture_of_scene(content)
+            more = {"X-Exposure": repr(picture.exposure)}
+            self.send(HTTPStatus.OK, "image/png", picture.png, more)
+        elif path == "seen":
+            self.send_json(HTTPStatus.OK, {"rgb": bench.seen(content)})
+        else:
+            self.send_json(HTTPStatus.OK, bench.again(content))
+
+
 def _text(content: Mapping[str, Any]) -> str:
     text = content.get("text")
     if not isinstance(text, str):
@@ -106,14 +124,23 @@ def _text(content: Mapping[str, Any]) -> str:
 
 
 def design_on_page(
-    start: Path | None, port: int, clock: Clock, tell: Callable[[str], None]
+    start: Path | None,
+    scene: str | None,
+    material: str | None,
+    port: int,
+    clock: Clock,
+    tell: Callable[[str], None],
 ) -> Never:
     """Serve the page on which a material is designed, until it is interrupted.
 
     Parameters
     ----------
     start
-        File of wishes with which the page begins; None for five minutes of daylight and no wish.
+        File of wishes with which the page begins; None for light and no wish.
+    scene
+        Scene file, or the name of a shipped scene; None for a patch under five minutes of daylight.
+    material
+        Name of the material of the scene that is designed; None for the only one that glows.
     port
         TCP port on 127.0.0.1; 0 for any that is free.
     clock
@@ -126,7 +153,7 @@ def design_on_page(
     Interrupted
         On Ctrl-C.
     UsageError
-        The file is malformed, or the port is taken.
+        A file is malformed, the scene moves or has no such material, or the port is taken.
 
     Examples
     --------
@@ -138,13 +165,13 @@ def design_on_page(
     ...     print(url.partition(":")[0])
     ...     clock.interrupt(signal.SIGINT)  # Ctrl-C, as soon as the page is served
     >>> try:
-    ...     design_on_page(None, 0, clock, tell)
+    ...     design_on_page(None, None, None, 0, clock, tell)
     ... except Interrupted:
     ...     print("stopped")
     http
     stopped
     """
-    workbench = Workbench()
+    workbench = Workbench() if scene is None else SceneBench(scene, material)
     first = workbench.start() if start is None else workbench.read(start)
     with StudioServer(workbench, first, port) as server, server.running():
         tell(server.url)

@@ -411,8 +411,9 @@ $("open").addEventListener("change", async (event) => {
 $("render-again").addEventListener("click", async () => {
   $("rendered-again").replaceChildren(tag("li", "The scene is rendered with the light of the glow itself …"));
   try {
-    const { lines } = await (await post("again", history.now)).json();
+    const { lines, parameters } = await (await post("again", history.now)).json();
     $("rendered-again").replaceChildren(...lines.map((text) => tag("li", text)));
+    history.set({ wish: history.now.wish, by_hand: parameters });
   } catch (error) {
     $("rendered-again").replaceChildren();
     say(error.message);

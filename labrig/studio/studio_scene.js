@@ -28,12 +28,14 @@ export class ScenePicture {
     while (this.#wanted) {
       const question = this.#wanted;
       this.#wanted = null;
+      const start = performance.now();
       try {
         const reply = await this.post("scene.png", question);
         this.exposure = Number(reply.headers.get("X-Exposure"));
         this.#image?.close();
         this.#image = await createImageBitmap(await reply.blob());
         this.onShown();
+        performance.measure("picture", { start, end: performance.now() });
       } catch {
         // What is wrong is said where the same question is answered in numbers.
       }

@@ -15,7 +15,6 @@ from labrig.design import (
     WishFile,
     judge,
     nearest_materials,
-    read_wish,
     smooth_spectrum,
     to_material,
     to_wish,
@@ -43,6 +42,9 @@ GREEN, BRIGHTNESS, K_R_PER_S, K_E_PER_S, ALBEDO = (0.1, 1.0, 0.3), 0.1, 0.02, 1e
 class Workbench:
     """What answers a page about patches under a light of their own."""
 
+    def __init__(self) -> None:
+        self._last: tuple[str, tuple[Design, Wish]] | None = None
+
     def start(self) -> dict[str, Any]:
         """Return the wish with which a page begins."""
         return wish_content(validate(START, WishFile, SOURCE))
@@ -55,7 +57,7 @@ class Workbench:
         UsageError
             It is malformed.
         """
-        return wish_content(read_wish(path).file)
+        return wish_content(self._wish(read_model(path, WishFile), str(path)).file)
 
     def open(self, text: str) -> dict[str, Any]:
         """Return the wish of a file's text.
@@ -66,7 +68,7 @@ class Workbench:
             It is malformed.
         """
         file = validate(parse_yaml(text, OPENED), WishFile, OPENED)
-        return wish_content(to_wish(file, OPENED).file)
+        return wish_content(self._wish(file, OPENED).file)
 
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the page's wishes, or that was set by hand."""
@@ -82,24 +84,19 @@ class Workbench:
             The message or the wish is malformed.
         """
         asked = Asked.of(content)
-        wish = asked.to_wish()
-        if asked.by_hand is not None:
-            given = asked.by_hand.parameters()
-        elif wish.keys.count:
-            return wish.solve(), wish
-        else:
-            given = _to_begin_with(wish.bands, wish.file)
-        weights = wish.file.weights
-        return judge(given, wish.programme, wish.keys, wish.bands, weights), wish
+        # Numbers, pictures and files are asked for one after another.
+        key = asked.model_dump_json()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._designed(asked)
+        return self._last[1]
 
     def material(self, content: Mapping[str, Any]) -> str:
         """Return the text of the material file of a design."""
-        design, wish = self.design(content)
-        return material_text(to_material(design, wish.file.name))
+        return material_text(self._material_of(*self.design(content)))
 
     def constraints(self, content: Mapping[str, Any]) -> str:
         """Return the text of a file of wishes, as `labrig design --constraints` reads it."""
-        file = Asked.of(content).to_wish().file
+        file = self._wish(Asked.of(content).file(), SOURCE).file
         return yaml_text(file.model_dump(mode="json", exclude_none=True, exclude_defaults=True))
 
     def picture(self, content: Mapping[str, Any]) -> bytes:
@@ -114,6 +111,29 @@ class Workbench:
         """Return the measured materials that come nearest to the wishes, one sentence each."""
         design, _ = self.design(content)
         return [describe_nearest(each) for each in nearest_materials(design) if each]
+
+    def _wish(self, file: WishFile, source: str) -> Wish:
+        """Return a file's wish in the form in which it is solved."""
+        if file.scene is not None:
+            raise UsageError(
+                f"{source}: expected keys on patches, got some in the scene {file.scene.file}; "
+                f"design there: labrig design {file.scene.file} --open FILE"
+            )
+        return to_wish(file, source)
+
+    def _designed(self, asked: Asked) -> tuple[Design, Wish]:
+        wish = self._wish(asked.file(), SOURCE)
+        if asked.by_hand is not None:
+            given = asked.by_hand.parameters()
+        elif wish.keys.count:
+            return wish.solve(), wish
+        else:
+            given = _to_begin_with(wish.bands, wish.file)
+        weights = wish.file.weights
+        return judge(given, wish.programme, wish.keys, wish.bands, weights), wish
+
+    def _material_of(self, design: Design, wish: Wish) -> Material:
+        return to_material(design, wish.file.name)
 
 
 def _to_begin_with(bands: DesignBands, file: WishFile) -> Parameters:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.design import Parameters, read_wish, written_differences
+from labrig.design import Parameters, read_wish, to_wish, written_differences
 from labrig.errors import UsageError
 from labrig.material import read_material
 from labrig.studio.messages import Asked, wish_content
@@ -33,7 +33,7 @@ def test_a_page_designs_as_a_file_does(tmp_path: Path) -> None:
     path = tmp_path / "wish.yaml"
     path.write_text(bench.constraints(asked()), encoding="utf-8")
     wish = read_wish(path)
-    assert wish_content(wish.file) == wish_content(Asked.of(asked()).to_wish().file)
+    assert wish_content(wish.file) == wish_content(to_wish(Asked.of(asked()).file(), "test").file)
     design = wish.solve()
     for name in ("k_r_per_s", "k_e_per_s", "reradiation", "albedo"):
         np.testing.assert_allclose(answer["parameters"][name], getattr(design, name), rtol=1e-4)
@@ -47,7 +47,7 @@ def test_a_page_designs_as_a_file_does(tmp_path: Path) -> None:
 
 def test_every_frame_has_the_colour_of_its_time() -> None:
     answer = Workbench().look(asked())
-    wish = Asked.of(asked()).to_wish()
+    wish = to_wish(Asked.of(asked()).file(), "test")
     design = wish.solve()
     frames_s = np.array(answer["frames_s"])
     shown = np.array(answer["places"][0]["rgb"])
@@ -102,7 +102,7 @@ def test_frames_rise_from_the_first_light_to_after_the_last_key(
         for number, at in enumerate(begin_s.tolist())
     ]
     key = {"at": f"{key_s!r} s", "colour": "#808080", "brightness": 0.1}
-    wish = Asked.of(asked(places={"patch": light}, keys=[key])).to_wish()
+    wish = to_wish(Asked.of(asked(places={"patch": light}, keys=[key])).file(), "test")
     timeline = timeline_of(wish)
     assert (np.diff(timeline.frames_s) > 0).all()
     np.testing.assert_array_equal(timeline.frames_s[list(timeline.first)], begin_s)

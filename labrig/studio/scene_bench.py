@@ -1,0 +1,287 @@
+"""Answers to the page about a material in a scene: its picture, and designs for dots on it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from labrig.design import (
+    Design,
+    Keys,
+    SceneLight,
+    SceneWish,
+    Wish,
+    WishFile,
+    solve_in_scene,
+    spectral_bands,
+    three_bands,
+    to_material,
+    to_wish,
+)
+from labrig.errors import UsageError
+from labrig.finite import Finite, UnitFraction
+from labrig.material import Material
+from labrig.optics import srgb_bytes
+from labrig.reproduce import load_scene
+from labrig.studio.messages import SOURCE, Asked, SetByHand, wish_content
+from labrig.studio.workbench import Workbench
+from labrig.yaml_file import validate
+
+FloatArray = NDArray[np.float64]
+
+#: Width of the picture, and paths for each of its pixels and each place: answered while a dot is
+#: dragged.
+WIDTH_PX, PATHS = 192, 16
+#: Name of the place that is shown before a dot is set.
+BRIGHTEST = "brightest place"
+#: Lights of one bands, programme and albedo that are kept.
+MOST_LIGHTS = 4
+#: Albedo of the material at first.
+ALBEDO = 0.6
+#: Percentile of the picture's luminance that automatic exposure shows so bright.
+PERCENTILE, EXPOSED = 97.0, 0.7
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+class PictureAsked(BaseModel):
+    """A picture that the page asks for.
+
+    Attributes
+    ----------
+    wish, by_hand
+        As of `Asked`.
+    t_s
+        Time in s.
+    exposure_ev
+        Exposure in stops; None to follow the glow.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    wish: dict[str, Any]
+    by_hand: SetByHand | None = None
+    t_s: Finite
+    exposure_ev: Finite | None = None
+
+
+class PointAsked(BaseModel):
+    """A point of the picture that the page asks about.
+
+    Attributes
+    ----------
+    wish, by_hand
+        As of `Asked`.
+    x, y
+        Fractions of the picture's width and height from its upper left.
+    t_s
+        Time in s.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    wish: dict[str, Any]
+    by_hand: SetByHand | None = None
+    x: UnitFraction
+    y: UnitFraction
+    t_s: Finite
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the scene.
+
+    Attributes
+    ----------
+    png
+        Content of its file.
+    exposure
+        Factor from colours to those of the screen.
+    """
+
+    png: bytes
+    exposure: float
+
+
+class SceneBench(Workbench):
+    """What answers a page about a material in a scene, whose light is traced once.
+
+    Parameters
+    ----------
+    scene
+        Scene file, or the name of a shipped scene.
+    material
+        Name of the material to be designed; None for the only one that glows.
+
+    Raises
+    ------
+    UsageError
+        The scene is malformed or moves, or does not say which material is meant.
+    """
+
+    def __init__(self, scene: str, material: str | None = None) -> None:
+        self._scene = scene
+        self._material = material or _only_glowing(scene)
+        self._white: float | None = None
+        self._of_bands: dict[tuple[float, ...] | None, SceneLight] = {}
+        self._lights: dict[object, SceneLight] = {}
+        first = self._traced(None)
+        self._white, self._built = first.white_cd_per_m2, first.scene
+        super().__init__()
+
+    def start(self) -> dict[str, Any]:
+        """Return the wish with which a page begins: the scene and its light, and no dot."""
+        content = {
+            "name": self._material,
+            "albedo": ALBEDO,
+            "scene": {
+                "file": self._scene,
+                "material": self._material,
+                "white_cd_per_m2": self._white,
+                "programme": [part.model_dump() for part in self._built.file.programme],
+                "width_px": WIDTH_PX,
+                "paths": PATHS,
+            },
+            "pixels": {},
+        }
+        return wish_content(validate(content, WishFile, SOURCE))
+
+    def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the material that meets the wishes, with what the page has to know of the scene."""
+        camera = self._built.file.camera
+        return super().look(content) | {
+            "scene": {
+                "material": self._material,
+                "lamps": list(self._built.file.lamps),
+                "width_px": camera.width_px,
+                "height_px": camera.height_px,
+            }
+        }
+
+    def picture_of_scene(self, content: Mapping[str, Any]) -> Picture:
+        """Return the picture of the scene with a material at a time.
+
+        Raises
+        ------
+        UsageError
+            The message or the wish is malformed.
+        """
+        asked = validate(content, PictureAsked, SOURCE)
+        design, wish = self.design(_without_question(content))
+        assert wish.scene is not None
+        rgb = wish.scene.picture(design, asked.t_s)
+        if asked.exposure_ev is not None:
+            exposure = 2.0**asked.exposure_ev
+        else:
+            bright = float(np.percentile(rgb @ LUMINANCE, PERCENTILE))
+            exposure = EXPOSED / bright if bright > 0 else 1.0
+        good, png = cv2.imencode(".png", srgb_bytes(exposure * rgb)[..., ::-1])
+        assert good
+        return Picture(png.tobytes(), exposure)
+
+    def seen(self, content: Mapping[str, Any]) -> list[float]:
+        """Return the colour of the material at a point of the picture.
+
+        Raises
+        ------
+        UsageError
+            Something else is seen there.
+        """
+        asked = validate(content, PointAsked, SOURCE)
+        design, wish = self.design(_without_question(content))
+        assert wish.scene is not None
+        place = wish.scene.place_at(asked.x, asked.y)
+        there = replace(design, programme=wish.scene.programme([place]))
+        return [float(x) for x in np.pi * there.rgb_at(0, [asked.t_s])[0]]
+
+    def again(self, content: Mapping[str, Any]) -> dict[str, Any]:
+        """Design again in the light that the glow itself adds, and render the scene with it."""
+        found = solve_in_scene(self._wish(Asked.of(content).file(), SOURCE))
+        lines = [
+            f"Round {number}: ΔE2000 {float(each.max()):.1f} at most, {float(each.mean()):.1f} in "
+            f"the mean{', which is kept' if number == found.best + 1 else ''}"
+            for number, each in enumerate(found.rounds, start=1)
+        ]
+        design = found.design
+        parameters = {
+            "k_r_per_s": design.k_r_per_s.tolist(),
+            "k_e_per_s": design.k_e_per_s.tolist(),
+            "reradiation": design.reradiation.tolist(),
+            "albedo": design.albedo.tolist(),
+            "order": design.order,
+        }
+        return {"lines": lines, "parameters": parameters}
+
+    def _wish(self, file: WishFile, source: str) -> Wish:
+        if file.scene is None:
+            raise UsageError(
+                f"{source}: expected keys in a scene, got some on patches; design there: labrig "
+                "design --open FILE"
+            )
+        if (file.scene.file, file.scene.material) != (self._scene, self._material):
+            raise UsageError(
+                f"{source}: expected '{self._material}' of {self._scene}, got "
+                f"'{file.scene.material}' of {file.scene.file}; design it there: labrig design "
+                f"{file.scene.file} --material {file.scene.material} --open FILE"
+            )
+        light = self._light_for(file, file.scene)
+        if file.pixels:
+            return to_wish(file, source, light=light)
+        everywhere = light.programme(range(light.n_places)).irradiance
+        brightest = int(everywhere.sum(axis=(1, 2)).argmax())
+        programme = light.programme([brightest])
+        return Wish(file, light.bands, programme, Keys.none(), (BRIGHTEST,), light, (brightest,))
+
+    def _light_for(self, file: WishFile, scene: SceneWish) -> SceneLight:
+        """Return the light in the bands, by the lamps and with the albedo of a wish."""
+        albedo = ALBEDO if isinstance(file.albedo, str) else file.albedo
+        key = (file.bands_nm, scene.programme, albedo)
+        if key not in self._lights:
+            while len(self._lights) >= MOST_LIGHTS:
+                self._lights.pop(next(iter(self._lights)))
+            light = self._traced(file.bands_nm)
+            if scene.programme is not None:
+                light = light.with_programme(scene.programme)
+            self._lights[key] = light.with_albedo(albedo)
+        return self._lights[key]
+
+    def _traced(self, edges_nm: tuple[float, ...] | None) -> SceneLight:
+        """Return the light in bands of a design, in the same white."""
+        if edges_nm not in self._of_bands:
+            self._of_bands[edges_nm] = SceneLight.of(
+                self._scene,
+                self._material,
+                white_cd_per_m2=self._white,
+                bands=three_bands() if edges_nm is None else spectral_bands(edges_nm),
+                width_px=WIDTH_PX,
+                paths=PATHS,
+            )
+        return self._of_bands[edges_nm]
+
+    def _material_of(self, design: Design, wish: Wish) -> Material:
+        assert wish.scene is not None
+        return to_material(design, wish.file.name, wish.scene.spectra(wish.scene_places))
+
+
+def _without_question(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a message without what only one question has."""
+    return {key: value for key, value in content.items() if key in Asked.model_fields}
+
+
+def _only_glowing(scene: str) -> str:
+    """Return the name of the only material of a scene that phosphoresces."""
+    built = load_scene(scene)
+    names = [
+        name
+        for name, made in zip(built.file.materials, built.materials, strict=True)
+        if made.parameters is not None
+    ]
+    if len(names) != 1:
+        raise UsageError(
+            f"{built.file.name}: expected the name of the material to be designed (--material), "
+            f"one of {', '.join(names or built.file.materials)}"
+        )
+    return names[0]
