@@ -9,11 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 from labrig.design.appearance import key_differences
 from labrig.design.bands import DesignBands
 from labrig.design.determined import Conflict, Estimate
+from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.glow import captures, emission
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme, steps_to
 
 FloatArray = NDArray[np.float64]
+
+#: Excess of emitted over absorbed light that is rounding.
+ROUNDED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -151,6 +155,14 @@ class Design:
             # Of no emission nothing has to be absorbed.
             ratios[steps.keys[0]] = emitted / absorbed if absorbed > 0 else np.inf * (emitted > 0)
         return ratios
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether light of no band, however weak, makes it emit more than is absorbed of it."""
+        ratio = emitted_over_absorbed(
+            self.k_e_per_s, self.reradiation, self.albedo, self.bands.energy
+        )
+        return bool(ratio.max(initial=0.0) <= 1 + ROUNDED)
 
     def with_impossible(self, impossible: tuple[Impossible, ...]) -> "Design":
         """Return the design with wishes that cannot be met."""
