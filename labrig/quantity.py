@@ -6,6 +6,7 @@ labrig a name such as `exposure_s` carries the unit.
 
 import math
 import re
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from pydantic import (
@@ -69,7 +70,7 @@ def duration_text(seconds: float) -> str:
     return f"{seconds * 1e3:.4g} ms"
 
 
-def _validator(units: dict[str, float], bare: bool) -> BeforeValidator:
+def _read(units: dict[str, float], bare: bool) -> Callable[[Any], Any]:
     def validate(value: Any) -> Any:
         if isinstance(value, str):
             return parse(value, units)
@@ -78,7 +79,22 @@ def _validator(units: dict[str, float], bare: bool) -> BeforeValidator:
             raise ValueError(f"expected a quantity with its unit, such as '{value} {unit}'")
         return value
 
-    return BeforeValidator(validate)
+    return validate
+
+
+def _validator(units: dict[str, float], bare: bool) -> BeforeValidator:
+    return BeforeValidator(_read(units, bare))
+
+
+_DURATION = _read(TIME_S, bare=False)
+
+
+def _time(value: Any) -> Any:
+    """Return a time of a clock, which may be before its zero."""
+    text = value.strip() if isinstance(value, str) else ""
+    if text[:1] in ("-", "−") and text:
+        return -parse(text[1:], TIME_S)
+    return _DURATION(value)
 
 
 def _serializer(unit: str) -> PlainSerializer:
@@ -90,13 +106,13 @@ def _written(value: float, unit: str) -> str:
     return f"{repr(value).removesuffix('.0')} {unit}"
 
 
-def _schema(units: dict[str, float], bare: bool) -> WithJsonSchema:
+def _schema(units: dict[str, float], bare: bool, sign: str = "") -> WithJsonSchema:
     """Return the JSON Schema of the accepted texts, for editors."""
     unit_pattern = "|".join(sorted(units, key=len, reverse=True))
     number_pattern = r"(\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+)(\s*/\s*\d+(\.\d+)?)?"
     text = {
         "type": "string",
-        "pattern": rf"^\s*{number_pattern}\s*({unit_pattern})\s*$",
+        "pattern": rf"^\s*{sign}{number_pattern}\s*({unit_pattern})\s*$",
         "description": f"a number with its unit: {', '.join(units)}",
     }
     return WithJsonSchema({"anyOf": [text, {"type": "number"}]} if bare else text, "validation")
@@ -145,6 +161,10 @@ Count = Annotated[int, Field(le=MAX_COUNT)]
 #: Seconds, written with a unit of time.
 DurationS = Annotated[
     float, _validator(TIME_S, bare=False), _serializer("s"), _schema(TIME_S, bare=False)
+]
+#: Seconds of a clock, written with a unit of time; before its zero with a minus.
+TimeS = Annotated[
+    float, BeforeValidator(_time), _serializer("s"), _schema(TIME_S, bare=False, sign="[-−]?")
 ]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
 Fraction = Annotated[float, _validator(FRACTION, bare=True), _schema(FRACTION, bare=True)]

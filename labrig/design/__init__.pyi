@@ -42,6 +42,10 @@ from .result import (
     Design as Design,
     Impossible as Impossible,
 )
+from .scene_design import (
+    SceneDesign as SceneDesign,
+    solve_in_scene as solve_in_scene,
+)
 from .scene_light import (
     SceneLight as SceneLight,
 )
@@ -56,6 +60,7 @@ from .solver import (
 )
 from .wish_file import (
     LightChange as LightChange,
+    SceneWish as SceneWish,
     Wish as Wish,
     WishedKey as WishedKey,
     WishFile as WishFile,

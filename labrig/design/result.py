@@ -9,11 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 from labrig.design.appearance import key_differences
 from labrig.design.bands import DesignBands
 from labrig.design.determined import Conflict, Estimate
+from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.glow import captures, emission
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme, steps_to
 
 FloatArray = NDArray[np.float64]
+
+#: Excess of emitted over absorbed light that is rounding.
+ROUNDED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -155,6 +159,14 @@ class Design:
     def with_cost(self, cost: float) -> "Design":
         """Return the design with another sum of squares."""
         return replace(self, cost=cost)
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether light of no band, however weak, makes it emit more than is absorbed of it."""
+        ratio = emitted_over_absorbed(
+            self.k_e_per_s, self.reradiation, self.albedo, self.bands.energy
+        )
+        return bool(ratio.max(initial=0.0) <= 1 + ROUNDED)
 
     def with_impossible(self, impossible: tuple[Impossible, ...]) -> "Design":
         """Return the design with wishes that cannot be met."""

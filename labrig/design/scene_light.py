@@ -171,13 +171,13 @@ class SceneLight:
 
     def _on(self, scene: Scene, albedo: FloatArray) -> Self:
         renderer = Renderer(scene, traced=self._renderer)
-        of_lamps = renderer.irradiance_of_lamps()[:, self._places]
+        of_lamps = renderer.irradiance_of_lamps()[:, self.places]
         return replace(self, scene=scene, albedo=albedo, _renderer=renderer, _of_lamps=of_lamps)
 
     @property
     def n_places(self) -> int:
         """Number of places of the material."""
-        return len(self._places)
+        return len(self.places)
 
     def place_at(self, x: float, y: float) -> int:
         """Return the place of the material that the picture shows somewhere.
@@ -203,7 +203,7 @@ class SceneLight:
                 f"expected a point on '{self.material}', got {x:g}, {y:g}, where {seen.name}{of} "
                 "is seen"
             )
-        return int(np.flatnonzero(self._places == seen.place)[0])
+        return int(np.flatnonzero(self.places == seen.place)[0])
 
     def spectra(self, places: Sequence[int]) -> SceneSpectra:
         """Return the spectral light on some places of the material, by lamps and all reflections.
@@ -212,11 +212,20 @@ class SceneLight:
         ----------
         places
             Numbers of places, as `place_at` returns them.
+
+        Raises
+        ------
+        UsageError
+            Three channels cannot hold the light that surfaces send there.
         """
-        parts = self.scene.file.programme
-        levels = np.stack([self.scene.levels(part.at_s) for part in parts])
-        light = np.einsum("tl,lpb->ptb", levels, self._of_lamps[:, list(places)])
-        return self._spectra(np.array([part.at_s for part in parts]), light)
+        found = self._of_programme(places)
+        if self.bands.edges_nm is None and not found.fits_three_channels:
+            raise UsageError(
+                f"{self.scene.file.name}: expected light whose colour is within linear sRGB for a "
+                f"design in three channels, got other light on '{self.material}', which comes from "
+                "surfaces around it; give bands_nm"
+            )
+        return found
 
     def programme(self, places: Sequence[int]) -> LightProgramme:
         """Return the light on some places of the material, in the bands and white of the design."""
@@ -244,20 +253,43 @@ class SceneLight:
         renderer = self._renderer
         if material is not None:
             surface = self._surface(material)
-            renderer = Renderer(
-                self.scene.with_material(self.material, surface), traced=self._renderer
-            )
-            glow[self._places] = self._glow(surface, t_s)
+            renderer = self._with(surface)
+            glow[self.places] = self._glow(surface, t_s)
         radiance = renderer.picture(glow, self.scene.levels(t_s))
         return self._typical.rgb(radiance)
 
+    def renderer(self, material: Material) -> Renderer:
+        """Return a renderer of the scene with a material, on the paths that are kept.
+
+        Raises
+        ------
+        UsageError
+            The material lacks something, or would glow ever more.
+        """
+        return self._with(self._measured(material))
+
     @cached_property
-    def _places(self) -> IntArray:
+    def places(self) -> IntArray:
+        """Numbers of the material's places among all of the scene, shape (places,)."""
         return self._renderer.places_of(self.material)
+
+    def albedo_of(self, material: Material) -> FloatArray:
+        """Return the albedo of a material in the bands of the scene."""
+        return np.diagonal(self._measured(material).matrix).astype(np.float64)
+
+    def _with(self, surface: SurfaceMaterial) -> Renderer:
+        scene = self.scene.with_material(self.material, surface)
+        return Renderer(scene, traced=self._renderer)
 
     @cached_property
     def _others(self) -> "_OtherGlow":
         return _OtherGlow(self.scene, self._renderer)
+
+    def _of_programme(self, places: Sequence[int]) -> SceneSpectra:
+        parts = self.scene.file.programme
+        levels = np.stack([self.scene.levels(part.at_s) for part in parts])
+        light = np.einsum("tl,lpb->ptb", levels, self._of_lamps[:, list(places)])
+        return self._spectra(np.array([part.at_s for part in parts]), light)
 
     def _spectra(self, begin_s: FloatArray, light: FloatArray) -> SceneSpectra:
         edges = self.scene.bands.edges_nm
@@ -274,20 +306,13 @@ class SceneLight:
 
     def _white(self) -> float:
         """Return the luminance of a card at the brightest place under the strongest light."""
-        light = self.spectra(range(self.n_places))
+        light = self._of_programme(range(self.n_places))
         return float(light.rgb(light.irradiance / np.pi)[..., 1].max(initial=0.0))
 
     def _surface(self, material: Material | Design) -> SurfaceMaterial:
         """Return a material in the bands of the scene."""
-        entry = self.scene.file.materials[self.material]
         if isinstance(material, Material):
-            return of_phosphor(
-                material,
-                self.scene.bands,
-                self.scene.bench_light,
-                entry.assume_albedo,
-                entry.assume_scale,
-            )
+            return self._measured(material)
         light, widths_nm = self._typical, self.scene.bands.width_nm
         parameters = FieldParameters.checked(
             material.k_r_per_s,
@@ -297,6 +322,11 @@ class SceneLight:
         )
         reflected = np.diag(light.albedo(material.albedo)).astype(np.float32)
         return SurfaceMaterial("design", reflected, parameters)
+
+    def _measured(self, material: Material) -> SurfaceMaterial:
+        entry, scene = self.scene.file.materials[self.material], self.scene
+        albedo, scale = entry.assume_albedo, entry.assume_scale
+        return of_phosphor(material, scene.bands, scene.bench_light, albedo, scale)
 
     def _glow(self, surface: SurfaceMaterial, t_s: float) -> Float32Array:
         """Return the radiance that the material emits at a time (places, bands)."""
@@ -387,10 +417,10 @@ def _require_colours(scene: Scene, bands: DesignBands) -> None:
         if not (is_used and lamp.light.any()):
             continue
         light = lamp.light[np.newaxis, np.newaxis]
-        try:
-            SceneSpectra(np.zeros(1), light, scene.bands.edges_nm, bands, 1.0).in_bands(light)
-        except UsageError:
+        if not SceneSpectra(
+            np.zeros(1), light, scene.bands.edges_nm, bands, 1.0
+        ).fits_three_channels:
             raise UsageError(
                 f"{scene.file.name}: expected lamps whose colour is within linear sRGB for a "
                 f"design in three channels, got '{lamp.name}'; give bands_nm"
-            ) from None
+            )

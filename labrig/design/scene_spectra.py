@@ -64,13 +64,7 @@ class SceneSpectra:
 
     @cached_property
     def programme(self) -> LightProgramme:
-        """The light in the bands and the unit of the design.
-
-        Raises
-        ------
-        UsageError
-            Three channels cannot hold the light.
-        """
+        """The light in the bands and the unit of the design."""
         return LightProgramme.checked(self.begin_s, self.in_bands(self.irradiance))
 
     def in_bands(self, irradiance: FloatArray) -> FloatArray:
@@ -78,15 +72,14 @@ class SceneSpectra:
         light = irradiance / self.unit_w_per_m2_nm
         if self.bands.edges_nm is not None:
             return np.asarray(light @ self._conversion.of_light / self._parts)
-        rgb = np.asarray(light @ self.to_rgb.T)
-        power = light @ np.diff(self.edges_nm)
-        seen = rgb @ RGB_TO_Y
-        if (seen < INVISIBLE * power).any() or (rgb.min(axis=-1) < -LEFT_OUT * seen).any():
-            raise UsageError(
-                "expected light whose colour is within linear sRGB, got some of which three "
-                "channels cannot tell how it excites; give bands_nm"
-            )
-        return np.maximum(rgb, 0.0)
+        return np.maximum(light @ self.to_rgb.T, 0.0)
+
+    @property
+    def fits_three_channels(self) -> bool:
+        """Whether all light has a colour within linear sRGB, so that it may excite by that."""
+        rgb = self.irradiance @ self.to_rgb.T
+        seen, power = rgb @ RGB_TO_Y, self.irradiance @ np.diff(self.edges_nm)
+        return bool((seen >= INVISIBLE * power).all() and (rgb.min(-1) >= -LEFT_OUT * seen).all())
 
     def rgb(self, radiance: NDArray[np.floating[Any]]) -> FloatArray:
         """Return linear sRGB over the white of radiance in W m⁻² sr⁻¹ nm⁻¹ (…, scene's bands)."""

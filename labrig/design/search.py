@@ -139,6 +139,11 @@ class Problem:
         """Number of rates of a state."""
         return self.n_groups + 1
 
+    def of_groups(self, k_e: FloatArray) -> FloatArray:
+        """Return the mean excitation rates (states, groups) of each group's bands."""
+        members = self.groups[:, np.newaxis] == np.arange(self.n_groups)
+        return np.asarray(k_e @ members / np.maximum(members.sum(axis=0), 1))
+
     @cached_property
     def k_r_range(self) -> tuple[float, float]:
         """Range of k_r in 1/s."""
@@ -270,6 +275,20 @@ def search(problem: Problem, *, is_order_free: bool, order: float) -> tuple[Foun
     return tuple(sorted(found, key=lambda each: each.cost))
 
 
+def search_near(
+    problem: Problem, rates: FloatArray, *, is_order_free: bool, order: float
+) -> tuple[Found, ...]:
+    """Return where a search ends that starts at rates (states, groups + 1), in their basin."""
+    if not problem.n_groups:
+        return (_dark(problem),)
+    start = np.clip(problem.coordinates(rates), *problem.bounds)
+    if is_order_free:
+        end, _ = _refined(problem, np.append(start, max(order, LEAST_ORDER)), None)
+        return (_found(problem, end[:-1], float(end[-1])),)
+    end, _ = _refined(problem, start, order)
+    return (_found(problem, end, order),)
+
+
 def _swept(problem: Problem, starts: FloatArray) -> FloatArray:
     """Return points (n, p) after searches along one rate after another over its whole range.
 
@@ -344,17 +363,17 @@ def _of_order(problem: Problem, starts: Sequence[FloatArray], order: float | Non
 
 
 def residuals_and_slopes(
-    problem: Problem, x: FloatArray, order: float
+    problem: Problem, x: FloatArray, order: float, given: Coefficients | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray, Coefficients]:
     """Return residuals (rows,), their slopes at fixed Λ and albedo, emissions, and Λ and albedo.
 
-    Slopes have a column for each coordinate, state by state, and one for the common order.
+    Λ and albedo are the best ones, or those that are given. Slopes have a column for each coordinate, state by state, and one for the common order.
     """
     glow = problem.emission_of(x, order)
     values = glow.value.T
     slopes = problem.by_parameter(np.swapaxes(glow.slopes, 0, 1))
     linear = problem.linear
-    coefficients = linear.coefficients(values)
+    coefficients = linear.coefficients(values) if given is None else given
     residuals = linear.residuals(values, coefficients)
     return residuals, linear.slopes(values, slopes, coefficients), values, coefficients
 

@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.design.bands import DesignBands
 from labrig.design.determined import POOR, POOR_ALBEDO, Conflict, Estimate, conflicts, covariance
+from labrig.design.energy import keeping_energy
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme
 from labrig.design.linear_part import Coefficients, Wanted, linear_part
 from labrig.design.possible import impossible_keys
 from labrig.design.result import Design
-from labrig.design.search import Found, Problem, residuals_and_slopes, search
+from labrig.design.search import Found, Problem, residuals_and_slopes, search, search_near
 from labrig.errors import UsageError
 from labrig.material import MAX_ORDER
 
@@ -42,6 +43,8 @@ def solve(
     albedo: ArrayLike | None = None,
     weights: Literal["luminance", "plain"] = "luminance",
     key_sigma: float = KEY_SIGMA,
+    energy: Literal["free", "kept"] = "free",
+    near: Design | None = None,
 ) -> Design:
     """Find the phosphorescent material whose radiance is closest to the keys.
 
@@ -67,6 +70,12 @@ def solve(
         `plain`: squares are summed as in eq. 7.
     key_sigma
         Relative σ with which keys are meant, for the σ of the parameters.
+    energy
+        `free`: a design that emits more than it absorbs is returned, and said to be impossible;
+        `kept`: the nearest that does not, under light of any band.
+    near
+        Design under nearly the same light, from whose rates alone is searched, so that what keys do
+        not determine stays as it is.
 
     Returns
     -------
@@ -107,8 +116,14 @@ def solve(
         Wanted(target, keys.weights(bands, weights), reflected if given is None else None, seen)
     )
     problem = Problem.of(programme, keys.place, keys.time_s, linear, n_states)
-    ends = search(problem, is_order_free=order is None, order=order or 1.0)
+    if near is None:
+        ends = search(problem, is_order_free=order is None, order=order or 1.0)
+    else:
+        rates = np.column_stack([problem.of_groups(near.k_e_per_s), near.k_r_per_s])
+        ends = search_near(problem, rates, is_order_free=order is None, order=order or near.order)
     best = ends[0]
+    if energy == "kept":
+        best = keeping_energy(problem, ends, given, bands.energy)
     estimates, fights = _judged(problem, best, keys, bands, key_sigma)
     k_e = np.zeros((n_states, bands.count))
     is_lit = problem.groups >= 0
@@ -173,7 +188,9 @@ def _judged(
 ) -> tuple[tuple[Estimate, ...], tuple[Conflict, ...]]:
     """Return the parameters with their σ, and the keys that work against each other."""
     x = problem.coordinates(best.rates)
-    residuals, by_rate, values, coefficients = residuals_and_slopes(problem, x, best.order)
+    residuals, by_rate, values, coefficients = residuals_and_slopes(
+        problem, x, best.order, best.coefficients
+    )
     n_rows = problem.linear.n_rows
     residuals = residuals[:n_rows]
     n_rates = problem.n_states * problem.n_rates

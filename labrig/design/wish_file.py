@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,13 @@ from labrig.errors import UsageError
 from labrig.finite import Finite, NotNegative, Positive, UnitFraction
 from labrig.material import MAX_ORDER
 from labrig.optics import read_light
-from labrig.quantity import DurationS, Fraction
+from labrig.quantity import DurationS, Fraction, TimeS
+from labrig.reproduce import ProgrammeEntry
 from labrig.yaml_file import did_you_mean, read_model
+
+# A scene is traced only if a file names one.
+if TYPE_CHECKING:
+    from labrig.design.scene_light import SceneLight
 
 FloatArray = NDArray[np.float64]
 
@@ -74,7 +79,7 @@ class WishedKey(_Part):
     Attributes
     ----------
     at
-        Time, on the clock of the light, for example `11 s`.
+        Time, on the clock of the light or the scene, for example `11 s`; `-1 s` is before its zero.
     place
         Name of the place. Default: the only one.
     colour
@@ -88,7 +93,7 @@ class WishedKey(_Part):
         Factor of the colour: a glow is far darker than a screen.
     """
 
-    at: DurationS
+    at: TimeS
     place: Annotated[str, Field(min_length=1)] | None = None
     colour: str | tuple[Finite, Finite, Finite] | None = None
     xyz: tuple[NotNegative, NotNegative, NotNegative] | None = None
@@ -116,6 +121,34 @@ class WishedKey(_Part):
         return self.brightness * np.array(self.colour)
 
 
+class SceneWish(_Part):
+    """Scene in which a material is designed.
+
+    Attributes
+    ----------
+    file
+        Name of a shipped scene, or a scene file, its path relative to this file.
+    material
+        Name of the material of the scene that is to be designed.
+    white_cd_per_m2
+        Luminance of the white, which is 1, 1, 1. Default: that of a white card at the brightest
+        place of the material under the strongest light.
+    programme
+        Which lamps shine when, instead of the scene's.
+    width_px
+        Width of the picture. Default: the scene's.
+    paths
+        Paths of light for each pixel and each place of the material. Default: the scene's.
+    """
+
+    file: Annotated[str, Field(min_length=1)]
+    material: Annotated[str, Field(min_length=1)]
+    white_cd_per_m2: Positive | None = None
+    programme: tuple[ProgrammeEntry, ...] | None = None
+    width_px: Annotated[int, Field(ge=1, le=8192)] | None = None
+    paths: Annotated[int, Field(ge=1, le=65536)] | None = None
+
+
 class WishFile(_Part):
     """How something should glow under which light.
 
@@ -140,6 +173,11 @@ class WishFile(_Part):
         Light programme of the only place. Before its first time all is dark.
     places
         Instead of `light`: a light programme for each of several places, by name.
+    scene
+        Instead of `light`: a scene in which the material is designed.
+    pixels
+        Places of the scene, by name: where its picture shows them, as fractions of its width and
+        height from its upper left.
     keys
         How it should look when; none yet is no wish to be solved, but one to go on with.
     """
@@ -153,27 +191,33 @@ class WishFile(_Part):
     key_sigma: Annotated[Fraction, Field(gt=0, lt=1)] = KEY_SIGMA
     light: tuple[LightChange, ...] | None = None
     places: dict[str, tuple[LightChange, ...]] | None = None
+    scene: SceneWish | None = None
+    pixels: dict[str, tuple[UnitFraction, UnitFraction]] | None = None
     keys: tuple[WishedKey, ...] = ()
 
     @model_validator(mode="after")
     def _has_light(self) -> Self:
-        if (self.light is None) == (self.places is None):
-            raise ValueError("expected 'light' or 'places', got both or neither")
+        given = [name for name in ("light", "places", "scene") if getattr(self, name) is not None]
+        if len(given) != 1:
+            got = " and ".join(f"'{name}'" for name in given) or "none"
+            raise ValueError(f"expected one of 'light', 'places' and 'scene', got {got}")
+        if self.scene is None and self.pixels is not None:
+            raise ValueError("expected 'pixels' beside 'scene' only")
         for name, changes in self.programmes.items():
             if not changes:
                 raise ValueError(f"expected at least one light of '{name}', got none")
             if any(b.at <= a.at for a, b in itertools.pairwise(changes)):
                 raise ValueError(f"expected rising times in the light of '{name}', got others")
-        if not self.programmes:
+        if self.scene is None and not self.programmes:
             raise ValueError("expected at least one of 'places', got none")
         return self
 
     @property
     def programmes(self) -> Mapping[str, tuple[LightChange, ...]]:
-        """Light programmes by the places' names."""
+        """Light programmes by the places' names; none of a scene."""
         if self.places is not None:
             return self.places
-        return {ONLY_PLACE: self.light or ()}
+        return {} if self.light is None else {ONLY_PLACE: self.light}
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +232,10 @@ class Wish:
         Arguments of `solve`.
     places
         Names of the places, in the programme's order.
+    scene
+        Light in the scene, if there is one, with the albedo that the file gives.
+    scene_places
+        Numbers of the places in the scene.
     """
 
     file: WishFile
@@ -195,12 +243,27 @@ class Wish:
     programme: LightProgramme
     keys: Keys
     places: tuple[str, ...]
+    scene: "SceneLight | None" = None
+    scene_places: tuple[int, ...] = ()
 
-    def solve(self) -> Design:
-        """Return the material that meets the wish best."""
+    def solve(
+        self,
+        energy: Literal["free", "kept"] = "free",
+        programme: LightProgramme | None = None,
+        near: Design | None = None,
+    ) -> Design:
+        """Return the material that meets the wish best.
+
+        Parameters
+        ----------
+        energy, near
+            As of `solve`.
+        programme
+            Light on the places instead of the wish's.
+        """
         file = self.file
         return solve(
-            self.programme,
+            self.programme if programme is None else programme,
             self.keys,
             self.bands,
             n_states=file.states,
@@ -208,6 +271,8 @@ class Wish:
             albedo=None if isinstance(file.albedo, str) else file.albedo,
             weights=file.weights,
             key_sigma=file.key_sigma,
+            energy=energy,
+            near=near,
         )
 
 
@@ -241,10 +306,12 @@ def read_wish(path: Path) -> Wish:
     >>> read_wish(Path("wish.yaml")).keys.radiance.round(5).tolist()
     [[9e-05, 0.00336, 0.00074]]
     """
-    return to_wish(read_model(path, WishFile), str(path))
+    return to_wish(read_model(path, WishFile), str(path), path.parent)
 
 
-def to_wish(file: WishFile, source: str) -> Wish:
+def to_wish(
+    file: WishFile, source: str, folder: Path = Path(), light: "SceneLight | None" = None
+) -> Wish:
     """Return a wish in the form in which it is solved.
 
     Parameters
@@ -253,6 +320,10 @@ def to_wish(file: WishFile, source: str) -> Wish:
         What was read.
     source
         Name of its source, for messages.
+    folder
+        Folder to which the path of a scene is relative.
+    light
+        Light of the scene, by the lamps and with the albedo of the file, if it was traced before.
 
     Returns
     -------
@@ -274,16 +345,39 @@ def to_wish(file: WishFile, source: str) -> Wish:
     """
     try:
         bands = three_bands() if file.bands_nm is None else spectral_bands(file.bands_nm)
+        if not isinstance(file.albedo, str | float) and len(file.albedo) != bands.count:
+            raise UsageError(f"expected an albedo of {bands.count} bands, got {len(file.albedo)}")
+        if file.scene is not None:
+            traced = light or _traced(file, file.scene, bands, folder)
+            return _in_scene(file, bands, traced)
         places = tuple(file.programmes)
         programme = _programme(file, bands)
         keys = _keys(file, places, bands)
     except UsageError as error:
         raise UsageError(f"{source}: {error}") from None
-    if not isinstance(file.albedo, (str, float)) and len(file.albedo) != bands.count:
-        raise UsageError(
-            f"{source}: expected an albedo of {bands.count} bands, got {len(file.albedo)}"
-        )
     return Wish(file, bands, programme, keys, places)
+
+
+def _in_scene(file: WishFile, bands: DesignBands, light: "SceneLight") -> Wish:
+    pixels = file.pixels or {}
+    keys = _keys(file, tuple(pixels), bands)
+    numbers = tuple(light.place_at(x, y) for x, y in pixels.values())
+    return Wish(file, bands, light.programme(numbers), keys, tuple(pixels), light, numbers)
+
+
+def _traced(file: WishFile, wish: SceneWish, bands: DesignBands, folder: Path) -> "SceneLight":
+    from labrig.design.scene_light import PLACEHOLDER, SceneLight
+
+    return SceneLight.of(
+        folder / wish.file if Path(wish.file).suffix else wish.file,
+        wish.material,
+        white_cd_per_m2=wish.white_cd_per_m2,
+        bands=bands,
+        programme=wish.programme,
+        albedo=PLACEHOLDER if isinstance(file.albedo, str) else file.albedo,
+        width_px=wish.width_px,
+        paths=wish.paths,
+    )
 
 
 def _programme(file: WishFile, bands: DesignBands) -> LightProgramme:

@@ -86,6 +86,8 @@ class Asked(BaseModel):
 def wish_content(file: WishFile) -> dict[str, Any]:
     """Return a file of wishes as the page keeps it: its light by places, without empty keys."""
     content = file.model_dump(mode="json", exclude_none=True, exclude={"light"})
+    if file.scene is not None:
+        content.setdefault("pixels", {})
     if file.light is not None:
         light = file.model_dump(mode="json", exclude_none=True)["light"]
         content["places"] = dict.fromkeys(file.programmes, light)

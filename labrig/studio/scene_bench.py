@@ -150,7 +150,7 @@ class SceneBench(Workbench):
         return wish_content(validate(content, WishFile, SOURCE))
 
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the material that meets the wishes, with what the page has to know of the scene."""
+        """Return the material that meets the wishes, and what the page has to know of the scene."""
         camera = self._built.file.camera
         return super().look(content) | {
             "scene": {
@@ -238,7 +238,7 @@ class SceneBench(Workbench):
     def _light_for(self, file: WishFile, scene: SceneWish) -> SceneLight:
         """Return the light in the bands, by the lamps and with the albedo of a wish."""
         albedo = ALBEDO if isinstance(file.albedo, str) else file.albedo
-        key = (file.bands_nm, scene.programme, albedo)
+        key = (file.bands_nm, scene.model_dump_json(), albedo)
         if key not in self._lights:
             while len(self._lights) >= MOST_LIGHTS:
                 self._lights.pop(next(iter(self._lights)))

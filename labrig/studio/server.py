@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any, ClassVar, Never
 
 from labrig.clock import Clock
+from labrig.design import WishFile
 from labrig.errors import UsageError
 from labrig.local_server import LocalConversation, LocalServer
 from labrig.studio.scene_bench import SceneBench
 from labrig.studio.workbench import Workbench
+from labrig.yaml_file import read_model
 
 #: Longest real time until Ctrl-C is answered.
 CHECK_PERIOD_S = 0.2
@@ -104,7 +106,6 @@ class _Conversation(LocalConversation):
             else:
                 self.refuse(HTTPStatus.NOT_FOUND, "no such thing here")
 
-
     def _answer_of_scene(self, bench: SceneBench, path: str, content: Mapping[str, Any]) -> None:
         if path == "scene.png":
             picture = bench.picture_of_scene(content)
@@ -171,8 +172,11 @@ def design_on_page(
     http
     stopped
     """
+    wished = None if start is None else read_model(start, WishFile)
+    if wished is not None and wished.scene is not None:
+        scene, material = scene or wished.scene.file, material or wished.scene.material
     workbench = Workbench() if scene is None else SceneBench(scene, material)
-    first = workbench.start() if start is None else workbench.read(start)
+    first = workbench.start() if wished is None else workbench.take(wished, str(start))
     with StudioServer(workbench, first, port) as server, server.running():
         tell(server.url)
         while True:

@@ -111,6 +111,9 @@ function draw() {
   for (const id of ["add-place", "remove-place"]) $(id).hidden = Boolean(answer.scene);
   $("remove-place").disabled = answer.places.length < 2;
   $("again").hidden = !answer.scene;
+  $("hint").textContent = answer.scene
+    ? `Click on '${answer.scene.material}' to set a key: so it shall look there at this time. Drag a dot to move it.`
+    : "Click on the material to set a key: so it shall look at this time. The small square is a white card in the same light.";
   $("impossible-section").hidden = !answer.impossible.length && !answer.conflicts.length;
   const pairs = new Set(answer.conflicts.map((pair) => [...pair].sort((a, b) => a - b).map((i) => i + 1).join(" and ")));
   const fights = [...pairs].slice(0, MOST_FIGHTS).map((pair) => `Keys ${pair} work against each other.`);

@@ -19,7 +19,8 @@ from labrig.design import (
     to_material,
     to_wish,
 )
-from labrig.material import material_text
+from labrig.errors import UsageError
+from labrig.material import Material, material_text
 from labrig.report import describe_nearest, draw_design
 from labrig.studio.messages import SOURCE, Asked, answer, wish_content
 from labrig.yaml_file import parse_yaml, validate, yaml_text
@@ -49,7 +50,7 @@ class Workbench:
         """Return the wish with which a page begins."""
         return wish_content(validate(START, WishFile, SOURCE))
 
-    def read(self, path: Path) -> dict[str, Any]:
+    def take(self, file: WishFile, source: str) -> dict[str, Any]:
         """Return the wish of a file.
 
         Raises
@@ -57,7 +58,7 @@ class Workbench:
         UsageError
             It is malformed.
         """
-        return wish_content(self._wish(read_model(path, WishFile), str(path)).file)
+        return wish_content(self._wish(file, source).file)
 
     def open(self, text: str) -> dict[str, Any]:
         """Return the wish of a file's text.
@@ -68,7 +69,7 @@ class Workbench:
             It is malformed.
         """
         file = validate(parse_yaml(text, OPENED), WishFile, OPENED)
-        return wish_content(self._wish(file, OPENED).file)
+        return self.take(file, OPENED)
 
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the page's wishes, or that was set by hand."""

@@ -22,12 +22,8 @@ from labrig.studio.workbench import Workbench
 from tests.chromium import browser
 
 STEPS = 60
-KEYS = (
-    {"at": "1 s", "colour": "#20c060", "brightness": 4e-3},
-    {"at": "5 s", "colour": "#20b060", "brightness": 2e-3},
-    {"at": "20 s", "colour": "#20a060", "brightness": 1e-3},
-    {"at": "60 s", "colour": "#209060", "brightness": 3e-4},
-)
+#: Times in s after the light, colours and brightnesses of the keys.
+KEYS = ((1, "#20c060", 4e-3), (5, "#20b060", 2e-3), (20, "#20a060", 1e-3), (60, "#209060", 3e-4))
 #: Begin of the darkness of a page about patches.
 DARK_S = 300.0
 #: A dot on the left wall of the shipped box.
@@ -41,12 +37,13 @@ def main() -> None:
     scene: str | None = parser.parse_args().scene
     bench = Workbench() if scene is None else SceneBench(scene)
     first = bench.start()
-    if scene is None:
-        keys = [{**key, "at": f"{DARK_S + float(key['at'].split()[0])} s"} for key in KEYS]
-    else:
-        keys = [{**key, "place": "dot 1"} for key in KEYS]
-        first["pixels"] = {"dot 1": DOT}
-    first["keys"] = keys
+    begin_s, place = (DARK_S, "patch") if scene is None else (0.0, "dot 1")
+    if scene is not None:
+        first["pixels"] = {place: DOT}
+    first["keys"] = [
+        {"at": f"{begin_s + after_s} s", "place": place, "colour": colour, "brightness": brightness}
+        for after_s, colour, brightness in KEYS
+    ]
     with (
         StudioServer(bench, first) as server,
         server.running(),

@@ -114,6 +114,7 @@ class Renderer:
         geometry = scene.geometry(self._t_s)
         self._material_of_place = geometry.material_of_place
         self._states = _states(scene, geometry)
+        self._record: Callable[[float, FloatArray], None] | None = None
         self._view: _View | None = None if traced is None else traced._view
         self._charge_at_first()
 
@@ -201,9 +202,33 @@ class Renderer:
         """
         return self._emitted()
 
-    def advance(self, t_s: float) -> None:
-        """Step all levels to a time in s."""
+    def irradiance(self) -> FloatArray:
+        """Return the irradiance by lamps and glow at the time that was reached.
+
+        Returns
+        -------
+        ndarray
+            Irradiance in W m⁻² nm⁻¹ at the places with states, zero elsewhere, shape (places,
+            bands).
+        """
+        return self._irradiance(self._view_at(self._t_s), self._t_s)
+
+    def advance(
+        self, t_s: float, record: Callable[[float, FloatArray], None] | None = None
+    ) -> None:
+        """Step all levels to a time.
+
+        Parameters
+        ----------
+        t_s
+            Time in s, not before the time that has been reached.
+        record
+            What is called for each step of a scene where nothing moves, with its begin in s and the
+            mean irradiance during it, shape (places, bands).
+        """
+        self._record = record
         self._advance(t_s)
+        self._record = None
 
     def picture(self, glow: Float32Array, levels: ArrayLike) -> Float32Array:
         """Return the picture of any glow under lamps of any levels.
@@ -360,6 +385,9 @@ class Renderer:
                     state.field.levels[:] = levels
                 self._glide(light, later, step_s)
                 later = self._irradiance(view, begin_s)
+            if self._record is not None:
+                middles = [_between(light, later, (part + 0.5) / PARTS) for part in range(PARTS)]
+                self._record(t_s, np.mean(middles, axis=0))
             t_s = end_s if step_s == end_s - t_s else t_s + step_s
             change = abs(math.log(max(float(later.sum()), TINY) / max(float(light.sum()), TINY)))
             step_s *= min(GROWTH, MOST_CHANGE / max(change, TINY))
@@ -367,13 +395,8 @@ class Renderer:
 
     def _glide(self, light: FloatArray, later: FloatArray, step_s: float) -> None:
         """Step through light that goes over into another, exponentially where both shine."""
-        both = (light > 0) & (later > 0)
-        ratio = np.divide(later, light, out=np.ones_like(light), where=both)
         for part in range(PARTS):
-            x = (part + 0.5) / PARTS
-            self._step(
-                np.where(both, light * ratio**x, (1 - x) * light + x * later), step_s / PARTS
-            )
+            self._step(_between(light, later, (part + 0.5) / PARTS), step_s / PARTS)
 
     def _follow(self, begin_s: float, end_s: float) -> None:
         """Step through a time in which something moves, which is where it is in mid-step."""
@@ -497,6 +520,13 @@ class _View:
                 if surface.samples is not None
             }
         return self._of_places
+
+
+def _between(light: FloatArray, later: FloatArray, x: float) -> FloatArray:
+    """Return light on its way into another, at a part x of it: exponentially where both shine."""
+    both = (light > 0) & (later > 0)
+    ratio = np.divide(later, light, out=np.ones_like(light), where=both)
+    return np.where(both, light * ratio**x, (1 - x) * light + x * later)
 
 
 def _nearest_lit(lit: IntArray, surface: Surface) -> IntArray:
