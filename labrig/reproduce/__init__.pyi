@@ -80,6 +80,7 @@ from .surface.surface_material import (
     SurfaceMaterial as SurfaceMaterial,
     of_albedo as of_albedo,
     of_matrix as of_matrix,
+    of_mixture as of_mixture,
     of_phosphor as of_phosphor,
 )
 from .transport.folding import (

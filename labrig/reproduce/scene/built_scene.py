@@ -11,8 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.material import Albedo, Material, read_any_material
-from labrig.optics import absolute_irradiance, read_colour_chart, read_light, read_transmittance
+from labrig.material import Albedo, Material, read_any_material, read_mixture
+from labrig.optics import (
+    Transmittance,
+    absolute_irradiance,
+    read_colour_chart,
+    read_light,
+    read_transmittance,
+)
 from labrig.reproduce.scene.scene_file import (
     STRENGTHS,
     AlbedoCurve,
@@ -29,6 +35,7 @@ from labrig.reproduce.surface.surface_material import (
     SurfaceMaterial,
     of_albedo,
     of_matrix,
+    of_mixture,
     of_phosphor,
 )
 from labrig.reproduce.transport.geometry import Geometry, Samples, Surface
@@ -263,7 +270,12 @@ def _replaced(
         name: (
             (
                 entry.model_copy(
-                    update={"file": replaced[name], "albedo": None, "chart_patch": None}
+                    update={
+                        "file": replaced[name],
+                        "albedo": None,
+                        "chart_patch": None,
+                        "mixture": None,
+                    }
                 ),
                 Path(),
             )
@@ -287,31 +299,47 @@ def _material(
     bench: BenchLight,
     assumptions: Assumptions,
 ) -> SurfaceMaterial:
-    if entry.chart_patch is not None:
-        patch = read_colour_chart("colorchecker")[entry.chart_patch - 1]
-        return of_albedo(name, patch, bands)
-    if isinstance(entry.albedo, str):
-        return of_albedo(name, read_transmittance(_beside(entry.albedo, folder)), bands)
-    if isinstance(entry.albedo, AlbedoCurve):
-        return of_albedo(name, Albedo(**entry.albedo.model_dump()), bands)
-    if entry.albedo is not None:
-        return of_albedo(name, entry.albedo, bands)
+    stored = None if entry.mixture is None else read_mixture(folder / entry.mixture)
+    albedo = _reflectance(entry, folder)
+    if albedo is not None:
+        if stored is None or not entry.is_fluorescent:
+            return of_albedo(name, albedo, bands)
+        return of_mixture(name, stored, albedo, bands)
     assert entry.file is not None
     material = read_any_material(_beside(entry.file, folder))
+    if stored is not None:
+        if isinstance(material, Material):
+            raise UsageError(
+                f"{name}: expected 'file' to be a measured matrix, whose reflectance the 'mixture' "
+                f"needs, got the phosphor {material.name}"
+            )
+        if entry.is_fluorescent:
+            return _named(name, of_mixture(material.name, stored, material, bands))
     if not isinstance(material, Material):
         if not entry.is_fluorescent:
             material = replace(material, reradiation=np.zeros_like(material.reradiation))
         return _named(name, of_matrix(material, bands))
-    albedo, scale = entry.assume_albedo, entry.assume_scale
+    assumed, scale = entry.assume_albedo, entry.assume_scale
     phosphor = of_phosphor(
         material,
         bands,
         bench,
-        albedo if assumptions.albedo is None else assumptions.albedo,
+        assumed if assumptions.albedo is None else assumptions.albedo,
         scale if assumptions.scale is None else assumptions.scale,
         entry.prompt,
     )
     return _named(name, phosphor)
+
+
+def _reflectance(entry: MaterialEntry, folder: Path) -> Albedo | Transmittance | float | None:
+    """Return the reflectance that a scene gives a material, None of one that its file has."""
+    if entry.chart_patch is not None:
+        return read_colour_chart("colorchecker")[entry.chart_patch - 1]
+    if isinstance(entry.albedo, str):
+        return read_transmittance(_beside(entry.albedo, folder))
+    if isinstance(entry.albedo, AlbedoCurve):
+        return Albedo(**entry.albedo.model_dump())
+    return entry.albedo
 
 
 def _named(name: str, material: SurfaceMaterial) -> SurfaceMaterial:

@@ -91,6 +91,9 @@ class MaterialEntry(_Part):
     albedo
         Albedo of a surface that only reflects: a number, a curve, or the name of a file with a
         reflectance.
+    mixture
+        File with a mixture that stands for the re-radiation (`fit.json` of `labrig fit mixture`),
+        beside what has the reflectance: `albedo`, `chart_patch`, or `file`, a measured matrix.
     chart_patch
         Number of a patch of the ColorChecker, 1 to 24, whose reflectance the surface has.
     assume_albedo
@@ -109,6 +112,7 @@ class MaterialEntry(_Part):
 
     file: str | None = None
     albedo: Annotated[float, Field(ge=0, lt=1)] | AlbedoCurve | str | None = None
+    mixture: Name | None = None
     chart_patch: Annotated[int, Field(ge=1, le=24)] | None = None
     assume_albedo: Annotated[float, Field(ge=0, lt=1)] | None = None
     assume_scale: Positive | None = None

@@ -4,16 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
 from labrig.material import (
     Albedo,
     Material,
     ReradiationMatrix,
+    StoredMixture,
     physical_warnings,
 )
-from labrig.optics import Spectrum, Transmittance
+from labrig.optics import Spectrum, Transmittance, edges_from_centres
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.field_parameters import FieldParameters
 
@@ -149,24 +150,83 @@ def of_matrix(matrix: ReradiationMatrix, bands: Bands) -> SurfaceMaterial:
             f"{matrix.name}: expected a re-radiation in 1/nm, got a relative one; measure the "
             "brightness of the lights that excite it"
         )
-    notes = physical_warnings(matrix)
-    low, high = (
-        max(matrix.output_edges_nm[0], bands.edges_nm[0]),
-        min(matrix.output_edges_nm[-1], bands.edges_nm[-1]),
+    return _fluorescent(matrix, _albedo_in_bands(_reflectance_of(matrix), bands), bands)
+
+
+def of_mixture(
+    name: str,
+    stored: StoredMixture,
+    reflectance: Albedo | Transmittance | ReradiationMatrix | float,
+    bands: Bands,
+) -> SurfaceMaterial:
+    """Return a fluorescent surface whose re-radiation is a mixture.
+
+    The mixture is evaluated at the centres of the bands on which it was fitted, and this matrix is
+    brought into the bands of the rendering as every other by `of_matrix`.
+
+    Parameters
+    ----------
+    name
+        Name of the material.
+    stored
+        The mixture with its bands.
+    reflectance
+        Radiance factor without re-radiation, which a mixture does not have: of a surface, or that
+        of a measured matrix.
+    bands
+        Bands of the rendering.
+
+    Returns
+    -------
+    SurfaceMaterial
+        The surface in these bands.
+
+    Raises
+    ------
+    UsageError
+        No band overlaps, the matrix has no reflectance, or the largest eigenvalue reaches 1.
+    DataError
+        It returns more light than any surface does, see `physical_warnings`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.fit import fit_mixture
+    >>> from labrig.material import read_mixture, read_reradiation
+    >>> from labrig.reproduce import Bands, of_matrix, of_mixture
+    >>> paper = read_reradiation("paper.csv")
+    >>> _ = Path("fit.json").write_text(fit_mixture(paper, 3, threshold=1e-3).to_json())
+    >>> dyed = of_mixture("paper", read_mixture("fit.json"), paper, Bands.even())
+    >>> bool(abs(dyed.matrix - of_matrix(paper, Bands.even()).matrix).max() < 0.02)
+    True
+    """
+    surface = (
+        _reflectance_of(reflectance) if isinstance(reflectance, ReradiationMatrix) else reflectance
     )
-    if low >= high:
-        raise UsageError(
-            f"{matrix.name}: expected bands that overlap those of the rendering, "
-            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got "
-            f"{matrix.output_edges_nm[0]:g} to {matrix.output_edges_nm[-1]:g} nm"
-        )
-    into = bands.overlap_nm(matrix.output_edges_nm) / bands.width_nm
-    absorbed = bands.overlap_nm(matrix.input_edges_nm)
-    reradiated = into.T @ np.nan_to_num(matrix.reradiation) @ absorbed
+    output_nm = stored.output_nm(bands.edges_nm[0], bands.edges_nm[-1])
+    on_output = _albedo_in_bands(surface, Bands(edges_from_centres(output_nm)))
+    matrix = stored.to_matrix(output_nm, on_output, name)
+    return _fluorescent(matrix, _albedo_in_bands(surface, bands), bands)
+
+
+def _reflectance_of(matrix: ReradiationMatrix) -> Spectrum:
+    """Return the measured reflectance of a matrix."""
     known = ~np.isnan(matrix.reflectance)
     if not known.any():
         raise UsageError(f"{matrix.name}: expected a reflectance, got none in its file")
-    reflectance = _in_bands(matrix.output_nm[known], matrix.reflectance[known], bands)
+    return Spectrum(matrix.name, matrix.output_nm[known], matrix.reflectance[known])
+
+
+def _fluorescent(
+    matrix: ReradiationMatrix, reflectance: FloatArray, bands: Bands
+) -> SurfaceMaterial:
+    """Return a surface of a reflectance in the bands, and of a matrix's re-radiation."""
+    notes = physical_warnings(matrix)
+    for edges_nm in (matrix.output_edges_nm, matrix.input_edges_nm):
+        _require_overlap(matrix.name, edges_nm, bands)
+    into = bands.overlap_nm(matrix.output_edges_nm) / bands.width_nm
+    absorbed = bands.overlap_nm(matrix.input_edges_nm)
+    reradiated = into.T @ np.nan_to_num(matrix.reradiation) @ absorbed
     return SurfaceMaterial(
         matrix.name, _checked(matrix.name, np.diag(reflectance) + reradiated), None, notes
     )
@@ -225,13 +285,8 @@ def of_phosphor(
     rates = FieldParameters.of(material, prompt)
     assert material.bands_nm is not None
     edges = material.bands_nm
+    _require_overlap(material.name, edges, bands)
     overlap = bands.overlap_nm(edges)
-    if not overlap.any():
-        raise UsageError(
-            f"{material.name}: expected bands that overlap those of the rendering, "
-            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got {edges[0]:g} to "
-            f"{edges[-1]:g} nm"
-        )
     notes = []
     if (surface := material.albedo or albedo) is None:
         raise UsageError(
@@ -269,6 +324,16 @@ def of_phosphor(
     return SurfaceMaterial(material.name, reflected, parameters, tuple(notes))
 
 
+def _require_overlap(name: str, edges_nm: ArrayLike, bands: Bands) -> None:
+    """Refuse a material that was measured in no band of the rendering."""
+    if not bands.overlap_nm(edges_nm).any():
+        first, *_, last = np.asarray(edges_nm)
+        raise UsageError(
+            f"{name}: expected bands that overlap those of the rendering, "
+            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got {first:g} to {last:g} nm"
+        )
+
+
 def _require_fading(material: Material, matrix: Float32Array, rates: FieldParameters) -> None:
     """Refuse a phosphor that in a closed room of its own would glow ever more.
 
@@ -301,7 +366,7 @@ def _spread(material: Material, reradiation: FloatArray, bands: Bands) -> FloatA
     return np.outer(strength, bands.means(fine))
 
 
-def _albedo_in_bands(albedo: Albedo | Transmittance | float, bands: Bands) -> FloatArray:
+def _albedo_in_bands(albedo: Albedo | Transmittance | Spectrum | float, bands: Bands) -> FloatArray:
     if isinstance(albedo, float | int):
         return np.full(len(bands), float(albedo))
     return _in_bands(np.array(albedo.wavelength_nm), np.array(albedo.value), bands)
