@@ -75,6 +75,11 @@ from .surface.field import (
 from .surface.field_parameters import (
     FieldParameters as FieldParameters,
 )
+from .surface.parameter_texture import (
+    ParameterTexture as ParameterTexture,
+    read_parameter_texture as read_parameter_texture,
+    write_parameter_texture as write_parameter_texture,
+)
 from .surface.surface_material import (
     BenchLight as BenchLight,
     SurfaceMaterial as SurfaceMaterial,

@@ -13,8 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
 from labrig.optics import srgb_bytes
+from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.export.exported_scene import (
     ExportedCamera,
     ExportedMesh,
@@ -104,12 +105,8 @@ def write_gltf(
     if is_any_glow and frames > 1:
         document.add_animation(times, [mesh.glow for mesh in meshes])
     content = document.binary(camera, up)
-    draft = path.with_name(f".{path.name}.draft")
-    try:
+    with replaced(path) as draft:
         draft.write_bytes(content)
-        draft.replace(path)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 class _Document:

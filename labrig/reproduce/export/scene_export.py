@@ -127,10 +127,12 @@ def _srgb(radiance: ArrayLike, scene: Scene) -> FloatArray:
 
 
 def _colour(scene: Scene, material: int) -> FloatArray:
-    """Return the colour of a material under D65 in linear sRGB, with what it re-radiates."""
+    """Return the mean colour of a material under D65 in linear sRGB, with its re-radiation."""
     if material < 0:
         return np.zeros(3)
-    daylight = scene.bands.means(illuminant("D65"))
-    seen = tristimulus(scene.materials[material].matrix @ daylight, scene.bands.edges_nm)
+    daylight, surface = scene.bands.means(illuminant("D65")), scene.materials[material]
+    factor = None if surface.texture is None else surface.texture.albedo_factor
+    returned = surface.matrix @ daylight * (1.0 if factor is None else float(factor.mean()))
+    seen = tristimulus(returned, scene.bands.edges_nm)
     white = tristimulus(daylight, scene.bands.edges_nm)
     return np.asarray(np.clip(XYZ_TO_SRGB @ seen / white[1], 0.0, 1.0))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
+from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
 from labrig.reproduce.picture.rendering import Frame, Renderer
 from labrig.reproduce.scene.built_scene import Scene
@@ -94,7 +95,8 @@ class RenderFolder:
                 "notes": scene.notes,
                 "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
             }
-            _replace(content, json.dumps(described, indent=1, ensure_ascii=False).encode())
+            with replaced(content) as draft:
+                draft.write_bytes(json.dumps(described, indent=1, ensure_ascii=False).encode())
         except OSError as error:
             raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
         return cls(path, scene.file.frames_s)
@@ -176,14 +178,9 @@ class RenderFolder:
             ) from None
 
     def _keep_levels(self, number: int, levels: dict[str, Float32Array]) -> None:
-        path = self._levels_path(number)
-        partial = path.with_suffix(".part.npz")
-        try:
-            named: dict[str, Any] = {f"{OF}{name}": level for name, level in levels.items()}
-            np.savez(partial, **named)
-            partial.replace(path)
-        except OSError as error:
-            raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+        named: dict[str, Any] = {f"{OF}{name}": level for name, level in levels.items()}
+        with replaced(self._levels_path(number)) as draft:
+            np.savez(draft, **named)
 
     def _levels_path(self, number: int) -> Path:
         return self.path / f"{number:03d}.levels.npz"
@@ -203,6 +200,10 @@ def _identity(scene: Scene) -> str:
                 np.array(parameters.prompt),
             ):
                 digest.update(array.tobytes())
+        if (texture := material.texture) is not None:
+            digest.update(repr(texture.shape).encode())
+            if texture.albedo_factor is not None:
+                digest.update(texture.albedo_factor.tobytes())
     for t_s in (scene.file.programme[0].at_s, *scene.file.frames_s):
         geometry = scene.geometry(t_s)
         for each in (geometry.triangles, geometry.uv, geometry.table, geometry.material_of_place):
@@ -210,9 +211,3 @@ def _identity(scene: Scene) -> str:
         for lamp in scene.lamps(t_s):
             digest.update(lamp.light.tobytes())
     return digest.hexdigest()
-
-
-def _replace(path: Path, content: bytes) -> None:
-    partial = path.with_suffix(".part")
-    partial.write_bytes(content)
-    partial.replace(path)

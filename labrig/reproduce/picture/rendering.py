@@ -19,6 +19,7 @@ from labrig.errors import UsageError
 from labrig.processors import n_processors
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.surface.field import Field
+from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.folding import Matrices, fold
 from labrig.reproduce.transport.geometry import Geometry, Surface
 from labrig.reproduce.transport.lamp import LampTable
@@ -90,6 +91,7 @@ class Renderer:
         geometry = scene.geometry(self._t_s)
         self._material_of_place = geometry.material_of_place
         self._states = _states(scene, geometry)
+        self._albedo_factor = _albedo_factor(scene, self._states, geometry.n_places)
         self._view: _View | None = None
         self._charge_at_first()
 
@@ -183,6 +185,7 @@ class Renderer:
             fold,
             matrices=self._matrices,
             material_of_place=self._material_of_place,
+            albedo_factor=self._albedo_factor,
             glow=glow,
             lamps=self._lamps(t_s),
             threads=self._threads,
@@ -280,8 +283,12 @@ class Renderer:
         rates = []
         for state in self._states:
             parameters = state.field.parameters
-            kappa = parameters.k_e_per_s @ light[state.places].T
-            rates.append(float(np.max(kappa.max(axis=1) + parameters.k_r_per_s)))
+            samples = light[state.places]
+            if parameters.k_e_per_s.ndim == 2:
+                kappa = parameters.k_e_per_s @ samples.T
+            else:
+                kappa = np.einsum("ibs,sb->is", parameters.k_e_per_s, samples)
+            rates.append(float(np.max(kappa + np.atleast_2d(parameters.k_r_per_s.T).T)))
         return max(rates)
 
 
@@ -290,7 +297,9 @@ class _State:
     """Levels of one phosphor, at all places that are made of it."""
 
     name: str
+    material: int
     places: IntArray
+    texels: IntArray | None
     field: Field
     is_charged: bool
 
@@ -386,10 +395,42 @@ def _states(scene: Scene, geometry: Geometry) -> list[_State]:
             continue
         given = entries[number].levels
         is_charged = given == "charged"
-        field = Field(material.parameters, len(places), 0.0 if given == "charged" else given)
+        texels, parameters = None, material.parameters
+        if material.texture is not None:
+            texels = _texels(material, number, geometry)[places]
+            parameters = parameters.at(texels)
+        field = Field(parameters, len(places), 0.0 if given == "charged" else given)
         name = list(scene.file.materials)[number]
-        states.append(_State(name, places.astype(np.int32), field, is_charged))
+        states.append(_State(name, number, places.astype(np.int32), texels, field, is_charged))
     return states
+
+
+def _texels(material: SurfaceMaterial, number: int, geometry: Geometry) -> IntArray:
+    """Return the texel of a material's texture at every place, zero of others, shape (places,)."""
+    assert material.texture is not None
+    texels = np.zeros(geometry.n_places, np.int32)
+    for index, surface in enumerate(geometry.surfaces):
+        own = geometry.places_of(index)
+        if surface.samples is None or not (geometry.material_of_place[own] == number).any():
+            continue
+        if (uv := surface.uv_of_places) is None:
+            raise UsageError(
+                f"{surface.name}: expected texture coordinates for the 'texture' of "
+                f"{material.name}, got a surface without"
+            )
+        texels[own] = material.texture.texel_at(uv)
+    return texels
+
+
+def _albedo_factor(scene: Scene, states: list[_State], n_places: int) -> Float32Array | None:
+    """Return the factor of the albedo of every place, None where there is none."""
+    factor = np.ones(n_places, np.float32)
+    for state in states:
+        texture = scene.materials[state.material].texture
+        of_texel = None if texture is None else texture.texels("albedo_factor")
+        if of_texel is not None and state.texels is not None:
+            factor[state.places] = of_texel[state.texels]
+    return None if (factor == 1).all() else factor
 
 
 def _require_memory(scene: Scene) -> None:

@@ -30,6 +30,7 @@ from labrig.reproduce.scene.scene_file import (
     read_scene,
 )
 from labrig.reproduce.surface.bands import Bands
+from labrig.reproduce.surface.parameter_texture import read_parameter_texture
 from labrig.reproduce.surface.surface_material import (
     BenchLight,
     SurfaceMaterial,
@@ -275,6 +276,7 @@ def _replaced(
                         "albedo": None,
                         "chart_patch": None,
                         "mixture": None,
+                        "texture": None,
                     }
                 ),
                 Path(),
@@ -316,6 +318,10 @@ def _material(
         if entry.is_fluorescent:
             return _named(name, of_mixture(material.name, stored, material, bands))
     if not isinstance(material, Material):
+        if entry.texture is not None:
+            raise UsageError(
+                f"{name}: expected a phosphor for 'texture', got the matrix {material.name}"
+            )
         if not entry.is_fluorescent:
             material = replace(material, reradiation=np.zeros_like(material.reradiation))
         return _named(name, of_matrix(material, bands))
@@ -327,6 +333,7 @@ def _material(
         assumed if assumptions.albedo is None else assumptions.albedo,
         scale if assumptions.scale is None else assumptions.scale,
         entry.prompt,
+        None if entry.texture is None else read_parameter_texture(folder / entry.texture),
     )
     return _named(name, phosphor)
 

@@ -17,6 +17,7 @@ from labrig.material import (
 from labrig.optics import Spectrum, Transmittance, edges_from_centres
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.field_parameters import FieldParameters
+from labrig.reproduce.surface.parameter_texture import ParameterTexture
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
@@ -59,15 +60,19 @@ class SurfaceMaterial:
         Matrix M of what comes back at once: the albedo on its diagonal, re-radiation off it; shape
         (bands out, bands in).
     parameters
-        Parameters of the glow in the scene's units; None of a material that does not glow.
+        Parameters of the glow in the scene's units, of each texel of `texture` where they differ;
+        None of a material that does not glow.
     notes
         What was assumed or is missing, one sentence each.
+    texture
+        Parameters that differ from place to place; None where all are the same.
     """
 
     name: str
     matrix: Float32Array
     parameters: FieldParameters | None = None
     notes: tuple[str, ...] = ()
+    texture: ParameterTexture | None = None
 
     @property
     def is_diagonal(self) -> bool:
@@ -239,6 +244,7 @@ def of_phosphor(
     albedo: float | None = None,
     reradiation_scale: float | None = None,
     prompt: float = 0.0,
+    texture: ParameterTexture | None = None,
 ) -> SurfaceMaterial:
     """Return a phosphorescent surface, with rates in the units of the scene.
 
@@ -261,6 +267,8 @@ def of_phosphor(
         the material has no scale.
     prompt
         Part η of captures that emit at once.
+    texture
+        Parameters of each texel in the bands and units of the material, instead of its own.
 
     Returns
     -------
@@ -270,7 +278,8 @@ def of_phosphor(
     Raises
     ------
     UsageError
-        Λ, albedo or scale is missing, no band overlaps, or an albedo reaches 1.
+        Λ, albedo or scale is missing, no band overlaps, an albedo reaches 1, or the texture has
+        another number of states or bands.
 
     Examples
     --------
@@ -283,6 +292,8 @@ def of_phosphor(
     'its albedo is assumed to be 0.7 at all wavelengths'
     """
     rates = FieldParameters.of(material, prompt)
+    if texture is not None:
+        rates = _textured(material.name, rates, texture)
     assert material.bands_nm is not None
     edges = material.bands_nm
     _require_overlap(material.name, edges, bands)
@@ -307,7 +318,7 @@ def of_phosphor(
         notes.append(
             f"the scale of its glow is assumed to be {reradiation_scale:g} s/sr for a Λ of 1"
         )
-    if all(state.k_e_per_s is None for state in material.states):
+    if not rates.k_e_per_s.any():
         notes.append("it has no excitation rates, so light does not charge it")
     k_e = rates.k_e_per_s.astype(np.float64)
     if material.irradiance_norm is not None:
@@ -315,13 +326,35 @@ def of_phosphor(
     reflected = _checked(material.name, np.diag(_albedo_in_bands(surface, bands)))
     parameters = FieldParameters.checked(
         rates.k_r_per_s,
-        k_e @ overlap,
+        in_bands(k_e, overlap),
         factor * _spread(material, rates.reradiation.astype(np.float64), bands),
         rates.order,
         prompt,
     )
-    _require_fading(material, reflected, parameters)
-    return SurfaceMaterial(material.name, reflected, parameters, tuple(notes))
+    albedo_factor = None if texture is None else texture.texels("albedo_factor")
+    _require_fading(material.name, reflected.diagonal(), albedo_factor, parameters)
+    return SurfaceMaterial(material.name, reflected, parameters, tuple(notes), texture)
+
+
+def _textured(name: str, rates: FieldParameters, texture: ParameterTexture) -> FieldParameters:
+    """Return rates in which what a texture has takes the place of the material's."""
+    arrays = []
+    for what in ("k_r_per_s", "k_e_per_s", "reradiation"):
+        own, texels = getattr(rates, what), texture.texels(what)
+        if texels is not None and texels.shape[:-1] != own.shape:
+            raise UsageError(
+                f"{name}: expected a texture of {what} with {' × '.join(map(str, own.shape))} "
+                "numbers for each texel, states and bands, as the material has, got "
+                f"{' × '.join(map(str, texels.shape[:-1]))}"
+            )
+        arrays.append(own if texels is None else texels)
+    k_r, k_e, emitted = arrays
+    return FieldParameters.checked(k_r, k_e, emitted, rates.order, rates.prompt)
+
+
+def in_bands(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return sums over the bands of values (states, bands[, samples]) with weights (bands, n)."""
+    return np.asarray(np.moveaxis(np.tensordot(values, weights, axes=(1, 0)), -1, 1))
 
 
 def _require_overlap(name: str, edges_nm: ArrayLike, bands: Bands) -> None:
@@ -334,22 +367,46 @@ def _require_overlap(name: str, edges_nm: ArrayLike, bands: Bands) -> None:
         )
 
 
-def _require_fading(material: Material, matrix: Float32Array, rates: FieldParameters) -> None:
+def _require_fading(
+    name: str, albedo: Float32Array, factor: Float32Array | None, rates: FieldParameters
+) -> None:
     """Refuse a phosphor that in a closed room of its own would glow ever more.
 
-    In weak light a state emits in the end Λ κ: all of it comes back to the walls of such a room.
+    In weak light a state emits in the end Λ κ. All of it comes back to the walls of such a room,
+    again and again as they reflect it: 1/(1 − albedo) times in all.
     """
-    glow = np.pi * rates.reradiation.T.astype(np.float64) @ rates.k_e_per_s
-    largest = float(np.abs(np.linalg.eigvals(matrix + glow)).max())
+    factors = np.ones(1) if factor is None else factor.astype(np.float64)
+    if not float(factors.max()) * float(albedo.max()) < 1:
+        raise UsageError(
+            f"{name}: expected an albedo below 1 everywhere, got {albedo.max():.3g} with a factor "
+            f"of {factors.max():.3g} in the texture"
+        )
+    k_e, reradiation = (
+        each[..., np.newaxis] if each.ndim == 2 else each
+        for each in (rates.k_e_per_s.astype(np.float64), rates.reradiation.astype(np.float64))
+    )
+    lasting = 1 / (1 - factors * albedo[:, np.newaxis])
+    # Excitation of state i by the glow of state j, for each sample.
+    among = np.pi * np.einsum("ibs,jbs->sij", k_e * lasting, reradiation)
+    largest = float(np.abs(np.linalg.eigvals(among)).max())
     if not largest < 1:
         raise UsageError(
-            f"{material.name}: expected a glow of less light than it takes, got {largest:.3g} "
+            f"{name}: expected a glow of less light than it takes, got {largest:.3g} "
             "times as much; the scale of Λ or the bench's light (bench_light) is wrong"
         )
 
 
 def _spread(material: Material, reradiation: FloatArray, bands: Bands) -> FloatArray:
-    """Return Λ of each state in the bands of the rendering, shape (states, bands)."""
+    """Return Λ (states, bands[, samples]) in the bands of the rendering."""
+    if reradiation.ndim == 2:
+        return _spread_rows(material, reradiation, bands)
+    rows = np.moveaxis(reradiation, 1, -1)
+    spread = _spread_rows(material, rows.reshape(-1, rows.shape[-1]), bands)
+    return np.moveaxis(spread.reshape(*rows.shape[:-1], -1), -1, 1)
+
+
+def _spread_rows(material: Material, reradiation: FloatArray, bands: Bands) -> FloatArray:
+    """Return spectra Λ (n, bands) in the bands of the rendering."""
     assert material.bands_nm is not None
     edges = np.array(material.bands_nm)
     flat = reradiation @ bands.overlap_nm(edges) / bands.width_nm

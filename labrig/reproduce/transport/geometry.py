@@ -69,6 +69,15 @@ class Surface:
             return len(self.mesh.vertices_m) // OF_PARTICLE
         return self.samples[0] * self.samples[1]
 
+    @property
+    def uv_of_places(self) -> FloatArray | None:
+        """Texture coordinates of its places, shape (places, 2); None where it has none."""
+        if isinstance(self.samples, tuple):
+            columns, rows = self.samples
+            row, column = np.divmod(np.arange(columns * rows), columns)
+            return np.stack([(column + 0.5) / columns, (row + 0.5) / rows], axis=1)
+        return self.mesh.uv if self.samples == "vertices" else None
+
 
 @dataclass(frozen=True, eq=False)
 class StartPoints:
