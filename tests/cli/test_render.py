@@ -1,7 +1,10 @@
 """`labrig render`."""
 
+import io
 import json
+import re
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -66,6 +69,35 @@ def test_other_settings_do_not_mix_with_what_is_there(labrig: Callable[..., Ende
     assert labrig("render", "cornell-box", *SMALL, "--out", "mine").code == 2
     assert (Path("mine") / "thesis.txt").read_text() == "words"
     shutil.rmtree("mine")
+
+
+class TerminalText(io.StringIO):
+    """Text that a command writes to a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_on_a_terminal_it_says_what_is_done_and_for_how_long(
+    labrig: Callable[..., Ended], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    text = TerminalText()
+    with monkeypatch.context() as on_terminal:
+        on_terminal.setattr(sys, "stderr", text)
+        assert labrig("render", "cornell-box", *SMALL).code == 0
+    shown = text.getvalue()
+    for what in (
+        "tracing paths of phosphors",
+        "tracing paths of the picture",
+        "charging and decay",
+    ):
+        assert re.search(what + r".* \d+%.* left", shown), what
+    assert "picture 3 of 3" in shown
+    ended = labrig("render", "cornell-box", *SMALL, "--out", "piped")
+    assert "tracing" not in ended.err
+    assert "\x1b" not in ended.err
+    assert [line for line in ended.err.splitlines() if line.startswith("picture")] != []
 
 
 @pytest.mark.parametrize(

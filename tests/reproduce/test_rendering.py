@@ -438,3 +438,23 @@ def test_glow_that_excites_another_colour_does_not_depend_on_the_frames(tmp_path
             renderer._advance(float(t_s))  # the pictures between are not wanted
         levels.append([float(renderer.levels[name].mean()) for name in ("walls", "ball")])
     np.testing.assert_allclose(levels[0], levels[1], rtol=0.02)
+
+
+def test_parts_that_are_done_are_told_and_only_rise(tmp_path: Path) -> None:
+    told: list[tuple[str, float]] = []
+    moving = {"rectangle": MANY, "wave": WAVE, "material": "paint", "samples": [4, 4]}
+    for changed in ({}, {"objects": {"square": moving}, "step_s": 50.0}):
+        told.clear()
+        renderer = Renderer(scene(tmp_path, **changed), report=lambda *each: told.append(each))
+        list(renderer.frames())
+        parts: dict[str, list[float]] = {}
+        for what, part in told:
+            parts.setdefault(what, []).append(part)
+        assert len(parts) >= 3
+        for what, rising in parts.items():
+            assert all(0 < part <= 1 for part in rising), what
+            assert rising[-1] == 1
+        assert any("tracing" in what for what in parts)
+        charging = next(rising for what, rising in parts.items() if "charging" in what)
+        assert len(charging) > 3
+        assert charging == sorted(charging)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from labrig.errors import DiskError, UsageError
 from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
-from labrig.reproduce.picture.rendering import Frame, Renderer
+from labrig.reproduce.picture.rendering import Frame, Renderer, Report
 from labrig.reproduce.scene.built_scene import Scene
 
 Float32Array = NDArray[np.float32]
@@ -123,7 +123,9 @@ class RenderFolder:
         """
         return read_spectral_exr(self.exr(number))
 
-    def rendered(self, scene: Scene, threads: int | None = None) -> Iterator[Frame]:
+    def rendered(
+        self, scene: Scene, threads: int | None = None, report: Report = lambda what, part: None
+    ) -> Iterator[Frame]:
         """Render the frames that are missing, and keep each.
 
         Parameters
@@ -132,6 +134,8 @@ class RenderFolder:
             The scene with which the folder was opened.
         threads
             Threads that trace and fold. Default: one for each processor.
+        report
+            Is told what is done, as by `Renderer`.
 
         Yields
         ------
@@ -148,7 +152,7 @@ class RenderFolder:
         done = self.n_done
         if done == len(self.times_s):
             return
-        renderer = Renderer(scene, threads)
+        renderer = Renderer(scene, threads, report)
         if done:
             renderer.restore(self.times_s[done - 1], self.levels(done - 1))
         for number in range(done, len(self.times_s)):

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,10 @@ TINY = 1e-300
 MOST_STEPS = 100_000
 
 
+#: Is told what is done, and which part of it is, 0 to 1.
+Report: TypeAlias = Callable[[str, float], None]
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """A picture.
@@ -71,6 +76,9 @@ class Renderer:
         The scene.
     threads
         Threads that trace and fold. Default: one for each processor.
+    report
+        Is called with what is done, such as the tracing of paths, and with the part of it that is,
+        0 to 1: while levels are stepped, an estimate.
 
     Examples
     --------
@@ -82,8 +90,10 @@ class Renderer:
     ((8, 8, 24), True)
     """
 
-    def __init__(self, scene: Scene, threads: int | None = None) -> None:
-        self._scene = scene
+    def __init__(
+        self, scene: Scene, threads: int | None = None, report: Report = lambda what, part: None
+    ) -> None:
+        self._scene, self._report = scene, report
         self._threads = threads or n_processors()
         _require_memory(scene)
         self._matrices = Matrices.of(scene.materials)
@@ -149,7 +159,7 @@ class Renderer:
     def _view_at(self, t_s: float) -> "_View":
         """Return paths; they are traced anew only where something moves."""
         if self._view is None or (self._scene.is_moving and self._view.t_s != t_s):
-            self._view = _View(self._scene, t_s, self._threads)
+            self._view = _View(self._scene, t_s, self._threads, self._report)
         return self._view
 
     def _lamps(self, t_s: float) -> Float32Array:
@@ -207,6 +217,7 @@ class Renderer:
             ]
             if max(changed) < SETTLED:
                 return
+            self._report("charging at the beginning", math.log(max(changed)) / math.log(SETTLED))
 
     def _advance(self, to_s: float) -> None:
         """Step all levels to a time."""
@@ -229,7 +240,7 @@ class Renderer:
         and the end of a step, which is found in rounds. Steps grow while light hardly changes.
         """
         view = self._view_at(begin_s)
-        t_s, step_s = begin_s, 0.0
+        t_s, step_s, n_steps = begin_s, 0.0, 0
         light = self._irradiance(view, begin_s)
         while t_s < end_s:
             step_s = max(step_s, FIRST_STEP / self._fastest(light))
@@ -248,7 +259,8 @@ class Renderer:
             t_s = end_s if step_s == end_s - t_s else t_s + step_s
             change = abs(math.log(max(float(later.sum()), TINY) / max(float(light.sum()), TINY)))
             step_s *= min(GROWTH, MOST_CHANGE / max(change, TINY))
-            light = later
+            light, n_steps = later, n_steps + 1
+            self._report(_levels_until(end_s), n_steps / (n_steps + (end_s - t_s) / step_s))
 
     def _glide(self, light: FloatArray, later: FloatArray, step_s: float) -> None:
         """Step through light that goes over into another, exponentially where both shine."""
@@ -269,10 +281,12 @@ class Renderer:
                 f"{self._scene.file.name}: expected at most {MOST_STEPS} steps between two "
                 f"pictures, got {parts:g}; give a longer 'step_s'"
             )
-        for low, high in pairwise(np.linspace(begin_s, end_s, parts + 1).tolist()):
+        edges = np.linspace(begin_s, end_s, parts + 1).tolist()
+        for number, (low, high) in enumerate(pairwise(edges), 1):
             middle = (low + high) / 2
             view = _View(self._scene, middle, self._threads)
             self._step(self._irradiance(view, middle), high - low)
+            self._report(_levels_until(end_s), number / parts)
 
     def _step(self, light: FloatArray, step_s: float) -> None:
         for state in self._states:
@@ -307,9 +321,11 @@ class _State:
 class _View:
     """Paths in the arrangement at one time; the camera's are traced when they are first needed."""
 
-    def __init__(self, scene: Scene, t_s: float, threads: int) -> None:
+    def __init__(
+        self, scene: Scene, t_s: float, threads: int, report: Report = lambda what, part: None
+    ) -> None:
         self.t_s = t_s
-        self._scene, self._threads = scene, threads
+        self._scene, self._threads, self._report = scene, threads, report
         self._geometry = scene.geometry(t_s)
         lamps = LampTable.of(scene.lamps(t_s), self._geometry)
         paths = scene.file.paths
@@ -321,9 +337,12 @@ class _View:
         """Return the paths of all pixels."""
         if not self._of_camera:
             per_pixel = self._scene.file.paths.per_pixel
-            self._of_camera = list(
-                self._tracer.from_camera(self._scene.camera, per_pixel, self._threads)
-            )
+            camera = self._scene.camera
+            n_done, n_pixels = 0, camera.width_px * camera.height_px
+            for paths in self._tracer.from_camera(camera, per_pixel, self._threads):
+                self._of_camera.append(paths)
+                n_done += paths.n_targets
+                self._report("tracing paths of the picture", n_done / n_pixels)
         return self._of_camera
 
     @property
@@ -363,12 +382,22 @@ class _View:
         """Return the paths from the places of each surface with states."""
         if self._of_places is None:
             per_place = self._scene.file.paths.per_place
-            self._of_places = {
-                number: list(self._tracer.from_surface(number, per_place, self._threads))
-                for number, surface in enumerate(self._geometry.surfaces)
-                if surface.samples is not None
-            }
+            surfaces = self._geometry.surfaces
+            own = {n: each.n_places for n, each in enumerate(surfaces) if each.samples is not None}
+            n_done, self._of_places = 0, {}
+            for number, n_places in own.items():
+                traced = self._of_places.setdefault(number, [])
+                begun = n_done
+                for paths in self._tracer.from_surface(number, per_place, self._threads):
+                    traced.append(paths)
+                    n_done += paths.n_targets
+                    self._report("tracing paths of phosphors", n_done / sum(own.values()))
+                n_done = begun + n_places
         return self._of_places
+
+
+def _levels_until(t_s: float) -> str:
+    return f"charging and decay up to {t_s:g} s"
 
 
 def _nearest_lit(lit: IntArray, surface: Surface) -> IntArray:
