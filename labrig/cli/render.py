@@ -121,6 +121,8 @@ def render(
             left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
             remaining = f", about {duration_text(left_s)} left" if number < count else ""
             bar.say(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}")
+            for warning in frame.warnings:
+                bar.say(f"warning: {warning}")
     _draw(folder, built, exposure, night, video, fps)
     _export(folder, built, gltf, mitsuba)
     typer.echo(folder.path)

@@ -247,3 +247,23 @@ def test_a_ball_far_away_that_shows_its_inside_makes_no_room() -> None:
     seen = folded(paths, geometry, black, np.zeros(BANDS), np.ones(BANDS), incident=True)
     assert seen[0, 0] == pytest.approx(np.pi, rel=0.01)
     assert sum(each.n_escaped for each in paths) == 0
+
+
+def test_rays_that_leave_a_closed_room_are_traced_again_and_counted() -> None:
+    """A room of 0.1 µm with slits of 0.4 nm, which count as closed: no light is lost in them."""
+    side_m = 1e-7
+    whole = Mesh.box((0, 0, 0), (side_m, side_m, side_m), inward=True)
+    moved = whole.vertices_m.copy()
+    moved[:4, 0] += 4e-10
+    expected = np.pi * sum(0.5**n for n in range(11))
+    for vertices, most in ((whole.vertices_m, 0.0), (moved, 0.02)):
+        mesh = Mesh(vertices, whole.faces, whole.uv)
+        geometry = Geometry.of([Surface("room", mesh, 0, samples=(6, 4))])
+        assert geometry.is_room
+        tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(12, 0.0), 5)
+        paths = list(tracer.from_surface(0, 256, 1))
+        grey = SurfaceMaterial("grey", (0.5 * np.eye(BANDS)).astype(np.float32))
+        seen = folded(paths, geometry, grey, np.ones(BANDS), np.zeros(0), incident=True)
+        np.testing.assert_allclose(seen, expected, rtol=1e-5)
+        share = sum(each.n_escaped for each in paths) / sum(len(each.place) for each in paths)
+        assert most / 20 <= share <= most

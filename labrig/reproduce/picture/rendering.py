@@ -43,6 +43,8 @@ CHARGING_ROUNDS, SETTLED = 100, 1e-5
 #: Rounds of what is emitted at once.
 PROMPT_ROUNDS = 6
 TINY = 1e-300
+#: Part of the rays that may leave a closed room between its triangles: none do of a whole mesh.
+MOST_ESCAPED = 1e-4
 #: Steps of a scene that moves.
 MOST_STEPS = 100_000
 
@@ -61,10 +63,24 @@ class Frame:
         Its time in s.
     radiance
         Spectral radiance in W m⁻² sr⁻¹ nm⁻¹, shape (height, width, bands).
+    escaped_share
+        Part of the rays of its paths that left a closed room between its triangles, and were traced
+        again.
     """
 
     t_s: float
     radiance: Float32Array
+    escaped_share: float = 0.0
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What may be wrong with the picture, one sentence each."""
+        if self.escaped_share <= MOST_ESCAPED:
+            return ()
+        return (
+            f"{self.escaped_share:.2%} of the rays left the closed room between its triangles and "
+            "were traced again, so light near its edges may be wrong; join the vertices there",
+        )
 
 
 class Renderer:
@@ -131,11 +147,6 @@ class Renderer:
         """Memory of the kept paths in bytes."""
         return 0 if self._view is None else self._view.nbytes
 
-    @property
-    def n_escaped(self) -> int:
-        """Rays that left a closed room between its triangles, and were traced again."""
-        return 0 if self._view is None else self._view.n_escaped
-
     def frame(self, t_s: float) -> Frame:
         """Advance to a time and return its picture.
 
@@ -148,7 +159,8 @@ class Renderer:
         view = self._view_at(t_s)
         camera = self._scene.camera
         light = self._fold_of(self._glow(view, t_s), t_s)(view.of_camera())
-        return Frame(t_s, light.reshape(camera.height_px, camera.width_px, -1))
+        picture = light.reshape(camera.height_px, camera.width_px, -1)
+        return Frame(t_s, picture, view.escaped_share)
 
     def frames(self) -> Iterator[Frame]:
         """Return the pictures at all times of the scene that were not passed yet."""
@@ -356,9 +368,10 @@ class _View:
         return sum(each.nbytes for each in self._all)
 
     @property
-    def n_escaped(self) -> int:
-        """Rays that left a closed room."""
-        return sum(each.n_escaped for each in self._all)
+    def escaped_share(self) -> float:
+        """Part of the rays that left a closed room."""
+        n_rays = sum(len(each.place) for each in self._all)
+        return sum(each.n_escaped for each in self._all) / max(n_rays, 1)
 
     def irradiance(self, folded: Callable[..., Float32Array]) -> FloatArray:
         """Return the irradiance at all places with states (places, bands).
