@@ -1,6 +1,7 @@
 """A mixture's file as a material of a scene."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -118,3 +119,21 @@ def test_a_mixture_that_does_not_fit_is_one_line(
         scene(tmp_path, materials={"paint": entry})
     if isinstance(raised.value, LabrigError):
         assert "\n" not in str(raised.value)
+
+
+def test_noise_that_takes_light_away_is_told() -> None:
+    """A mixture of the same matrix has none."""
+    matrix = DYE.to_matrix(INPUT_NM, OUTPUT_NM, reflectance=np.full(len(OUTPUT_NM), 0.4))
+    assert of_matrix(matrix, Bands.even()).notes == ()
+    for noise, is_told in ((1e-5, False), (5e-4, True)):
+        rng = np.random.default_rng(3)
+        noisy = replace(
+            matrix, reradiation=matrix.reradiation + rng.normal(0, noise, matrix.reradiation.shape)
+        )
+        surface = of_matrix(noisy, Bands.even())
+        lowest = (surface.matrix - 0.4 * np.eye(24)).min()
+        assert len(surface.notes) == is_told
+        if is_told:
+            assert f"{-lowest:.1%}" in surface.notes[0]
+    with pytest.raises(UsageError, match="≥ 0"):
+        of_matrix(replace(matrix, reradiation=matrix.reradiation - 0.003), Bands.even())

@@ -209,9 +209,12 @@ def _identity(scene: Scene) -> str:
             if texture.albedo_factor is not None:
                 digest.update(texture.albedo_factor.tobytes())
     for t_s in (scene.file.programme[0].at_s, *scene.file.frames_s):
-        geometry = scene.geometry(t_s)
-        for each in (geometry.triangles, geometry.uv, geometry.table, geometry.material_of_place):
-            digest.update(each.tobytes())
+        for surface in scene.surfaces(t_s):
+            mesh = surface.mesh
+            where = (surface.samples, surface.material, surface.lamp, surface.is_two_sided)
+            digest.update(repr((surface.name, len(mesh.vertices_m), where)).encode())
+            for each in (mesh.vertices_m, mesh.faces, mesh.uv, surface.material_of_texel):
+                digest.update(b"" if each is None else each.tobytes())
         for lamp in scene.lamps(t_s):
             digest.update(lamp.light.tobytes())
     return digest.hexdigest()

@@ -32,6 +32,8 @@ IntArray = NDArray[np.int32]
 
 #: Part of the memory that paths and pictures may take, and copies of a picture at once.
 LARGEST_PART, MOST_COPIES = 0.7, 6
+#: Memory in bytes that tells where a texel lies on its surface.
+OF_TEXEL = 300
 #: First step after a change of light, as a part of the fastest relaxation; later ones grow.
 FIRST_STEP, GROWTH = 0.25, 2.0
 #: Change of the logarithm of all light at which steps grow no more; rounds and parts of a step.
@@ -484,12 +486,17 @@ def _require_memory(scene: Scene) -> None:
     camera, paths = scene.file.camera, scene.file.paths
     places = sum(
         surface.n_places
-        for surface in scene.geometry(scene.file.programme[0].at_s).surfaces
+        for surface in scene.surfaces(scene.file.programme[0].at_s)
         if surface.samples is not None
     )
     n_paths = camera.width_px * camera.height_px * paths.per_pixel + places * paths.per_place
     needed = scene.path_length.nbytes(n_paths, len(scene.file.lamps))
     needed += MOST_COPIES * 4 * len(scene.bands) * (places + camera.width_px * camera.height_px)
+    needed += OF_TEXEL * places
+    for material in scene.materials:
+        if material.texture is not None and material.parameters is not None:
+            states = material.parameters.n_states
+            needed += 4 * states * (1 + 2 * len(scene.bands)) * places
     if needed > LARGEST_PART * there:
         raise UsageError(
             f"{scene.file.name}: expected paths that fit into {LARGEST_PART * there / 1e9:.1f} GB, "

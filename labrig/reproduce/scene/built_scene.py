@@ -147,9 +147,13 @@ class Scene:
         content["frames_s"] = tuple(frames_s)
         return replace(self, file=validate(content, SceneFile, "--times"))
 
+    def surfaces(self, t_s: float) -> tuple[Surface, ...]:
+        """Return the objects at a time in s, in the order of the scene."""
+        return tuple(surface(t_s) for surface in self._surfaces)
+
     def geometry(self, t_s: float) -> Geometry:
-        """Return the surfaces at a time in s."""
-        return Geometry.of([surface(t_s) for surface in self._surfaces])
+        """Return all triangles at a time in s."""
+        return Geometry.of(self.surfaces(t_s))
 
     def lamps(self, t_s: float) -> tuple[Lamp, ...]:
         """Return the lamps at a time in s, at their full strength."""

@@ -22,6 +22,8 @@ from labrig.reproduce.surface.parameter_texture import ParameterTexture
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 
+#: Negative re-radiation, as a part of the light of a band, that is told, and that is refused.
+TOLD_NEGATIVE, REFUSED_NEGATIVE = 0.005, 0.05
 #: Relative difference up to which Λ of all states has the shape of the finer spectrum.
 SAME_SHAPE = 0.05
 
@@ -232,8 +234,22 @@ def _fluorescent(
     into = bands.overlap_nm(matrix.output_edges_nm) / bands.width_nm
     absorbed = bands.overlap_nm(matrix.input_edges_nm)
     reradiated = into.T @ np.nan_to_num(matrix.reradiation) @ absorbed
+    notes += _negative_notes(reradiated, bands)
     return SurfaceMaterial(
         matrix.name, _checked(matrix.name, np.diag(reflectance) + reradiated), None, notes
+    )
+
+
+def _negative_notes(reradiated: FloatArray, bands: Bands) -> tuple[str, ...]:
+    """Return a note on re-radiation that takes light away instead of giving it back."""
+    out, into = np.unravel_index(int(np.argmin(reradiated)), reradiated.shape)
+    lowest = float(reradiated[out, into])
+    if lowest >= -TOLD_NEGATIVE:
+        return ()
+    return (
+        f"noise of its matrix takes up to {-lowest:.1%} of light away instead of re-radiating it "
+        f"(at {bands.centre_nm[out]:g} nm, of light at {bands.centre_nm[into]:g} nm); a mixture "
+        "(labrig fit mixture) does not",
     )
 
 
@@ -439,7 +455,7 @@ def _in_bands(wavelength_nm: FloatArray, values: FloatArray, bands: Bands) -> Fl
 
 def _checked(name: str, matrix: FloatArray) -> Float32Array:
     """Return a matrix of which light is lost at every bounce."""
-    if not np.isfinite(matrix).all() or matrix.min() < -0.05:
+    if not np.isfinite(matrix).all() or matrix.min() < -REFUSED_NEGATIVE:
         raise UsageError(f"{name}: expected an albedo and re-radiation that are finite and ≥ 0")
     largest = float(np.abs(np.linalg.eigvals(matrix)).max())
     if largest >= 1:

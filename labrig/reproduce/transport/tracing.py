@@ -253,33 +253,35 @@ class Tracer:
         Paths
             Of some places each, in order; places that do not lie on the surface have none.
         """
-        rng = np.random.default_rng((self._seed, 1, surface))
-        places = self._geometry.surfaces[surface].n_places
-        even = _even(places, per_place, 4 + 2 * len(self._lamps), rng)
-        scattered = even[:, :2].reshape(places, per_place, 2).astype(np.float64)
-        points = self._geometry.starts(surface, per_place, rng, scattered)
-        at_once = max(1, CHUNK // per_place) * per_place
-        lift = np.float32(LIFT * self._geometry.size_m)
-        if self._geometry.surfaces[surface].is_two_sided:
-            first = rng.integers(0, 2, len(points.place) // per_place).repeat(per_place)
-            turn = np.tile(np.arange(per_place), len(points.place) // per_place)
-            points.normal[(first + turn) % 2 == 1] *= -1
+        geometry = self._geometry
+        starts = geometry.start_points(surface)
+        first_face = np.searchsorted(geometry.surface_of_face, surface).astype(np.int32)
+        at_once = max(1, CHUNK // per_place)
 
         def part(number: int) -> Paths:
-            own = slice(number * at_once, (number + 1) * at_once)
-            normal = points.normal[own]
-            rng = np.random.default_rng((self._seed, 2, surface, number))
+            chosen = slice(number * at_once, (number + 1) * at_once)
+            places = starts.places[chosen]
+            rng = np.random.default_rng((self._seed, 1, surface, number))
+            even = _even(len(places), per_place, 4 + 2 * len(self._lamps), rng)
+            scattered = even[:, :2].reshape(len(places), per_place, 2).astype(np.float64)
+            face, weights = starts.at(chosen, scattered, rng)
+            face += first_face
+            position = np.einsum("nk,nkc->nc", weights, geometry.triangles[face])
+            normal = geometry.normals[face]
+            if geometry.surfaces[surface].is_two_sided:
+                side = rng.integers(0, 2, (len(places), 1)) + np.arange(per_place)
+                normal[side.ravel() % 2 == 1] *= -1
             return self._walk(
-                points.position_m[own] + lift * normal,
-                normal.copy(),
-                points.place[own].copy(),
+                position.astype(np.float32) + np.float32(LIFT * geometry.size_m) * normal,
+                normal,
+                (places + geometry.places_of(surface).start).astype(np.int32).repeat(per_place),
                 np.full(len(normal), -1, np.int16),
                 per_place,
-                even[own, 2:],
+                even[:, 2:],
                 rng,
             )
 
-        yield from _in_threads(part, -(-len(points.place) // at_once), threads)
+        yield from _in_threads(part, -(-len(starts.places) // at_once), threads)
 
     def _trace(
         self,
@@ -352,7 +354,8 @@ class Tracer:
             self._kernels.locate(
                 hit["primID"], hit["u"], hit["v"], direction, rng.random(n, np.float32),
                 geometry.triangles, geometry.normals, geometry.uv, geometry.corner_place,
-                geometry.surface_of_face, geometry.table, np.float32(LIFT * geometry.size_m),
+                geometry.surface_of_face, geometry.table, geometry.chart_of_face,
+                geometry.chart_of_place, np.float32(LIFT * geometry.size_m),
                 position, normal, place,
             )  # fmt: skip
         return position, normal, place
