@@ -238,3 +238,23 @@ def test_measured_materials(name: str) -> None:
 def test_what_does_not_fit_is_refused(wrong: Callable[[], object], told: str) -> None:
     with pytest.raises(UsageError, match=told):
         wrong()
+
+
+def test_many_short_steps_of_slow_materials_lose_no_digits() -> None:
+    """Two minutes in the dark in steps of 10 ms: the same rounding in each would add up to 1e-4."""
+    k_r = np.geomspace(0.003, 0.3, 16)
+    parameters = FieldParameters.checked([k_r], [[0.0]], [[1.0]])
+    level = np.linspace(0.1, 1, 16, dtype=np.float32)
+    field = Field(parameters, levels=[level])
+    for _ in range(12_000):
+        field.step([0.0], 0.01)
+    expected = level * np.exp(-parameters.k_r_per_s[0].astype(float) * 120)
+    np.testing.assert_allclose(field.levels[0], expected, rtol=0, atol=2e-6)
+
+
+def test_a_lit_level_stops_at_most_half_a_digit_of_a_step_before_its_end() -> None:
+    parameters = FieldParameters.checked([0.01], [[1.0]], [[1.0]])
+    field = Field(parameters, n_samples=8, levels=[np.linspace(0, 1, 8)])
+    for _ in range(12_000):
+        field.step([0.03], 0.1)
+    assert np.abs(field.levels - 0.75).max() < 1.2 * 2**-25 / (0.04 * 0.1)
