@@ -134,6 +134,15 @@ def test_two_steps_are_one(
     assert (once.levels <= 1).all()
 
 
+def test_next_to_no_light_is_like_none() -> None:
+    of = FieldParameters.checked([0.05], [[1.0]], [[1.0]], 3.0)
+    for kappa in (0.0, 1e-32, 1e-25, 1e-12, 1e-8):
+        field = Field(of, 2, [[0.0, 1.0]])
+        field.step([kappa], 200.0)
+        # r = (1 + (b − 1) k t)^(−1/(b − 1)) in the dark.
+        np.testing.assert_allclose(field.levels[0], [200 * kappa, 21**-0.5], rtol=1e-5, atol=1e-12)
+
+
 @pytest.mark.parametrize("order", [1.0, 1.4, 2.0])
 def test_a_long_charge_ends_in_equilibrium(order: float) -> None:
     of = parameters((order,))
