@@ -180,23 +180,23 @@ def _export(
     if gltf is None and mitsuba is None:
         return
     from labrig.reproduce import (
-        exported_camera,
         exported_meshes,
         write_gltf,
         write_mitsuba_scene,
     )
 
-    meshes, camera = exported_meshes(scene, folder), exported_camera(scene)
+    meshes = exported_meshes(scene, folder)
     if gltf is not None:
         times_s = [t_s - folder.times_s[0] for t_s in folder.times_s]
         brightest = max(
             (float(each.glow.colour[1:].max(initial=0.0)) for each in meshes if each.glow),
             default=0.0,
         )
-        write_gltf(gltf, meshes, times_s, 1 / brightest if brightest else 1.0, camera, up="z")
+        exposure = 1 / brightest if brightest else 1.0
+        write_gltf(gltf, meshes, times_s, exposure, scene.camera, up="z")
         typer.echo(f"wrote {gltf}: sRGB of what glows, without light between surfaces", err=True)
     if mitsuba is not None:
-        written = write_mitsuba_scene(mitsuba, meshes, camera)
+        written = write_mitsuba_scene(mitsuba, meshes, scene.camera)
         typer.echo(f"wrote {written}: lamps and glow in sRGB, without re-radiation", err=True)
 
 

@@ -1,5 +1,4 @@
 from .export.exported_scene import (
-    ExportedCamera as ExportedCamera,
     ExportedMesh as ExportedMesh,
     Glow as Glow,
 )
@@ -10,7 +9,6 @@ from .export.mitsuba_scene import (
     write_mitsuba_scene as write_mitsuba_scene,
 )
 from .export.scene_export import (
-    exported_camera as exported_camera,
     exported_meshes as exported_meshes,
 )
 from .picture.display import (

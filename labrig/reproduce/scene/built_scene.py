@@ -260,7 +260,10 @@ def build_scene(
         _surface(name, entry, folder, numbers, lamps, materials)
         for name, entry in file.objects.items()
     )
-    return Scene(file, bands, materials, surfaces, folder)
+    scene = Scene(file, bands, materials, surfaces, folder)
+    # A camera that sees nothing is refused before a folder is made for its pictures.
+    _ = scene.camera
+    return scene
 
 
 def _replaced(

@@ -171,7 +171,7 @@ class Field:
         if not (np.isfinite(rates).all() and rates.min(initial=0.0) >= 0):
             raise UsageError(IMPROPER)
         after = np.asarray(dark_concentration(before, k_r, order, duration_s))
-        # In next to no light the solution of lit levels is found no more; captures then just add up.
+        # In next to no light the solution of lit levels is not found; captures just add up.
         is_lit = rates * duration_s > NEXT_TO_DARK
         after = np.minimum(after + rates * duration_s, 1.0)
         if is_lit.any():

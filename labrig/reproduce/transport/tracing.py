@@ -123,6 +123,17 @@ class Pinhole:
         Angle from the lower to the upper edge, in degrees.
     width_px, height_px
         Size of the picture.
+
+    Raises
+    ------
+    UsageError
+        The angle or the size is none, or it looks at its own place or along `up`.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import Pinhole
+    >>> Pinhole((0, 0, 1), (0, 0, 0), up=(0, 1, 0)).axes.round().tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
 
     position_m: tuple[float, float, float]
@@ -131,6 +142,30 @@ class Pinhole:
     vertical_fov_deg: float = 40.0
     width_px: int = 256
     height_px: int = 256
+
+    def __post_init__(self) -> None:
+        if not 0 < self.vertical_fov_deg < 180:
+            raise UsageError(
+                f"expected an angle of view from 0 to 180°, got {self.vertical_fov_deg:g}°"
+            )
+        if self.width_px < 1 or self.height_px < 1:
+            raise UsageError(f"expected a size in pixels, got {self.width_px} × {self.height_px}")
+        away = np.subtract(self.position_m, self.look_at_m)
+        length = np.linalg.norm(away) * np.linalg.norm(self.up)
+        if not np.linalg.norm(np.cross(self.up, away)) > 1e-9 * length:
+            raise UsageError(
+                "expected a camera that looks at another point than its own, and not upwards, got "
+                f"position {list(self.position_m)}, look_at {list(self.look_at_m)}"
+            )
+
+    @property
+    def axes(self) -> FloatArray:
+        """Unit vectors to the right, upwards and backwards in the picture, the rows of (3, 3)."""
+        backwards = np.subtract(self.position_m, self.look_at_m)
+        backwards = backwards / np.linalg.norm(backwards)
+        right = np.cross(self.up, backwards)
+        right = right / np.linalg.norm(right)
+        return np.stack([right, np.cross(backwards, right), backwards])
 
     def rays(
         self, pixels: IntArray, within: FloatArray, origin_m: FloatArray
@@ -147,21 +182,12 @@ class Pinhole:
             Point from which origins are measured, in m (3,).
         """
         eye = np.array(self.position_m, dtype=np.float64)
-        forward = np.array(self.look_at_m) - eye
-        right = np.cross(forward, np.array(self.up, dtype=np.float64))
-        if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(forward):
-            raise UsageError(
-                "expected a camera that looks at another point than its own, and not upwards, got "
-                f"position {list(self.position_m)}, look_at {list(self.look_at_m)}"
-            )
-        forward /= np.linalg.norm(forward)
-        right /= np.linalg.norm(right)
-        down = np.cross(forward, right)
+        right, up, backwards = self.axes
         half = np.tan(np.deg2rad(self.vertical_fov_deg) / 2)
         row, column = np.divmod(pixels, self.width_px)
         x = (2 * (column + within[:, 0]) - self.width_px) / self.height_px * half
-        y = (2 * (row + within[:, 1]) / self.height_px - 1) * half
-        direction = forward + x[:, None] * right + y[:, None] * down
+        y = (1 - 2 * (row + within[:, 1]) / self.height_px) * half
+        direction = x[:, None] * right + y[:, None] * up - backwards
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         begin = np.broadcast_to((eye - origin_m).astype(np.float32), direction.shape)
         return np.ascontiguousarray(begin), direction.astype(np.float32)
