@@ -1,5 +1,8 @@
 """`labrig render`: measured materials in a scene, over time."""
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,6 +11,8 @@ import typer
 from labrig.cli.completion import complete_scene
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from labrig.reproduce import RenderFolder, Scene
 
 
@@ -110,13 +115,62 @@ def render(
         typer.echo(f"{done} of {count} pictures are there already", err=True)
     clock = SystemClock()
     begin_s = clock.now()
-    for number, frame in enumerate(folder.rendered(built), done + 1):
-        left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
-        remaining = f", about {duration_text(left_s)} left" if number < count else ""
-        typer.echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
+    with _bar() as bar:
+        frames = folder.rendered(built, report=bar.report)
+        for number, frame in enumerate(frames, done + 1):
+            left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
+            remaining = f", about {duration_text(left_s)} left" if number < count else ""
+            bar.say(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}")
+            for warning in frame.warnings:
+                bar.say(f"warning: {warning}")
     _draw(folder, built, exposure, night, video, fps)
     _export(folder, built, gltf, mitsuba)
     typer.echo(folder.path)
+
+
+class _Bar:
+    """What is done to a picture, and how long it still takes, in a line of the terminal."""
+
+    def __init__(self, progress: "Progress") -> None:
+        self._progress, self._what = progress, ""
+        self._task = progress.add_task("", total=1.0, visible=False)
+
+    def report(self, what: str, part: float) -> None:
+        """Show the part of something that is done."""
+        if what != self._what:
+            self._what = what
+            self._progress.reset(self._task, description=what, visible=True)
+        self._progress.update(self._task, completed=part)
+
+    def say(self, line: str) -> None:
+        """Print a line that stays."""
+        self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def _bar() -> Iterator[_Bar]:
+    """Yield a bar on standard error, which is there on a terminal only and away at the end."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+    )
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not sys.stderr.isatty()
+    ) as progress:
+        yield _Bar(progress)
 
 
 def _export(
@@ -126,23 +180,23 @@ def _export(
     if gltf is None and mitsuba is None:
         return
     from labrig.reproduce import (
-        exported_camera,
         exported_meshes,
         write_gltf,
         write_mitsuba_scene,
     )
 
-    meshes, camera = exported_meshes(scene, folder), exported_camera(scene)
+    meshes = exported_meshes(scene, folder)
     if gltf is not None:
         times_s = [t_s - folder.times_s[0] for t_s in folder.times_s]
         brightest = max(
             (float(each.glow.colour[1:].max(initial=0.0)) for each in meshes if each.glow),
             default=0.0,
         )
-        write_gltf(gltf, meshes, times_s, 1 / brightest if brightest else 1.0, camera, up="z")
+        exposure = 1 / brightest if brightest else 1.0
+        write_gltf(gltf, meshes, times_s, exposure, scene.camera, up="z")
         typer.echo(f"wrote {gltf}: sRGB of what glows, without light between surfaces", err=True)
     if mitsuba is not None:
-        written = write_mitsuba_scene(mitsuba, meshes, camera)
+        written = write_mitsuba_scene(mitsuba, meshes, scene.camera)
         typer.echo(f"wrote {written}: lamps and glow in sRGB, without re-radiation", err=True)
 
 

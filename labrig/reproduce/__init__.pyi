@@ -1,5 +1,4 @@
 from .export.exported_scene import (
-    ExportedCamera as ExportedCamera,
     ExportedMesh as ExportedMesh,
     Glow as Glow,
 )
@@ -10,7 +9,6 @@ from .export.mitsuba_scene import (
     write_mitsuba_scene as write_mitsuba_scene,
 )
 from .export.scene_export import (
-    exported_camera as exported_camera,
     exported_meshes as exported_meshes,
 )
 from .picture.display import (
@@ -77,11 +75,17 @@ from .surface.field import (
 from .surface.field_parameters import (
     FieldParameters as FieldParameters,
 )
+from .surface.parameter_texture import (
+    ParameterTexture as ParameterTexture,
+    read_parameter_texture as read_parameter_texture,
+    write_parameter_texture as write_parameter_texture,
+)
 from .surface.surface_material import (
     BenchLight as BenchLight,
     SurfaceMaterial as SurfaceMaterial,
     of_albedo as of_albedo,
     of_matrix as of_matrix,
+    of_mixture as of_mixture,
     of_phosphor as of_phosphor,
 )
 from .transport.folding import (

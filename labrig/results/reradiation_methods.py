@@ -117,6 +117,7 @@ class MixtureOfMatrix:
         return {
             "scale": self.scale * self.band_nm,
             "band_nm": self.band_nm,
+            "unit": "1/nm",
             "components": [
                 {
                     "weight": float(weight),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.reproduce import ExportedCamera, ExportedMesh, Glow, write_mitsuba_scene
+from labrig.reproduce import ExportedMesh, Glow, Pinhole, write_mitsuba_scene
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 HEIGHT_M, HALF_M = 0.8, 0.5
 
 
-def rendered(meshes: list[ExportedMesh], camera: ExportedCamera, **settings: Any) -> FloatArray:
+def rendered(meshes: list[ExportedMesh], camera: Pinhole, **settings: Any) -> FloatArray:
     """Radiance (height, width, 3) by Mitsuba."""
     import mitsuba
 
@@ -68,7 +68,7 @@ def error_of_a_seen_texture() -> float:
     glow = Glow(np.array([[9.0, 9.0, 9.0], [0.5, 2.0, 0.1]]), texture())
     mesh = ExportedMesh("glow -- a", square(0.5, 0.0, True), FACES, np.full(3, 0.3), UV, glow)
     angle = float(np.rad2deg(2 * np.arctan(0.5 / 4)))
-    camera = ExportedCamera((0, 0, 4.0), (0, 0, 0), (0, 1, 0), angle, 40, 40)
+    camera = Pinhole((0, 0, 4.0), (0, 0, 0), (0, 1, 0), angle, 40, 40)
     image = rendered([mesh], camera, frame=1, samples=400)
     # Means over pixels, as the samples are spread.
     fine = (np.arange(400) + 0.5) / 400
@@ -77,11 +77,11 @@ def error_of_a_seen_texture() -> float:
     return float(np.abs(image / (expected * glow.colour[1]) - 1).max())
 
 
-def floor_scene(glow: Glow) -> tuple[list[ExportedMesh], ExportedCamera]:
+def floor_scene(glow: Glow) -> tuple[list[ExportedMesh], Pinhole]:
     """A black lamp that shines down upon a grey floor, and a camera at the floor's middle."""
     lamp = ExportedMesh("lamp", square(HALF_M, HEIGHT_M, False), FACES, np.zeros(3), UV, glow)
     floor = ExportedMesh("floor", square(3.0, 0.0, True), FACES, np.array([0.2, 0.5, 0.8]))
-    camera = ExportedCamera((2.0, 0, 0.5), (0, 0, 0), (0, 0, 1), 0.3, 16, 16)
+    camera = Pinhole((2.0, 0, 0.5), (0, 0, 0), (0, 0, 1), 0.3, 16, 16)
     return [lamp, floor], camera
 
 
@@ -101,7 +101,7 @@ def error_below_a_texture() -> float:
     glow = Glow(np.array([[4.0, 1.0, 0.3]]), texture() ** 3)
     meshes, camera = floor_scene(glow)
     place = np.array([0.7, -0.4, 0.0])
-    camera = replace(camera, target_m=(0.7, -0.4, 0.0))
+    camera = replace(camera, look_at_m=(0.7, -0.4, 0.0))
     image = rendered(meshes, camera, samples=1024).mean(axis=(0, 1))
     fine = (np.arange(500) + 0.5) / 500
     u, v = np.meshgrid(fine, fine)
@@ -135,7 +135,7 @@ def error_in_a_furnace() -> float:
                     glow=Glow(np.array([[1.0, 0.5, 0.1]])),
                 )
             )
-    camera = ExportedCamera((0.1, 0.2, 0.3), (1, 0, 0), (0, 0, 1), 60, 24, 24)
+    camera = Pinhole((0.1, 0.2, 0.3), (1, 0, 0), (0, 0, 1), 60, 24, 24)
     image = rendered(walls, camera, samples=256, most_vertices=12).mean(axis=(0, 1))
     rho = walls[0].base_colour
     expected = np.array([1.0, 0.5, 0.1]) * (1 - rho**12) / (1 - rho)

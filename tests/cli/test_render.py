@@ -1,14 +1,17 @@
 """`labrig render`."""
 
+import io
 import json
+import re
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from labrig.reproduce import RenderFolder, exported_meshes, load_scene, read_spectral_exr
+from labrig.reproduce import Mesh, RenderFolder, exported_meshes, load_scene, read_spectral_exr
 from tests.conftest import Ended
 
 SMALL = ("--size", "12x9", "--paths", "4")
@@ -68,6 +71,35 @@ def test_other_settings_do_not_mix_with_what_is_there(labrig: Callable[..., Ende
     shutil.rmtree("mine")
 
 
+class TerminalText(io.StringIO):
+    """Text that a command writes to a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_on_a_terminal_it_says_what_is_done_and_for_how_long(
+    labrig: Callable[..., Ended], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    text = TerminalText()
+    with monkeypatch.context() as on_terminal:
+        on_terminal.setattr(sys, "stderr", text)
+        assert labrig("render", "cornell-box", *SMALL).code == 0
+    shown = text.getvalue()
+    for what in (
+        "tracing paths of phosphors",
+        "tracing paths of the picture",
+        "charging and decay",
+    ):
+        assert re.search(what + r".* \d+%.* left", shown), what
+    assert "picture 3 of 3" in shown
+    ended = labrig("render", "cornell-box", *SMALL, "--out", "piped")
+    assert "tracing" not in ended.err
+    assert "\x1b" not in ended.err
+    assert [line for line in ended.err.splitlines() if line.startswith("picture")] != []
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -106,3 +138,27 @@ def test_other_programs_take_the_scene(labrig: Callable[..., Ended]) -> None:
     # Its own light, back from the walls, charges it a little again.
     assert ratio == pytest.approx(np.exp(-0.032 * 59.9), rel=0.04)
     assert wall.glow.lost < 0.02
+
+
+def test_a_room_that_is_not_tight_is_told(labrig: Callable[..., Ended]) -> None:
+    """Sides of a box that nearly meet count as closed; the rays between them are counted."""
+    box = Mesh.box((0, 0, 0), (1, 1, 1))
+    ends = {}
+    for name, slit in (("tight", 0.0), ("leaky", 4e-3)):
+        moved = box.vertices_m.copy()
+        moved[:4, 0] += slit
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in moved.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (box.faces + 1).tolist()]
+        Path(f"{name}.obj").write_text("\n".join(lines))
+        room = {"file": f"{name}.obj", "size_m": 1e-7, "inward": True}
+        Path(f"{name}.yaml").write_text(json.dumps({
+            "name": name, "kind": "scene", "materials": {"wall": {"albedo": 0.5}},
+            "lamps": {"lamp": {"kind": "point", "intensity_cd": 1, "position_m": [0, 0, 2e-8]}},
+            "objects": {"room": {"material": "wall", "mesh": room}},
+            "camera": {"position_m": [0, 0, 0], "look_at_m": [1e-8, 1e-9, 0]},
+            "programme": [{"at_s": 0, "lamps": {"lamp": 1}}], "frames_s": [0],
+        }))  # fmt: skip
+        ends[name] = labrig("render", f"{name}.yaml", "--size", "32x24", "--paths", "16")
+        assert ends[name].code == 0, ends[name].err
+    assert "warning" not in ends["tight"].err
+    assert "left the closed room" in ends["leaky"].err

@@ -134,6 +134,15 @@ def test_two_steps_are_one(
     assert (once.levels <= 1).all()
 
 
+def test_next_to_no_light_is_like_none() -> None:
+    of = FieldParameters.checked([0.05], [[1.0]], [[1.0]], 3.0)
+    for kappa in (0.0, 1e-32, 1e-25, 1e-12, 1e-8):
+        field = Field(of, 2, [[0.0, 1.0]])
+        field.step([kappa], 200.0)
+        # r = (1 + (b − 1) k t)^(−1/(b − 1)) in the dark.
+        np.testing.assert_allclose(field.levels[0], [200 * kappa, 21**-0.5], rtol=1e-5, atol=1e-12)
+
+
 @pytest.mark.parametrize("order", [1.0, 1.4, 2.0])
 def test_a_long_charge_ends_in_equilibrium(order: float) -> None:
     of = parameters((order,))
@@ -238,3 +247,23 @@ def test_measured_materials(name: str) -> None:
 def test_what_does_not_fit_is_refused(wrong: Callable[[], object], told: str) -> None:
     with pytest.raises(UsageError, match=told):
         wrong()
+
+
+def test_many_short_steps_of_slow_materials_lose_no_digits() -> None:
+    """Two minutes in the dark in steps of 10 ms: the same rounding in each would add up to 1e-4."""
+    k_r = np.geomspace(0.003, 0.3, 16)
+    parameters = FieldParameters.checked([k_r], [[0.0]], [[1.0]])
+    level = np.linspace(0.1, 1, 16, dtype=np.float32)
+    field = Field(parameters, levels=[level])
+    for _ in range(12_000):
+        field.step([0.0], 0.01)
+    expected = level * np.exp(-parameters.k_r_per_s[0].astype(float) * 120)
+    np.testing.assert_allclose(field.levels[0], expected, rtol=0, atol=2e-6)
+
+
+def test_a_lit_level_stops_at_most_half_a_digit_of_a_step_before_its_end() -> None:
+    parameters = FieldParameters.checked([0.01], [[1.0]], [[1.0]])
+    field = Field(parameters, n_samples=8, levels=[np.linspace(0, 1, 8)])
+    for _ in range(12_000):
+        field.step([0.03], 0.1)
+    assert np.abs(field.levels - 0.75).max() < 1.2 * 2**-25 / (0.04 * 0.1)

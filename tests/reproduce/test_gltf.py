@@ -12,7 +12,7 @@ from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
-from labrig.reproduce import ExportedCamera, ExportedMesh, Glow, write_gltf
+from labrig.reproduce import ExportedMesh, Glow, Pinhole, write_gltf
 
 FloatArray = NDArray[np.float64]
 
@@ -193,7 +193,7 @@ def test_darkness_is_no_glow(tmp_path: Path) -> None:
 
 
 def test_a_camera_sees_its_target_in_the_middle(tmp_path: Path) -> None:
-    camera = ExportedCamera((1.0, 2.0, 3.0), (0.0, 0.5, -1.0), (0.0, 0.0, 1.0), 35.0, 640, 480)
+    camera = Pinhole((1.0, 2.0, 3.0), (0.0, 0.5, -1.0), (0.0, 0.0, 1.0), 35.0, 640, 480)
     write_gltf(tmp_path / "a.glb", [mesh()], [0.0], camera=camera, up="z")
     read = Read(tmp_path / "a.glb")
     (node,) = [one for one in read.json["nodes"] if "camera" in one]
@@ -233,8 +233,8 @@ def test_meshes_that_are_none_are_refused(tmp_path: Path) -> None:
         lambda: Glow(-DECAY),
         lambda: Glow(DECAY[0]),
         lambda: Glow.of_textures(np.ones((2, 2, 3))),
-        lambda: ExportedCamera((0, 0, 0), (0, 0, 1), (0, 0, 2), 40, 10, 10),
-        lambda: ExportedCamera((0, 0, 0), (0, 0, 1), (0, 1, 0), 180, 10, 10),
+        lambda: Pinhole((0, 0, 0), (0, 0, 1), (0, 0, 2), 40, 10, 10),
+        lambda: Pinhole((0, 0, 0), (0, 0, 1), (0, 1, 0), 180, 10, 10),
         lambda: write_gltf(tmp_path / "a.glb", [], [0.0]),
         lambda: write_gltf(tmp_path / "a.gltf", [mesh()], [0.0]),
         lambda: write_gltf(tmp_path / "a.glb", [mesh()], [0.0], exposure=0.0),

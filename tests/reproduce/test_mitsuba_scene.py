@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
-from labrig.reproduce import ExportedCamera, ExportedMesh, Glow, write_mitsuba_scene
+from labrig.reproduce import ExportedMesh, Glow, Pinhole, write_mitsuba_scene
 
 FloatArray = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ FACES = np.array([[0, 1, 2], [0, 2, 3]])
 UV = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.8]])
 GREY = np.array([0.5, 0.4, 0.3])
 DECAY = np.array([[1.0, 2.0, 3.0], [0.5, 0.25, 0.125]])
-CAMERA = ExportedCamera((1.0, 2.0, 3.0), (0.0, 0.5, -1.0), (0.0, 0.0, 1.0), 35.0, 64, 48)
+CAMERA = Pinhole((1.0, 2.0, 3.0), (0.0, 0.5, -1.0), (0.0, 0.0, 1.0), 35.0, 64, 48)
 
 
 def ply(path: Path) -> tuple[FloatArray, NDArray[np.uint32]]:
@@ -89,7 +89,7 @@ def test_a_scene_has_its_camera(tmp_path: Path) -> None:
     assert lookat is not None
     for key, expected in (
         ("origin", CAMERA.position_m),
-        ("target", CAMERA.target_m),
+        ("target", CAMERA.look_at_m),
         ("up", CAMERA.up),
     ):
         assert tuple(numbers(lookat.attrib[key])) == expected

@@ -20,6 +20,7 @@ from labrig.reproduce import (
     SceneFile,
     build_scene,
     load_scene,
+    read_mesh,
 )
 from labrig.yaml_file import write_yaml
 
@@ -216,6 +217,15 @@ def test_levels_at_first_are_given_or_those_of_the_light(tmp_path: Path) -> None
             },
             "GB",
         ),
+        (
+            {
+                "objects": {
+                    "square": {"material": "paint", "rectangle": FLAT, "samples": [8192, 8192]}
+                },
+                "paths": {"per_place": 16384},
+            },
+            "GB",
+        ),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_one_line(tmp_path: Path, changed: dict[str, Any], says: str) -> None:
@@ -253,6 +263,19 @@ f 1 4 3
         ("v 0 0 0\n", {}, {}, "triangles"),
         ("v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", {}, {"two_sided": True}, "area"),
         ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", {}, {"two_sided": True}, "finite"),
+        (
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 1 2 4\n",
+            {},
+            {"two_sided": True},
+            "on some",
+        ),
+        (
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+            "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1//1 2//1 4//1\n",
+            {},
+            {"two_sided": True},
+            "on some",
+        ),
         (
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
             "f 1/1 2/2 3/3\nf 1/1 2/2 4/3\n",
@@ -438,3 +461,37 @@ def test_glow_that_excites_another_colour_does_not_depend_on_the_frames(tmp_path
             renderer._advance(float(t_s))  # the pictures between are not wanted
         levels.append([float(renderer.levels[name].mean()) for name in ("walls", "ball")])
     np.testing.assert_allclose(levels[0], levels[1], rtol=0.02)
+
+
+def test_parts_that_are_done_are_told_and_only_rise(tmp_path: Path) -> None:
+    told: list[tuple[str, float]] = []
+    moving = {"rectangle": MANY, "wave": WAVE, "material": "paint", "samples": [4, 4]}
+    for changed in ({}, {"objects": {"square": moving}, "step_s": 50.0}):
+        told.clear()
+        renderer = Renderer(scene(tmp_path, **changed), report=lambda *each: told.append(each))
+        list(renderer.frames())
+        parts: dict[str, list[float]] = {}
+        for what, part in told:
+            parts.setdefault(what, []).append(part)
+        assert len(parts) >= 3
+        for what, rising in parts.items():
+            assert all(0 < part <= 1 for part in rising), what
+            assert rising[-1] == 1
+        assert any("tracing" in what for what in parts)
+        charging = next(rising for what, rising in parts.items() if "charging" in what)
+        assert len(charging) > 3
+        assert charging == sorted(charging)
+
+
+def test_a_mesh_of_two_parts_keeps_its_own_texture_coordinates(tmp_path: Path) -> None:
+    """Readers of meshes like to pack textures anew, and a picture over them would be elsewhere."""
+    (tmp_path / "a.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 0.5 0\nvt 0 0.5\nvt 1 1\n"
+        "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/4 2/2 4/3\n"
+    )
+    mesh = read_mesh(tmp_path / "a.obj")
+    assert mesh.uv is not None
+    corners = np.concatenate([mesh.vertices_m, mesh.uv], axis=1)[mesh.faces]
+    first = [[0, 0, 0, 0, 0], [1, 0, 0, 0.5, 0], [0, 1, 0, 0, 0.5]]
+    second = [[0, 0, 0, 1, 1], [1, 0, 0, 0.5, 0], [0, 0, 1, 0, 0.5]]
+    assert sorted(corners.tolist()) == [first, second]

@@ -1,5 +1,6 @@
 """Light that is traced once and folded, against what can be computed without rays."""
 
+import tracemalloc
 from collections.abc import Sequence
 
 import numpy as np
@@ -247,3 +248,72 @@ def test_a_ball_far_away_that_shows_its_inside_makes_no_room() -> None:
     seen = folded(paths, geometry, black, np.zeros(BANDS), np.ones(BANDS), incident=True)
     assert seen[0, 0] == pytest.approx(np.pi, rel=0.01)
     assert sum(each.n_escaped for each in paths) == 0
+
+
+def test_rays_that_leave_a_closed_room_are_traced_again_and_counted() -> None:
+    """A room of 0.1 µm with slits of 0.4 nm, which count as closed: no light is lost in them."""
+    side_m = 1e-7
+    whole = Mesh.box((0, 0, 0), (side_m, side_m, side_m), inward=True)
+    moved = whole.vertices_m.copy()
+    moved[:4, 0] += 4e-10
+    expected = np.pi * sum(0.5**n for n in range(11))
+    for vertices, most in ((whole.vertices_m, 0.0), (moved, 0.02)):
+        mesh = Mesh(vertices, whole.faces, whole.uv)
+        geometry = Geometry.of([Surface("room", mesh, 0, samples=(6, 4))])
+        assert geometry.is_room
+        tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(12, 0.0), 5)
+        paths = list(tracer.from_surface(0, 256, 1))
+        grey = SurfaceMaterial("grey", (0.5 * np.eye(BANDS)).astype(np.float32))
+        seen = folded(paths, geometry, grey, np.ones(BANDS), np.zeros(0), incident=True)
+        np.testing.assert_allclose(seen, expected, rtol=1e-5)
+        share = sum(each.n_escaped for each in paths) / sum(len(each.place) for each in paths)
+        assert most / 20 <= share <= most
+
+
+def test_light_of_another_side_does_not_run_over_the_edge_of_a_chart() -> None:
+    """Sides of a box lie side by side in its texture, and are apart in space."""
+    box = Mesh.box((0, 0, 0), (1, 1, 1))
+    geometry = Geometry.of([Surface("box", box, 0, samples=(12, 8))])
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(1, 0.0), 3)
+    column, row = np.meshgrid(np.arange(12) // 4, np.arange(8) // 4)
+    for side, direction in enumerate(
+        np.repeat(np.eye(3), 2, axis=0) * np.tile([1, -1], 3)[:, None]
+    ):
+        glow = np.repeat((column + 3 * row == side).ravel()[:, None], BANDS, axis=1)
+        up = np.roll(np.abs(direction), 1)
+        camera = Pinhole(tuple(3 * direction), (0, 0, 0), tuple(up), 22.0, 16, 16)
+        seen = fold(
+            list(tracer.from_camera(camera, 64, 1)), Matrices.of([black]),
+            geometry.material_of_place, glow.astype(np.float32),
+            np.zeros((0, BANDS), np.float32), 1,
+        )  # fmt: skip
+        np.testing.assert_array_equal(seen, 1.0)
+
+
+def test_one_texel_is_the_mean_over_its_surface_not_over_its_texture() -> None:
+    """A ball in the light of the sun gets a quarter of it; near its poles the texture is dense."""
+    ball = Mesh.sphere((0, 0, 0), 0.5, rows=64)
+    black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
+    for samples, per_place in (((1, 1), 4096), ((2, 4), 1024)):
+        geometry = Geometry.of([Surface("ball", ball, 0, samples=samples)])
+        lamps = LampTable.of([Lamp("sun", "distant", np.ones(BANDS))], geometry)
+        paths = list(Tracer(geometry, lamps, PathLength(1, 0.0)).from_surface(0, per_place, 1))
+        seen = folded(paths, geometry, black, np.zeros(BANDS), np.ones(BANDS), incident=True)
+        rows = seen[:, 0].reshape(samples[::-1]).mean(axis=1)
+        cosine = np.cos(np.linspace(np.pi, 0, samples[1] + 1))
+        expected = np.diff(np.maximum(cosine, 0) ** 2 / 2) / np.diff(cosine)
+        np.testing.assert_allclose(rows, expected, atol=0.003)
+
+
+def test_paths_from_places_take_little_more_memory_than_is_kept() -> None:
+    """Points of all places at once took seven times as much as their paths."""
+    wall = Mesh.rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    geometry = Geometry.of([Surface("wall", wall, 0, samples=(256, 256))])
+    tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(1, 0.0))
+    next(iter(tracer.from_surface(0, 16, 1)))
+    tracemalloc.start()
+    kept = list(tracer.from_surface(0, 16, 1))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3 * sum(each.nbytes for each in kept)

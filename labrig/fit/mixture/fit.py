@@ -137,6 +137,8 @@ def fit_mixture(
         masked_mse=masked_mse(entries, mixture),
         likelihood_mse=best.likelihood_mse,
         band_nm=float(widths_nm[0]) if np.allclose(widths_nm, widths_nm[0]) else 1.0,
+        measured_input_nm=(float(matrix.input_edges_nm[0]), float(matrix.input_edges_nm[-1])),
+        unit=matrix.unit,
         iterations=best.iterations,
         refinement_iterations=best.refinement_iterations,
         converged=best.converged,

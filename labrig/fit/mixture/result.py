@@ -73,6 +73,10 @@ class MixtureFit:
         The same before refinement, of expectation maximisation alone.
     band_nm
         Width of the output bands in nm; 1 if they differ.
+    measured_input_nm
+        Ends in nm of the incident light that the matrix has; beyond are only tails of densities.
+    unit
+        Unit of the re-radiation, `1/nm` or `relative`.
     iterations, refinement_iterations
         Number of iterations of expectation maximisation and of the refinement.
     converged
@@ -93,6 +97,8 @@ class MixtureFit:
     masked_mse: float
     likelihood_mse: float
     band_nm: float
+    measured_input_nm: tuple[float, float]
+    unit: str
     iterations: int
     refinement_iterations: int
     converged: bool
@@ -114,6 +120,8 @@ class MixtureFit:
         return {
             "scale": mixture.scale * self.band_nm,
             "band_nm": self.band_nm,
+            "unit": self.unit,
+            "measured_input_nm": list(self.measured_input_nm),
             "components": [
                 {
                     "weight": float(weight),

@@ -39,6 +39,10 @@ from labrig.material.reradiation.matrix import (
 from labrig.material.reradiation.mixture import (
     ReradiationMixture,
 )
+from labrig.material.reradiation.mixture_file import (
+    StoredMixture,
+    read_mixture,
+)
 from labrig.material.reradiation.noise import (
     InstrumentNoise,
     instrument_noise,
@@ -62,6 +66,7 @@ __all__ = [
     "ReradiationMixture",
     "SeenSpectrum",
     "SpectralImage",
+    "StoredMixture",
     "appearance",
     "colour_pair",
     "compare_colours",
@@ -71,6 +76,7 @@ __all__ = [
     "matrix_files",
     "physical_warnings",
     "read_emissions",
+    "read_mixture",
     "read_reradiation",
     "read_spectral_image",
     "reradiates",

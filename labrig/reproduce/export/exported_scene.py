@@ -1,4 +1,4 @@
-"""Meshes, glows and a camera as other programs take them: in linear sRGB, at some frames."""
+"""Meshes and glows as other programs take them: in linear sRGB, at some frames."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -156,57 +156,6 @@ class ExportedMesh:
             raise UsageError(f"{self.name}: expected finite uv of shape ({n}, 2)")
         if self.uv is None and self.glow is not None and self.glow.texture is not None:
             raise UsageError(f"{self.name}: its glow has a texture, for which it needs uv")
-
-
-@dataclass(frozen=True)
-class ExportedCamera:
-    """A pinhole camera for other programs.
-
-    Parameters
-    ----------
-    position_m, target_m
-        Where it stands and looks.
-    up
-        Direction that is upwards in the picture.
-    field_of_view_deg
-        Vertical angle of view in degrees, between 0 and 180.
-    width, height
-        Size of the picture in pixels.
-
-    Raises
-    ------
-    UsageError
-        The angle or the size is none, or `up` is along the view.
-    """
-
-    position_m: tuple[float, float, float]
-    target_m: tuple[float, float, float]
-    up: tuple[float, float, float]
-    field_of_view_deg: float
-    width: int
-    height: int
-
-    def __post_init__(self) -> None:
-        if not 0 < self.field_of_view_deg < 180:
-            raise UsageError(
-                f"expected an angle of view from 0 to 180°, got {self.field_of_view_deg:g}°"
-            )
-        if self.width < 1 or self.height < 1:
-            raise UsageError(f"expected a size in pixels, got {self.width} × {self.height}")
-        if not np.linalg.norm(np.cross(self._forwards, self.up)) > 0:
-            raise UsageError("expected a camera whose upwards is not along its view")
-
-    @property
-    def _forwards(self) -> FloatArray:
-        return np.subtract(self.target_m, self.position_m)
-
-    @property
-    def axes(self) -> FloatArray:
-        """Unit vectors to the right, upwards and backwards, the rows of shape (3, 3)."""
-        backwards = -self._forwards / np.linalg.norm(self._forwards)
-        right = np.cross(self.up, backwards)
-        right /= np.linalg.norm(right)
-        return np.stack([right, np.cross(backwards, right), backwards])
 
 
 def _check_light(values: FloatArray) -> None:

@@ -13,14 +13,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
 from labrig.optics import srgb_bytes
+from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.export.exported_scene import (
-    ExportedCamera,
     ExportedMesh,
     Glow,
     frame_count,
 )
+from labrig.reproduce.transport.tracing import Pinhole
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ def write_gltf(
     meshes: Sequence[ExportedMesh],
     times_s: ArrayLike,
     exposure: float = 1.0,
-    camera: ExportedCamera | None = None,
+    camera: Pinhole | None = None,
     up: Literal["y", "z"] = "y",
 ) -> None:
     """Write meshes whose emission changes over time as binary glTF, a preview for browsers.
@@ -104,12 +105,8 @@ def write_gltf(
     if is_any_glow and frames > 1:
         document.add_animation(times, [mesh.glow for mesh in meshes])
     content = document.binary(camera, up)
-    draft = path.with_name(f".{path.name}.draft")
-    try:
+    with replaced(path) as draft:
         draft.write_bytes(content)
-        draft.replace(path)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 class _Document:
@@ -152,7 +149,7 @@ class _Document:
         if channels:
             self._animation = {"name": "glow", "channels": channels, "samplers": samplers}
 
-    def binary(self, camera: ExportedCamera | None, up: str) -> bytes:
+    def binary(self, camera: Pinhole | None, up: str) -> bytes:
         """Return the file: a head, the description as JSON, and the numbers."""
         nodes = self._parts["nodes"]
         root: dict[str, Any] = {"name": "scene", "children": list(range(len(nodes)))}
@@ -263,17 +260,17 @@ class _Document:
         return len(self._accessors) - 1
 
 
-def _camera(camera: ExportedCamera) -> dict[str, Any]:
-    distance_m = float(np.linalg.norm(np.subtract(camera.target_m, camera.position_m)))
+def _camera(camera: Pinhole) -> dict[str, Any]:
+    distance_m = float(np.linalg.norm(np.subtract(camera.look_at_m, camera.position_m)))
     perspective = {
-        "yfov": float(np.deg2rad(camera.field_of_view_deg)),
-        "aspectRatio": camera.width / camera.height,
+        "yfov": float(np.deg2rad(camera.vertical_fov_deg)),
+        "aspectRatio": camera.width_px / camera.height_px,
         "znear": distance_m / 1000,
     }
     return {"type": "perspective", "perspective": perspective}
 
 
-def _camera_node(camera: ExportedCamera) -> dict[str, Any]:
+def _camera_node(camera: Pinhole) -> dict[str, Any]:
     """Return the node of a camera, which looks along its own −z."""
     matrix = np.eye(4)
     matrix[:3, :3] = camera.axes.T

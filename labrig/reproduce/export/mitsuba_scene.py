@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
 from labrig.reproduce.export.exported_scene import (
-    ExportedCamera,
     ExportedMesh,
     Glow,
     frame_count,
 )
+from labrig.reproduce.transport.tracing import Pinhole
 
 FloatArray = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _VERSION = "3.0.0"
 def write_mitsuba_scene(
     folder: Path,
     meshes: Sequence[ExportedMesh],
-    camera: ExportedCamera,
+    camera: Pinhole,
     frame: int = 0,
     samples: int = 256,
     most_vertices: int = 12,
@@ -71,11 +71,11 @@ def write_mitsuba_scene(
     --------
     >>> from pathlib import Path
     >>> import numpy as np
-    >>> from labrig.reproduce import ExportedCamera, ExportedMesh, Glow, write_mitsuba_scene
+    >>> from labrig.reproduce import ExportedMesh, Glow, Pinhole, write_mitsuba_scene
     >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     >>> glow = Glow(np.array([[0.1, 1.0, 0.5]]))
     >>> sheet = ExportedMesh("sheet", corners, np.array([[0, 1, 2]]), np.full(3, 0.5), glow=glow)
-    >>> camera = ExportedCamera((0.5, 0.5, 3.0), (0.5, 0.5, 0.0), (0.0, 1.0, 0.0), 40.0, 64, 64)
+    >>> camera = Pinhole((0.5, 0.5, 3.0), (0.5, 0.5, 0.0), (0.0, 1.0, 0.0), 40.0, 64, 64)
     >>> path = write_mitsuba_scene(Path("sheet"), [sheet], camera)
     >>> sorted(file.name for file in path.parent.iterdir())
     ['mesh_00.ply', 'scene.xml']
@@ -121,23 +121,23 @@ def _add_rgb(parent: ElementTree.Element, name: str, colour: FloatArray) -> None
     _add(parent, "rgb", name=name, value=_numbers(colour))
 
 
-def _add_camera(scene: ElementTree.Element, camera: ExportedCamera, samples: int) -> None:
+def _add_camera(scene: ElementTree.Element, camera: Pinhole, samples: int) -> None:
     sensor = _add(scene, "sensor", type="perspective")
     _add(sensor, "string", name="fov_axis", value="y")
-    _add(sensor, "float", name="fov", value=f"{camera.field_of_view_deg:.9g}")
+    _add(sensor, "float", name="fov", value=f"{camera.vertical_fov_deg:.9g}")
     to_world = _add(sensor, "transform", name="to_world")
     _add(
         to_world,
         "lookat",
         origin=_numbers(camera.position_m),
-        target=_numbers(camera.target_m),
+        target=_numbers(camera.look_at_m),
         up=_numbers(camera.up),
     )
     _add(_add(sensor, "sampler", type="independent"), "integer", name="sample_count",
          value=str(samples))  # fmt: skip
     film = _add(sensor, "film", type="hdrfilm")
-    _add(film, "integer", name="width", value=str(camera.width))
-    _add(film, "integer", name="height", value=str(camera.height))
+    _add(film, "integer", name="width", value=str(camera.width_px))
+    _add(film, "integer", name="height", value=str(camera.height_px))
     _add(film, "string", name="pixel_format", value="rgb")
     _add(film, "rfilter", type="box")
 

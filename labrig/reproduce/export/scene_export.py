@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.optics import XYZ_TO_SRGB, illuminant
-from labrig.reproduce.export.exported_scene import ExportedCamera, ExportedMesh, Glow
+from labrig.reproduce.export.exported_scene import ExportedMesh, Glow
 from labrig.reproduce.picture.display import Display, tristimulus
 from labrig.reproduce.picture.render_folder import RenderFolder
 from labrig.reproduce.picture.rendering import Renderer
@@ -12,36 +12,6 @@ from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.transport.geometry import Geometry
 
 FloatArray = NDArray[np.float64]
-
-
-def exported_camera(scene: Scene) -> ExportedCamera:
-    """Return the camera of a scene for other programs.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-
-    Returns
-    -------
-    ExportedCamera
-        The same pinhole.
-
-    Examples
-    --------
-    >>> from labrig.reproduce import exported_camera, load_scene
-    >>> exported_camera(load_scene("cornell-box")).field_of_view_deg
-    40.0
-    """
-    camera = scene.file.camera
-    return ExportedCamera(
-        camera.position_m,
-        camera.look_at_m,
-        camera.up,
-        camera.vertical_fov_deg,
-        camera.width_px,
-        camera.height_px,
-    )
 
 
 def exported_meshes(scene: Scene, folder: RenderFolder) -> list[ExportedMesh]:
@@ -127,10 +97,12 @@ def _srgb(radiance: ArrayLike, scene: Scene) -> FloatArray:
 
 
 def _colour(scene: Scene, material: int) -> FloatArray:
-    """Return the colour of a material under D65 in linear sRGB, with what it re-radiates."""
+    """Return the mean colour of a material under D65 in linear sRGB, with its re-radiation."""
     if material < 0:
         return np.zeros(3)
-    daylight = scene.bands.means(illuminant("D65"))
-    seen = tristimulus(scene.materials[material].matrix @ daylight, scene.bands.edges_nm)
+    daylight, surface = scene.bands.means(illuminant("D65")), scene.materials[material]
+    factor = None if surface.texture is None else surface.texture.albedo_factor
+    returned = surface.matrix @ daylight * (1.0 if factor is None else float(factor.mean()))
+    seen = tristimulus(returned, scene.bands.edges_nm)
     white = tristimulus(daylight, scene.bands.edges_nm)
     return np.asarray(np.clip(XYZ_TO_SRGB @ seen / white[1], 0.0, 1.0))

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
 from labrig.input_file import read_bytes
 from labrig.material import read_spectral_image
 from labrig.optics import XYZ_TO_SRGB, edges_from_centres
+from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.picture.display import tristimulus
 
 FloatArray = NDArray[np.float64]
@@ -246,12 +247,11 @@ def _write(path: Path, header: Mapping[str, Any], channels: Mapping[str, Pixels]
         **header,
     }
     rows = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
-    draft = path.with_name(f".{path.name}.draft")
-    try:
-        OpenEXR.File(whole, rows).write(str(draft))
-        draft.replace(path)
-    except (RuntimeError, OSError):
-        raise DiskError(f"{path}: cannot be written") from None
+    with replaced(path) as draft:
+        try:
+            OpenEXR.File(whole, rows).write(str(draft))
+        except RuntimeError as error:
+            raise OSError(str(error).partition("\n")[0]) from None
 
 
 def _attributes(path: Path) -> dict[str, Any]:

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
 from labrig.input_file import read_bytes
+from labrig.reproduce.draft_file import replaced
 
 Bytes = NDArray[np.uint8]
 
@@ -64,12 +65,8 @@ def write_png(path: Path, picture: Bytes, texts: Mapping[str, str]) -> None:
     content = encoded.tobytes()
     chunks = [_chunk(b"sRGB", _RELATIVE_COLORIMETRIC)]
     chunks += [_chunk(b"iTXt", _text(*pair)) for pair in texts.items()]
-    draft = path.with_name(f".{path.name}.draft")
-    try:
+    with replaced(path) as draft:
         draft.write_bytes(content[:_HEAD_BYTES] + b"".join(chunks) + content[_HEAD_BYTES:])
-        draft.replace(path)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def read_png_texts(path: Path) -> dict[str, str]:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
+from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
-from labrig.reproduce.picture.rendering import Frame, Renderer
+from labrig.reproduce.picture.rendering import Frame, Renderer, Report
 from labrig.reproduce.scene.built_scene import Scene
 
 Float32Array = NDArray[np.float32]
@@ -94,7 +95,8 @@ class RenderFolder:
                 "notes": scene.notes,
                 "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
             }
-            _replace(content, json.dumps(described, indent=1, ensure_ascii=False).encode())
+            with replaced(content) as draft:
+                draft.write_bytes(json.dumps(described, indent=1, ensure_ascii=False).encode())
         except OSError as error:
             raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
         return cls(path, scene.file.frames_s)
@@ -121,7 +123,9 @@ class RenderFolder:
         """
         return read_spectral_exr(self.exr(number))
 
-    def rendered(self, scene: Scene, threads: int | None = None) -> Iterator[Frame]:
+    def rendered(
+        self, scene: Scene, threads: int | None = None, report: Report = lambda what, part: None
+    ) -> Iterator[Frame]:
         """Render the frames that are missing, and keep each.
 
         Parameters
@@ -130,6 +134,8 @@ class RenderFolder:
             The scene with which the folder was opened.
         threads
             Threads that trace and fold. Default: one for each processor.
+        report
+            Is told what is done, as by `Renderer`.
 
         Yields
         ------
@@ -146,7 +152,7 @@ class RenderFolder:
         done = self.n_done
         if done == len(self.times_s):
             return
-        renderer = Renderer(scene, threads)
+        renderer = Renderer(scene, threads, report)
         if done:
             renderer.restore(self.times_s[done - 1], self.levels(done - 1))
         for number in range(done, len(self.times_s)):
@@ -176,14 +182,9 @@ class RenderFolder:
             ) from None
 
     def _keep_levels(self, number: int, levels: dict[str, Float32Array]) -> None:
-        path = self._levels_path(number)
-        partial = path.with_suffix(".part.npz")
-        try:
-            named: dict[str, Any] = {f"{OF}{name}": level for name, level in levels.items()}
-            np.savez(partial, **named)
-            partial.replace(path)
-        except OSError as error:
-            raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+        named: dict[str, Any] = {f"{OF}{name}": level for name, level in levels.items()}
+        with replaced(self._levels_path(number)) as draft:
+            np.savez(draft, **named)
 
     def _levels_path(self, number: int) -> Path:
         return self.path / f"{number:03d}.levels.npz"
@@ -203,16 +204,17 @@ def _identity(scene: Scene) -> str:
                 np.array(parameters.prompt),
             ):
                 digest.update(array.tobytes())
+        if (texture := material.texture) is not None:
+            digest.update(repr(texture.shape).encode())
+            if texture.albedo_factor is not None:
+                digest.update(texture.albedo_factor.tobytes())
     for t_s in (scene.file.programme[0].at_s, *scene.file.frames_s):
-        geometry = scene.geometry(t_s)
-        for each in (geometry.triangles, geometry.uv, geometry.table, geometry.material_of_place):
-            digest.update(each.tobytes())
+        for surface in scene.surfaces(t_s):
+            mesh = surface.mesh
+            where = (surface.samples, surface.material, surface.lamp, surface.is_two_sided)
+            digest.update(repr((surface.name, len(mesh.vertices_m), where)).encode())
+            for each in (mesh.vertices_m, mesh.faces, mesh.uv, surface.material_of_texel):
+                digest.update(b"" if each is None else each.tobytes())
         for lamp in scene.lamps(t_s):
             digest.update(lamp.light.tobytes())
     return digest.hexdigest()
-
-
-def _replace(path: Path, content: bytes) -> None:
-    partial = path.with_suffix(".part")
-    partial.write_bytes(content)
-    partial.replace(path)

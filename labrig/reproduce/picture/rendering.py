@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +20,7 @@ from labrig.errors import UsageError
 from labrig.processors import n_processors
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.surface.field import Field
+from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.folding import Matrices, fold
 from labrig.reproduce.transport.geometry import Geometry, Surface
 from labrig.reproduce.transport.lamp import LampTable
@@ -30,6 +32,8 @@ IntArray = NDArray[np.int32]
 
 #: Part of the memory that paths and pictures may take, and copies of a picture at once.
 LARGEST_PART, MOST_COPIES = 0.7, 6
+#: Memory in bytes that tells where a texel lies on its surface.
+OF_TEXEL = 300
 #: First step after a change of light, as a part of the fastest relaxation; later ones grow.
 FIRST_STEP, GROWTH = 0.25, 2.0
 #: Change of the logarithm of all light at which steps grow no more; rounds and parts of a step.
@@ -41,8 +45,14 @@ CHARGING_ROUNDS, SETTLED = 100, 1e-5
 #: Rounds of what is emitted at once.
 PROMPT_ROUNDS = 6
 TINY = 1e-300
+#: Part of the rays that may leave a closed room between its triangles: none do of a whole mesh.
+MOST_ESCAPED = 1e-4
 #: Steps of a scene that moves.
 MOST_STEPS = 100_000
+
+
+#: Is told what is done, and which part of it is, 0 to 1.
+Report: TypeAlias = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +65,24 @@ class Frame:
         Its time in s.
     radiance
         Spectral radiance in W m⁻² sr⁻¹ nm⁻¹, shape (height, width, bands).
+    escaped_share
+        Part of the rays of its paths that left a closed room between its triangles, and were traced
+        again.
     """
 
     t_s: float
     radiance: Float32Array
+    escaped_share: float = 0.0
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What may be wrong with the picture, one sentence each."""
+        if self.escaped_share <= MOST_ESCAPED:
+            return ()
+        return (
+            f"{self.escaped_share:.2%} of the rays left the closed room between its triangles and "
+            "were traced again, so light near its edges may be wrong; join the vertices there",
+        )
 
 
 @dataclass(frozen=True)
@@ -89,6 +113,9 @@ class Renderer:
         The scene.
     threads
         Threads that trace and fold. Default: one for each processor.
+    report
+        Is called with what is done, such as the tracing of paths, and with the part of it that is,
+        0 to 1: while levels are stepped, an estimate.
     traced
         Renderer of a scene with the same objects, lamps and camera, where nothing moves: its paths
         are taken over.
@@ -104,9 +131,13 @@ class Renderer:
     """
 
     def __init__(
-        self, scene: Scene, threads: int | None = None, traced: "Renderer | None" = None
+        self,
+        scene: Scene,
+        threads: int | None = None,
+        report: Report = lambda what, part: None,
+        traced: "Renderer | None" = None,
     ) -> None:
-        self._scene = scene
+        self._scene, self._report = scene, report
         self._threads = threads or n_processors()
         _require_memory(scene)
         self._matrices = Matrices.of(scene.materials)
@@ -114,6 +145,7 @@ class Renderer:
         geometry = scene.geometry(self._t_s)
         self._material_of_place = geometry.material_of_place
         self._states = _states(scene, geometry)
+        self._albedo_factor = _albedo_factor(scene, self._states, geometry.n_places)
         self._record: Callable[[float, FloatArray], None] | None = None
         self._view: _View | None = None if traced is None else traced._view
         self._charge_at_first()
@@ -144,11 +176,6 @@ class Renderer:
         """Memory of the kept paths in bytes."""
         return 0 if self._view is None else self._view.nbytes
 
-    @property
-    def n_escaped(self) -> int:
-        """Rays that left a closed room between its triangles, and were traced again."""
-        return 0 if self._view is None else self._view.n_escaped
-
     def frame(self, t_s: float) -> Frame:
         """Advance to a time and return its picture.
 
@@ -161,7 +188,8 @@ class Renderer:
         view = self._view_at(t_s)
         camera = self._scene.camera
         light = self._fold_of(self._glow(view, t_s), t_s)(view.of_camera())
-        return Frame(t_s, light.reshape(camera.height_px, camera.width_px, -1))
+        picture = light.reshape(camera.height_px, camera.width_px, -1)
+        return Frame(t_s, picture, view.escaped_share)
 
     def frames(self) -> Iterator[Frame]:
         """Return the pictures at all times of the scene that were not passed yet."""
@@ -282,7 +310,7 @@ class Renderer:
     def _view_at(self, t_s: float) -> "_View":
         """Return paths; they are traced anew only where something moves."""
         if self._view is None or (self._scene.is_moving and self._view.t_s != t_s):
-            self._view = _View(self._scene, t_s, self._threads)
+            self._view = _View(self._scene, t_s, self._threads, self._report)
         return self._view
 
     def _lamps(self, t_s: float) -> Float32Array:
@@ -326,6 +354,7 @@ class Renderer:
             fold,
             matrices=self._matrices,
             material_of_place=self._material_of_place,
+            albedo_factor=self._albedo_factor,
             glow=glow,
             lamps=lamps,
             threads=self._threads,
@@ -347,6 +376,7 @@ class Renderer:
             ]
             if max(changed) < SETTLED:
                 return
+            self._report("charging at the beginning", math.log(max(changed)) / math.log(SETTLED))
 
     def _advance(self, to_s: float) -> None:
         """Step all levels to a time."""
@@ -369,7 +399,7 @@ class Renderer:
         and the end of a step, which is found in rounds. Steps grow while light hardly changes.
         """
         view = self._view_at(begin_s)
-        t_s, step_s = begin_s, 0.0
+        t_s, step_s, n_steps = begin_s, 0.0, 0
         light = self._irradiance(view, begin_s)
         while t_s < end_s:
             step_s = max(step_s, FIRST_STEP / self._fastest(light))
@@ -391,7 +421,8 @@ class Renderer:
             t_s = end_s if step_s == end_s - t_s else t_s + step_s
             change = abs(math.log(max(float(later.sum()), TINY) / max(float(light.sum()), TINY)))
             step_s *= min(GROWTH, MOST_CHANGE / max(change, TINY))
-            light = later
+            light, n_steps = later, n_steps + 1
+            self._report(_levels_until(end_s), n_steps / (n_steps + (end_s - t_s) / step_s))
 
     def _glide(self, light: FloatArray, later: FloatArray, step_s: float) -> None:
         """Step through light that goes over into another, exponentially where both shine."""
@@ -407,10 +438,12 @@ class Renderer:
                 f"{self._scene.file.name}: expected at most {MOST_STEPS} steps between two "
                 f"pictures, got {parts:g}; give a longer 'step_s'"
             )
-        for low, high in pairwise(np.linspace(begin_s, end_s, parts + 1).tolist()):
+        edges = np.linspace(begin_s, end_s, parts + 1).tolist()
+        for number, (low, high) in enumerate(pairwise(edges), 1):
             middle = (low + high) / 2
             view = _View(self._scene, middle, self._threads)
             self._step(self._irradiance(view, middle), high - low)
+            self._report(_levels_until(end_s), number / parts)
 
     def _step(self, light: FloatArray, step_s: float) -> None:
         for state in self._states:
@@ -421,8 +454,12 @@ class Renderer:
         rates = []
         for state in self._states:
             parameters = state.field.parameters
-            kappa = parameters.k_e_per_s @ light[state.places].T
-            rates.append(float(np.max(kappa.max(axis=1) + parameters.k_r_per_s)))
+            samples = light[state.places]
+            if parameters.k_e_per_s.ndim == 2:
+                kappa = parameters.k_e_per_s @ samples.T
+            else:
+                kappa = np.einsum("ibs,sb->is", parameters.k_e_per_s, samples)
+            rates.append(float(np.max(kappa + np.atleast_2d(parameters.k_r_per_s.T).T)))
         return max(rates)
 
 
@@ -431,7 +468,9 @@ class _State:
     """Levels of one phosphor, at all places that are made of it."""
 
     name: str
+    material: int
     places: IntArray
+    texels: IntArray | None
     field: Field
     is_charged: bool
 
@@ -439,9 +478,11 @@ class _State:
 class _View:
     """Paths in the arrangement at one time; the camera's are traced when they are first needed."""
 
-    def __init__(self, scene: Scene, t_s: float, threads: int) -> None:
+    def __init__(
+        self, scene: Scene, t_s: float, threads: int, report: Report = lambda what, part: None
+    ) -> None:
         self.t_s = t_s
-        self._scene, self._threads = scene, threads
+        self._scene, self._threads, self._report = scene, threads, report
         self._geometry = scene.geometry(t_s)
         lamps = LampTable.of(scene.lamps(t_s), self._geometry)
         paths = scene.file.paths
@@ -453,9 +494,12 @@ class _View:
         """Return the paths of all pixels."""
         if not self._of_camera:
             per_pixel = self._scene.file.paths.per_pixel
-            self._of_camera = list(
-                self._tracer.from_camera(self._scene.camera, per_pixel, self._threads)
-            )
+            camera = self._scene.camera
+            n_done, n_pixels = 0, camera.width_px * camera.height_px
+            for paths in self._tracer.from_camera(camera, per_pixel, self._threads):
+                self._of_camera.append(paths)
+                n_done += paths.n_targets
+                self._report("tracing paths of the picture", n_done / n_pixels)
         return self._of_camera
 
     @property
@@ -488,9 +532,10 @@ class _View:
         return sum(each.nbytes for each in self._all)
 
     @property
-    def n_escaped(self) -> int:
-        """Rays that left a closed room."""
-        return sum(each.n_escaped for each in self._all)
+    def escaped_share(self) -> float:
+        """Part of the rays that left a closed room."""
+        n_rays = sum(len(each.place) for each in self._all)
+        return sum(each.n_escaped for each in self._all) / max(n_rays, 1)
 
     def irradiance(self, folded: Callable[..., Float32Array]) -> FloatArray:
         """Return the irradiance at all places with states (places, bands).
@@ -514,11 +559,17 @@ class _View:
         """Return the paths from the places of each surface with states."""
         if self._of_places is None:
             per_place = self._scene.file.paths.per_place
-            self._of_places = {
-                number: list(self._tracer.from_surface(number, per_place, self._threads))
-                for number, surface in enumerate(self._geometry.surfaces)
-                if surface.samples is not None
-            }
+            surfaces = self._geometry.surfaces
+            own = {n: each.n_places for n, each in enumerate(surfaces) if each.samples is not None}
+            n_done, self._of_places = 0, {}
+            for number, n_places in own.items():
+                traced = self._of_places.setdefault(number, [])
+                begun = n_done
+                for paths in self._tracer.from_surface(number, per_place, self._threads):
+                    traced.append(paths)
+                    n_done += paths.n_targets
+                    self._report("tracing paths of phosphors", n_done / sum(own.values()))
+                n_done = begun + n_places
         return self._of_places
 
 
@@ -527,6 +578,10 @@ def _between(light: FloatArray, later: FloatArray, x: float) -> FloatArray:
     both = (light > 0) & (later > 0)
     ratio = np.divide(later, light, out=np.ones_like(light), where=both)
     return np.where(both, light * ratio**x, (1 - x) * light + x * later)
+
+
+def _levels_until(t_s: float) -> str:
+    return f"charging and decay up to {t_s:g} s"
 
 
 def _nearest_lit(lit: IntArray, surface: Surface) -> IntArray:
@@ -553,10 +608,42 @@ def _states(scene: Scene, geometry: Geometry) -> list[_State]:
             continue
         given = entries[number].levels
         is_charged = given == "charged"
-        field = Field(material.parameters, len(places), 0.0 if given == "charged" else given)
+        texels, parameters = None, material.parameters
+        if material.texture is not None:
+            texels = _texels(material, number, geometry)[places]
+            parameters = parameters.at(texels)
+        field = Field(parameters, len(places), 0.0 if given == "charged" else given)
         name = list(scene.file.materials)[number]
-        states.append(_State(name, places.astype(np.int32), field, is_charged))
+        states.append(_State(name, number, places.astype(np.int32), texels, field, is_charged))
     return states
+
+
+def _texels(material: SurfaceMaterial, number: int, geometry: Geometry) -> IntArray:
+    """Return the texel of a material's texture at every place, zero of others, shape (places,)."""
+    assert material.texture is not None
+    texels = np.zeros(geometry.n_places, np.int32)
+    for index, surface in enumerate(geometry.surfaces):
+        own = geometry.places_of(index)
+        if surface.samples is None or not (geometry.material_of_place[own] == number).any():
+            continue
+        if (uv := surface.uv_of_places) is None:
+            raise UsageError(
+                f"{surface.name}: expected texture coordinates for the 'texture' of "
+                f"{material.name}, got a surface without"
+            )
+        texels[own] = material.texture.texel_at(uv)
+    return texels
+
+
+def _albedo_factor(scene: Scene, states: list[_State], n_places: int) -> Float32Array | None:
+    """Return the factor of the albedo of every place, None where there is none."""
+    factor = np.ones(n_places, np.float32)
+    for state in states:
+        texture = scene.materials[state.material].texture
+        of_texel = None if texture is None else texture.texels("albedo_factor")
+        if of_texel is not None and state.texels is not None:
+            factor[state.places] = of_texel[state.texels]
+    return None if (factor == 1).all() else factor
 
 
 def _require_memory(scene: Scene) -> None:
@@ -568,12 +655,17 @@ def _require_memory(scene: Scene) -> None:
     camera, paths = scene.file.camera, scene.file.paths
     places = sum(
         surface.n_places
-        for surface in scene.geometry(scene.file.programme[0].at_s).surfaces
+        for surface in scene.surfaces(scene.file.programme[0].at_s)
         if surface.samples is not None
     )
     n_paths = camera.width_px * camera.height_px * paths.per_pixel + places * paths.per_place
     needed = scene.path_length.nbytes(n_paths, len(scene.file.lamps))
     needed += MOST_COPIES * 4 * len(scene.bands) * (places + camera.width_px * camera.height_px)
+    needed += OF_TEXEL * places
+    for material in scene.materials:
+        if material.texture is not None and material.parameters is not None:
+            states = material.parameters.n_states
+            needed += 4 * states * (1 + 2 * len(scene.bands)) * places
     if needed > LARGEST_PART * there:
         raise UsageError(
             f"{scene.file.name}: expected paths that fit into {LARGEST_PART * there / 1e9:.1f} GB, "

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
+from labrig.reproduce.draft_file import replaced
 
 Bytes = NDArray[np.uint8]
 
@@ -104,9 +105,19 @@ def write_video(path: Path, frames: Iterable[Bytes], frames_per_s: float) -> Non
     first = next(remaining, None)
     if first is None:
         raise UsageError(f"{path}: expected at least one frame, got none")
-    height, width = first.shape[:2]
-    draft = path.with_name(f".{path.stem}.draft{SUFFIX}")
-    command = [
+    with replaced(path) as draft, tempfile.TemporaryFile() as complaints:
+        command = _command(program, first.shape, frames_per_s, draft)
+        with _running(command, complaints) as process:
+            assert process.stdin is not None
+            is_fed = _fed(process.stdin, chain([first], remaining), first.shape)
+        if process.returncode or not is_fed:
+            raise DiskError(f"{path}: ffmpeg could not write it ({_last_line(complaints)})")
+
+
+def _command(program: str, shape: tuple[int, ...], frames_per_s: float, draft: Path) -> list[str]:
+    """Return the command that makes a film of raw frames on its input."""
+    height, width = shape[:2]
+    return [
         program, "-hide_banner", "-loglevel", "error", "-nostdin", "-y",
         "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
         "-framerate", f"{frames_per_s:g}", "-i", "-",
@@ -114,18 +125,6 @@ def write_video(path: Path, frames: Iterable[Bytes], frames_per_s: float) -> Non
         "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1",
         "-movflags", "+faststart", os.fspath(draft),
     ]  # fmt: skip
-    try:
-        with tempfile.TemporaryFile() as complaints:
-            with _running(command, complaints) as process:
-                assert process.stdin is not None
-                is_fed = _fed(process.stdin, chain([first], remaining), first.shape)
-            if process.returncode or not is_fed:
-                raise DiskError(f"{path}: ffmpeg could not write it ({_last_line(complaints)})")
-        draft.replace(path)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 @contextmanager

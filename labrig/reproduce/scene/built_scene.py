@@ -11,8 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.material import Albedo, Material, read_any_material
-from labrig.optics import absolute_irradiance, read_colour_chart, read_light, read_transmittance
+from labrig.material import Albedo, Material, read_any_material, read_mixture
+from labrig.optics import (
+    Transmittance,
+    absolute_irradiance,
+    read_colour_chart,
+    read_light,
+    read_transmittance,
+)
 from labrig.reproduce.scene.scene_file import (
     STRENGTHS,
     AlbedoCurve,
@@ -25,11 +31,13 @@ from labrig.reproduce.scene.scene_file import (
     read_scene,
 )
 from labrig.reproduce.surface.bands import Bands
+from labrig.reproduce.surface.parameter_texture import read_parameter_texture
 from labrig.reproduce.surface.surface_material import (
     BenchLight,
     SurfaceMaterial,
     of_albedo,
     of_matrix,
+    of_mixture,
     of_phosphor,
 )
 from labrig.reproduce.transport.geometry import Geometry, Samples, Surface
@@ -175,9 +183,13 @@ class Scene:
         content["frames_s"] = [part.at_s for part in programme][:1]
         return replace(self, file=validate(content, SceneFile, self.file.name))
 
+    def surfaces(self, t_s: float) -> tuple[Surface, ...]:
+        """Return the objects at a time in s, in the order of the scene."""
+        return tuple(surface(t_s) for surface in self._surfaces)
+
     def geometry(self, t_s: float) -> Geometry:
-        """Return the surfaces at a time in s."""
-        return Geometry.of([surface(t_s) for surface in self._surfaces])
+        """Return all triangles at a time in s."""
+        return Geometry.of(self.surfaces(t_s))
 
     def lamps(self, t_s: float) -> tuple[Lamp, ...]:
         """Return the lamps at a time in s, at their full strength."""
@@ -285,7 +297,10 @@ def build_scene(
         _surface(name, entry, folder, numbers, lamps, materials)
         for name, entry in file.objects.items()
     )
-    return Scene(file, bands, materials, surfaces, folder)
+    scene = Scene(file, bands, materials, surfaces, folder)
+    # A camera that sees nothing is refused before a folder is made for its pictures.
+    _ = scene.camera
+    return scene
 
 
 def _bench_light(file: SceneFile, folder: Path) -> BenchLight:
@@ -306,7 +321,13 @@ def _replaced(
         name: (
             (
                 entry.model_copy(
-                    update={"file": replaced[name], "albedo": None, "chart_patch": None}
+                    update={
+                        "file": replaced[name],
+                        "albedo": None,
+                        "chart_patch": None,
+                        "mixture": None,
+                        "texture": None,
+                    }
                 ),
                 Path(),
             )
@@ -330,31 +351,52 @@ def _material(
     bench: BenchLight,
     assumptions: Assumptions,
 ) -> SurfaceMaterial:
-    if entry.chart_patch is not None:
-        patch = read_colour_chart("colorchecker")[entry.chart_patch - 1]
-        return of_albedo(name, patch, bands)
-    if isinstance(entry.albedo, str):
-        return of_albedo(name, read_transmittance(_beside(entry.albedo, folder)), bands)
-    if isinstance(entry.albedo, AlbedoCurve):
-        return of_albedo(name, Albedo(**entry.albedo.model_dump()), bands)
-    if entry.albedo is not None:
-        return of_albedo(name, entry.albedo, bands)
+    stored = None if entry.mixture is None else read_mixture(folder / entry.mixture)
+    albedo = _reflectance(entry, folder)
+    if albedo is not None:
+        if stored is None or not entry.is_fluorescent:
+            return of_albedo(name, albedo, bands)
+        return of_mixture(name, stored, albedo, bands)
     assert entry.file is not None
     material = read_any_material(_beside(entry.file, folder))
+    if stored is not None:
+        if isinstance(material, Material):
+            raise UsageError(
+                f"{name}: expected 'file' to be a measured matrix, whose reflectance the 'mixture' "
+                f"needs, got the phosphor {material.name}"
+            )
+        if entry.is_fluorescent:
+            return _named(name, of_mixture(material.name, stored, material, bands))
     if not isinstance(material, Material):
+        if entry.texture is not None:
+            raise UsageError(
+                f"{name}: expected a phosphor for 'texture', got the matrix {material.name}"
+            )
         if not entry.is_fluorescent:
             material = replace(material, reradiation=np.zeros_like(material.reradiation))
         return _named(name, of_matrix(material, bands))
-    albedo, scale = entry.assume_albedo, entry.assume_scale
+    assumed, scale = entry.assume_albedo, entry.assume_scale
     phosphor = of_phosphor(
         material,
         bands,
         bench,
-        albedo if assumptions.albedo is None else assumptions.albedo,
+        assumed if assumptions.albedo is None else assumptions.albedo,
         scale if assumptions.scale is None else assumptions.scale,
         entry.prompt,
+        None if entry.texture is None else read_parameter_texture(folder / entry.texture),
     )
     return _named(name, phosphor)
+
+
+def _reflectance(entry: MaterialEntry, folder: Path) -> Albedo | Transmittance | float | None:
+    """Return the reflectance that a scene gives a material, None of one that its file has."""
+    if entry.chart_patch is not None:
+        return read_colour_chart("colorchecker")[entry.chart_patch - 1]
+    if isinstance(entry.albedo, str):
+        return read_transmittance(_beside(entry.albedo, folder))
+    if isinstance(entry.albedo, AlbedoCurve):
+        return Albedo(**entry.albedo.model_dump())
+    return entry.albedo
 
 
 def _named(name: str, material: SurfaceMaterial) -> SurfaceMaterial:

@@ -91,6 +91,9 @@ class MaterialEntry(_Part):
     albedo
         Albedo of a surface that only reflects: a number, a curve, or the name of a file with a
         reflectance.
+    mixture
+        File with a mixture that stands for the re-radiation (`fit.json` of `labrig fit mixture`),
+        beside what has the reflectance: `albedo`, `chart_patch`, or `file`, a measured matrix.
     chart_patch
         Number of a patch of the ColorChecker, 1 to 24, whose reflectance the surface has.
     assume_albedo
@@ -100,6 +103,10 @@ class MaterialEntry(_Part):
     is_fluorescent
         Whether a measured re-radiation matrix is used whole; else its reflectance only, to see what
         re-radiation contributes.
+    texture
+        File (.npz) with parameters of a phosphor that differ from place to place, which take the
+        place of those in `file`: any of `k_r_per_s`, `k_e_per_s`, `reradiation` and
+        `albedo_factor`.
     prompt
         Part of the captures that find their trap filled and emit at once, 0 to 1.
     levels
@@ -109,10 +116,12 @@ class MaterialEntry(_Part):
 
     file: str | None = None
     albedo: Annotated[float, Field(ge=0, lt=1)] | AlbedoCurve | str | None = None
+    mixture: Name | None = None
     chart_patch: Annotated[int, Field(ge=1, le=24)] | None = None
     assume_albedo: Annotated[float, Field(ge=0, lt=1)] | None = None
     assume_scale: Positive | None = None
     is_fluorescent: bool = True
+    texture: Name | None = None
     prompt: Annotated[float, Field(ge=0, le=1)] = 0.0
     levels: Annotated[float, Field(ge=0, le=1)] | Literal["charged"] = 0.0
 
@@ -124,6 +133,8 @@ class MaterialEntry(_Part):
         if len(given) != 1:
             got = " and ".join(f"'{name}'" for name in given) or "none of them"
             raise ValueError(f"expected one of 'file', 'albedo' and 'chart_patch', got {got}")
+        if self.texture is not None and (self.file is None or self.mixture is not None):
+            raise ValueError("expected 'texture' beside the 'file' of a phosphor")
         return self
 
 

@@ -82,8 +82,9 @@ def step_first_order(
                 own = k_r[state, begin : begin + size]
                 for s in range(size):
                     rate[s] = kappa[s] + own[s] * duration
-            # e^(−x) = 2^(−n) 2^(n − x log₂e): the first factor is the exponent's bits. The loops
-            # are apart, or the compiler computes the samples one by one.
+            # e^(−x) = 2^(−n) 2^(n − x log₂e): the first factor is the exponent's bits. Of a short
+            # step, n = 0, e^(−x) − 1 is taken, or the same rounding in every step would add up. The
+            # loops are apart, or the compiler computes the samples one by one.
             for s in range(size):
                 bits[s] = np.int32(min(rate[s] * LOG2_E, LARGEST) + HALF)
             level = levels[state, begin : begin + size]
@@ -96,11 +97,12 @@ def step_first_order(
                 p = p * x + C4
                 p = p * x + C3
                 p = p * x + C2
-                p = p * x + C1
-                p = p * x + ONE
+                p = (p * x + C1) * x
                 bits[s] = (ZERO_EXPONENT - n) << MANTISSA_BITS
                 steady = kappa[s] / (rate[s] + TINY)
-                level[s] = steady + (level[s] - steady) * p * power[s]
+                whole = np.float32(0) if n == 0 else power[s]
+                begin_at = level[s] if n == 0 else steady
+                level[s] = begin_at + (level[s] - steady) * (p * power[s] + whole)
     return True
 
 

@@ -1,6 +1,6 @@
 """Parameters of a material's states for a field of samples, of one material or of a texture."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -123,6 +123,22 @@ class FieldParameters:
             [state.kinetic_order for state in material.states],
             prompt,
         )
+
+    def at(self, texels: NDArray[np.int32]) -> Self:
+        """Return the parameters of samples, each of which has those of a texel of these textures.
+
+        Parameters
+        ----------
+        texels
+            Number of the texel of each sample, shape (samples,).
+        """
+        k_r, k_e, emitted = (
+            np.ascontiguousarray(each[..., texels]) if each.ndim > plain else each
+            for each, plain in (
+                (self.k_r_per_s, 1), (self.k_e_per_s, 2), (self.reradiation, 2)
+            )
+        )  # fmt: skip
+        return replace(self, k_r_per_s=k_r, k_e_per_s=k_e, reradiation=emitted)
 
     @property
     def n_states(self) -> int:

@@ -4,22 +4,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
 from labrig.material import (
     Albedo,
     Material,
     ReradiationMatrix,
+    StoredMixture,
     physical_warnings,
 )
-from labrig.optics import Spectrum, Transmittance
+from labrig.optics import Spectrum, Transmittance, edges_from_centres
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.field_parameters import FieldParameters
+from labrig.reproduce.surface.parameter_texture import ParameterTexture
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 
+#: Negative re-radiation, as a part of the light of a band, that is told, and that is refused.
+TOLD_NEGATIVE, REFUSED_NEGATIVE = 0.005, 0.05
 #: Relative difference up to which Λ of all states has the shape of the finer spectrum.
 SAME_SHAPE = 0.05
 
@@ -58,15 +62,19 @@ class SurfaceMaterial:
         Matrix M of what comes back at once: the albedo on its diagonal, re-radiation off it; shape
         (bands out, bands in).
     parameters
-        Parameters of the glow in the scene's units; None of a material that does not glow.
+        Parameters of the glow in the scene's units, of each texel of `texture` where they differ;
+        None of a material that does not glow.
     notes
         What was assumed or is missing, one sentence each.
+    texture
+        Parameters that differ from place to place; None where all are the same.
     """
 
     name: str
     matrix: Float32Array
     parameters: FieldParameters | None = None
     notes: tuple[str, ...] = ()
+    texture: ParameterTexture | None = None
 
     @property
     def is_diagonal(self) -> bool:
@@ -149,26 +157,99 @@ def of_matrix(matrix: ReradiationMatrix, bands: Bands) -> SurfaceMaterial:
             f"{matrix.name}: expected a re-radiation in 1/nm, got a relative one; measure the "
             "brightness of the lights that excite it"
         )
-    notes = physical_warnings(matrix)
-    low, high = (
-        max(matrix.output_edges_nm[0], bands.edges_nm[0]),
-        min(matrix.output_edges_nm[-1], bands.edges_nm[-1]),
+    return _fluorescent(matrix, _albedo_in_bands(_reflectance_of(matrix), bands), bands)
+
+
+def of_mixture(
+    name: str,
+    stored: StoredMixture,
+    reflectance: Albedo | Transmittance | ReradiationMatrix | float,
+    bands: Bands,
+) -> SurfaceMaterial:
+    """Return a fluorescent surface whose re-radiation is a mixture.
+
+    The mixture is evaluated at the centres of the bands on which it was fitted, and this matrix is
+    brought into the bands of the rendering as every other by `of_matrix`.
+
+    Parameters
+    ----------
+    name
+        Name of the material.
+    stored
+        The mixture with its bands.
+    reflectance
+        Radiance factor without re-radiation, which a mixture does not have: of a surface, or that
+        of a measured matrix.
+    bands
+        Bands of the rendering.
+
+    Returns
+    -------
+    SurfaceMaterial
+        The surface in these bands.
+
+    Raises
+    ------
+    UsageError
+        No band overlaps, the matrix has no reflectance, or the largest eigenvalue reaches 1.
+    DataError
+        It returns more light than any surface does, see `physical_warnings`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.fit import fit_mixture
+    >>> from labrig.material import read_mixture, read_reradiation
+    >>> from labrig.reproduce import Bands, of_matrix, of_mixture
+    >>> paper = read_reradiation("paper.csv")
+    >>> _ = Path("fit.json").write_text(fit_mixture(paper, 3, threshold=1e-3).to_json())
+    >>> dyed = of_mixture("paper", read_mixture("fit.json"), paper, Bands.even())
+    >>> bool(abs(dyed.matrix - of_matrix(paper, Bands.even()).matrix).max() < 0.02)
+    True
+    """
+    surface = (
+        _reflectance_of(reflectance) if isinstance(reflectance, ReradiationMatrix) else reflectance
     )
-    if low >= high:
-        raise UsageError(
-            f"{matrix.name}: expected bands that overlap those of the rendering, "
-            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got "
-            f"{matrix.output_edges_nm[0]:g} to {matrix.output_edges_nm[-1]:g} nm"
-        )
-    into = bands.overlap_nm(matrix.output_edges_nm) / bands.width_nm
-    absorbed = bands.overlap_nm(matrix.input_edges_nm)
-    reradiated = into.T @ np.nan_to_num(matrix.reradiation) @ absorbed
+    output_nm = stored.output_nm(bands.edges_nm[0], bands.edges_nm[-1])
+    on_output = _albedo_in_bands(surface, Bands(edges_from_centres(output_nm)))
+    matrix = stored.to_matrix(output_nm, on_output, name)
+    return _fluorescent(matrix, _albedo_in_bands(surface, bands), bands)
+
+
+def _reflectance_of(matrix: ReradiationMatrix) -> Spectrum:
+    """Return the measured reflectance of a matrix."""
     known = ~np.isnan(matrix.reflectance)
     if not known.any():
         raise UsageError(f"{matrix.name}: expected a reflectance, got none in its file")
-    reflectance = _in_bands(matrix.output_nm[known], matrix.reflectance[known], bands)
+    return Spectrum(matrix.name, matrix.output_nm[known], matrix.reflectance[known])
+
+
+def _fluorescent(
+    matrix: ReradiationMatrix, reflectance: FloatArray, bands: Bands
+) -> SurfaceMaterial:
+    """Return a surface of a reflectance in the bands, and of a matrix's re-radiation."""
+    notes = physical_warnings(matrix)
+    for edges_nm in (matrix.output_edges_nm, matrix.input_edges_nm):
+        _require_overlap(matrix.name, edges_nm, bands)
+    into = bands.overlap_nm(matrix.output_edges_nm) / bands.width_nm
+    absorbed = bands.overlap_nm(matrix.input_edges_nm)
+    reradiated = into.T @ np.nan_to_num(matrix.reradiation) @ absorbed
+    notes += _negative_notes(reradiated, bands)
     return SurfaceMaterial(
         matrix.name, _checked(matrix.name, np.diag(reflectance) + reradiated), None, notes
+    )
+
+
+def _negative_notes(reradiated: FloatArray, bands: Bands) -> tuple[str, ...]:
+    """Return a note on re-radiation that takes light away instead of giving it back."""
+    out, into = np.unravel_index(int(np.argmin(reradiated)), reradiated.shape)
+    lowest = float(reradiated[out, into])
+    if lowest >= -TOLD_NEGATIVE:
+        return ()
+    return (
+        f"noise of its matrix takes up to {-lowest:.1%} of light away instead of re-radiating it "
+        f"(at {bands.centre_nm[out]:g} nm, of light at {bands.centre_nm[into]:g} nm); a mixture "
+        "(labrig fit mixture) does not",
     )
 
 
@@ -179,6 +260,7 @@ def of_phosphor(
     albedo: float | None = None,
     reradiation_scale: float | None = None,
     prompt: float = 0.0,
+    texture: ParameterTexture | None = None,
 ) -> SurfaceMaterial:
     """Return a phosphorescent surface, with rates in the units of the scene.
 
@@ -202,6 +284,8 @@ def of_phosphor(
         the material has no scale.
     prompt
         Part η of captures that emit at once.
+    texture
+        Parameters of each texel in the bands and units of the material, instead of its own.
 
     Returns
     -------
@@ -211,7 +295,8 @@ def of_phosphor(
     Raises
     ------
     UsageError
-        Λ, albedo or scale is missing, no band overlaps, or an albedo reaches 1.
+        Λ, albedo or scale is missing, no band overlaps, an albedo reaches 1, or the texture has
+        another number of states or bands.
 
     Examples
     --------
@@ -224,15 +309,12 @@ def of_phosphor(
     'its albedo is assumed to be 0.7 at all wavelengths'
     """
     rates = FieldParameters.of(material, prompt)
+    if texture is not None:
+        rates = _textured(material.name, rates, texture)
     assert material.bands_nm is not None
     edges = material.bands_nm
+    _require_overlap(material.name, edges, bands)
     overlap = bands.overlap_nm(edges)
-    if not overlap.any():
-        raise UsageError(
-            f"{material.name}: expected bands that overlap those of the rendering, "
-            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got {edges[0]:g} to "
-            f"{edges[-1]:g} nm"
-        )
     notes = []
     if (surface := material.albedo or albedo) is None:
         raise UsageError(
@@ -253,7 +335,7 @@ def of_phosphor(
         notes.append(
             f"the scale of its glow is assumed to be {reradiation_scale:g} s/sr for a Λ of 1"
         )
-    if all(state.k_e_per_s is None for state in material.states):
+    if not rates.k_e_per_s.any():
         notes.append("it has no excitation rates, so light does not charge it")
     k_e = rates.k_e_per_s.astype(np.float64)
     if material.irradiance_norm is not None:
@@ -261,31 +343,87 @@ def of_phosphor(
     reflected = _checked(material.name, np.diag(_albedo_in_bands(surface, bands)))
     parameters = FieldParameters.checked(
         rates.k_r_per_s,
-        k_e @ overlap,
+        in_bands(k_e, overlap),
         factor * _spread(material, rates.reradiation.astype(np.float64), bands),
         rates.order,
         prompt,
     )
-    _require_fading(material, reflected, parameters)
-    return SurfaceMaterial(material.name, reflected, parameters, tuple(notes))
+    albedo_factor = None if texture is None else texture.texels("albedo_factor")
+    _require_fading(material.name, reflected.diagonal(), albedo_factor, parameters)
+    return SurfaceMaterial(material.name, reflected, parameters, tuple(notes), texture)
 
 
-def _require_fading(material: Material, matrix: Float32Array, rates: FieldParameters) -> None:
+def _textured(name: str, rates: FieldParameters, texture: ParameterTexture) -> FieldParameters:
+    """Return rates in which what a texture has takes the place of the material's."""
+    arrays = []
+    for what in ("k_r_per_s", "k_e_per_s", "reradiation"):
+        own, texels = getattr(rates, what), texture.texels(what)
+        if texels is not None and texels.shape[:-1] != own.shape:
+            raise UsageError(
+                f"{name}: expected a texture of {what} with {' × '.join(map(str, own.shape))} "
+                "numbers for each texel, states and bands, as the material has, got "
+                f"{' × '.join(map(str, texels.shape[:-1]))}"
+            )
+        arrays.append(own if texels is None else texels)
+    k_r, k_e, emitted = arrays
+    return FieldParameters.checked(k_r, k_e, emitted, rates.order, rates.prompt)
+
+
+def in_bands(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return sums over the bands of values (states, bands[, samples]) with weights (bands, n)."""
+    return np.asarray(np.moveaxis(np.tensordot(values, weights, axes=(1, 0)), -1, 1))
+
+
+def _require_overlap(name: str, edges_nm: ArrayLike, bands: Bands) -> None:
+    """Refuse a material that was measured in no band of the rendering."""
+    if not bands.overlap_nm(edges_nm).any():
+        first, *_, last = np.asarray(edges_nm)
+        raise UsageError(
+            f"{name}: expected bands that overlap those of the rendering, "
+            f"{bands.edges_nm[0]:g} to {bands.edges_nm[-1]:g} nm, got {first:g} to {last:g} nm"
+        )
+
+
+def _require_fading(
+    name: str, albedo: Float32Array, factor: Float32Array | None, rates: FieldParameters
+) -> None:
     """Refuse a phosphor that in a closed room of its own would glow ever more.
 
-    In weak light a state emits in the end Λ κ: all of it comes back to the walls of such a room.
+    In weak light a state emits in the end Λ κ. All of it comes back to the walls of such a room,
+    again and again as they reflect it: 1/(1 − albedo) times in all.
     """
-    glow = np.pi * rates.reradiation.T.astype(np.float64) @ rates.k_e_per_s
-    largest = float(np.abs(np.linalg.eigvals(matrix + glow)).max())
+    factors = np.ones(1) if factor is None else factor.astype(np.float64)
+    if not float(factors.max()) * float(albedo.max()) < 1:
+        raise UsageError(
+            f"{name}: expected an albedo below 1 everywhere, got {albedo.max():.3g} with a factor "
+            f"of {factors.max():.3g} in the texture"
+        )
+    k_e, reradiation = (
+        each[..., np.newaxis] if each.ndim == 2 else each
+        for each in (rates.k_e_per_s.astype(np.float64), rates.reradiation.astype(np.float64))
+    )
+    lasting = 1 / (1 - factors * albedo[:, np.newaxis])
+    # Excitation of state i by the glow of state j, for each sample.
+    among = np.pi * np.einsum("ibs,jbs->sij", k_e * lasting, reradiation)
+    largest = float(np.abs(np.linalg.eigvals(among)).max())
     if not largest < 1:
         raise UsageError(
-            f"{material.name}: expected a glow of less light than it takes, got {largest:.3g} "
+            f"{name}: expected a glow of less light than it takes, got {largest:.3g} "
             "times as much; the scale of Λ or the bench's light (bench_light) is wrong"
         )
 
 
 def _spread(material: Material, reradiation: FloatArray, bands: Bands) -> FloatArray:
-    """Return Λ of each state in the bands of the rendering, shape (states, bands)."""
+    """Return Λ (states, bands[, samples]) in the bands of the rendering."""
+    if reradiation.ndim == 2:
+        return _spread_rows(material, reradiation, bands)
+    rows = np.moveaxis(reradiation, 1, -1)
+    spread = _spread_rows(material, rows.reshape(-1, rows.shape[-1]), bands)
+    return np.moveaxis(spread.reshape(*rows.shape[:-1], -1), -1, 1)
+
+
+def _spread_rows(material: Material, reradiation: FloatArray, bands: Bands) -> FloatArray:
+    """Return spectra Λ (n, bands) in the bands of the rendering."""
     assert material.bands_nm is not None
     edges = np.array(material.bands_nm)
     flat = reradiation @ bands.overlap_nm(edges) / bands.width_nm
@@ -302,7 +440,7 @@ def _spread(material: Material, reradiation: FloatArray, bands: Bands) -> FloatA
     return np.outer(strength, bands.means(fine))
 
 
-def _albedo_in_bands(albedo: Albedo | Transmittance | float, bands: Bands) -> FloatArray:
+def _albedo_in_bands(albedo: Albedo | Transmittance | Spectrum | float, bands: Bands) -> FloatArray:
     if isinstance(albedo, float | int):
         return np.full(len(bands), float(albedo))
     return _in_bands(np.array(albedo.wavelength_nm), np.array(albedo.value), bands)
@@ -318,7 +456,7 @@ def _in_bands(wavelength_nm: FloatArray, values: FloatArray, bands: Bands) -> Fl
 
 def _checked(name: str, matrix: FloatArray) -> Float32Array:
     """Return a matrix of which light is lost at every bounce."""
-    if not np.isfinite(matrix).all() or matrix.min() < -0.05:
+    if not np.isfinite(matrix).all() or matrix.min() < -REFUSED_NEGATIVE:
         raise UsageError(f"{name}: expected an albedo and re-radiation that are finite and ≥ 0")
     largest = float(np.abs(np.linalg.eigvals(matrix)).max())
     if largest >= 1:

@@ -59,6 +59,7 @@ def fold(
     lamps: Float32Array,
     threads: int,
     *,
+    albedo_factor: Float32Array | None = None,
     incident: bool = False,
 ) -> Float32Array:
     """Return the light of kept paths, the mean for each pixel or place.
@@ -77,6 +78,8 @@ def fold(
         Light of each lamp, see `Lamp`, shape (lamps, bands).
     threads
         Threads that fold at the same time.
+    albedo_factor
+        Factor of what the material of each place returns, shape (places,); None for 1 everywhere.
     incident
         Whether the irradiance at the first vertices is wanted, in W m⁻² nm⁻¹, instead of the
         radiance from them in W m⁻² sr⁻¹ nm⁻¹.
@@ -106,9 +109,12 @@ def fold(
     [2.0, 2.0, 2.0]
     """
     fold_paths = compiled("transport.folding_kernels").fold_paths
+    if albedo_factor is None:
+        albedo_factor = np.ones(len(material_of_place), np.float32)
     arguments = (
         matrices.values, matrices.first, matrices.last, matrices.is_diagonal,
         np.ascontiguousarray(material_of_place, dtype=np.int32),
+        np.ascontiguousarray(albedo_factor, dtype=np.float32),
         np.ascontiguousarray(glow, dtype=np.float32),
         np.ascontiguousarray(lamps, dtype=np.float32), incident,
     )  # fmt: skip

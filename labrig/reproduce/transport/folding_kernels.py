@@ -32,6 +32,7 @@ def fold_paths(
     row_last: IntArray,
     is_diagonal: NDArray[np.bool_],
     material_of_place: IntArray,
+    albedo_factor: Float32Array,
     glow: Float32Array,
     lamps: Float32Array,
     incident: bool,
@@ -43,8 +44,8 @@ def fold_paths(
     ----------
     per_target, first, place, weight, light, seen_lamp
         The paths.
-    matrices, row_first, row_last, is_diagonal, material_of_place
-        Matrices (materials, bands in, bands out), and of which place each is.
+    matrices, row_first, row_last, is_diagonal, material_of_place, albedo_factor
+        Matrices (materials, bands in, bands out), of which place each is, and its factor there.
     glow, lamps
         Glow (places, bands) and lamps (lamps, bands).
     incident
@@ -80,6 +81,9 @@ def fold_paths(
                     radiance[band] = glow[here, band]
                 if material < 0:
                     continue
+                if albedo_factor[here] != 1:
+                    for band in range(bands):
+                        coming[band] *= albedo_factor[here]
                 if is_diagonal[material]:
                     for band in range(bands):
                         radiance[band] += matrices[material, band, band] * coming[band]

@@ -1,6 +1,6 @@
 """Surfaces of a scene as one list of triangles, and the places on them that have states."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, Self, TypeAlias
@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.reproduce.compiled import compiled
 from labrig.reproduce.transport.mesh import Mesh
+from labrig.reproduce.transport.start_points import OnParticles, OnTexels, OnVertices, StartPoints
+from labrig.reproduce.transport.texel_map import TexelMap
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
@@ -22,10 +23,6 @@ Samples: TypeAlias = tuple[int, int] | Literal["vertices", "particles"] | None
 ONE_PLACE, TEXELS, VERTICES = 0, 1, 2
 #: Vertices of the octahedron that a particle is.
 OF_PARTICLE = 6
-#: Points along each edge of a texel at which its place on the surface is looked up.
-LOOKUPS = 4
-#: Part of the looked-up points that may belong to two triangles: rounding along their edges.
-SHARED_POINTS = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,22 +66,14 @@ class Surface:
             return len(self.mesh.vertices_m) // OF_PARTICLE
         return self.samples[0] * self.samples[1]
 
-
-@dataclass(frozen=True, eq=False)
-class StartPoints:
-    """Points on surfaces, several in a row for each place.
-
-    Attributes
-    ----------
-    position_m, normal
-        Points in m from the geometry's `origin_m`, and unit normals there, shape (n, 3).
-    place
-        Place of each point, shape (n,).
-    """
-
-    position_m: Float32Array
-    normal: Float32Array
-    place: IntArray
+    @property
+    def uv_of_places(self) -> FloatArray | None:
+        """Texture coordinates of its places, shape (places, 2); None where it has none."""
+        if isinstance(self.samples, tuple):
+            columns, rows = self.samples
+            row, column = np.divmod(np.arange(columns * rows), columns)
+            return np.stack([(column + 0.5) / columns, (row + 0.5) / rows], axis=1)
+        return self.mesh.uv if self.samples == "vertices" else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +96,11 @@ class Geometry:
         A row for each surface: kind of its places, first place, columns, rows, lamp, two-sided.
     material_of_place
         Number of the material of each place, shape (places,); -1 is black.
+    chart_of_face, chart_of_place
+        Chart of each triangle (m,) and of each texel (places,), of surfaces with texels; see
+        `TexelMap`.
+    texel_maps
+        Maps of the surfaces with texels, by their numbers.
     origin_m
         Middle of the scene, from which `triangles` are measured: single precision is finest there.
     """
@@ -119,6 +113,9 @@ class Geometry:
     surface_of_face: IntArray
     table: IntArray
     material_of_place: IntArray
+    chart_of_face: IntArray
+    chart_of_place: IntArray
+    texel_maps: Mapping[int, TexelMap]
     origin_m: FloatArray
 
     @classmethod
@@ -128,18 +125,19 @@ class Geometry:
         Raises
         ------
         UsageError
-            There is no surface, or one with texels has no texture coordinates, or some that are not
-            finite.
+            There is no surface, or the texture coordinates of one with texels do not fit; see
+            `TexelMap`.
         """
         if not surfaces:
             raise UsageError("expected a scene with objects, got none")
         triangles, normals, uvs, corners, owners, rows, materials = [], [], [], [], [], [], []
-        first = 0
+        charts, charts_of_places = [], []
+        maps, first = {}, 0
         for number, surface in enumerate(surfaces):
             mesh, faces = surface.mesh, surface.mesh.faces
             triangles.append(mesh.vertices_m[faces])
             normals.append(mesh.normals)
-            uvs.append(_uv_of(surface)[faces])
+            uvs.append(np.zeros((len(faces), 3, 2)) if mesh.uv is None else mesh.uv[faces])
             owners.append(np.full(len(faces), number))
             is_particle = surface.samples == "particles"
             corners.append((faces // OF_PARTICLE if is_particle else faces) + first)
@@ -156,6 +154,13 @@ class Geometry:
             materials.append(
                 np.full(surface.n_places, surface.material) if own is None else own.ravel()
             )
+            chart = np.zeros(len(faces), np.int32)
+            chart_of_place = np.zeros(surface.n_places, np.int32)
+            if isinstance(surface.samples, tuple):
+                maps[number] = TexelMap.of(surface.name, mesh, surface.samples)
+                chart, chart_of_place = maps[number].chart_of_face, maps[number].chart_of_texel
+            charts.append(chart)
+            charts_of_places.append(chart_of_place)
             first += surface.n_places
         corners_m = np.concatenate(triangles)
         flat = corners_m.reshape(-1, 3)
@@ -169,6 +174,9 @@ class Geometry:
             np.concatenate(owners).astype(np.int32),
             np.array(rows, dtype=np.int32),
             np.concatenate(materials).astype(np.int32),
+            np.concatenate(charts),
+            np.concatenate(charts_of_places),
+            maps,
             origin_m,
         )
 
@@ -203,153 +211,17 @@ class Geometry:
         first = int(self.table[surface, 1])
         return slice(first, first + self.surfaces[surface].n_places)
 
-    def starts(
-        self, surface: int, per_place: int, rng: np.random.Generator, scattered: FloatArray
-    ) -> StartPoints:
-        """Return points on a surface, `per_place` for each place that lies on it.
+    def start_points(self, surface: int) -> StartPoints:
+        """Return the points at which the paths of the places of a surface begin.
 
         Parameters
         ----------
         surface
-            Number of a surface whose states lie on texels or vertices.
-        per_place
-            Points for each place.
-        rng
-            Random numbers that choose triangles or parts of a texel.
-        scattered
-            Even numbers from 0 to 1 that choose points, shape (places, per_place, 2).
-
-        Raises
-        ------
-        UsageError
-            Two parts of the surface share texels, or no texel lies on it.
+            Number of a surface that has places with states of their own.
         """
         own = self.surfaces[surface]
-        first = int(self.table[surface, 1])
         if own.samples == "particles":
-            face, weights, place = _on_particles(own, per_place, rng, scattered)
-        elif own.samples == "vertices":
-            face, weights, place = _around_vertices(own.mesh, per_place, rng, scattered)
-        else:
-            face, weights, place = _on_texels(own, per_place, rng, scattered)
-        corners = own.mesh.vertices_m[own.mesh.faces[face]]
-        return StartPoints(
-            (np.einsum("nk,nkc->nc", weights, corners) - self.origin_m).astype(np.float32),
-            own.mesh.normals[face].astype(np.float32),
-            (place + first).astype(np.int32),
-        )
-
-
-def _uv_of(surface: Surface) -> FloatArray:
-    uv = surface.mesh.uv
-    if isinstance(surface.samples, tuple):
-        if uv is None:
-            raise UsageError(
-                f"{surface.name}: expected texture coordinates for its texels, got a mesh without; "
-                "unwrap it, or give 'samples: vertices'"
-            )
-        if not np.isfinite(uv).all() or uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
-            raise UsageError(
-                f"{surface.name}: expected texture coordinates from 0 to 1, got "
-                f"{np.nanmin(uv):g} to {np.nanmax(uv):g}"
-            )
-    return np.zeros((len(surface.mesh.vertices_m), 2)) if uv is None else uv
-
-
-def _around_vertices(
-    mesh: Mesh, per_place: int, rng: np.random.Generator, scattered: FloatArray
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return triangles, weights of their corners, and vertices, for points near each vertex.
-
-    A point lies the likelier near a vertex the larger the weight of the vertex there, so that the
-    mean over the points is that which the vertex stands for.
-    """
-    vertex, area = mesh.faces.T.ravel(), np.tile(mesh.areas_m2, 3)
-    corner = np.repeat(np.arange(3), len(mesh.faces))
-    order = np.argsort(vertex, kind="stable")
-    vertex, area, corner = vertex[order], area[order], corner[order]
-    face = (order % len(mesh.faces)).astype(np.int32)
-    end = np.cumsum(area)
-    begin_of = np.searchsorted(vertex, np.arange(len(mesh.vertices_m)))
-    end_of = np.searchsorted(vertex, np.arange(len(mesh.vertices_m)), side="right")
-    total = np.r_[0.0, end]
-    place = np.flatnonzero(total[end_of] > total[begin_of]).repeat(per_place)
-    chosen = rng.random(len(place))
-    level = total[begin_of[place]] * (1 - chosen) + total[end_of[place]] * chosen
-    entry = np.clip(np.searchsorted(end, level), begin_of[place], end_of[place] - 1)
-    # Weight w of the corner with density 6 w (1 − w), the rest of the two others evenly.
-    first, second = scattered.reshape(-1, 2)[: len(place)].T
-    own = _inverse_hat(first)
-    weights = np.empty((len(place), 3))
-    rows = np.arange(len(place))
-    weights[rows, corner[entry]] = own
-    weights[rows, (corner[entry] + 1) % 3] = (1 - own) * second
-    weights[rows, (corner[entry] + 2) % 3] = (1 - own) * (1 - second)
-    return face[entry], weights, place.astype(np.int32)
-
-
-def _on_particles(
-    surface: Surface, per_place: int, rng: np.random.Generator, scattered: FloatArray
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return triangles, weights of their corners, and particles, for points on each particle."""
-    place = np.arange(surface.n_places).repeat(per_place)
-    faces = len(surface.mesh.faces) // surface.n_places
-    turn = rng.integers(0, faces, surface.n_places).repeat(per_place)
-    face = faces * place + (turn + np.tile(np.arange(per_place), surface.n_places)) % faces
-    first, second = scattered.reshape(-1, 2)[: len(place)].T
-    root = np.sqrt(first)
-    weights = np.stack([1 - root, root * second, root * (1 - second)], axis=1)
-    return face.astype(np.int32), weights, place.astype(np.int32)
-
-
-def _inverse_hat(evenly: FloatArray) -> FloatArray:
-    """Return w where ∫₀ʷ 6 x (1 − x) dx = 3 w² − 2 w³ is as given: 1/2 − sin(arcsin(1 − 2 x)/3)."""
-    return np.asarray(0.5 - np.sin(np.arcsin(1 - 2 * evenly) / 3))
-
-
-def _on_texels(
-    surface: Surface, per_place: int, rng: np.random.Generator, scattered: FloatArray
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return triangles, weights of their corners, and texels, for points on each texel."""
-    kernels = compiled("transport.tracing_kernels")
-    assert isinstance(surface.samples, tuple)
-    assert surface.mesh.uv is not None
-    columns, rows = surface.samples
-    corners = surface.mesh.uv[surface.mesh.faces].astype(np.float32)
-    face_at, n_shared = kernels.rasterised(corners, columns * LOOKUPS, rows * LOOKUPS)
-    covered = int((face_at >= 0).sum())
-    if not covered:
-        raise UsageError(
-            f"{surface.name}: expected texels on the surface, got none; see its texture"
-        )
-    if n_shared > SHARED_POINTS * covered:
-        raise UsageError(
-            f"{surface.name}: expected every texel at one place, got texture coordinates of which "
-            f"{n_shared / covered:.0%} belong to two triangles; unwrap it without overlap"
-        )
-    parts = face_at.reshape(rows, LOOKUPS, columns, LOOKUPS).swapaxes(1, 2)
-    parts = parts.reshape(rows * columns, LOOKUPS**2)
-    n_parts = (parts >= 0).sum(axis=1)
-    texel = np.flatnonzero(n_parts)
-    # Covered parts first, in their order.
-    order = np.argsort(parts < 0, axis=1, kind="stable")
-    place = texel.repeat(per_place)
-    even = scattered.reshape(-1, 2)[: len(place)]
-    start = rng.integers(0, 2**31, len(texel)).repeat(per_place)
-    turn = (start + np.tile(np.arange(per_place), len(texel))) % n_parts[place]
-    part = order[place, turn]
-    u = ((place % columns) + (part % LOOKUPS + even[:, 0]) / LOOKUPS) / columns
-    v = ((place // columns) + (part // LOOKUPS + even[:, 1]) / LOOKUPS) / rows
-    face, weights = kernels.located_in_texture(
-        corners,
-        face_at,
-        np.stack([u, v], axis=1).astype(np.float32),
-        np.stack(
-            [
-                place // columns * LOOKUPS + part // LOOKUPS,
-                place % columns * LOOKUPS + part % LOOKUPS,
-            ],
-            axis=1,
-        ).astype(np.int32),
-    )
-    return face, weights, place.astype(np.int32)
+            return OnParticles.of(own.mesh, own.n_places)
+        if own.samples == "vertices":
+            return OnVertices.of(own.mesh)
+        return OnTexels.of(own.mesh, self.texel_maps[surface])

@@ -1,5 +1,6 @@
 """Triangle meshes: shapes that a scene file names, and files."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -289,24 +290,80 @@ def read_mesh(path: Path) -> Mesh:
         raise UsageError(f"{path}: expected a mesh as {', '.join(FORMATS)}, got '{path.suffix}'")
     if not path.is_file():
         raise UsageError(f"{path}: expected a file with a mesh, got no such file")
-    trimesh = _trimesh()
     try:
-        loaded = trimesh.load(path, force="mesh", process=False)
-        vertices = np.asarray(loaded.vertices, dtype=np.float64)
-        faces = np.asarray(loaded.faces, dtype=np.int32)
+        parts = _parts(path)
     except (ValueError, KeyError, IndexError, AttributeError, TypeError, OSError) as error:
         raise UsageError(
             f"{path}: expected a mesh, got a file that cannot be read ({error})"
         ) from None
-    if not len(faces) or not np.isfinite(vertices).all():
+    n_faces = sum(len(part.faces) for part in parts)
+    if not n_faces or not all(np.isfinite(part.vertices_m).all() for part in parts):
         raise UsageError(
-            f"{path}: expected triangles with finite vertices, got {len(faces)} triangles"
+            f"{path}: expected triangles with finite vertices, got {n_faces} triangles"
         )
-    uv = getattr(loaded.visual, "uv", None)
-    mesh = Mesh(vertices, faces, None if uv is None else np.asarray(uv, dtype=np.float64))
+    if len({part.uv is None for part in parts}) > 1 or _is_partly_unwrapped(path):
+        raise UsageError(
+            f"{path}: expected texture coordinates on all faces or on none, got them on some; "
+            "unwrap all of the mesh"
+        )
+    mesh = _joined(parts)
     if not mesh.area_m2 > 0:
         raise UsageError(f"{path}: expected triangles with an area, got none")
     return mesh
+
+
+def _parts(path: Path) -> list[Mesh]:
+    """Return the meshes of a file, each with one material, where its scene has them."""
+    trimesh = _trimesh()
+    loaded = trimesh.load(path, process=False)
+    placed = [(np.eye(4), loaded)]
+    if isinstance(loaded, trimesh.Scene):
+        # In an order that does not depend on the run.
+        nodes = [loaded.graph[node] for node in sorted(loaded.graph.nodes_geometry)]
+        placed = [(transform, loaded.geometry[name]) for transform, name in nodes]
+    meshes = []
+    for transform, part in placed:
+        if not isinstance(part, trimesh.Trimesh):
+            continue
+        uv = getattr(part.visual, "uv", None)
+        vertices = np.asarray(part.vertices, dtype=np.float64)
+        meshes.append(
+            Mesh(
+                vertices @ transform[:3, :3].T + transform[:3, 3],
+                np.asarray(part.faces, dtype=np.int32),
+                None if uv is None or not len(uv) else np.asarray(uv, dtype=np.float64),
+            )
+        )
+    return meshes
+
+
+def _joined(parts: Sequence[Mesh]) -> Mesh:
+    """Return several meshes as one, all or none with texture coordinates."""
+    first = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
+    faces = [part.faces + begin for part, begin in zip(parts, first, strict=False)]
+    uvs = [part.uv for part in parts if part.uv is not None]
+    return Mesh(
+        np.concatenate([part.vertices_m for part in parts]),
+        np.concatenate(faces).astype(np.int32),
+        np.concatenate(uvs) if uvs else None,
+    )
+
+
+def _is_partly_unwrapped(path: Path) -> bool:
+    """Return whether an OBJ file has texture coordinates on some of its faces only.
+
+    Its reader leaves them all out then.
+    """
+    if path.suffix.lower() != ".obj":
+        return False
+    kinds: set[bool] = set()
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            if line.startswith(("f ", "f\t")):
+                kinds.update(
+                    corner.split("/")[1:2] not in ([], [""]) for corner in line.split()[1:]
+                )
+    return len(kinds) > 1
 
 
 def frame(normal: FloatArray) -> FloatArray:

@@ -131,6 +131,17 @@ class Pinhole:
         Angle from the lower to the upper edge, in degrees.
     width_px, height_px
         Size of the picture.
+
+    Raises
+    ------
+    UsageError
+        The angle or the size is none, or it looks at its own place or along `up`.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import Pinhole
+    >>> Pinhole((0, 0, 1), (0, 0, 0), up=(0, 1, 0)).axes.round().tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
 
     position_m: tuple[float, float, float]
@@ -139,6 +150,30 @@ class Pinhole:
     vertical_fov_deg: float = 40.0
     width_px: int = 256
     height_px: int = 256
+
+    def __post_init__(self) -> None:
+        if not 0 < self.vertical_fov_deg < 180:
+            raise UsageError(
+                f"expected an angle of view from 0 to 180°, got {self.vertical_fov_deg:g}°"
+            )
+        if self.width_px < 1 or self.height_px < 1:
+            raise UsageError(f"expected a size in pixels, got {self.width_px} × {self.height_px}")
+        away = np.subtract(self.position_m, self.look_at_m)
+        length = np.linalg.norm(away) * np.linalg.norm(self.up)
+        if not np.linalg.norm(np.cross(self.up, away)) > 1e-9 * length:
+            raise UsageError(
+                "expected a camera that looks at another point than its own, and not upwards, got "
+                f"position {list(self.position_m)}, look_at {list(self.look_at_m)}"
+            )
+
+    @property
+    def axes(self) -> FloatArray:
+        """Unit vectors to the right, upwards and backwards in the picture, the rows of (3, 3)."""
+        backwards = np.subtract(self.position_m, self.look_at_m)
+        backwards = backwards / np.linalg.norm(backwards)
+        right = np.cross(self.up, backwards)
+        right = right / np.linalg.norm(right)
+        return np.stack([right, np.cross(backwards, right), backwards])
 
     def rays(
         self, pixels: IntArray, within: FloatArray, origin_m: FloatArray
@@ -155,21 +190,12 @@ class Pinhole:
             Point from which origins are measured, in m (3,).
         """
         eye = np.array(self.position_m, dtype=np.float64)
-        forward = np.array(self.look_at_m) - eye
-        right = np.cross(forward, np.array(self.up, dtype=np.float64))
-        if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(forward):
-            raise UsageError(
-                "expected a camera that looks at another point than its own, and not upwards, got "
-                f"position {list(self.position_m)}, look_at {list(self.look_at_m)}"
-            )
-        forward /= np.linalg.norm(forward)
-        right /= np.linalg.norm(right)
-        down = np.cross(forward, right)
+        right, up, backwards = self.axes
         half = np.tan(np.deg2rad(self.vertical_fov_deg) / 2)
         row, column = np.divmod(pixels, self.width_px)
         x = (2 * (column + within[:, 0]) - self.width_px) / self.height_px * half
-        y = (2 * (row + within[:, 1]) / self.height_px - 1) * half
-        direction = forward + x[:, None] * right + y[:, None] * down
+        y = (1 - 2 * (row + within[:, 1]) / self.height_px) * half
+        direction = x[:, None] * right + y[:, None] * up - backwards
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
         begin = np.broadcast_to((eye - origin_m).astype(np.float32), direction.shape)
         return np.ascontiguousarray(begin), direction.astype(np.float32)
@@ -261,33 +287,35 @@ class Tracer:
         Paths
             Of some places each, in order; places that do not lie on the surface have none.
         """
-        rng = np.random.default_rng((self._seed, 1, surface))
-        places = self._geometry.surfaces[surface].n_places
-        even = _even(places, per_place, 4 + 2 * len(self._lamps), rng)
-        scattered = even[:, :2].reshape(places, per_place, 2).astype(np.float64)
-        points = self._geometry.starts(surface, per_place, rng, scattered)
-        at_once = max(1, CHUNK // per_place) * per_place
-        lift = np.float32(LIFT * self._geometry.size_m)
-        if self._geometry.surfaces[surface].is_two_sided:
-            first = rng.integers(0, 2, len(points.place) // per_place).repeat(per_place)
-            turn = np.tile(np.arange(per_place), len(points.place) // per_place)
-            points.normal[(first + turn) % 2 == 1] *= -1
+        geometry = self._geometry
+        starts = geometry.start_points(surface)
+        first_face = np.searchsorted(geometry.surface_of_face, surface).astype(np.int32)
+        at_once = max(1, CHUNK // per_place)
 
         def part(number: int) -> Paths:
-            own = slice(number * at_once, (number + 1) * at_once)
-            normal = points.normal[own]
-            rng = np.random.default_rng((self._seed, 2, surface, number))
+            chosen = slice(number * at_once, (number + 1) * at_once)
+            places = starts.places[chosen]
+            rng = np.random.default_rng((self._seed, 1, surface, number))
+            even = _even(len(places), per_place, 4 + 2 * len(self._lamps), rng)
+            scattered = even[:, :2].reshape(len(places), per_place, 2).astype(np.float64)
+            face, weights = starts.at(chosen, scattered, rng)
+            face += first_face
+            position = np.einsum("nk,nkc->nc", weights, geometry.triangles[face])
+            normal = geometry.normals[face]
+            if geometry.surfaces[surface].is_two_sided:
+                side = rng.integers(0, 2, (len(places), 1)) + np.arange(per_place)
+                normal[side.ravel() % 2 == 1] *= -1
             return self._walk(
-                points.position_m[own] + lift * normal,
-                normal.copy(),
-                points.place[own].copy(),
+                position.astype(np.float32) + np.float32(LIFT * geometry.size_m) * normal,
+                normal,
+                (places + geometry.places_of(surface).start).astype(np.int32).repeat(per_place),
                 np.full(len(normal), -1, np.int16),
                 per_place,
-                even[own, 2:],
+                even[:, 2:],
                 rng,
             )
 
-        yield from _in_threads(part, -(-len(points.place) // at_once), threads)
+        yield from _in_threads(part, -(-len(starts.places) // at_once), threads)
 
     def _trace(
         self,
@@ -360,7 +388,8 @@ class Tracer:
             self._kernels.locate(
                 hit["primID"], hit["u"], hit["v"], direction, rng.random(n, np.float32),
                 geometry.triangles, geometry.normals, geometry.uv, geometry.corner_place,
-                geometry.surface_of_face, geometry.table, np.float32(LIFT * geometry.size_m),
+                geometry.surface_of_face, geometry.table, geometry.chart_of_face,
+                geometry.chart_of_place, np.float32(LIFT * geometry.size_m),
                 position, normal, place,
             )  # fmt: skip
         return position, normal, place

@@ -40,6 +40,8 @@ def locate(
     corner_place: IntArray,
     surface_of_face: IntArray,
     table: IntArray,
+    chart_of_face: IntArray,
+    chart_of_place: IntArray,
     offset: np.float32,
     position: Float32Array,
     normal: Float32Array,
@@ -48,7 +50,8 @@ def locate(
     """Write where rays arrived: position just above the surface, its normal, and the place.
 
     A place between texels or vertices is one of them by chance, as often as its weight says: the
-    mean over many rays is the interpolated value.
+    mean over many rays is the interpolated value. A texel of another chart, which is elsewhere on
+    the surface, is none of them.
 
     Parameters
     ----------
@@ -58,7 +61,7 @@ def locate(
         Directions of the rays (n, 3).
     chance
         Random numbers (n,) from 0 to 1.
-    triangles, normals, uv, corner_place, surface_of_face, table
+    triangles, normals, uv, corner_place, surface_of_face, table, chart_of_face, chart_of_place
         The geometry.
     offset
         Distance in m by which a position is lifted off its surface.
@@ -99,7 +102,12 @@ def locate(
             line = math.floor(t - np.float32(0.5) + (many - math.floor(many)))
             column = min(max(column, 0), row[2] - 1)
             line = min(max(line, 0), row[3] - 1)
-            place[i] = row[1] + line * row[2] + column
+            texel = row[1] + line * row[2] + column
+            if chart_of_place[texel] != chart_of_face[f]:
+                column = min(max(math.floor(s), 0), row[2] - 1)
+                line = min(max(math.floor(t), 0), row[3] - 1)
+                texel = row[1] + line * row[2] + column
+            place[i] = texel
         elif chance[i] < a:
             place[i] = corner_place[f, 0]
         elif chance[i] < a + b:

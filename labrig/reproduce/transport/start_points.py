@@ -1,0 +1,182 @@
+"""Points on a surface at which the paths of its places begin, as even by area as they can be."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.reproduce.compiled import compiled
+from labrig.reproduce.transport.mesh import Mesh
+from labrig.reproduce.transport.texel_map import TexelMap
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+#: What is surely below 1, also of a sum over many texels.
+BELOW_ONE = 1 - 1e-9
+
+
+class StartPoints(Protocol):
+    """Points on a surface, several for each of its places."""
+
+    @property
+    def places(self) -> IntArray:
+        """Places that lie on the surface, counted from its first, shape (n,)."""
+
+    def at(
+        self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
+    ) -> tuple[IntArray, FloatArray]:
+        """Return triangles (points,) and weights of their corners (points, 3), place by place.
+
+        Parameters
+        ----------
+        chosen
+            Which of `places`.
+        scattered
+            Even numbers from 0 to 1 that choose points, shape (places, per place, 2).
+        rng
+            Random numbers that choose triangles or parts of a texel.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class OnVertices:
+    """Points around vertices.
+
+    A point lies the likelier near a vertex the larger the weight of the vertex there, so that the
+    mean over the points is that which the vertex stands for.
+    """
+
+    places: IntArray
+    _face: IntArray
+    _corner: IntArray
+    _end: FloatArray
+    _first: NDArray[np.int64]
+    _last: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> "OnVertices":
+        """Return the points of a mesh."""
+        vertex = mesh.faces.T.ravel()
+        order = np.argsort(vertex, kind="stable")
+        end = np.cumsum(np.tile(mesh.areas_m2, 3)[order])
+        numbers = np.arange(len(mesh.vertices_m))
+        first = np.searchsorted(vertex[order], numbers)
+        last = np.searchsorted(vertex[order], numbers, side="right")
+        total = np.r_[0.0, end]
+        places = np.flatnonzero(total[last] > total[first])
+        return cls(
+            places.astype(np.int32),
+            (order % len(mesh.faces)).astype(np.int32),
+            (order // len(mesh.faces)).astype(np.int32),
+            end,
+            first[places],
+            last[places],
+        )
+
+    def at(
+        self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
+    ) -> tuple[IntArray, FloatArray]:
+        """Return triangles and weights of their corners; see `StartPoints`."""
+        per_place = scattered.shape[1]
+        first, last = (each[chosen].repeat(per_place) for each in (self._first, self._last))
+        low, high = np.where(first > 0, self._end[first - 1], 0.0), self._end[last - 1]
+        level = low + rng.random(len(first)) * (high - low)
+        entry = np.clip(np.searchsorted(self._end, level), first, last - 1)
+        # Weight w of the corner with density 6 w (1 − w), the rest of the two others evenly.
+        own, second = _inverse_hat(scattered[..., 0].ravel()), scattered[..., 1].ravel()
+        weights = np.empty((len(entry), 3))
+        rows, corner = np.arange(len(entry)), self._corner[entry]
+        weights[rows, corner] = own
+        weights[rows, (corner + 1) % 3] = (1 - own) * second
+        weights[rows, (corner + 2) % 3] = (1 - own) * (1 - second)
+        return self._face[entry], weights
+
+
+@dataclass(frozen=True, eq=False)
+class OnParticles:
+    """Points on particles, each of so many triangles of the same size."""
+
+    places: IntArray
+    _n_faces: int
+
+    @classmethod
+    def of(cls, mesh: Mesh, n_particles: int) -> "OnParticles":
+        """Return the points of a mesh of particles."""
+        return cls(np.arange(n_particles, dtype=np.int32), len(mesh.faces) // n_particles)
+
+    def at(
+        self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
+    ) -> tuple[IntArray, FloatArray]:
+        """Return triangles and weights of their corners; see `StartPoints`."""
+        own = self.places[chosen]
+        turn = rng.integers(0, self._n_faces, len(own))[:, np.newaxis]
+        side = (turn + np.arange(scattered.shape[1])) % self._n_faces
+        face = self._n_faces * own[:, np.newaxis] + side
+        root, second = np.sqrt(scattered[..., 0]).ravel(), scattered[..., 1].ravel()
+        weights = np.stack([1 - root, root * second, root * (1 - second)], axis=1)
+        return face.ravel().astype(np.int32), weights
+
+
+@dataclass(frozen=True, eq=False)
+class OnTexels:
+    """Points in texels, as even on the surface as its triangles are in the texture.
+
+    A texel is divided into the cells of its map. A cell is taken as often as the part of the
+    surface is large that lies there.
+    """
+
+    places: IntArray
+    _map: TexelMap
+    _corners: NDArray[np.float32]
+    _density: FloatArray
+
+    @classmethod
+    def of(cls, mesh: Mesh, texel_map: TexelMap) -> "OnTexels":
+        """Return the points of a mesh with texels."""
+        assert mesh.uv is not None
+        corners = mesh.uv[mesh.faces]
+        u, v = np.moveaxis(corners[:, 1:] - corners[:, :1], -1, 0)
+        in_texture = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        # Of triangles without an area in the texture there is no cell.
+        density = mesh.areas_m2 / np.where(in_texture > 0, in_texture, np.inf)
+        lit = (density > 0)[texel_map.face_at] & (texel_map.face_at >= 0)
+        size = texel_map.lookups
+        is_on_surface = lit.reshape(texel_map.rows, size, texel_map.columns, size).any(axis=(1, 3))
+        places = np.flatnonzero(is_on_surface).astype(np.int32)
+        return cls(places, texel_map, corners.astype(np.float32), density)
+
+    def at(
+        self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
+    ) -> tuple[IntArray, FloatArray]:
+        """Return triangles and weights of their corners; see `StartPoints`."""
+        texels, per_place, size = self.places[chosen], scattered.shape[1], self._map.lookups
+        faces = self._map.faces_in(texels)
+        end = np.cumsum(np.where(faces >= 0, self._density[faces], 0.0)).reshape(faces.shape)
+        low = np.r_[0.0, end[:-1, -1]][:, np.newaxis]
+        evenly = (np.arange(per_place) + rng.random((len(texels), 1))) / per_place
+        level = low + evenly * BELOW_ONE * (end[:, -1:] - low)
+        cell = np.searchsorted(end.ravel(), level.ravel(), side="right") % size**2
+        row, column = np.divmod(texels.repeat(per_place), self._map.columns)
+        at_row, at_column = row * size + cell // size, column * size + cell % size
+        n_rows, n_columns = self._map.face_at.shape
+        uv = np.stack(
+            [
+                (at_column + scattered[..., 0].ravel()) / n_columns,
+                (at_row + scattered[..., 1].ravel()) / n_rows,
+            ],
+            axis=1,
+        )
+        face, weights = compiled("transport.tracing_kernels").located_in_texture(
+            self._corners,
+            self._map.face_at,
+            uv.astype(np.float32),
+            np.stack([at_row, at_column], axis=1).astype(np.int32),
+        )
+        return face, weights
+
+
+def _inverse_hat(evenly: FloatArray) -> FloatArray:
+    """Return w where ∫₀ʷ 6 x (1 − x) dx = 3 w² − 2 w³ is as given: 1/2 − sin(arcsin(1 − 2 x)/3)."""
+    return np.asarray(0.5 - np.sin(np.arcsin(1 - 2 * evenly) / 3))
