@@ -213,7 +213,9 @@ class Renderer:
         """
         return self._irradiance(self._view_at(self._t_s), self._t_s)
 
-    def advance(self, t_s: float, record: Callable[[float, FloatArray], None] | None = None) -> None:
+    def advance(
+        self, t_s: float, record: Callable[[float, FloatArray], None] | None = None
+    ) -> None:
         """Step all levels to a time.
 
         Parameters
