@@ -19,6 +19,8 @@ FloatArray = NDArray[np.float64]
 
 #: Searches for the nearest material that keeps the energy, and evaluations of each.
 SEARCHES, EVALUATIONS = 4, 40
+#: Relative gain and step of a search that ends it.
+LEAST_GAIN = 1e-4
 #: Powers of the excess by which excitation rates are lowered where a search starts.
 LOWERED = (0.0, 0.5, 1.0)
 #: Relative change of a coordinate by which slopes are found.
@@ -43,6 +45,8 @@ def keeping_energy(
             bounds=(low, high),
             diff_step=np.full(len(low), DIFFERENCE),
             max_nfev=EVALUATIONS,
+            ftol=LEAST_GAIN,
+            xtol=LEAST_GAIN,
         )
         for start in starts
     ]

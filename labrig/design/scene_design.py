@@ -5,6 +5,7 @@ rendered with all light between surfaces; and designed again under the light tha
 shows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,8 +71,8 @@ class SceneDesign:
         """ΔE2000 of all keys in the rendered scene, shape (keys,)."""
         return self.rounds[self.best]
 
-    def pictures(self) -> FloatArray:
-        """Return the rendered pictures at all different times of keys, in their order.
+    def pictures(self, times_s: Sequence[float]) -> FloatArray:
+        """Return rendered pictures at rising times in s, not before the programme.
 
         Returns
         -------
@@ -79,8 +80,7 @@ class SceneDesign:
             Linear sRGB over the white, shape (times, height, width, 3).
         """
         renderer = self.light.renderer(self.material)
-        times = [t_s for t_s in np.unique(self.wish.keys.time_s) if t_s >= renderer.t_s]
-        return np.array([self.spectra.rgb(renderer.frame(t_s).radiance) for t_s in times])
+        return np.array([self.spectra.rgb(renderer.frame(t_s).radiance) for t_s in times_s])
 
 
 def solve_in_scene(wish: Wish) -> SceneDesign:

@@ -367,7 +367,8 @@ def residuals_and_slopes(
 ) -> tuple[FloatArray, FloatArray, FloatArray, Coefficients]:
     """Return residuals (rows,), their slopes at fixed Λ and albedo, emissions, and Λ and albedo.
 
-    Λ and albedo are the best ones, or those that are given. Slopes have a column for each coordinate, state by state, and one for the common order.
+    Λ and albedo are the best ones, or those that are given. Slopes have a column for each
+    coordinate, state by state, and one for the common order.
     """
     glow = problem.emission_of(x, order)
     values = glow.value.T

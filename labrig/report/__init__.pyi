@@ -85,6 +85,11 @@ from .run_sections import (
     lamp_sections as lamp_sections,
     temperature_sections as temperature_sections,
 )
+from .scene_design import (
+    describe_energy as describe_energy,
+    describe_scene_design as describe_scene_design,
+    draw_scene_design as draw_scene_design,
+)
 from .sections import (
     Picture as Picture,
     Rendered as Rendered,

@@ -29,6 +29,8 @@ MOST_CONFLICTS, SEEN = 3, 1.0
 SHOWN_Y = 0.5
 #: Times at which a curve is drawn.
 POINTS = 600
+#: Light over the strongest from which a time is drawn as lit: the glow of a scene is darkness.
+LIT = 0.01
 #: Part of the time beyond the last key that is drawn.
 AFTER = 0.1
 
@@ -144,9 +146,14 @@ def draw_design(design: Design, places: Sequence[str], path: Path) -> None:
         figure = Figure(figsize=(7.5, 3.2 * len(numbers)), layout="constrained")
         rows = figure.subplots(2 * len(numbers), 1, height_ratios=[4, 1.2] * len(numbers))
         for row, number in enumerate(numbers):
-            _draw_curve(rows[2 * row], design, number, places[number])
-            _draw_patches(rows[2 * row + 1], design, number)
+            draw_curve(rows[2 * row], design, number, places[number])
+            draw_patches(rows[2 * row + 1], design, number)
         save_picture(figure, path)
+
+
+def time_text(t_s: float) -> str:
+    """Return a time of a clock, which may be before its zero, such as `−5 s`."""
+    return f"−{duration_text(-t_s)}" if t_s < 0 else duration_text(t_s)
 
 
 def _parameters(design: Design) -> Iterator[str]:
@@ -177,7 +184,7 @@ def _keys(design: Design, places: Sequence[str]) -> Iterator[str]:
             return
         where = f" {places[keys.place[key]]:12}" if len(places) > 1 else ""
         yield (
-            f"{key + 1:<4}{duration_text(float(keys.time_s[key])):>10}{where}  "
+            f"{key + 1:<4}{time_text(float(keys.time_s[key])):>10}{where}  "
             f"{_numbers(first):27} {_numbers(second):27} {design.delta_e2000[key]:6.1f}"
         )
 
@@ -204,7 +211,7 @@ def _impossible(design: Design) -> Iterator[str]:
         yield f"! {len(design.impossible) - MOST_LINES} more wishes are not possible"
 
 
-def _draw_curve(axes: "Axes", design: Design, number: int, name: str) -> None:
+def draw_curve(axes: "Axes", design: Design, number: int, name: str) -> None:
     """Draw the luminance of one place over time, with the keys and the time of light."""
     programme, keys = design.programme, design.keys
     own = keys.place == number
@@ -220,7 +227,8 @@ def _draw_curve(axes: "Axes", design: Design, number: int, name: str) -> None:
         zorder=3,
     )  # fmt: skip
     ends = np.append(programme.begin_s[1:], end)
-    is_lit = programme.irradiance[number].any(axis=1)
+    light = programme.irradiance[number].sum(axis=1)
+    is_lit = light > LIT * light.max(initial=0.0)
     for first, last in zip(programme.begin_s[is_lit], ends[is_lit], strict=True):
         axes.axvspan(first, min(last, end), color=MUTED, alpha=0.15, linewidth=0)
     axes.set(xlabel="time / s", ylabel="luminance over a white's", xlim=(begin, end))
@@ -229,15 +237,21 @@ def _draw_curve(axes: "Axes", design: Design, number: int, name: str) -> None:
     axes.set_title(name, fontsize="medium", color=INK)
 
 
-def _draw_patches(axes: "Axes", design: Design, number: int) -> None:
-    """Draw what was wanted above what is got, both brightened so that the first is bright."""
+def draw_patches(
+    axes: "Axes", design: Design, number: int, got_rgb: FloatArray | None = None
+) -> None:
+    """Draw what was wanted above what is got, both brightened so that the first is bright.
+
+    What is got may be that of a rendering instead of the design's, shape (keys, 3).
+    """
     own = np.flatnonzero(design.keys.place == number)
     own = own[np.argsort(design.keys.time_s[own])][:MOST_LINES]
-    wanted, got = design.keys.rgb(design.bands)[own], design.got_rgb[own]
+    wanted = design.keys.rgb(design.bands)[own]
+    got = (design.got_rgb if got_rgb is None else got_rgb)[own]
     for column, (first, second) in enumerate(zip(wanted, got, strict=True)):
         for row, rgb in ((0.5, first), (0.0, second)):
             axes.add_patch(_patch(column, row, _shown(rgb, first)))
-        time = duration_text(float(design.keys.time_s[own[column]]))
+        time = time_text(float(design.keys.time_s[own[column]]))
         axes.text(column + 0.5, -0.1, time, ha="center", va="top", fontsize="x-small", color=INK)
     axes.set(xlim=(0, len(own)), ylim=(0, 1), yticks=[0.25, 0.75], xticks=[])
     axes.set_yticklabels(["got", "wanted"], fontsize="small")

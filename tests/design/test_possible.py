@@ -106,3 +106,48 @@ def test_every_wish_is_one_line() -> None:
     for wish in designed([61.0, 80.0, 100.0], [50.0, 100.0, 200.0]).impossible:
         assert "\n" not in str(wish)
         assert "nearest that is possible" in str(wish)
+
+
+def weak_light(design: Design) -> float:
+    """Energy that weak light of one channel makes leave, over that which is absorbed of it."""
+    energy = design.bands.energy
+    ratios = [
+        np.pi * sum(
+            k_e[band] * float(emitted @ energy)
+            for k_e, emitted in zip(design.k_e_per_s, design.reradiation, strict=True)
+        ) / ((1 - design.albedo[band]) * energy[band])
+        for band in range(3)
+    ]  # fmt: skip
+    return float(max(ratios))
+
+
+@pytest.mark.parametrize("albedo", [0.3, None])
+def test_the_nearest_that_keeps_the_energy(albedo: float | None) -> None:
+    """Two places of different light that are to glow alike: full states would, at any light."""
+    light = LightProgramme.checked(
+        [0.0, 600.0], [[[0.6, 0.5, 0.4], [0.0] * 3], [[0.9, 0.6, 0.6], [0.0] * 3]]
+    )
+    keys = Keys.checked(
+        [0, 1, 0], [601.0, 620.0, 690.0], np.multiply.outer([4.0, 2.5, 0.7], GREEN / 10)
+    )
+    free, kept = (solve(light, keys, RGB, albedo=albedo, energy=each) for each in ("free", "kept"))
+    assert kept.keeps_energy
+    assert weak_light(kept) <= 1 + 1e-6
+    assert not free.keeps_energy
+    assert weak_light(free) > 1
+    assert free.cost <= kept.cost * (1 + 1e-6)
+    assert kept.delta_e2000.max() < free.delta_e2000.max() + 0.5
+
+
+def test_too_bright_a_glow_is_as_bright_as_can_be() -> None:
+    keys = Keys.checked(0, [61.0, 80.0], np.multiply.outer([100.0, 80.0], GREEN))
+    kept = solve(CHARGE, keys, RGB, albedo=0.2, energy="kept")
+    assert weak_light(kept) == pytest.approx(1, abs=1e-3)
+    assert kept.delta_e2000.max() > 5
+    assert kept.emitted_over_absorbed[0] < 1
+
+
+def test_what_keeps_the_energy_is_left_as_it_is() -> None:
+    keys = Keys.checked(0, [61.0, 80.0, 200.0], np.multiply.outer([1.0, 0.5, 0.1], GREEN / 100))
+    free, kept = (solve(CHARGE, keys, RGB, albedo=0.2, energy=each) for each in ("free", "kept"))
+    np.testing.assert_array_equal(free.reradiation, kept.reradiation)
