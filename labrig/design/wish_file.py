@@ -203,6 +203,8 @@ class WishFile(_Part):
             raise ValueError(f"expected one of 'light', 'places' and 'scene', got {got}")
         if self.scene is None and self.pixels is not None:
             raise ValueError("expected 'pixels' beside 'scene' only")
+        if self.scene is not None and self.keys and not self.pixels:
+            raise ValueError("expected 'pixels', the places of the keys in the scene, got none")
         for name, changes in self.programmes.items():
             if not changes:
                 raise ValueError(f"expected at least one light of '{name}', got none")

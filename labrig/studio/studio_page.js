@@ -114,11 +114,11 @@ function draw() {
   $("hint").textContent = answer.scene
     ? `Click on '${answer.scene.material}' to set a key: so it shall look there at this time. Drag a dot to move it.`
     : "Click on the material to set a key: so it shall look at this time. The small square is a white card in the same light.";
-  $("impossible-section").hidden = !answer.impossible.length && !answer.conflicts.length;
+  $("impossible-section").hidden = !answer.impossible.length && !answer.conflicts.length && !answer.energy;
   const pairs = new Set(answer.conflicts.map((pair) => [...pair].sort((a, b) => a - b).map((i) => i + 1).join(" and ")));
   const fights = [...pairs].slice(0, MOST_FIGHTS).map((pair) => `Keys ${pair} work against each other.`);
   $("impossible").replaceChildren(
-    ...[...answer.impossible.map((each) => each.text[0].toUpperCase() + each.text.slice(1)), ...fights].map((text) => tag("li", text)),
+    ...[...answer.impossible.map((each) => each.text), ...(answer.energy ? [answer.energy] : []), ...fights].map(begun).map((text) => tag("li", text)),
   );
   const result = summary(answer.keys);
   $("status").textContent = result || "No keys yet: a plain green glow to look at.";
@@ -247,6 +247,7 @@ async function save(path, name) {
   }
 }
 
+const begun = (text) => text[0].toUpperCase() + text.slice(1);
 const fileName = () => (history.now.wish.name || "design").replace(/[^\p{L}\p{N}_-]+/gu, "-");
 
 const timeline = new Timeline({

@@ -21,7 +21,7 @@ from labrig.design import (
 )
 from labrig.errors import UsageError
 from labrig.material import Material, material_text
-from labrig.report import describe_nearest, draw_design
+from labrig.report import describe_energy, describe_nearest, draw_design
 from labrig.studio.messages import SOURCE, Asked, answer, wish_content
 from labrig.yaml_file import parse_yaml, validate, yaml_text
 
@@ -45,6 +45,8 @@ class Workbench:
 
     def __init__(self) -> None:
         self._last: tuple[str, tuple[Design, Wish]] | None = None
+        #: What of the last wishes would take more energy than there is.
+        self._energy: str | None = None
 
     def start(self) -> dict[str, Any]:
         """Return the wish with which a page begins."""
@@ -74,7 +76,7 @@ class Workbench:
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the page's wishes, or that was set by hand."""
         design, wish = self.design(content)
-        return answer(design, wish)
+        return answer(design, wish) | {"energy": self._energy}
 
     def design(self, content: Mapping[str, Any]) -> tuple[Design, Wish]:
         """Return the design that a page asks for, and its wish.
@@ -124,10 +126,15 @@ class Workbench:
 
     def _designed(self, asked: Asked) -> tuple[Design, Wish]:
         wish = self._wish(asked.file(), SOURCE)
+        self._energy = None
         if asked.by_hand is not None:
             given = asked.by_hand.parameters()
         elif wish.keys.count:
-            return wish.solve(), wish
+            wished = wish.solve()
+            if wished.keeps_energy:
+                return wished, wish
+            self._energy = describe_energy(wished).removeprefix("! ")
+            return wish.solve("kept"), wish
         else:
             given = _to_begin_with(wish.bands, wish.file)
         weights = wish.file.weights
