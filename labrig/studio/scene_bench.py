@@ -115,6 +115,8 @@ class SceneBench(Workbench):
         Scene file, or the name of a shipped scene.
     material
         Name of the material to be designed; None for the only one that glows.
+    width_px, paths
+        Width of the picture, and paths for each of its pixels and each place.
 
     Raises
     ------
@@ -122,7 +124,10 @@ class SceneBench(Workbench):
         The scene is malformed or moves, or does not say which material is meant.
     """
 
-    def __init__(self, scene: str, material: str | None = None) -> None:
+    def __init__(
+        self, scene: str, material: str | None = None, width_px: int = WIDTH_PX, paths: int = PATHS
+    ) -> None:
+        self._width_px, self._paths = width_px, paths
         self._scene = scene
         self._material = material or _only_glowing(scene)
         self._white: float | None = None
@@ -142,8 +147,8 @@ class SceneBench(Workbench):
                 "material": self._material,
                 "white_cd_per_m2": self._white,
                 "programme": [part.model_dump() for part in self._built.file.programme],
-                "width_px": WIDTH_PX,
-                "paths": PATHS,
+                "width_px": self._width_px,
+                "paths": self._paths,
             },
             "pixels": {},
         }
@@ -256,8 +261,8 @@ class SceneBench(Workbench):
                 self._material,
                 white_cd_per_m2=self._white,
                 bands=three_bands() if edges_nm is None else spectral_bands(edges_nm),
-                width_px=WIDTH_PX,
-                paths=PATHS,
+                width_px=self._width_px,
+                paths=self._paths,
             )
         return self._of_bands[edges_nm]
 

@@ -32,8 +32,9 @@ export class ScenePicture {
       try {
         const reply = await this.post("scene.png", question);
         this.exposure = Number(reply.headers.get("X-Exposure"));
+        const next = await createImageBitmap(await reply.blob());
         this.#image?.close();
-        this.#image = await createImageBitmap(await reply.blob());
+        this.#image = next;
         this.onShown();
         performance.measure("picture", { start, end: performance.now() });
       } catch {

@@ -14,8 +14,10 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from labrig.design import read_wish, written_differences
 from labrig.material import read_material
+from labrig.studio.scene_bench import SceneBench
 from labrig.studio.server import StudioServer
 from labrig.studio.workbench import Workbench
+from tests.design.small_scene import corner
 
 #: Where screenshots are kept for a person to look at.
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")
@@ -81,6 +83,13 @@ class Page:
     def screenshot(self, name: str) -> None:
         if SCREENSHOTS:
             self.browser.save_screenshot(f"{SCREENSHOTS}/{name}.png")
+
+
+@pytest.fixture
+def page_of_scene(tmp_path: Path) -> Iterator[str]:
+    bench = SceneBench(str(corner(tmp_path)), "paint", width_px=24, paths=8)
+    with StudioServer(bench, bench.start()) as server, server.running():
+        yield server.url
 
 
 def severe(browser: Chrome) -> list[object]:
@@ -187,3 +196,45 @@ def test_a_wrong_light_is_said_and_nothing_is_lost(
     view.give("frame", "199")
     wide = chromium.execute_script("return document.documentElement.scrollWidth <= innerWidth")
     assert wide
+
+
+def test_dots_on_a_picture_of_a_scene(chromium: Chrome, page_of_scene: str, tmp_path: Path) -> None:
+    view = Page(chromium, page_of_scene, tmp_path)
+    picture = view.one("#picture")
+
+    def offsets(x: float, y: float) -> tuple[int, int]:
+        size = picture.size
+        return round((x - 0.5) * size["width"]), round((y - 0.5) * size["height"])
+
+    def click(x: float, y: float) -> None:
+        ActionChains(chromium).move_to_element_with_offset(
+            picture, *offsets(x, y)
+        ).click().perform()
+
+    view.give("frame", "130")
+    view.wait(lambda: picture.size["width"] == picture.size["height"])
+    click(0.5, 0.62)
+    view.wait(lambda: view.all("#keys li"))
+    view.settle()
+    # nothing is wished for on the wall, which is said
+    click(0.5, 0.2)
+    view.wait(lambda: "'wall'" in view.one("#message").text)
+    assert len(view.all("#keys li")) == 1
+    # the dot is dragged along the floor
+    ActionChains(chromium, duration=20).move_to_element_with_offset(
+        picture, *offsets(0.5, 0.62)
+    ).click_and_hold().move_by_offset(-10, 4).move_by_offset(-20, 6).release().perform()
+    view.settle()
+    view.wait(lambda: not view.one("#message").is_displayed())
+    wish = view.download("#save-constraints", "paint-keys.yaml").read_text()
+    assert len(view.all("#keys li")) == 1
+    x, y = (float(word) for word in wish.split("dot 1:")[1].split()[1:4:2])
+    assert x == pytest.approx(0.5 - 30 / picture.size["width"], abs=0.02)
+    assert y == pytest.approx(0.62 + 10 / picture.size["height"], abs=0.02)
+    view.wait(lambda: not chromium.execute_script("return document.body.dataset.painting"))
+    view.screenshot("design-scene")
+    level = view.one("#lamps input")
+    level.send_keys(Keys.CONTROL, "a")
+    level.send_keys("0.5", Keys.TAB)
+    view.settle()
+    assert "0.5" in view.one('#timeline [data-light="0"]').text
