@@ -255,8 +255,9 @@ class SceneLight:
             surface = self._surface(material)
             renderer = self._with(surface)
             glow[self.places] = self._glow(surface, t_s)
-        radiance = renderer.picture(glow, self.scene.levels(t_s))
-        return self._typical.rgb(radiance)
+        unit = np.pi / self._typical.unit_w_per_m2_nm
+        to_rgb = unit * self._typical.to_rgb
+        return renderer.colours(glow, self.scene.levels(t_s), to_rgb).astype(np.float64)
 
     def renderer(self, material: Material) -> Renderer:
         """Return a renderer of the scene with a material, on the paths that are kept.

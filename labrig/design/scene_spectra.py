@@ -52,7 +52,7 @@ class SceneSpectra:
     bands: DesignBands
     white_cd_per_m2: float
 
-    @property
+    @cached_property
     def unit_w_per_m2_nm(self) -> float:
         """Spectral irradiance, weighted as an eye sees it, under which a card is the white."""
         return np.pi * self.white_cd_per_m2 / float(photopic_efficacy(555.0))
