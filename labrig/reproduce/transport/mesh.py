@@ -12,6 +12,7 @@ from labrig.errors import UsageError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+IntArray64 = NDArray[np.int64]
 
 #: Formats of meshes that are read.
 FORMATS = (".obj", ".ply", ".glb", ".gltf", ".stl")
@@ -244,12 +245,24 @@ class Mesh:
     @property
     def is_closed(self) -> bool:
         """Whether each edge has a triangle on both sides, vertices at one place being one."""
+        edges, back = self._edges()
+        return bool(np.isin(back, edges).all())
+
+    @property
+    def is_turned_alike(self) -> bool:
+        """Whether no two triangles run along an edge in the same direction, each alone there."""
+        edges, back = self._edges()
+        same_way, count = np.unique(edges, return_counts=True)
+        return not bool((~np.isin(same_way[count == 2], back)).any())
+
+    def _edges(self) -> tuple[IntArray64, IntArray64]:
+        """Return a number for each edge of each triangle, and that of the way back along it."""
         _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
         faces = same.reshape(-1)[self.faces]
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
         n = len(self.vertices_m)
-        return bool(np.isin(edges[:, 1] * n + edges[:, 0], edges[:, 0] * n + edges[:, 1]).all())
+        return edges[:, 0] * n + edges[:, 1], edges[:, 1] * n + edges[:, 0]
 
     def turned_over(self) -> Self:
         """Return the mesh with its front on the other side."""
