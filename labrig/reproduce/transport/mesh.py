@@ -303,17 +303,21 @@ def read_mesh(path: Path) -> Mesh:
         raise UsageError(f"{path}: expected a mesh as {', '.join(FORMATS)}, got '{path.suffix}'")
     if not path.is_file():
         raise UsageError(f"{path}: expected a file with a mesh, got no such file")
+    trimesh = _trimesh()
     try:
-        parts = _parts(path)
-    except (ValueError, KeyError, IndexError, AttributeError, TypeError, OSError) as error:
+        parts = _parts(trimesh, path)
+    except Exception as error:  # the reader meets damage with errors of any kind
         raise UsageError(
-            f"{path}: expected a mesh, got a file that cannot be read ({error})"
+            f"{path}: expected a mesh, got a file that cannot be read "
+            f"({str(error).partition(chr(10))[0]})"
         ) from None
     n_faces = sum(len(part.faces) for part in parts)
     if not n_faces or not all(np.isfinite(part.vertices_m).all() for part in parts):
         raise UsageError(
             f"{path}: expected triangles with finite vertices, got {n_faces} triangles"
         )
+    if any(part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m) for part in parts):
+        raise UsageError(f"{path}: expected triangles of its own vertices, got others")
     if len({part.uv is None for part in parts}) > 1 or _is_partly_unwrapped(path):
         raise UsageError(
             f"{path}: expected texture coordinates on all faces or on none, got them on some; "
@@ -325,9 +329,8 @@ def read_mesh(path: Path) -> Mesh:
     return mesh
 
 
-def _parts(path: Path) -> list[Mesh]:
+def _parts(trimesh: Any, path: Path) -> list[Mesh]:
     """Return the meshes of a file, each with one material, where its scene has them."""
-    trimesh = _trimesh()
     loaded = trimesh.load(path, process=False)
     placed = [(np.eye(4), loaded)]
     if isinstance(loaded, trimesh.Scene):
@@ -336,7 +339,7 @@ def _parts(path: Path) -> list[Mesh]:
         placed = [(transform, loaded.geometry[name]) for transform, name in nodes]
     meshes = []
     for transform, part in placed:
-        if not isinstance(part, trimesh.Trimesh):
+        if not isinstance(part, trimesh.Trimesh) or not len(part.faces):
             continue
         uv = getattr(part.visual, "uv", None)
         vertices = np.asarray(part.vertices, dtype=np.float64)
