@@ -175,6 +175,7 @@ CAMPAIGNS = {
         _module("wavelength_noise", "--paths", "786432"),
         _module("history_sampling"),
         _module("euler_steps"),
+        _module("chart_colours"),
         Campaign(
             "benchmarks",
             ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),

@@ -82,6 +82,11 @@ def _steps(printed: str) -> str:
     return "\n".join(lines)
 
 
+def _charts(printed: str) -> str:
+    rows = re.findall(r"^(\S+ \S+(?: \S+)?)  +(\S.*?)  +(D50|D65|C) +(.*?)  +(.*)$", printed, re.M)
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
 def _raised(text: str) -> str:
     """Return a text whose exponents are superscripts."""
     return re.sub(
@@ -95,4 +100,5 @@ QUOTES = (
     Quote(PAGE, "history_sampling", _history),
     Quote(PAGE, "history_sampling", _saturated),
     Quote(PAGE, "euler_steps", _steps),
+    Quote(PAGE, "chart_colours", _charts),
 )

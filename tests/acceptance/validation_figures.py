@@ -316,6 +316,12 @@ def _steps(printed: str) -> str:
     return f"within {max(errors):.5f}"
 
 
+def _chart(printed: str) -> str:
+    row = r"^BabelColor Average +BabelColor Average +{} +\S+ +\S+ +([\d.]+, [\d.]+)$"
+    same, other = (match(row.format(light), printed) for light in ("D50", "D65"))
+    return f"lit by D50 {same}; lit by D65 {other}"
+
+
 def _single_wavelengths(printed: str) -> str:
     times = columns(
         r"^(?:furnace|sphere) +\d wavelengths? +" + 4 * r"\S+ +" + r"(\S+) +(\S+) +(\S+) +(\S+) ",
@@ -677,6 +683,13 @@ FIGURES = (
         "Levels from 0 to 1 by 25 exact steps a second, four materials, steady and swinging light",
         "euler_steps",
         _steps,
+    ),
+    Figure(
+        "ColorChecker in 20-nm bands, mean reflectances of 30 charts, against their published "
+        "colours, which are under D50 and adapted to the screen: ΔE2000, mean and largest of 24 "
+        "patches",
+        "chart_colours",
+        _chart,
     ),
     Figure(
         "Light in closed rooms with fluorescent papers: time of paths of 1 to 8 wavelengths over "

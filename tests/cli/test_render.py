@@ -162,3 +162,46 @@ def test_a_room_that_is_not_tight_is_told(labrig: Callable[..., Ended]) -> None:
         assert ends[name].code == 0, ends[name].err
     assert "warning" not in ends["tight"].err
     assert "left the closed room" in ends["leaky"].err
+
+
+def test_what_failed_before_its_first_picture_does_not_stand_in_the_way(
+    labrig: Callable[..., Ended],
+) -> None:
+    """A scene is corrected, and rendered into the same folder."""
+    flat = {"corner_m": [0, 0, 0], "edge_u_m": [1, 0, 0], "edge_v_m": [0, 1, 0]}
+    for per_place, code in ((65536, 2), (4, 0)):
+        Path("s.yaml").write_text(json.dumps({
+            "name": "s", "kind": "scene",
+            "materials": {
+                "paint": {"file": "blue-paint", "assume_albedo": 0.6, "assume_scale": 0.5}
+            },
+            "objects": {"a": {"material": "paint", "rectangle": flat, "samples": [2, 2]}},
+            "camera": {"position_m": [0, 0, 1], "look_at_m": [0, 1, 0]},
+            "programme": [{"at_s": 0, "lamps": {}}], "frames_s": [0],
+            "paths": {"per_place": per_place, "per_pixel": per_place},
+        }))  # fmt: skip
+        size = ["--size", "8192x8192"] if code else ["--size", "8x8"]
+        ended = labrig("render", "s.yaml", *size)
+        assert ended.code == code, ended.err
+        assert len([line for line in ended.err.splitlines() if "labrig:" in line]) == bool(code)
+
+
+@pytest.mark.parametrize("missing", ["embreex", "numba", "trimesh"])
+def test_without_the_extra_it_is_one_line(
+    labrig: Callable[..., Ended], monkeypatch: pytest.MonkeyPatch, missing: str
+) -> None:
+    for name in list(sys.modules):
+        if name.split(".")[0] == missing or name.endswith("kernels"):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, missing, None)
+    Path("a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    Path("s.yaml").write_text(json.dumps({
+        "name": "s", "kind": "scene", "materials": {"grey": {"albedo": 0.5}},
+        "objects": {"a": {"material": "grey", "mesh": {"file": "a.obj"}, "two_sided": True}},
+        "camera": {"position_m": [0, 0, 1], "look_at_m": [0, 1, 0]},
+        "programme": [{"at_s": 0, "lamps": {}}], "frames_s": [0],
+    }))  # fmt: skip
+    ended = labrig("render", "s.yaml", *SMALL)
+    assert ended.code == 2
+    assert len(ended.err.splitlines()) == 1
+    assert "pip install 'labrig[render]'" in ended.err

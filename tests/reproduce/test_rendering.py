@@ -204,6 +204,10 @@ def test_levels_at_first_are_given_or_those_of_the_light(tmp_path: Path) -> None
         ),
         ({"materials": {"paint": {"albedo": MIRROR}}}, "eigenvalue"),
         ({"lamps": {"sun": {"spectrum": "900nm", **SUN}}}, "between 300 and 780 nm"),
+        ({"lamps": {"sun": {"spectrum": "none.csv", **SUN}}}, "none.csv: no such file"),
+        ({"lamps": {"sun": {"spectrum": "D66", **SUN}}}, "D65"),
+        ({"lamps": {"sun": {"spectrum": "dark.csv", **SUN}}}, "without light"),
+        ({"lamps": {"sun": {"spectrum": "negative.csv", **SUN}}}, "negative one at 510 nm"),
         (
             {"materials": {"paint": {**PAINT, "assume_scale": 500.0}}},
             "less light than it takes",
@@ -229,6 +233,8 @@ def test_levels_at_first_are_given_or_those_of_the_light(tmp_path: Path) -> None
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_one_line(tmp_path: Path, changed: dict[str, Any], says: str) -> None:
+    (tmp_path / "dark.csv").write_text("wavelength_nm,value\n400,0\n700,0\n")
+    (tmp_path / "negative.csv").write_text("wavelength_nm,value\n400,9\n510,-1\n700,9\n")
     with pytest.raises(UsageError, match=says) as raised:
         Renderer(scene(tmp_path, **changed)).frame(0.0)
     assert "\n" not in str(raised.value)
@@ -251,6 +257,7 @@ f 1 4 3
     [
         (OBJ, {}, {"samples": [8, 8]}, "texture coordinates"),
         (OBJ.replace("f 1 4 3", ""), {}, {}, "holes"),
+        (OBJ.replace("f 1 4 3", "f 1 3 4"), {}, {}, "some inverted"),
         (
             OBJ.replace("1 3 2", "1 2 3")
             .replace("1 2 4", "1 4 2")

@@ -78,13 +78,16 @@ class RenderFolder:
                 known = json.loads(content.read_text(encoding="utf-8"))["identity"]
             except (ValueError, KeyError, TypeError):
                 known = None
-            if known != identity:
+            # One that failed before its first frame leaves nothing that is worth keeping.
+            is_begun = known is None or any(path.glob("*.exr"))
+            if known != identity and is_begun:
                 raise UsageError(
                     f"{path}: expected a new folder or the same rendering, got another scene, "
                     "other materials or other settings; give another folder (--out)"
                 )
-            return cls(path, scene.file.frames_s)
-        if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            if known == identity:
+                return cls(path, scene.file.frames_s)
+        elif path.exists() and (not path.is_dir() or any(path.iterdir())):
             raise UsageError(
                 f"{path}: expected a new folder, got one without {CONTENT}; give another (--out)"
             )

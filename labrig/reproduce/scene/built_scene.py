@@ -52,6 +52,8 @@ IntArray = NDArray[np.int32]
 #: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
 TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
 MOST_AREA_M2 = 1e12
+#: Part of a lamp's brightest band by which noise may make another negative.
+NOISE_OF_LAMP = 0.01
 
 
 @dataclass(frozen=True)
@@ -298,8 +300,8 @@ def build_scene(
         for name, entry in file.objects.items()
     )
     scene = Scene(file, bands, materials, surfaces, folder)
-    # A camera that sees nothing is refused before a folder is made for its pictures.
-    _ = scene.camera
+    # What a camera or a lamp cannot be is refused before a folder is made for the pictures.
+    _ = scene.camera, scene.lamps(file.programme[0].at_s)
     return scene
 
 
@@ -411,6 +413,13 @@ def _lamp(name: str, entry: LampEntry, bands: Bands, folder: Path, t_s: float) -
     strength = getattr(entry, of_eye)
     is_to_eye = strength is not None
     unit = _unit_light(_beside(entry.spectrum, folder), bands, is_to_eye)
+    if unit.min() < -NOISE_OF_LAMP * unit.max():
+        worst = bands.centre_nm[int(np.argmin(unit))]
+        raise UsageError(
+            f"lamp {name}: expected a spectrum ≥ 0, got a negative one at {worst:g} nm in "
+            f"'{entry.spectrum}'"
+        )
+    unit = np.maximum(unit, 0.0)
     light = unit * (strength if is_to_eye else getattr(entry, of_watt))
     if not light.any() and strength != 0:
         raise UsageError(
@@ -436,6 +445,8 @@ def _unit_light(named: str, bands: Bands, is_to_eye: bool) -> FloatArray:
     if is_to_eye:
         return absolute_irradiance(1.0, spectrum).in_bands(bands.edges_nm)
     whole = float(np.trapezoid(spectrum.value, spectrum.wavelength_nm))
+    if not whole > 0:
+        raise UsageError(f"{named}: expected the spectrum of a lamp, got one without light")
     return np.asarray(bands.means(spectrum) / whole)
 
 
@@ -504,6 +515,12 @@ def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
     mesh = Mesh(placed, mesh.faces, mesh.uv)
     if entry.mesh.inward:
         mesh = mesh.turned_over()
+    if not entry.two_sided and not mesh.is_turned_alike:
+        raise UsageError(
+            f"{name}: expected triangles that all have their front on the same side, got some "
+            f"inverted ones in {entry.mesh.file}; turn their normals over, or give "
+            "'two_sided: true'"
+        )
     if not entry.two_sided and not mesh.is_closed and entry.lamp is None:
         raise UsageError(
             f"{name}: expected a closed mesh, got one with holes in {entry.mesh.file}; its back "

@@ -12,6 +12,7 @@ from labrig.errors import UsageError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+IntArray64 = NDArray[np.int64]
 
 #: Formats of meshes that are read.
 FORMATS = (".obj", ".ply", ".glb", ".gltf", ".stl")
@@ -244,12 +245,24 @@ class Mesh:
     @property
     def is_closed(self) -> bool:
         """Whether each edge has a triangle on both sides, vertices at one place being one."""
+        edges, back = self._edges()
+        return bool(np.isin(back, edges).all())
+
+    @property
+    def is_turned_alike(self) -> bool:
+        """Whether no two triangles run along an edge in the same direction, each alone there."""
+        edges, back = self._edges()
+        same_way, count = np.unique(edges, return_counts=True)
+        return not bool((~np.isin(same_way[count == 2], back)).any())
+
+    def _edges(self) -> tuple[IntArray64, IntArray64]:
+        """Return a number for each edge of each triangle, and that of the way back along it."""
         _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
         faces = same.reshape(-1)[self.faces]
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
         n = len(self.vertices_m)
-        return bool(np.isin(edges[:, 1] * n + edges[:, 0], edges[:, 0] * n + edges[:, 1]).all())
+        return edges[:, 0] * n + edges[:, 1], edges[:, 1] * n + edges[:, 0]
 
     def turned_over(self) -> Self:
         """Return the mesh with its front on the other side."""
@@ -290,17 +303,21 @@ def read_mesh(path: Path) -> Mesh:
         raise UsageError(f"{path}: expected a mesh as {', '.join(FORMATS)}, got '{path.suffix}'")
     if not path.is_file():
         raise UsageError(f"{path}: expected a file with a mesh, got no such file")
+    trimesh = _trimesh()
     try:
-        parts = _parts(path)
-    except (ValueError, KeyError, IndexError, AttributeError, TypeError, OSError) as error:
+        parts = _parts(trimesh, path)
+    except Exception as error:  # the reader meets damage with errors of any kind
         raise UsageError(
-            f"{path}: expected a mesh, got a file that cannot be read ({error})"
+            f"{path}: expected a mesh, got a file that cannot be read "
+            f"({str(error).partition(chr(10))[0]})"
         ) from None
     n_faces = sum(len(part.faces) for part in parts)
     if not n_faces or not all(np.isfinite(part.vertices_m).all() for part in parts):
         raise UsageError(
             f"{path}: expected triangles with finite vertices, got {n_faces} triangles"
         )
+    if any(part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m) for part in parts):
+        raise UsageError(f"{path}: expected triangles of its own vertices, got others")
     if len({part.uv is None for part in parts}) > 1 or _is_partly_unwrapped(path):
         raise UsageError(
             f"{path}: expected texture coordinates on all faces or on none, got them on some; "
@@ -312,9 +329,8 @@ def read_mesh(path: Path) -> Mesh:
     return mesh
 
 
-def _parts(path: Path) -> list[Mesh]:
+def _parts(trimesh: Any, path: Path) -> list[Mesh]:
     """Return the meshes of a file, each with one material, where its scene has them."""
-    trimesh = _trimesh()
     loaded = trimesh.load(path, process=False)
     placed = [(np.eye(4), loaded)]
     if isinstance(loaded, trimesh.Scene):
@@ -323,7 +339,7 @@ def _parts(path: Path) -> list[Mesh]:
         placed = [(transform, loaded.geometry[name]) for transform, name in nodes]
     meshes = []
     for transform, part in placed:
-        if not isinstance(part, trimesh.Trimesh):
+        if not isinstance(part, trimesh.Trimesh) or not len(part.faces):
             continue
         uv = getattr(part.visual, "uv", None)
         vertices = np.asarray(part.vertices, dtype=np.float64)
