@@ -1,13 +1,9 @@
 """Comparison of a run with photographs, other materials and the paper of Nalbach et al."""
 
+from labrig.compare.dark_room_view import DarkRoomScene
+from labrig.compare.glow_ratio import GlowRatio, RenderedPatch
 from labrig.compare.numbers import numbers, rendered_numbers
-from labrig.compare.rendered import (
-    DarkRoomScene,
-    GlowRatio,
-    RenderedComparison,
-    RenderedPatch,
-    compare_rendered,
-)
+from labrig.compare.rendered import RenderedComparison, compare_rendered
 from labrig.compare.rendered_sections import rendered_sections
 from labrig.compare.run import RunComparison, compare_run
 from labrig.compare.sections import sections

@@ -6,7 +6,9 @@ from functools import partial
 import numpy as np
 
 from labrig.compare.glow_figure import glow_figure, shown_rows
-from labrig.compare.rendered import MEASURED, RenderedComparison, RenderedPatch
+from labrig.compare.glow_ratio import RenderedPatch
+from labrig.compare.rendered import RenderedComparison
+from labrig.compare.rendered_states import MEASURED
 from labrig.compare.viewing import FloatArray
 from labrig.number_format import plus_minus, rounded
 from labrig.report import Picture, Section, Table
