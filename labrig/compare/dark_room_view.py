@@ -1,15 +1,16 @@
 """The dark room as a rendered scene: its size, and the light in the middle of each sample."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from labrig.compare.viewing import FloatArray
-from labrig.material import Material, write_material
+from labrig.material import Material, ReradiationMatrix, write_fluorescent, write_material
+from labrig.optics import Spectrum
 from labrig.reduce import SensorLayout
-from labrig.region import Region
+from labrig.region import Region, region_pixels
 from labrig.reproduce import CARD_NAME, DarkRoomPicture, Renderer, Scene, SceneFile
 from labrig.yaml_file import yaml_text
 
@@ -29,20 +30,37 @@ class DarkRoomScene:
         The scene, with pictures under the lamp and of the glow.
     materials
         Materials by the names under which the scene names their files.
+    lights
+        Spectra of lamps that are files of the scene's own, by the names of these.
     """
 
     file: SceneFile
-    materials: Mapping[str, Material]
+    materials: Mapping[str, Material | ReradiationMatrix]
+    lights: Mapping[str, Spectrum] = field(default_factory=dict)
 
     def write(self, folder: Path) -> Path:
-        """Write scene and materials into a folder, and return the path of the scene."""
+        """Write scene, materials and lights into a folder, and return the path of the scene."""
         folder.mkdir(parents=True, exist_ok=True)
         for name, material in self.materials.items():
-            write_material(folder / name, material)
+            if isinstance(material, Material):
+                write_material(folder / name, material)
+            else:
+                write_fluorescent(folder / name, material)
+        for name, light in self.lights.items():
+            columns = np.column_stack([light.wavelength_nm, light.value])
+            np.savetxt(
+                folder / name, columns, "%.9g", ",", header="wavelength_nm,value", comments=""
+            )
         path = folder / SCENE_FILE
         content = self.file.model_dump(mode="json", exclude_none=True)
         path.write_text(yaml_text(content), encoding="utf-8")
         return path
+
+
+def fractions_of(region: Region, layout: SensorLayout) -> Region:
+    """Return a region in fractions of the frame."""
+    x, y, wide, high = region_pixels(region, layout.width, layout.height)
+    return (x / layout.width, y / layout.height, wide / layout.width, high / layout.height)
 
 
 def picture_of(layout: SensorLayout) -> DarkRoomPicture:

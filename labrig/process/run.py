@@ -12,6 +12,7 @@ from labrig.calibration import LvfFile, keep_calibration
 from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
 from labrig.optics import CameraResponse
+from labrig.process.comparison import include_comparison
 from labrig.process.provenance import Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
 from labrig.record import RunLock, read_run
@@ -198,6 +199,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     rendered = _render(result, Source(run, protocol, rig, about, camera))
     report = Report(about, warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
+    include_comparison(folder, result_folder)
     changes = put_in_place(result_folder)
     keep_calibration(folder)
 

@@ -60,6 +60,7 @@ from .scene.dark_room import (
     DarkRoomLamp as DarkRoomLamp,
     DarkRoomPicture as DarkRoomPicture,
     dark_room as dark_room,
+    under_lamps as under_lamps,
 )
 from .scene.scene_file import (
     MaterialEntry as MaterialEntry,
