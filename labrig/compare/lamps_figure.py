@@ -27,23 +27,16 @@ LETTER_PT = 5.0
 Block = tuple[str, str, tuple[tuple[str, RenderedSample], ...]]
 
 
-def lamps_figure(lamps: Sequence[RenderedLamp], notes: Sequence[str] = ()) -> Figure:
-    """Draw a block for each lamp: photographs above, the rendering and its parts below.
-
-    Notes stand under the last block, a line each.
-    """
+def lamps_figure(lamps: Sequence[RenderedLamp]) -> Figure:
+    """Draw a block for each lamp: photographs above, the rendering and its parts below."""
     blocks = [block for lamp in lamps for block in _blocks(lamp)]
     height_pt = TITLE_PT + len(LOOKS) * CELL_HEIGHT_PT + TIMES_PT + GAP_PT
-    height = len(blocks) * height_pt + TIMES_PT * len(notes)
-    figure = new_figure(height)
+    figure = new_figure(len(blocks) * height_pt)
     axes = figure.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(0, WIDTH_PT), ylim=(height, 0))
+    axes.set(xlim=(0, WIDTH_PT), ylim=(len(blocks) * height_pt, 0))
     axes.axis("off")
     for number, block in enumerate(blocks):
         _draw(axes, block, number * height_pt)
-    for number, note in enumerate(notes):
-        y = len(blocks) * height_pt + number * TIMES_PT + TIMES_PT / 2
-        axes.text(EDGE_PT, y, note, color=MUTED, fontsize=SMALL_PT, wrap=True)
     return figure
 
 

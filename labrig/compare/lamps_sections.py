@@ -25,7 +25,7 @@ def lamps_sections(comparison: LampsComparison) -> tuple[Section, ...]:
     Returns
     -------
     tuple of Section
-        One section with a picture and tables.
+        A section with a picture, and one with a table of each lamp.
 
     Examples
     --------
@@ -33,21 +33,26 @@ def lamps_sections(comparison: LampsComparison) -> tuple[Section, ...]:
     >>> from labrig.compare import compare_lamps, lamps_sections
     >>> compared = compare_lamps(Path("runs/validation"))  # doctest: +SKIP
     >>> [section.title for section in lamps_sections(compared)]  # doctest: +SKIP
-    ['Under lamps, photographed and rendered']
+    ['Under lamps, photographed and rendered', 'Light of the samples, photographed and rendered']
     """
-    text = (comparison.description, *(f"Note: {note}." for note in comparison.notes))
+    notes = (f"Note: {note}." for note in comparison.notes)
     picture = Picture(
         "lamps",
-        partial(lamps_figure, comparison.lamps, comparison.notes),
+        partial(lamps_figure, comparison.lamps),
         "Photographed and rendered samples; a white under the balanced lamp is white. Numbers are "
         "CIEDE2000 of rendered and of reflected light to the photograph, and the share of the "
         "luminance that is re-radiated.",
     )
-    tables = (
-        _overview(comparison),
-        *(_lamp_table(lamp, comparison.channels) for lamp in comparison.lamps),
+    by_lamp = tuple(_lamp_table(lamp, comparison.channels) for lamp in comparison.lamps)
+    return (
+        Section(
+            "Under lamps, photographed and rendered",
+            (*comparison.description, *notes),
+            (picture,),
+            (_overview(comparison),),
+        ),
+        Section("Light of the samples, photographed and rendered", tables=by_lamp),
     )
-    return (Section("Under lamps, photographed and rendered", text, (picture,), tables),)
 
 
 def _overview(comparison: LampsComparison) -> Table:

@@ -167,7 +167,7 @@ def lamps_numbers(comparison: LampsComparison) -> dict[str, Any]:
     """
     plain: dict[str, Any] = _plain(
         {
-            "description": comparison.description,
+            "description": " ".join(comparison.description),
             "notes": list(comparison.notes),
             "channels": list(comparison.channels),
             "lamps": {

@@ -120,7 +120,7 @@ class LampsComparison:
     lamps
         The lamps.
     description
-        How it was compared, for people.
+        How it was compared, in paragraphs for people.
     notes
         What is assumed or missing, one sentence each.
     scene
@@ -129,7 +129,7 @@ class LampsComparison:
 
     channels: tuple[str, ...]
     lamps: tuple[RenderedLamp, ...]
-    description: str
+    description: tuple[str, ...]
     notes: tuple[str, ...]
     scene: DarkRoomScene
 
@@ -325,19 +325,16 @@ def _sample(
     )
 
 
-def _description(result: ValidateIlluminantsResult, conversion: Viewing) -> str:
-    return " ".join(
-        (
-            "The dark room is rendered under each lamp with the samples' matrices, predicted from "
-            f"{result.fluorescence}, in bands of 10 nm.",
-            "Light of a sample is divided by that of the grey card in its place, which tells how "
-            "bright the lamp is in each channel; under a lamp that the camera hardly sees, by the "
-            "brightest rendered light, and one strength for all samples is fitted.",
-            "σ of a rendering is that of the prediction in the run's result: lamps' spectra, "
-            "camera's curves, card, and matrices.",
-            f"CIELAB: {conversion.source}. Its white is a perfect one under the lamp; where the "
-            "lamp shows none, the one named, which the brightest photograph just reaches.",
-        )
+def _description(result: ValidateIlluminantsResult, conversion: Viewing) -> tuple[str, ...]:
+    return (
+        f"The dark room is rendered under each lamp with the matrices of {result.fluorescence}, in "
+        "bands of 10 nm. Light of a sample is divided by that of the grey card in its place, which "
+        "tells how bright the lamp is in each channel; under a lamp that the camera hardly sees, "
+        "by the brightest rendered light, and one strength for all samples is fitted.",
+        "σ of a rendering is that of the prediction in the run's result: lamps' spectra, camera's "
+        "curves, card, and matrices.",
+        f"CIELAB: {conversion.source}. Its white is a perfect one under the lamp; where the lamp "
+        "shows none, the one named, which the brightest photograph just reaches.",
     )
 
 
