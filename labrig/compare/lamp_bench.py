@@ -21,17 +21,21 @@ from labrig.compare.dark_room_view import (
 )
 from labrig.compare.viewing import FloatArray
 from labrig.errors import DataError, UsageError
+from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse
 from labrig.record import read_run
 from labrig.reduce import sensor_layout
 from labrig.reproduce import (
     CARD_NAME,
+    Bands,
+    BandsEntry,
     DarkRoomLamp,
     MaterialEntry,
     SceneFile,
     build_scene,
     camera_values,
     dark_room,
+    of_matrix,
     tristimulus,
     under_lamps,
 )
@@ -95,19 +99,22 @@ class LampBench:
         self.result, self.camera = result, camera
         layout = sensor_layout(frames[0])
         self._picture = picture_of(layout)
-        self._regions = {
-            name: fractions_of(sample.region, layout) for name, sample in result.samples.items()
-        }
         self._lights = {
             f"lamp-{number}.csv": lamp.light(name)
             for number, (name, lamp) in enumerate(result.lamps.items(), start=1)
         }
         self._spectra = dict(zip(result.lamps, self._lights, strict=True)) | {TAILS: TAILS_SPECTRUM}
-        self._materials = {
-            f"material-{number}.yaml": sample.matrix.named(name)
-            for number, (name, sample) in enumerate(result.samples.items(), start=1)
+        card = str(resources.curve_path(rig.optics.grey_card))
+        matrices, self.left_out = _that_lose_light(result, self._file(card, {}).bands)
+        self.samples = tuple(matrices)
+        self._regions = {
+            name: fractions_of(result.samples[name].region, layout) for name in matrices
         }
-        self._room = self._file(str(resources.curve_path(rig.optics.grey_card)))
+        self._materials = {
+            f"material-{number}.yaml": matrix
+            for number, matrix in enumerate(matrices.values(), start=1)
+        }
+        self._room = self._file(card, dict(zip(matrices, self._materials, strict=True)))
         one_by_one = under_lamps(
             self._room, self._spectra, [{light: 1.0} for light in self._spectra]
         )
@@ -116,10 +123,15 @@ class LampBench:
         self.whole = self._folded(one_by_one, place)
         self.reflected = self._folded(_without_reradiation(one_by_one), place)
 
-    def _file(self, card: str) -> SceneFile:
+    def patches(self, lamp: str) -> dict[str, LampPatch]:
+        """Return the samples that are rendered, as they were photographed under a lamp."""
+        patches = self.result.lamps[lamp].patches
+        return {name: patches[name] for name in self.samples}
+
+    def _file(self, card: str, files: Mapping[str, str]) -> SceneFile:
+        """Return the dark room under one lamp, with the material files of samples."""
         patches = {
-            name: (self._regions[name], MaterialEntry(file=file))
-            for name, file in zip(self._regions, self._materials, strict=True)
+            name: (self._regions[name], MaterialEntry(file=file)) for name, file in files.items()
         }
         lamp = DarkRoomLamp(self._spectra[self.result.balance], ANY_LUX)
         return dark_room("dark-room", patches, lamp, [(0.0, 1.0)], [0.0], self._picture, card)
@@ -152,7 +164,7 @@ class LampBench:
 
     def by_card(self, lamp: str) -> LitSamples:
         """Return the samples under a lamp whose strength the card tells, in each channel."""
-        patches = self.result.lamps[lamp].patches
+        patches = self.patches(lamp)
         of_card = self.values(lamp, CARD_NAME)
         is_seen = of_card > VISIBLE * of_card.max()
         gains, references = {}, {}
@@ -177,7 +189,7 @@ class LampBench:
 
         One strength for all is the most likely one.
         """
-        patches = self.result.lamps[lamp].patches
+        patches = self.patches(lamp)
         of_card = self.values(TAILS, CARD_NAME)
         tails = {
             name: self.values(TAILS, name, whole=False) / of_card * patch.card
@@ -228,11 +240,34 @@ class LampBench:
         return replace(self.kept, file=file.model_copy(update={"paths": paths}))
 
 
+def _that_lose_light(
+    result: ValidateIlluminantsResult, entry: BandsEntry
+) -> tuple[dict[str, ReradiationMatrix], tuple[str, ...]]:
+    """Return the matrices that a renderer takes, and a reason for each one that it does not.
+
+    A radiance factor, which a bench measures for one direction, may be above 1; a scene's albedo
+    may not.
+    """
+    bands = Bands.even(**entry.model_dump())
+    matrices, left_out = {}, []
+    for name, sample in result.samples.items():
+        matrix = sample.matrix.named(name)
+        try:
+            of_matrix(matrix, bands)
+        except (UsageError, DataError) as error:
+            left_out.append(f"left out: {error}")
+        else:
+            matrices[name] = matrix
+    if not matrices:
+        raise UsageError(f"no sample can be rendered; {left_out[0]}")
+    return matrices, tuple(left_out)
+
+
 def lit_by_all(bench: LampBench) -> dict[str, LitSamples]:
     """Return the samples under each lamp, in the order of the lamps."""
     lamps = bench.result.lamps
     of_card = {name: bench.by_card(name) for name, lamp in lamps.items() if lamp.scale == "card"}
-    evenness = _evenness([lamps[name].patches for name in of_card], list(bench.result.samples))
+    evenness = _evenness([bench.patches(name) for name in of_card], bench.samples)
     return {
         name: of_card[name] if name in of_card else bench.by_samples(name, evenness)
         for name in lamps

@@ -230,7 +230,7 @@ def compare_lamps(
         result.channels,
         tuple(_compared(name, bench, each, look) for name, each in lit.items()),
         _description(result, conversion),
-        tuple(_notes(result, is_same_camera=camera is None)),
+        (*bench.left_out, *_notes(result, is_same_camera=camera is None)),
         bench.scene({name: each.strengths for name, each in lit.items()}),
     )
 
@@ -286,11 +286,11 @@ class _Scale:
 
 def _compared(name: str, bench: LampBench, lit: LitSamples, look: _Look) -> RenderedLamp:
     """Compare photographs and renderings under a lamp."""
-    lamp = bench.result.lamps[name]
-    exposed = look.exposed(patch.value for patch in lamp.patches.values())
+    patches, is_white = bench.patches(name), bench.result.lamps[name].white == "lamp"
+    exposed = look.exposed(patch.value for patch in patches.values())
     samples = {}
-    for sample, patch in lamp.patches.items():
-        scale = look.under(lit.white[sample]) if lamp.white == "lamp" else exposed
+    for sample, patch in patches.items():
+        scale = look.under(lit.white[sample]) if is_white else exposed
         share = bench.reradiated_luminance(lit.strengths, sample)
         samples[sample] = _sample(patch, sample, lit, scale, look.to_picture, share)
     return RenderedLamp(name, lit.reference, samples)

@@ -63,6 +63,7 @@ from .scene.dark_room import (
     under_lamps as under_lamps,
 )
 from .scene.scene_file import (
+    BandsEntry as BandsEntry,
     MaterialEntry as MaterialEntry,
     SceneFile as SceneFile,
     read_scene as read_scene,
