@@ -133,6 +133,9 @@ def _export(
     )
 
     meshes, camera = exported_meshes(scene, folder), exported_camera(scene)
+    for mesh in meshes:
+        if mesh.preview is not None:
+            typer.echo(f"{mesh.name}: {mesh.preview.statement}", err=True)
     if gltf is not None:
         times_s = [t_s - folder.times_s[0] for t_s in folder.times_s]
         brightest = max(

@@ -9,6 +9,10 @@ from .export.gltf import (
 from .export.mitsuba_scene import (
     write_mitsuba_scene as write_mitsuba_scene,
 )
+from .export.rgb_preview import (
+    RgbPreview as RgbPreview,
+    rgb_preview as rgb_preview,
+)
 from .export.scene_export import (
     exported_camera as exported_camera,
     exported_meshes as exported_meshes,
