@@ -175,6 +175,8 @@ CAMPAIGNS = {
         _module("wavelength_noise", "--paths", "786432"),
         _module("history_sampling"),
         _module("euler_steps"),
+        _module("dark_room"),
+        _module("fluorescent_room"),
         Campaign(
             "benchmarks",
             ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),

@@ -74,7 +74,7 @@ CASES = (
     Case("textiles, measured", TEXTILES, 165, is_measured=True),
     Case("papers, measured", PAPERS, 166, is_measured=True),
     Case(
-        "LEDs not calibrated", SAMPLES, 164, is_measured=True, is_calibrated=False, is_right=False
+        "LEDs not calibrated", SAMPLES, 169, is_measured=True, is_calibrated=False, is_right=False
     ),
     Case("felt for paper", SAMPLES, 167, taken_for={"paper": "grey-felt"}, is_right=False),
     Case("card glows", SAMPLES, 168, room={"grey_card_fluorescence": 0.3}, is_right=False),
@@ -172,6 +172,8 @@ def told(case: Case, folder: Path) -> bool:
     right = is_right(compared)
     said = {True: "right", False: "differs"}[right]
     print(f"{case.name}, seed {case.seed}: {said}{'' if right == case.is_right else ', WRONG'}")
+    for line in compared.notes:
+        print(f"    {line}")
     for lamp in compared.lamps:
         samples = list(lamp.samples.values())
         bright = max(float(sample.rendered.max()) for sample in samples)
