@@ -9,10 +9,13 @@ import typer
 from labrig.cli.completion import complete_run
 
 if TYPE_CHECKING:
-    from labrig.compare import DarkRoomScene
+    from labrig.compare import DarkRoomScene, LampsComparison, RenderedComparison
     from labrig.fit import DecayFit
     from labrig.report import Section
     from labrig.results import Series
+
+#: Name of the table of what was photographed and rendered.
+TABLE = "rendered.csv"
 
 
 def compare(
@@ -76,7 +79,7 @@ def compare(
     --rendered also fluorescent samples under lamps, photographed by validate_illuminants.
     """
     from labrig.catalogue import find_run
-    from labrig.compare import compare_run, is_of_fluorescence, numbers, sections
+    from labrig.compare import compare_run, is_of_fluorescence, numbers, sections, write_rendered
     from labrig.errors import UsageError
 
     if not rendered and (assume_albedo is not None or assume_scale is not None):
@@ -106,6 +109,8 @@ def compare(
         _save_figures(section, drawn)
     if room is None:
         return
+    write_rendered(drawn / TABLE, room.comparison)
+    typer.echo(f"table: {drawn / TABLE}")
     if room.scene is not None:
         typer.echo(f"scene: {room.scene.write(drawn)}")
     if figures is None:
@@ -115,8 +120,9 @@ def compare(
 
 @dataclass(frozen=True)
 class _RenderedRoom:
-    """The dark room rendered: for programs, for people, and as a scene."""
+    """The dark room rendered: the comparison, for programs, for people, and as a scene."""
 
+    comparison: "RenderedComparison | LampsComparison"
     content: dict[str, Any]
     sections: "tuple[Section, ...]"
     scene: "DarkRoomScene | None"
@@ -134,7 +140,7 @@ def _of_glow(
     from labrig.reproduce import Assumptions
 
     room = compare_rendered(folder, _refit, material, Assumptions(*assumed), white, camera)
-    return _RenderedRoom(rendered_numbers(room), rendered_sections(room), room.scene)
+    return _RenderedRoom(room, rendered_numbers(room), rendered_sections(room), room.scene)
 
 
 def _of_lamps(folder: Path, white: str, camera: str | None) -> _RenderedRoom:
@@ -142,7 +148,7 @@ def _of_lamps(folder: Path, white: str, camera: str | None) -> _RenderedRoom:
     from labrig.compare import compare_lamps, lamps_numbers, lamps_sections
 
     room = compare_lamps(folder, white, camera)
-    return _RenderedRoom(lamps_numbers(room), lamps_sections(room), room.scene)
+    return _RenderedRoom(room, lamps_numbers(room), lamps_sections(room), room.scene)
 
 
 def _check_for_fluorescence(

@@ -13,6 +13,7 @@ from labrig.compare.rendered_lamps import (
     is_of_fluorescence,
 )
 from labrig.compare.rendered_sections import rendered_sections
+from labrig.compare.rendered_table import write_rendered
 from labrig.compare.run import RunComparison, compare_run
 from labrig.compare.sections import sections
 from labrig.compare.three_channels import ThreeChannels, three_channels
@@ -38,4 +39,5 @@ __all__ = [
     "rendered_sections",
     "sections",
     "three_channels",
+    "write_rendered",
 ]

@@ -110,12 +110,12 @@ def rendered_numbers(comparison: RenderedComparison) -> dict[str, Any]:
     Examples
     --------
     >>> from labrig.compare import RenderedComparison, rendered_numbers
-    >>> rendered_numbers(RenderedComparison((), "one exposure", (), ()))["description"]
+    >>> rendered_numbers(RenderedComparison((), ("one exposure",), (), ()))["description"]
     'one exposure'
     """
     plain: dict[str, Any] = _plain(
         {
-            "description": comparison.description,
+            "description": " ".join(comparison.description),
             "notes": list(comparison.notes),
             "left_out": list(comparison.left_out),
             "patches": {

@@ -42,7 +42,7 @@ class RenderedComparison:
     patches
         All patches.
     description
-        How it was compared, for people.
+        How it was compared, in paragraphs for people.
     notes
         What was assumed, one sentence each.
     left_out
@@ -52,7 +52,7 @@ class RenderedComparison:
     """
 
     patches: tuple[RenderedPatch, ...]
-    description: str
+    description: tuple[str, ...]
     notes: tuple[str, ...]
     left_out: tuple[str, ...]
     scene: DarkRoomScene | None = None
@@ -193,20 +193,21 @@ def _description(
     reflected_by: Sequence[str],
     room: PhotographedRoom,
     left_out: Sequence[str],
-) -> str:
+) -> tuple[str, ...]:
     by = " and ".join(dict.fromkeys(reflected_by))
-    sentences = [
+    paragraphs = [
         "The dark room is rendered at the exposures of the photographs, in bands of 10 nm; its "
-        f"light is that of the lamp as {by} reflects it in the photographs.",
-        f"'{MEASURED}': the measured material, charged as the journal says; the others: fits to "
-        "the decay, whose brightness is fitted, too.",
-        f"CIELAB: {conversion.source}.",
-        f"ΔE is CIEDE2000 with L* = {LIGHTNESS:g} of every photograph, and with one exposure for "
-        "all, the brightest at that; a rendering has the factor of its photograph.",
+        f"light is that of the lamp as {by} reflects it in the photographs. '{MEASURED}': the "
+        "measured material, charged as the journal says; the others: fits to the decay, whose "
+        "brightness is fitted, too.",
+        f"CIELAB: {conversion.source}. ΔE is CIEDE2000 with L* = {LIGHTNESS:g} of every "
+        "photograph, and with one exposure for all, the brightest at that; a rendering has the "
+        "factor of its photograph.",
         *_unread(room),
-        *(f"Left out: {reason}." for reason in left_out),
     ]
-    return " ".join(sentences)
+    if left_out:
+        paragraphs.append(f"Left out: {'; '.join(left_out)}.")
+    return tuple(paragraphs)
 
 
 def _unread(room: PhotographedRoom) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """`labrig compare --rendered` of fluorescent samples under the lamps of the simulated bench."""
 
+import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -118,6 +119,12 @@ def test_it_is_printed_for_programs_and_the_report_shows_it_while_it_is_of_its_r
     assert "is of another result" in report.read_text()
     felt = compare_lamps(run).lamps[0].samples["felt"]
     assert (felt.in_sigma > 10).all()
+    rows = list(csv.DictReader((run / "comparison" / "rendered.csv").read_text().splitlines()))
+    assert len(rows) == 2 * len(SAMPLES) * 3
+    for row in rows:
+        said = lamps[row["lamp"]]["samples"][row["sample"]]
+        number = "RGB".index(row["channel"])
+        assert float(row["rendered"]) == pytest.approx(said["rendered"][number], rel=1e-5)
     scene = load_scene(run / "comparison" / "dark-room.yaml")
     renderer = Renderer(scene.resized(width_px=30, height_px=20), threads=1)
     lit = [float(frame.radiance.sum()) for frame in renderer.frames()]
