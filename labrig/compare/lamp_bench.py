@@ -162,26 +162,45 @@ class LampBench:
         both = tristimulus(np.array([whole, reflected]), self.edges_nm)[:, 1]
         return float(1 - both[1] / both[0])
 
+    def _reradiated(self, light: str, name: str) -> FloatArray:
+        """Return the camera's values (k,) of what a sample re-radiates under one light."""
+        return self.values(light, name) - self.values(light, name, whole=False)
+
+    def _gains(self) -> FloatArray:
+        """Return gains (k,) of the channels relative to the camera's curves, by the balanced lamp.
+
+        A card under a narrow lamp tells how the curves err there, and not where samples re-radiate.
+        """
+        lamp = self.result.balance
+        of_card = self.values(lamp, CARD_NAME)
+        gains = np.mean([patch.card / of_card for patch in self.patches(lamp).values()], axis=0)
+        return np.asarray(gains / gains.mean())
+
     def by_card(self, lamp: str) -> LitSamples:
         """Return the samples under a lamp whose strength the card tells, in each channel."""
-        patches = self.patches(lamp)
+        patches, camera = self.patches(lamp), self._gains()
         of_card = self.values(lamp, CARD_NAME)
         is_seen = of_card > VISIBLE * of_card.max()
-        gains, references = {}, {}
+        is_broad = self.result.lamps[lamp].white == "lamp"
+        gains, references, whole, strengths = {}, {}, {}, []
         for name, patch in patches.items():
-            strength = patch.card[is_seen].sum() / of_card[is_seen].sum()
-            gains[name] = np.where(is_seen, patch.card / np.where(is_seen, of_card, 1), strength)
+            strength = patch.card[is_seen].sum() / (camera * of_card)[is_seen].sum()
+            by_channel = patch.card / np.where(is_seen, of_card, 1.0)
+            gains[name] = np.where(is_seen, by_channel, strength * camera)
             references[name] = np.where(is_seen, patch.card, patch.card.max())
-        strength = float(np.mean([gain[is_seen].mean() for gain in gains.values()]))
+            seen_by = gains[name] if is_broad else strength * camera
+            whole[name] = seen_by * self._reradiated(lamp, name)
+            whole[name] += gains[name] * self.values(lamp, name, whole=False)
+            strengths.append(strength)
         return LitSamples(
             reference="card",
-            whole={name: gains[name] * self.values(lamp, name) for name in patches},
+            whole=whole,
             reflected={
                 name: gains[name] * self.values(lamp, name, whole=False) for name in patches
             },
             white={name: gains[name] * self.values(lamp, WHITE) for name in patches},
             references=references,
-            strengths={lamp: strength},
+            strengths={lamp: float(np.mean(strengths))},
         )
 
     def by_samples(self, lamp: str, evenness: Mapping[str, float]) -> LitSamples:
@@ -189,13 +208,13 @@ class LampBench:
 
         One strength for all is the most likely one.
         """
-        patches = self.patches(lamp)
+        patches, camera = self.patches(lamp), self._gains()
         of_card = self.values(TAILS, CARD_NAME)
         tails = {
             name: self.values(TAILS, name, whole=False) / of_card * patch.card
             for name, patch in patches.items()
         }
-        unit = {name: evenness[name] * self.values(lamp, name) for name in patches}
+        unit = {name: evenness[name] * camera * self.values(lamp, name) for name in patches}
         numerator = denominator = 0.0
         for name, patch in patches.items():
             weight = 1 / (patch.sigma**2 + patch.predicted_sigma**2)
@@ -207,10 +226,12 @@ class LampBench:
                 "nothing; leave it out of 'lamps:' in the run's protocol.yaml, and process again"
             )
         strength = numerator / denominator
-        own = {name: strength * evenness[name] for name in patches}
+        own = {name: strength * evenness[name] * camera for name in patches}
         whole = {name: strength * unit[name] + tails[name] for name in patches}
         brightest = np.full(len(of_card), max(float(values.max()) for values in whole.values()))
-        of_tails = float(np.mean([(patch.card / of_card).mean() for patch in patches.values()]))
+        of_tails = float(
+            np.mean([(patch.card / (camera * of_card)).mean() for patch in patches.values()])
+        )
         return LitSamples(
             reference="brightest",
             whole=whole,

@@ -6,8 +6,9 @@ Every case is a `labrig run validate_illuminants` in the simulated room, under l
 are not quite those of the rig file: a halogen lamp of 2880 K for one of 3000 K, a black light 1.5
 nm away and broader. The room takes matrices as bilinear between their wavelengths; measured papers
 and textiles (RIT, BFC-450) are no sums of a few dyes. `files`: the rendering has the matrices of
-the room, the instrument's ones corrected and with σ; `measured`: those that `led_fluorescence`
-estimated from earlier photographs of the same samples, after `led_brightness`.
+the room, the instrument's ones corrected and with σ; `blue`: the same under a narrow blue lamp, 1
+nm away and broader than the rig file says; `measured`: those that `led_fluorescence` estimated from
+earlier photographs of the same samples, after `led_brightness`.
 Of each lamp: ΔE2000 of photograph and rendering, mean over the samples and largest, beside the root
 mean square that their errors alone make, and to the reflected light; rendered over photographed
 light − 1, mean and furthest of what is brighter than 2 % of the brightest; the furthest value in σ;
@@ -52,6 +53,8 @@ class Case:
         whether one of `led_brightness` came before it.
     taken_for
         Materials by which patches are rendered instead of their own.
+    blue_nm
+        Peak of a lamp of 20 nm width in the place of the black light; None leaves that there.
     room
         Further keys of the simulated room.
     """
@@ -62,6 +65,7 @@ class Case:
     is_measured: bool = False
     is_calibrated: bool = True
     taken_for: dict[str, str] = field(default_factory=dict)
+    blue_nm: float | None = None
     room: dict[str, Any] = field(default_factory=dict)
     is_right: bool = True
 
@@ -70,6 +74,9 @@ CASES = (
     Case("shipped, files", SAMPLES, 161),
     Case("textiles, files", TEXTILES, 162),
     Case("papers, files", PAPERS, 163),
+    Case("shipped, blue", SAMPLES, 170, blue_nm=450.0),
+    Case("textiles, blue", TEXTILES, 171, blue_nm=465.0),
+    Case("papers, blue", PAPERS, 172, blue_nm=440.0),
     Case("shipped, measured", SAMPLES, 164, is_measured=True),
     Case("textiles, measured", TEXTILES, 165, is_measured=True),
     Case("papers, measured", PAPERS, 166, is_measured=True),
@@ -98,6 +105,8 @@ def recorded(case: Case, folder: Path) -> Path:
             "fluorescence": _fluorescence(case, patches, place),
             "longest": "2 s",
         }
+        if case.blue_nm is not None:
+            protocol["lamps"] = ["daylight", "blue"]
         process_run(record(place, protocol, _room(case)))
     return next((place / "runs").iterdir())
 
@@ -136,6 +145,10 @@ def _room(case: Case, leds: Path | None = None) -> Callable[[dict[str, Any]], No
         for sample, name in zip(simulation["sample"], case.samples.values(), strict=True):
             sample["material"] = material(name)
         simulation |= {"seed": case.seed, "sensor": {"width": 192, "height": 128}, **case.room}
+        if case.blue_nm is not None:
+            lamps = rig["devices"]["illuminants"]["lamps"]
+            lamps["blue"] = lamps.pop("ultraviolet") | {"centre": case.blue_nm, "fwhm": 20}
+            simulation["illuminants"][3] |= {"centre": case.blue_nm + 1.0, "fwhm": 22}
         if leds is not None:
             rig["optics"]["leds"] = str(leds.resolve())
 

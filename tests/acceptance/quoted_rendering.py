@@ -148,6 +148,15 @@ def _lamps(printed: str) -> str:
     return "\n".join(lines)
 
 
+def _blue(printed: str) -> str:
+    rows = re.findall(r"^ +blue +ΔE +([\d.]+) .*alone +([\d.]+), .* ([\d.]+) σ", printed, re.M)
+    delta_e, alone, sigmas = (list(map(float, column)) for column in zip(*rows, strict=True))
+    return (
+        f"Under a narrow blue lamp mean ΔE is {span(delta_e, 1)} (errors alone: {span(alone, 1)}), "
+        f"and no value is further than {max(sigmas):.1f} σ"
+    )
+
+
 def _reflected(printed: str) -> str:
     cases = re.findall(r"^\w+, (?:files|measured),(?:.|\n)*?(?=^\S)", printed, re.M)
     found = re.findall(r"^ +(?:daylight|halogen|xenon) .*reflected +([\d.]+)", "".join(cases), re.M)
@@ -170,6 +179,7 @@ QUOTES = (
     Quote(DARK_ROOM, "dark_room", _rooms),
     Quote(DARK_ROOM, "dark_room", _furthest_photograph),
     Quote(DARK_ROOM, "fluorescent_room", _lamps),
+    Quote(DARK_ROOM, "fluorescent_room", _blue),
     Quote(DARK_ROOM, "fluorescent_room", _reflected),
     Quote(DARK_ROOM, "fluorescent_room", _must_not_agree),
     Quote(PAGE, "wavelength_noise", _noise),

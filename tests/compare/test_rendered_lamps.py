@@ -25,16 +25,26 @@ CAMERA = read_camera("canon_eos_5d_mark_ii")
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Samples in the room under a lamp that is not quite its file, and under one not seen."""
+    """Samples under a lamp that is not quite its file, a narrow one, and one that is not seen."""
+
+    def with_blue(rig: dict[str, Any]) -> None:
+        lamps = rig["devices"]["illuminants"]["lamps"]
+        of_black_light = rig["simulation"]["illuminants"][3]
+        lamps["blue"] = lamps["ultraviolet"] | {"relay": 1, "centre": 450, "fwhm": 20}
+        rig["simulation"]["illuminants"][1] = of_black_light | {
+            "relay": 1, "centre": 451.0, "fwhm": 22
+        }  # fmt: skip
+        lamps.pop("halogen")
+
     protocol: dict[str, Any] = {
         "protocol": "validate_illuminants",
         "patches": QUICK["patches"],
         "fluorescence": SAMPLES,
-        "lamps": ["daylight", "ultraviolet"],
+        "lamps": ["daylight", "blue", "ultraviolet"],
         "longest": "2 s",
         "repeats": 1,
     }
-    folder = record(tmp_path_factory.mktemp("lamps"), protocol)
+    folder = record(tmp_path_factory.mktemp("lamps"), protocol, with_blue)
     process_and_report(folder)
     return folder
 
@@ -45,8 +55,8 @@ def compared(run: Path) -> LampsComparison:
 
 
 def test_renderings_are_the_photographs_within_their_errors(compared: LampsComparison) -> None:
-    daylight, ultraviolet = compared.lamps
-    assert (daylight.reference, ultraviolet.reference) == ("card", "brightest")
+    daylight, _, ultraviolet = compared.lamps
+    assert [lamp.reference for lamp in compared.lamps] == ["card", "card", "brightest"]
     for lamp in compared.lamps:
         for sample in lamp.samples.values():
             assert (np.abs(sample.in_sigma) < 3).all()
@@ -71,7 +81,7 @@ def seen_share(name: str, light: Spectrum) -> np.ndarray:
 def test_the_share_that_is_reradiated_is_that_of_the_matrix(
     run: Path, compared: LampsComparison
 ) -> None:
-    daylight, ultraviolet = compared.lamps
+    daylight, _, ultraviolet = compared.lamps
     result = read_result(run)
     assert isinstance(result, ValidateIlluminantsResult)
     light = result.lamps["daylight"].light("daylight")
@@ -101,7 +111,7 @@ def test_it_is_printed_for_programs_and_the_report_shows_it_while_it_is_of_its_r
     ended = labrig("compare", run, "--rendered", "--json")
     assert (ended.code, ended.err) == (0, "")
     lamps = json.loads(ended.out)["rendered"]["lamps"]
-    assert list(lamps) == ["daylight", "ultraviolet"]
+    assert list(lamps) == ["daylight", "blue", "ultraviolet"]
     assert "photographed and rendered" not in report.read_text()
     ended = labrig("compare", run, "--rendered")
     assert (ended.code, ended.err) == (0, "")
@@ -120,7 +130,7 @@ def test_it_is_printed_for_programs_and_the_report_shows_it_while_it_is_of_its_r
     felt = compare_lamps(run).lamps[0].samples["felt"]
     assert (felt.in_sigma > 10).all()
     rows = list(csv.DictReader((run / "comparison" / "rendered.csv").read_text().splitlines()))
-    assert len(rows) == 2 * len(SAMPLES) * 3
+    assert len(rows) == 3 * len(SAMPLES) * 3
     for row in rows:
         said = lamps[row["lamp"]]["samples"][row["sample"]]
         number = "RGB".index(row["channel"])
@@ -128,7 +138,7 @@ def test_it_is_printed_for_programs_and_the_report_shows_it_while_it_is_of_its_r
     scene = load_scene(run / "comparison" / "dark-room.yaml")
     renderer = Renderer(scene.resized(width_px=30, height_px=20), threads=1)
     lit = [float(frame.radiance.sum()) for frame in renderer.frames()]
-    assert len(lit) == 2
+    assert len(lit) == 3
     assert min(lit) > 0
 
 
