@@ -78,8 +78,8 @@ class RgbPreview:
         return {
             "preview": self.statement,
             "linearSrgbFromLinearSrgb": np.round(self.matrix, 6).tolist(),
-            "deltaE2000UnderLamps": dict(self.delta_e),
-            "deltaE2000OfBaseColorUnderLamps": dict(self.delta_e_of_colour),
+            "deltaE2000UnderLamps": _rounded(self.delta_e),
+            "deltaE2000OfBaseColorUnderLamps": _rounded(self.delta_e_of_colour),
         }
 
 
@@ -132,6 +132,10 @@ def rgb_preview(material: SurfaceMaterial, bands: Bands, lamps: Sequence[Lamp]) 
         {lamp.name: _delta_e(fitted, matrix, lamp.light, bands) for lamp in lamps},
         {lamp.name: _delta_e(colour, matrix, lamp.light, bands) for lamp in lamps},
     )
+
+
+def _rounded(differences: Mapping[str, float | None]) -> dict[str, float | None]:
+    return {lamp: None if value is None else round(value, 2) for lamp, value in differences.items()}
 
 
 def _whole(name: str, bands: Bands) -> FloatArray:
