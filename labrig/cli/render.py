@@ -146,7 +146,7 @@ def _export(
         typer.echo(f"wrote {gltf}: sRGB of what glows, without light between surfaces", err=True)
     if mitsuba is not None:
         written = write_mitsuba_scene(mitsuba, meshes, camera)
-        typer.echo(f"wrote {written}: lamps and glow in sRGB; re-radiation is not rendered", err=True)
+        typer.echo(f"wrote {written}: lamps and glow in sRGB, not re-radiation", err=True)
 
 
 def _check_places(gltf: Path | None, mitsuba: Path | None) -> None:
