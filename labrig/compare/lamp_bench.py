@@ -23,7 +23,7 @@ from labrig.compare.viewing import FloatArray
 from labrig.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse
-from labrig.record import read_run
+from labrig.record import FrameRole, read_run
 from labrig.reduce import sensor_layout
 from labrig.reproduce import (
     CARD_NAME,
@@ -93,9 +93,9 @@ class LampBench:
         rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), run.camera_identity)
         if rig.optics.grey_card is None:
             raise UsageError(f"rig '{rig.name}': expected 'grey_card' under 'optics:', got none")
-        frames = run.frames("lamp-card")
+        frames = run.frames(FrameRole.DARK)
         if not frames:
-            raise DataError(f"{folder}: expected photographs of the card, found none")
+            raise DataError(f"{folder}: expected dark frames, found none")
         self.result, self.camera = result, camera
         layout = sensor_layout(frames[0])
         self._picture = picture_of(layout)

@@ -7,8 +7,11 @@ from pathlib import Path
 from markupsafe import escape
 
 from labrig.errors import DiskError
+from labrig.record import RunLock
 from labrig.report import Section, section_page, with_later
 
+#: Lock of the process that makes the result; acquisition has another one.
+LOCK = ".process.lock"
 FOLDER, PART, RESULT, REPORT = "comparison", "section.html", "result.json", "report.html"
 
 
@@ -29,6 +32,8 @@ def show_comparison(run: Path, sections: Sequence[Section]) -> bool:
 
     Raises
     ------
+    UsageError
+        Another labrig is processing the run.
     DiskError
         A file cannot be written.
 
@@ -51,7 +56,8 @@ def show_comparison(run: Path, sections: Sequence[Section]) -> bool:
         (folder / PART).write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
-    return include_comparison(run, result)
+    with RunLock(run / LOCK, "processing this run"):
+        return include_comparison(run, result)
 
 
 def include_comparison(run: Path, result: Path) -> bool:
