@@ -1,5 +1,6 @@
 """`labrig compare`: comparison of a run with predictions, another material and the paper."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,9 +9,13 @@ import typer
 from labrig.cli.completion import complete_run
 
 if TYPE_CHECKING:
+    from labrig.compare import DarkRoomScene, LampsComparison, RenderedComparison
     from labrig.fit import DecayFit
     from labrig.report import Section
     from labrig.results import Series
+
+#: Name of the table of what was photographed and rendered.
+TABLE = "rendered.csv"
 
 
 def compare(
@@ -70,43 +75,144 @@ def compare(
 ) -> None:
     """Predicted against photographed glow, more states against one, a material beside another.
 
-    With the paper's own numbers (Nalbach et al., fig. 8 and 9, section 4.4, Table 1).
+    With the paper's own numbers (Nalbach et al., fig. 8 and 9, section 4.4, Table 1). With
+    --rendered also fluorescent samples under lamps, photographed by validate_illuminants.
     """
     from labrig.catalogue import find_run
-    from labrig.compare import (
-        compare_rendered,
-        compare_run,
-        numbers,
-        rendered_numbers,
-        rendered_sections,
-        sections,
-    )
+    from labrig.compare import compare_run, is_of_fluorescence, numbers, sections, write_rendered
     from labrig.errors import UsageError
-    from labrig.reproduce import Assumptions
 
     if not rendered and (assume_albedo is not None or assume_scale is not None):
         raise UsageError("expected --assume-albedo and --assume-scale with --rendered only")
-    folder = find_run(run, runs)
-    comparison = compare_run(folder, _refit, material or [], white, normalise, camera)
-    content, pages = numbers(comparison), sections(comparison)
-    room = None
-    if rendered:
-        room = compare_rendered(
-            folder, _refit, material or [], Assumptions(assume_albedo, assume_scale), white, camera
-        )
-        content |= {"rendered": rendered_numbers(room)}
-        pages = (*pages, *rendered_sections(room))
+    folder, room = find_run(run, runs), None
+    pages: tuple[Section, ...] = ()
+    content: dict[str, Any] = {}
+    warnings: tuple[str, ...] = ()
+    if is_of_fluorescence(folder):
+        _check_for_fluorescence(folder, rendered, material, assume_albedo, assume_scale)
+        room = _of_lamps(folder, white, camera)
+    else:
+        comparison = compare_run(folder, _refit, material or [], white, normalise, camera)
+        content, pages = numbers(comparison), sections(comparison)
+        warnings = comparison.left_out
+        if rendered:
+            assumed = (assume_albedo, assume_scale)
+            room = _of_glow(folder, material or [], assumed, white, camera)
     if json:
-        _print_json(content)
+        _print_json(content if room is None else content | {"rendered": room.content})
         return
-    for line in comparison.left_out:
+    for line in warnings:
         typer.echo(f"warning: {line}", err=True)
     drawn = figures or folder / "comparison"
-    for section in pages:
+    for section in (*pages, *(() if room is None else room.sections)):
         _print_section(section)
         _save_figures(section, drawn)
-    if room is not None and room.scene is not None:
+    if room is None:
+        return
+    write_rendered(drawn / TABLE, room.comparison)
+    typer.echo(f"table: {drawn / TABLE}")
+    if room.scene is not None:
         typer.echo(f"scene: {room.scene.write(drawn)}")
+    if figures is None:
+        options = _options(material, white, camera, assume_albedo, assume_scale)
+        _show_in_report(folder, room.sections, options)
+
+
+@dataclass(frozen=True)
+class _RenderedRoom:
+    """The dark room rendered: the comparison, for programs, for people, and as a scene."""
+
+    comparison: "RenderedComparison | LampsComparison"
+    content: dict[str, Any]
+    sections: "tuple[Section, ...]"
+    scene: "DarkRoomScene | None"
+
+
+def _of_glow(
+    folder: Path,
+    material: list[str],
+    assumed: tuple[float | None, float | None],
+    white: str,
+    camera: str | None,
+) -> _RenderedRoom:
+    """Render the decay of a phosphor."""
+    from labrig.compare import compare_rendered, rendered_numbers, rendered_sections
+    from labrig.reproduce import Assumptions
+
+    room = compare_rendered(folder, _refit, material, Assumptions(*assumed), white, camera)
+    return _RenderedRoom(room, rendered_numbers(room), rendered_sections(room), room.scene)
+
+
+def _of_lamps(folder: Path, white: str, camera: str | None) -> _RenderedRoom:
+    """Render fluorescent samples under lamps."""
+    from labrig.compare import compare_lamps, lamps_numbers, lamps_sections
+
+    room = compare_lamps(folder, white, camera)
+    return _RenderedRoom(room, lamps_numbers(room), lamps_sections(room), room.scene)
+
+
+def _check_for_fluorescence(
+    folder: Path,
+    rendered: bool,
+    material: list[str] | None,
+    assume_albedo: float | None,
+    assume_scale: float | None,
+) -> None:
+    """Refuse what a run under lamps does not answer."""
+    from labrig.errors import UsageError
+
+    if not rendered:
+        raise UsageError(
+            f"{folder}: expected --rendered for a run of validate_illuminants; its report has what "
+            "the matrices predict"
+        )
+    if material:
+        raise UsageError(
+            f"{folder}: expected no --material for a run of validate_illuminants; name other "
+            "materials as 'fluorescence:' in its protocol.yaml, and process it again"
+        )
+    if assume_albedo is not None or assume_scale is not None:
+        raise UsageError(
+            "expected --assume-albedo and --assume-scale for a run with a decay: a fluorescent "
+            "material has both"
+        )
+
+
+def _options(
+    material: list[str] | None,
+    white: str,
+    camera: str | None,
+    assume_albedo: float | None,
+    assume_scale: float | None,
+) -> list[str]:
+    """Return the options that change what is rendered, as they were given."""
+    options = [word for name in material or () for word in ("--material", name)]
+    options += ["--white", white] if white != "D65" else []
+    options += ["--camera", camera] if camera is not None else []
+    for name, value in (("--assume-albedo", assume_albedo), ("--assume-scale", assume_scale)):
+        options += [name, f"{value:g}"] if value is not None else []
+    return options
+
+
+def _show_in_report(folder: Path, pages: "tuple[Section, ...]", options: list[str]) -> None:
+    """Show rendered sections in the run's report, with the command that made them."""
+    import shlex
+    from dataclasses import replace
+
+    from labrig.process import show_comparison
+
+    if not pages:
+        return
+    command = shlex.join(["labrig", "compare", folder.name, "--rendered", *options])
+    made = replace(pages[0], text=(*pages[0].text, f"Made by: {command}"))
+    report = folder / "result" / "report.html"
+    if show_comparison(folder, (made, *pages[1:])):
+        typer.echo(f"report: {report}")
+    else:
+        typer.echo(
+            f"note: {report} has no place for it; make the report again: labrig process {folder}",
+            err=True,
+        )
 
 
 def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
@@ -124,6 +230,8 @@ def _print_section(section: "Section") -> None:
     for text in section.text:
         console.print(text, style="dim")
     for data in section.tables:
+        if data.title:
+            console.print(f"\n[bold]{data.title}[/bold]")
         table = Table(box=None, pad_edge=False)
         for number, heading in enumerate(data.head):
             table.add_column(heading, justify="right" if number else "left", overflow="fold")

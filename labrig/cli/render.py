@@ -186,6 +186,9 @@ def _export(
     )
 
     meshes = exported_meshes(scene, folder)
+    for mesh in meshes:
+        if mesh.preview is not None:
+            typer.echo(f"{mesh.name}: {mesh.preview.statement}", err=True)
     if gltf is not None:
         times_s = [t_s - folder.times_s[0] for t_s in folder.times_s]
         brightest = max(
@@ -197,7 +200,7 @@ def _export(
         typer.echo(f"wrote {gltf}: sRGB of what glows, without light between surfaces", err=True)
     if mitsuba is not None:
         written = write_mitsuba_scene(mitsuba, meshes, scene.camera)
-        typer.echo(f"wrote {written}: lamps and glow in sRGB, without re-radiation", err=True)
+        typer.echo(f"wrote {written}: lamps and glow in sRGB, not re-radiation", err=True)
 
 
 def _check_places(gltf: Path | None, mitsuba: Path | None) -> None:

@@ -111,24 +111,30 @@ def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> No
                   fontsize=SMALL_PT)  # fmt: skip
         for column, row in enumerate(rows):
             x = LABELS_PT + column * width
-            colour = strip[row]
-            axes.add_patch(
-                Rectangle((x, y), width, CELL_HEIGHT_PT, color=css_colour(colour), linewidth=0)
-            )
-            if name in glow.delta_e:
-                axes.text(
-                    x + width / 2,
-                    y + CELL_HEIGHT_PT / 2,
-                    _delta_e_text(float(glow.delta_e[name][row])),
-                    ha="center",
-                    va="center",
-                    fontsize=WRITING_PT,
-                    color="#000000" if _luminance(colour) > BRIGHT else "#ffffff",
-                )
+            delta_e = glow.delta_e.get(name)
+            text = "" if delta_e is None else _delta_e_text(float(delta_e[row]))
+            draw_cell(axes, (x, y), width, strip[row], text)
         y += CELL_HEIGHT_PT
     for column, row in enumerate(rows if with_times else ()):
         axes.text(LABELS_PT + (column + 0.5) * width, y + 12, rounded(float(glow.t_s[row]), 3),
                   ha="center", color=MUTED, fontsize=SMALL_PT)  # fmt: skip
+
+
+def draw_cell(
+    axes: Axes, corner: tuple[float, float], width: float, colour: FloatArray, text: str
+) -> None:
+    """Draw a cell of a colour in linear sRGB (3,), with a text that stands out of it."""
+    x, y = corner
+    axes.add_patch(Rectangle((x, y), width, CELL_HEIGHT_PT, color=css_colour(colour), linewidth=0))
+    axes.text(
+        x + width / 2,
+        y + CELL_HEIGHT_PT / 2,
+        text,
+        ha="center",
+        va="center",
+        fontsize=WRITING_PT,
+        color="#000000" if _luminance(colour) > BRIGHT else "#ffffff",
+    )
 
 
 def _delta_e_text(delta_e: float) -> str:

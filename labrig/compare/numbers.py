@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from labrig.compare.rendered import RenderedComparison
+from labrig.compare.rendered_lamps import LampsComparison
 from labrig.compare.run import RunComparison
 from labrig.compare.viewing import FloatArray
 
@@ -109,12 +110,12 @@ def rendered_numbers(comparison: RenderedComparison) -> dict[str, Any]:
     Examples
     --------
     >>> from labrig.compare import RenderedComparison, rendered_numbers
-    >>> rendered_numbers(RenderedComparison((), "one exposure", (), ()))["description"]
+    >>> rendered_numbers(RenderedComparison((), ("one exposure",), (), ()))["description"]
     'one exposure'
     """
     plain: dict[str, Any] = _plain(
         {
-            "description": comparison.description,
+            "description": " ".join(comparison.description),
             "notes": list(comparison.notes),
             "left_out": list(comparison.left_out),
             "patches": {
@@ -137,6 +138,57 @@ def rendered_numbers(comparison: RenderedComparison) -> dict[str, Any]:
                     },
                 }
                 for patch in comparison.patches
+            },
+        }
+    )
+    return plain
+
+
+def lamps_numbers(comparison: LampsComparison) -> dict[str, Any]:
+    """Convert fluorescent samples under lamps to plain numbers for programs.
+
+    Parameters
+    ----------
+    comparison
+        The samples of a run under its lamps, rendered beside their photographs.
+
+    Returns
+    -------
+    dict
+        As of `numbers`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.compare import compare_lamps, lamps_numbers
+    >>> said = lamps_numbers(compare_lamps(Path("runs/validation")))  # doctest: +SKIP
+    >>> said["lamps"]["daylight"]["samples"]["yellow"]["delta_e"]  # doctest: +SKIP
+    2.4
+    """
+    plain: dict[str, Any] = _plain(
+        {
+            "description": " ".join(comparison.description),
+            "notes": list(comparison.notes),
+            "channels": list(comparison.channels),
+            "lamps": {
+                lamp.name: {
+                    "reference": lamp.reference,
+                    "samples": {
+                        name: {
+                            "photographed": sample.photographed.tolist(),
+                            "photographed_sigma": sample.photographed_sigma.tolist(),
+                            "rendered": sample.rendered.tolist(),
+                            "rendered_sigma": sample.rendered_sigma.tolist(),
+                            "reradiated": sample.reradiated.tolist(),
+                            "reradiated_luminance": sample.reradiated_luminance,
+                            "delta_e": sample.delta_e,
+                            "delta_e_by_errors": sample.delta_e_by_errors,
+                            "delta_e_reflected": sample.delta_e_reflected,
+                        }
+                        for name, sample in lamp.samples.items()
+                    },
+                }
+                for lamp in comparison.lamps
             },
         }
     )

@@ -24,11 +24,12 @@ from labrig.calibration import (
     IrradianceFile,
     relative_sensitivity,
 )
+from labrig.compare.dark_room_view import fractions_of
 from labrig.errors import DataError, UsageError
 from labrig.material import Material
 from labrig.record import FrameRole, RunRecord, read_run
 from labrig.reduce import SensorLayout, SeriesFrame, reduce_patches, sensor_layout
-from labrig.region import Region, region_pixels
+from labrig.region import Region
 from labrig.reproduce import DarkRoomLamp
 from labrig.results import DecayResult, PhosphorResult, RunResult, Series
 
@@ -143,7 +144,7 @@ class PhotographedRoom:
             camera=_calibration(provided, rig, CAMERA_KIND),
             layout=layout,
             regions={
-                name: _fractions(patch.region, layout)
+                name: fractions_of(patch.region, layout)
                 for name, patch in decay.patches.items()
                 if patch.region is not None
             },
@@ -333,11 +334,6 @@ def _lux(rig: RigFile, irradiance: IrradianceFile | None) -> float | None:
     if irradiance is not None and irradiance.illuminance_lux is not None:
         return irradiance.illuminance_lux
     return None if rig.optics.luminance is None else illuminance_lx(rig)
-
-
-def _fractions(region: Region, layout: SensorLayout) -> Region:
-    x, y, wide, high = region_pixels(region, layout.width, layout.height)
-    return (x / layout.width, y / layout.height, wide / layout.width, high / layout.height)
 
 
 def _settings(series: Series) -> tuple[float, float | None]:

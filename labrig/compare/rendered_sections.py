@@ -6,7 +6,9 @@ from functools import partial
 import numpy as np
 
 from labrig.compare.glow_figure import glow_figure, shown_rows
-from labrig.compare.rendered import MEASURED, RenderedComparison, RenderedPatch
+from labrig.compare.glow_ratio import RenderedPatch
+from labrig.compare.rendered import RenderedComparison
+from labrig.compare.rendered_states import MEASURED
 from labrig.compare.viewing import FloatArray
 from labrig.number_format import plus_minus, rounded
 from labrig.report import Picture, Section, Table
@@ -28,12 +30,12 @@ def rendered_sections(comparison: RenderedComparison) -> tuple[Section, ...]:
     Examples
     --------
     >>> from labrig.compare import RenderedComparison, rendered_sections
-    >>> rendered_sections(RenderedComparison((), "", (), ()))
+    >>> rendered_sections(RenderedComparison((), (), (), ()))
     ()
     """
     if not comparison.patches:
         return ()
-    text = (comparison.description, *(f"Note: {note}." for note in comparison.notes))
+    text = (*comparison.description, *(f"Note: {note}." for note in comparison.notes))
     return (
         Section(
             "The dark room, photographed and rendered",
@@ -111,7 +113,7 @@ def _ratio_table(patch: RenderedPatch) -> Table:
         head=("t / s", "photographed", "rendered", "σ", "ΔE at L* 50", "ΔE, one exposure"),
         rows=tuple(rows),
         caption=f"{patch.each.patch}: glow over the light that {ratio.reflected_by} reflects, in "
-        f"{ratio.channel}, of photographs and of the run's own material.",
+        f"{ratio.channel}, of photographs and of the measured material.",
     )
 
 

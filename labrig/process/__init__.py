@@ -1,6 +1,7 @@
 """Processing of a run folder, or of a table: analysis, report and exports."""
 
 from labrig.process.charge import ReportedCharge, report_charge
+from labrig.process.comparison import show_comparison
 from labrig.process.led_study import report_led_study
 from labrig.process.mixture import report_mixture
 from labrig.process.result_changes import other_settings
@@ -22,5 +23,6 @@ __all__ = [
     "report_mixture",
     "report_table",
     "report_trap_depths",
+    "show_comparison",
     "write_with_report",
 ]

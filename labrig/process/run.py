@@ -12,6 +12,7 @@ from labrig.calibration import LvfFile, keep_calibration
 from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
 from labrig.optics import CameraResponse
+from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
 from labrig.record import RunLock, read_run
@@ -30,8 +31,6 @@ from labrig.results import RunResult, read_result, write_result
 from labrig.yaml_file import write_yaml
 
 _EARLIER = "result-"
-#: Lock of the process that makes the result; acquisition has another one.
-_LOCK = ".process.lock"
 
 
 def new_result(run: Path) -> Path:
@@ -169,7 +168,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     """
     folder, overrides = Path(folder), overrides or Overrides()
     protocol = read_run_protocol(folder)
-    with RunLock(folder / _LOCK, "processing this run"):
+    with RunLock(folder / LOCK, "processing this run"):
         return _process(folder, overrides, protocol)
 
 
@@ -198,6 +197,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     rendered = _render(result, Source(run, protocol, rig, about, camera))
     report = Report(about, warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
+    include_comparison(folder, result_folder)
     changes = put_in_place(result_folder)
     keep_calibration(folder)
 

@@ -68,6 +68,8 @@ from .mixture_page import (
 )
 from .page import (
     Report as Report,
+    section_page as section_page,
+    with_later as with_later,
     write_report as write_report,
 )
 from .phosphor_picture import (

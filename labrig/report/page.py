@@ -3,7 +3,7 @@
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -128,6 +128,86 @@ def _draw_section(number: int, section: Section, figure_files: FigureFiles) -> R
 
 
 TEMPLATE = "report.html.j2"
+#: What stands in a page before and after sections that were made later than its other ones.
+BEGIN_LATER, END_LATER = "<!-- made later -->", "<!-- end of what was made later -->"
+_LATER = re.compile(f"{BEGIN_LATER}.*?{END_LATER}", re.DOTALL)
+
+
+def section_page(sections: Sequence[Section], folder: Path, beside: str) -> str:
+    """Return sections as a part of a page, and write their figures into a folder beside it.
+
+    Parameters
+    ----------
+    sections
+        Sections with figures and tables.
+    folder
+        Folder of the figures, which are written into `figures` in it.
+    beside
+        Address of that folder from the page.
+
+    Returns
+    -------
+    str
+        HTML of the sections, for `with_later`.
+
+    Raises
+    ------
+    DiskError
+        A figure cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.report import Section, section_page
+    >>> remark = Section("Remarks", text=("It was cold.",))
+    >>> print(section_page([remark], Path("."), "."))
+    <section>
+    <h2>Remarks</h2>
+    <p class="text">It was cold.</p>
+    </section>
+    """
+    figure_files = FigureFiles()
+    parts = []
+    for rendered in draw(sections, figure_files):
+        item = replace(
+            rendered,
+            figures=tuple(
+                (replace(figure, link=f"{beside}/{figure.link}"), caption)
+                for figure, caption in rendered.figures
+            ),
+        )
+        parts.append(environment().get_template(rendered.section.template).render(item=item))
+    try:
+        figure_files.write(folder)
+    except OSError as error:
+        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+    return "\n".join(part.strip() for part in parts)
+
+
+def with_later(page: str, part: str) -> str | None:
+    """Return a report's page with what was made later in its place; None if it has no such place.
+
+    Parameters
+    ----------
+    page
+        Text of a page by `write_report`.
+    part
+        HTML, instead of what stood there before.
+
+    Returns
+    -------
+    str or None
+        Text of the page.
+
+    Examples
+    --------
+    >>> from labrig.report import with_later
+    >>> with_later("<p>no report</p>", "<p>remark</p>") is None
+    True
+    """
+    if not _LATER.search(page):
+        return None
+    return _LATER.sub(lambda _: f"{BEGIN_LATER}\n{part}\n{END_LATER}", page, count=1)
 
 
 @dataclass(frozen=True)
@@ -204,6 +284,7 @@ def write_report(path: Path, report: Report) -> None:
             # Style sheet and script are labrig's own; escaping them would break them.
             style=Markup(style()),
             script=Markup(script()),
+            later=Markup(f"{BEGIN_LATER}{END_LATER}"),
         )
     )
     try:

@@ -8,6 +8,10 @@ from .export.gltf import (
 from .export.mitsuba_scene import (
     write_mitsuba_scene as write_mitsuba_scene,
 )
+from .export.rgb_preview import (
+    RgbPreview as RgbPreview,
+    rgb_preview as rgb_preview,
+)
 from .export.scene_export import (
     exported_meshes as exported_meshes,
 )
@@ -59,8 +63,10 @@ from .scene.dark_room import (
     DarkRoomLamp as DarkRoomLamp,
     DarkRoomPicture as DarkRoomPicture,
     dark_room as dark_room,
+    under_lamps as under_lamps,
 )
 from .scene.scene_file import (
+    BandsEntry as BandsEntry,
     MaterialEntry as MaterialEntry,
     ProgrammeEntry as ProgrammeEntry,
     SceneFile as SceneFile,

@@ -225,5 +225,6 @@ from .validate_illuminants import (
     LampComparison as LampComparison,
     LampPatch as LampPatch,
     SeenColour as SeenColour,
+    ValidatedSample as ValidatedSample,
     ValidateIlluminantsResult as ValidateIlluminantsResult,
 )

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from labrig.optics import Spectrum
+from labrig.region import Region
+from labrig.results.led_fluorescence import MatrixOnBands
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
@@ -38,6 +41,8 @@ class LampPatch:
     ----------
     value, sigma
         Values of the channels in DN/s and their σ, shape (k,).
+    card, card_sigma
+        The same of the grey card in the sample's place.
     predicted, predicted_sigma
         The same by the sample's matrix; σ is that of lamp, curves and card, and of the matrix.
     reflected
@@ -58,6 +63,8 @@ class LampPatch:
 
     value: FloatArray
     sigma: FloatArray
+    card: FloatArray
+    card_sigma: FloatArray
     predicted: FloatArray
     predicted_sigma: FloatArray
     reflected: FloatArray
@@ -73,11 +80,30 @@ class LampPatch:
 
 
 @dataclass(frozen=True, eq=False)
+class ValidatedSample:
+    """What is said of a sample before it is photographed.
+
+    Attributes
+    ----------
+    region
+        Region of the sample in the frame.
+    matrix
+        Matrix by which it is predicted.
+    """
+
+    region: Region
+    matrix: MatrixOnBands
+
+
+@dataclass(frozen=True, eq=False)
 class LampComparison:
     """All samples under a lamp.
 
     Attributes
     ----------
+    spectrum_nm, spectrum
+        Wavelengths in nm and power per nm of the lamp behind its filter, relative, by the rig file,
+        shape (n,).
     brightness
         Brightness of the lamp in DN/s, as `LedFluorescenceResult.brightness`.
     scale
@@ -96,6 +122,8 @@ class LampComparison:
         The samples by name.
     """
 
+    spectrum_nm: FloatArray
+    spectrum: FloatArray
     brightness: float
     scale: Literal["card", "samples"]
     white: Literal["lamp", "D65"]
@@ -103,6 +131,10 @@ class LampComparison:
     largest_pull: float
     verdict: Verdict
     patches: Mapping[str, LampPatch]
+
+    def light(self, name: str) -> Spectrum:
+        """Return the spectrum of the lamp."""
+        return Spectrum(name, self.spectrum_nm, self.spectrum)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,6 +149,8 @@ class ValidateIlluminantsResult(RunResult):
         What the predictions are from: a run, or the materials.
     without_matrix_sigma
         Samples whose matrix has no σ; that of the others is in the σ of their predictions.
+    samples
+        The samples by name, with what they are predicted from.
     balance
         Lamp under which a white is white in the pictures.
     colours_from
@@ -138,6 +172,7 @@ class ValidateIlluminantsResult(RunResult):
     channels: tuple[str, ...]
     fluorescence: str
     without_matrix_sigma: tuple[str, ...]
+    samples: Mapping[str, ValidatedSample]
     balance: str
     colours_from: Literal["curves", "chart"]
     chart_delta_e: tuple[float, float] | None

@@ -176,6 +176,8 @@ CAMPAIGNS = {
         _module("history_sampling"),
         _module("euler_steps"),
         _module("chart_colours"),
+        _module("dark_room"),
+        _module("fluorescent_room"),
         Campaign(
             "benchmarks",
             ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),

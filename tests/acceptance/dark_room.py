@@ -15,7 +15,6 @@ import argparse
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -140,7 +139,7 @@ def is_right(case: Case, patch: RenderedPatch) -> bool:
     )
 
 
-def told(case: Case, folder: Path, began: float) -> bool:
+def told(case: Case, folder: Path) -> bool:
     """Print the comparison of a case; return whether it is right."""
     run = recorded(case, folder)
     measured_in = folder / (case.of or case.name) / "runs"
@@ -153,8 +152,7 @@ def told(case: Case, folder: Path, began: float) -> bool:
     print(
         f"{case.name}: {case.material}, order {orders}, seed {case.seed}, light reflected by "
         f"{ratio.reflected_by}, {ratio.photographed[0]:.3g} to {ratio.photographed[-1]:.3g} in "
-        f"{ratio.channel}; noise alone ΔE {patch.each.noise:.2f}; "
-        f"{time.monotonic() - began:.0f} s: {'right' if right else 'WRONG'}"
+        f"{ratio.channel}; noise alone ΔE {patch.each.noise:.2f}: {'right' if right else 'WRONG'}"
     )
     for name in patch.each.delta_e:
         excess, pull = 100 * ratio.excess(name), ratio.in_sigma(name)
@@ -180,8 +178,7 @@ def main(arguments: Sequence[str]) -> None:
     right = []
     for case in CASES:
         if not asked.names or case.name in asked.names:
-            began = time.monotonic()
-            right.append(told(case, folder, began))
+            right.append(told(case, folder))
     print(f"{sum(right)} of {len(right)} cases are right")
 
 

@@ -2,8 +2,8 @@
 
 import re
 
-from tests.acceptance.printed import match, part
-from tests.acceptance.quote import EXPLANATION, Quote
+from tests.acceptance.printed import furthest, match, part, span
+from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
 
 PAGE = f"{EXPLANATION}/rendering.md"
 METHODS = ("fold, 24 bands", "1 wavelength", "4 wavelengths", "8 wavelengths")
@@ -18,6 +18,26 @@ NOISE_ROWS = (
 )
 HISTORY = ("blue-paint, 1 state, κ/k at most 0.0001", "yellow-paint, 1 state, κ/k at most 0.0001")
 SATURATED = "blue-paint, glow of the law"
+DARK_ROOM = f"{HOW_TO}/render_dark_room.md"
+#: Samples and rooms, as the campaign and as the page call them.
+ROOMS = {
+    "two-states": "two states, 0.08 and 0.016 /s",
+    "two-states-wide": "two states, 0.2 and 0.01 /s",
+    "two-states-slow": "two states, one of them slow",
+    "two-states-no-door": "the first of them on a bench without a door",
+    "wide-no-door": "the second of them on a bench without a door",
+    "known-camera": "the first of them before a camera whose curves are the file's",
+    "blue-paint": "one state",
+    "order-1.5": "order 1.5",
+    "two-states-faint": "two states, one faint, and a glow of 10⁻⁶ of the card's light at last",
+    "otor-0.5": "one trap with retrapping",
+}
+LAMPS = ("daylight", "halogen", "xenon", "ultraviolet")
+SAMPLES = {
+    "shipped": "shipped ones",
+    "textiles": "textiles and a golf ball",
+    "papers": "papers and textiles",
+}
 #: Column of the step of 0.04 s, a video's frame.
 FRAME_STEP = 2
 
@@ -94,7 +114,79 @@ def _raised(text: str) -> str:
     )
 
 
+def _rooms(printed: str) -> str:
+    lines = []
+    for name, said in ROOMS.items():
+        case = match(rf"(^{re.escape(name)}: (?:.|\n)*?)(?=^\S|\Z)", printed)
+        light = match(r"reflected by the (?:grey )?(\w+)", case)
+        delta_e, ratio = (
+            match(rf"^ +measured +{pattern}", case)
+            for pattern in (r"ΔE +([\d.]+)", r".*ratio +(\S+) %")
+        )
+        single = match(r"^ +1 state +ΔE +([\d.]+)", case)
+        cells = (said, light, f"{float(delta_e):.1f}", _signed(ratio), f"{float(single):.1f}")
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _signed(percent: str) -> str:
+    return f"{float(percent):+.1f} %".replace("-", "−")
+
+
+def _furthest_photograph(printed: str) -> str:
+    pulls = re.findall(r"^ +measured .* (\S+) σ$", printed, re.M)
+    return f"No photograph is further than {furthest(map(float, pulls)):.1f} σ"
+
+
+def _lamps(printed: str) -> str:
+    lines = []
+    for matrices in ("files", "measured"):
+        for samples, said in SAMPLES.items():
+            case = match(rf"(^{samples}, {matrices},(?:.|\n)*?)(?=^\S|\Z)", printed)
+            rows = [match(rf"^ +{lamp} +(.*)$", case) for lamp in LAMPS]
+            found = [
+                "{} ({})".format(*(match(rf"{word} +([\d.]+)", row) for word in ("ΔE", "alone")))
+                for row in rows
+            ]
+            most = furthest(float(match(r"([\d.]+) σ", row)) for row in rows)
+            lines.append(f"| {said} | {matrices} | {' | '.join(found)} | {most:.1f} σ |")
+    return "\n".join(lines)
+
+
+def _blue(printed: str) -> str:
+    rows = re.findall(r"^ +blue +ΔE +([\d.]+) .*alone +([\d.]+), .* ([\d.]+) σ", printed, re.M)
+    delta_e, alone, sigmas = (list(map(float, column)) for column in zip(*rows, strict=True))
+    return (
+        f"Under a narrow blue lamp mean ΔE is {span(delta_e, 1)} (errors alone: {span(alone, 1)}), "
+        f"and no value is further than {max(sigmas):.1f} σ"
+    )
+
+
+def _reflected(printed: str) -> str:
+    cases = re.findall(r"^\w+, (?:files|measured),(?:.|\n)*?(?=^\S)", printed, re.M)
+    found = re.findall(r"^ +(?:daylight|halogen|xenon) .*reflected +([\d.]+)", "".join(cases), re.M)
+    return f"Of reflected light alone, ΔE is {span(map(float, found))} under the first three lamps"
+
+
+def _must_not_agree(printed: str) -> str:
+    felt, card, leds = (
+        furthest(map(float, re.findall(r"([\d.]+) σ", match(rf"(^{name},(?:.|\n)*?)^\S", printed))))
+        for name in ("felt for paper", "card glows", "LEDs not calibrated")
+    )
+    return (
+        f"a paper rendered with the matrix of a felt is up to {felt:.0f} σ away, samples beside a "
+        f"card that fluoresces up to {card:.0f} σ, and samples measured under LEDs of unknown "
+        f"brightness up to {leds:.0f} σ"
+    )
+
+
 QUOTES = (
+    Quote(DARK_ROOM, "dark_room", _rooms),
+    Quote(DARK_ROOM, "dark_room", _furthest_photograph),
+    Quote(DARK_ROOM, "fluorescent_room", _lamps),
+    Quote(DARK_ROOM, "fluorescent_room", _blue),
+    Quote(DARK_ROOM, "fluorescent_room", _reflected),
+    Quote(DARK_ROOM, "fluorescent_room", _must_not_agree),
     Quote(PAGE, "wavelength_noise", _noise),
     Quote(PAGE, "wavelength_noise", _bands),
     Quote(PAGE, "history_sampling", _history),

@@ -331,6 +331,28 @@ def _single_wavelengths(printed: str) -> str:
     return f"{span(spectrum)} × for spectra, {span(luminance, 1)} × for Y"
 
 
+def _dark_rooms(printed: str) -> str:
+    own, ratio = columns(r"^ +measured +ΔE +([\d.]+) .*ratio +(\S+) %", printed)
+    (single,) = columns(r"^ +1 state +ΔE +([\d.]+)", printed)
+    return (
+        f"ΔE {span(own, 1)}, with one state {span(single, 1)}; ratio within "
+        f"{furthest(ratio):.1f} % in the mean over time"
+    )
+
+
+def _fluorescent_rooms(printed: str) -> str:
+    said = []
+    for matrices in ("files", "measured"):
+        cases = re.findall(rf"^\w+, {matrices},(?:.|\n)*?(?=^\S)", printed, re.M)
+        broad, pulls = columns(r"^ +(?!ultra)\w+ +ΔE +([\d.]+) .* ([\d.]+) σ", "".join(cases))
+        dark, others = columns(r"^ +ultraviolet +ΔE +([\d.]+) .* ([\d.]+) σ", "".join(cases))
+        said.append(
+            f"{matrices}: ΔE {span(broad, 1)}, under ultraviolet {span(dark, 1)}, all within "
+            f"{max(*pulls, *others):.1f} σ"
+        )
+    return "; ".join(said)
+
+
 FIGURES = (
     Figure(
         "Simulated dark room, from lamp to fit: samples of one and of two states, sensor of "
@@ -690,6 +712,18 @@ FIGURES = (
         "patches",
         "chart_colours",
         _chart,
+    ),
+    Figure(
+        "Glow rendered from the files of simulated runs, 10 samples and rooms, beside photographs: "
+        "ΔE2000 with the run's material, and with one state; glow over reflected light",
+        "dark_room",
+        _dark_rooms,
+    ),
+    Figure(
+        "Fluorescent samples rendered under 4 lamps, beside photographs: shipped and measured "
+        "papers and textiles, with the matrices of the room and as measured under LEDs",
+        "fluorescent_room",
+        _fluorescent_rooms,
     ),
     Figure(
         "Light in closed rooms with fluorescent papers: time of paths of 1 to 8 wavelengths over "

@@ -126,7 +126,12 @@ def test_other_programs_take_the_scene(labrig: Callable[..., Ended]) -> None:
     ended = labrig("render", "cornell-box", *SMALL, "--gltf", "box.glb", "--mitsuba", "for-mitsuba")
     assert ended.code == 0, ended.err
     assert Path("box.glb").read_bytes()[:4] == b"glTF"
-    assert (Path("for-mitsuba") / "scene.xml").is_file()
+    text = (Path("for-mitsuba") / "scene.xml").read_text(encoding="utf-8")
+    # The wall of orange textile is the only surface that re-radiates.
+    comments = re.findall(r"<!-- (.*?): preview of re-radiation", text)
+    beside = (Path("for-mitsuba") / "reradiation_previews.json").read_text(encoding="utf-8")
+    assert comments == list(json.loads(beside)) == ["right"]
+    assert "ΔE2000" in ended.err
     scene = load_scene("cornell-box").resized(12, 9, 4)
     meshes = exported_meshes(scene, RenderFolder.open(ended.run_folder, scene))
     wall, lamp = (next(each for each in meshes if each.name == name) for name in ("left", "lamp"))

@@ -236,7 +236,9 @@ def test_the_assumption_is_in_the_picture(labrig: Labrig, measured: Path, tmp_pa
     ended = labrig("compare", measured, "--rendered", "--assume-albedo", 0.5, "--figures", tmp_path)
     assert (ended.code, ended.err) == (0, "")
     assert "assumed to be 0.5 at all wavelengths" in " ".join(ended.out.split())
-    assert {"rendered.png", "rendered-one-exposure.png"} <= {p.name for p in tmp_path.iterdir()}
+    assert {"rendered.png", "rendered-one-exposure.png", "rendered.csv"} <= {
+        p.name for p in tmp_path.iterdir()
+    }
     # The same room for `labrig render`, with the assumption in it.
     scene = load_scene(tmp_path / "dark-room.yaml")
     assert scene.notes == (

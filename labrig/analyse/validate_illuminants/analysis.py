@@ -38,7 +38,9 @@ from labrig.results import (
     FloatArray,
     LampComparison,
     LampPatch,
+    MatrixOnBands,
     SeenColour,
+    ValidatedSample,
     ValidateIlluminantsResult,
 )
 
@@ -88,9 +90,11 @@ def analyse(part: Part) -> ValidateIlluminantsResult:
     colours = _colours(part, lights, camera, usable, next(iter(predicted.values())).white)
     warnings += _chart_warnings(colours)
     compared = {
-        lamp: _lamp(row, lamps[row], samples, predicted, colours) for row, lamp in enumerate(used)
+        lamp: _lamp(row, lamps[row], samples, cards, predicted, colours)
+        for row, lamp in enumerate(used)
     }
     warnings += _verdict_warnings(compared)
+    regions = part.overrides.patches(protocol)
     without_sigma = tuple(
         name
         for name, matrix in matrices.items()
@@ -100,6 +104,10 @@ def analyse(part: Part) -> ValidateIlluminantsResult:
         channels=camera.channels,
         fluorescence=_origin(protocol.fluorescence),
         without_matrix_sigma=without_sigma,
+        samples={
+            name: ValidatedSample(regions[name], MatrixOnBands.of(matrix))
+            for name, matrix in matrices.items()
+        },
         balance=colours.balance,
         colours_from=colours.source,
         chart_delta_e=colours.chart_delta_e,
@@ -159,6 +167,7 @@ def _lamp(
     row: int,
     lamp: LedExposure,
     samples: Mapping[str, LitPatch],
+    cards: Mapping[str, LitPatch],
     predicted: Mapping[str, PredictedValues],
     colours: _Colours,
 ) -> LampComparison:
@@ -173,12 +182,14 @@ def _lamp(
             if has_white
             else exposed
         )
-        patches[name] = _patch(row, samples[name], values, scale, (row, number))
+        patches[name] = _patch(row, samples[name], cards[name], values, scale, (row, number))
     chi2 = float(np.mean([patch.reduced_chi2 for patch in patches.values()]))
     pulls = np.concatenate([patch.pull for patch in patches.values()])
     largest = float(pulls[np.abs(pulls).argmax()])
     first = next(iter(predicted.values()))
     return LampComparison(
+        spectrum_nm=lamp.light.wavelength_nm,
+        spectrum=lamp.light.value,
         brightness=float(first.brightness[row]),
         scale="card" if first.is_scaled[row] else "samples",
         white="lamp" if has_white else "D65",
@@ -192,6 +203,7 @@ def _lamp(
 def _patch(
     row: int,
     sample: LitPatch,
+    card: LitPatch,
     predicted: PredictedValues,
     scale: ColourScale,
     seed: tuple[int, int],
@@ -209,6 +221,8 @@ def _patch(
     return LampPatch(
         value=value,
         sigma=np.sqrt(variance),
+        card=card.value[row],
+        card_sigma=np.sqrt(card.variance[row]),
         predicted=whole,
         predicted_sigma=np.sqrt(np.diagonal(predicted.covariance[row])),
         reflected=reflected,

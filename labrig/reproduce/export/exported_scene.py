@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
+from labrig.reproduce.export.rgb_preview import RgbPreview
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -114,6 +115,8 @@ class ExportedMesh:
         Place of each vertex in the textures, shape (n, 2): (0, 0) is their lower left corner.
     glow
         Light that it emits; None for none.
+    preview
+        What it does to light as a fluorescent surface, in three colours; None of other surfaces.
 
     Raises
     ------
@@ -136,6 +139,7 @@ class ExportedMesh:
     base_colour: FloatArray
     uv: FloatArray | None = None
     glow: Glow | None = None
+    preview: RgbPreview | None = None
 
     def __post_init__(self) -> None:
         n = len(self.vertices_m)

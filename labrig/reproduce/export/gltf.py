@@ -26,6 +26,8 @@ from labrig.reproduce.transport.tracing import Pinhole
 FloatArray = NDArray[np.float64]
 
 STRENGTH, POINTER = "KHR_materials_emissive_strength", "KHR_animation_pointer"
+#: Name of what viewers do not know: what a fluorescent surface does to light.
+EXTRA = "reradiationPreview"
 #: Numbers of the specification: types of components and targets of buffer views.
 _FLOAT, _UNSIGNED = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
@@ -49,7 +51,8 @@ def write_gltf(
     between the frames. Texels that decay at rates of their own are not expressible: they are given
     one course in each channel by `Glow.of_textures`, and what is lost is told in the file. So are
     spectra, re-radiation and light from one surface onto another: viewers show a base colour and a
-    glow.
+    glow. What a fluorescent surface does to light stands in `extras` of its material, a matrix of
+    linear sRGB with its ΔE2000, for renderers that can use one.
 
     Parameters
     ----------
@@ -198,6 +201,8 @@ class _Document:
                 "roughnessFactor": 1.0,
             },
         }
+        if mesh.preview is not None:
+            material["extras"] = {EXTRA: mesh.preview.to_dict()}
         if mesh.glow is None:
             return material
         largest = float(mesh.glow.colour.max())
@@ -208,7 +213,7 @@ class _Document:
         if mesh.glow.texture is not None:
             relative = mesh.glow.texture / (scale or 1.0)
             material["emissiveTexture"] = {"index": self._texture(relative)}
-            material["extras"] = {"lostByOneCourseRms": mesh.glow.lost}
+            material.setdefault("extras", {})["lostByOneCourseRms"] = mesh.glow.lost
         return material
 
     def _texture(self, linear: FloatArray) -> int:

@@ -1,8 +1,10 @@
 """Scenes for Mitsuba 3, with what glows at one frame as textures of emitters.
 
-Its variants `*_rgb` render them: re-radiation has no place there, and is left out.
+Its variants `*_rgb` render them: re-radiation has no place there. Matrices of linear sRGB stand
+beside the scene as previews of it.
 """
 
+import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +23,7 @@ from labrig.reproduce.transport.tracing import Pinhole
 
 FloatArray = NDArray[np.float64]
 
-SCENE = "scene.xml"
+SCENE, PREVIEWS = "scene.xml", "reradiation_previews.json"
 #: Version of the scene's language.
 _VERSION = "3.0.0"
 
@@ -38,7 +40,9 @@ def write_mitsuba_scene(
 
     Surfaces are Lambertian and reflect on both sides. They emit on the side that their faces show
     anticlockwise, as Mitsuba's emitters do, with the radiance of the glow. Mitsuba interpolates
-    textures linearly between the centres of texels.
+    textures linearly between the centres of texels. Fluorescent surfaces have their colour under
+    D65; what they do to other light is in `reradiation_previews.json` by their names, a matrix of
+    linear sRGB with its ΔE2000, for renderers that can use one.
 
     Parameters
     ----------
@@ -98,7 +102,8 @@ def write_mitsuba_scene(
             file = folder / f"mesh_{number:02d}.ply"
             _write_ply(file, mesh)
             shape = _add(scene, "shape", type="ply", id=f"mesh_{number:02d}")
-            scene.insert(len(scene) - 1, ElementTree.Comment(f" {_comment(mesh.name)} "))
+            said = mesh.name if mesh.preview is None else f"{mesh.name}: {mesh.preview.statement}"
+            scene.insert(len(scene) - 1, ElementTree.Comment(f" {_comment(said)} "))
             _add(shape, "string", name="filename", value=file.name)
             _add(shape, "boolean", name="face_normals", value="true")
             both_sides = _add(shape, "bsdf", type="twosided")
@@ -106,6 +111,12 @@ def write_mitsuba_scene(
             if mesh.glow is not None:
                 texture = folder / f"glow_{number:02d}.exr"
                 _add_glow(shape, mesh.glow, frame, texture)
+        previews = {
+            mesh.name: mesh.preview.to_dict() for mesh in meshes if mesh.preview is not None
+        }
+        if previews:
+            text = json.dumps(previews, indent=2, ensure_ascii=False)
+            (folder / PREVIEWS).write_text(f"{text}\n", encoding="utf-8")
         ElementTree.indent(scene)
         ElementTree.ElementTree(scene).write(path, encoding="utf-8", xml_declaration=True)
     except OSError as error:

@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.optics import XYZ_TO_SRGB, illuminant
 from labrig.reproduce.export.exported_scene import ExportedMesh, Glow
+from labrig.reproduce.export.rgb_preview import RgbPreview, rgb_preview
 from labrig.reproduce.picture.display import Display, tristimulus
 from labrig.reproduce.picture.render_folder import RenderFolder
 from labrig.reproduce.picture.rendering import Renderer
@@ -18,8 +19,8 @@ def exported_meshes(scene: Scene, folder: RenderFolder) -> list[ExportedMesh]:
     """Return the objects of a rendered scene, with what each emits at its frames.
 
     They are where they stand at the first frame. Light is reduced to linear sRGB in cd/m²: lamps
-    emit theirs, phosphors their glow; surfaces have the colour that they have under D65. What a
-    fluorescent surface re-radiates of other light is not in it.
+    emit theirs, phosphors their glow; surfaces have the colour that they have under D65, and
+    fluorescent ones also a matrix of linear sRGB as a preview, see `rgb_preview`.
 
     Parameters
     ----------
@@ -69,8 +70,16 @@ def exported_meshes(scene: Scene, folder: RenderFolder) -> list[ExportedMesh]:
         mesh = surface.mesh
         uv = None if glow is None or glow.texture is None else mesh.uv
         faces = mesh.faces.astype(np.int64)
-        meshes.append(ExportedMesh(surface.name, mesh.vertices_m, faces, colour, uv, glow))
+        preview = _preview(scene, surface.material, folder.times_s[0])
+        meshes.append(ExportedMesh(surface.name, mesh.vertices_m, faces, colour, uv, glow, preview))
     return meshes
+
+
+def _preview(scene: Scene, material: int, t_s: float) -> RgbPreview | None:
+    """Return the reduction of a fluorescent material, judged under the scene's lamps."""
+    if material < 0 or scene.materials[material].is_diagonal:
+        return None
+    return rgb_preview(scene.materials[material], scene.bands, scene.lamps(t_s))
 
 
 def _glow(emitted: FloatArray, geometry: Geometry, number: int) -> Glow | None:

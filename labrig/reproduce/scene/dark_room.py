@@ -30,6 +30,8 @@ FRAME_M, CAMERA_M = 0.1, 1.0
 GAP, CARD = 0.05, 0.15
 #: Direction of the lamp, 45° from the side.
 TOWARDS_LAMP = (1.0, 0.0, 1.0)
+#: Irradiance across that direction over that on the plane, by the cosine of 45°.
+ACROSS_OVER_ON_PLANE = math.sqrt(2)
 #: Bands of 10 nm: bands of 20 nm displace colours by ΔE2000 up to 0.7, these by up to 0.2.
 BANDS = BandsEntry(count=48)
 #: Names in the scene.
@@ -162,8 +164,7 @@ def dark_room(
             LAMP: LampEntry(
                 kind="distant",
                 spectrum=lamp.spectrum,
-                # Across its direction; on the plane it is less by the cosine of 45°.
-                illuminance_lux=lamp.illuminance_lux * math.sqrt(2),
+                illuminance_lux=lamp.illuminance_lux * ACROSS_OVER_ON_PLANE,
                 towards=TOWARDS_LAMP,
             )
         },
@@ -182,6 +183,57 @@ def dark_room(
         frames_s=tuple(frames_s),
         paths=PATHS,
     )
+
+
+def under_lamps(
+    room: SceneFile, spectra: Mapping[str, str], pictures: Sequence[Mapping[str, float]]
+) -> SceneFile:
+    """Return a dark room with other lamps, and a picture under each of some mixtures of them.
+
+    Parameters
+    ----------
+    room
+        A dark room; its lamp is replaced.
+    spectra
+        Spectrum of each lamp by its name: a CIE illuminant, or the path of a file.
+    pictures
+        For each picture the irradiance of the plane by the lamps that burn, in W m⁻² over all of
+        their wavelengths; the first picture is at 0 s, each other one a second later.
+
+    Returns
+    -------
+    SceneFile
+        The scene, for `build_scene`.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import (
+    ...     DarkRoomLamp, DarkRoomPicture, MaterialEntry, dark_room, under_lamps
+    ... )
+    >>> paper = {"paper": ((0.25, 0.25, 0.5, 0.5), MaterialEntry(file="white-paper"))}
+    >>> picture = DarkRoomPicture(60, 40)
+    >>> room = dark_room("bench", paper, DarkRoomLamp("A", 1000.0), [(0.0, 1.0)], [0.0], picture)
+    >>> lit = under_lamps(room, {"day": "D65", "black light": "365nm"}, [{"day": 1.0}, {}])
+    >>> sorted(lit.lamps), lit.frames_s
+    (['black light', 'day'], (0.0, 1.0))
+    """
+    (placed,) = room.lamps.values()
+    lamps = {
+        name: placed.model_copy(
+            update={
+                "spectrum": spectrum,
+                "illuminance_lux": None,
+                "irradiance_w_per_m2": ACROSS_OVER_ON_PLANE,
+            }
+        )
+        for name, spectrum in spectra.items()
+    }
+    programme = tuple(
+        ProgrammeEntry(at_s=float(at_s), lamps=dict.fromkeys(spectra, 0.0) | dict(levels))
+        for at_s, levels in enumerate(pictures)
+    )
+    times = tuple(part.at_s for part in programme)
+    return room.model_copy(update={"lamps": lamps, "programme": programme, "frames_s": times})
 
 
 def _in_plane(left_m: float, low_m: float, width_m: float, height_m: float) -> RectangleEntry:
