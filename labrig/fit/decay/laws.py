@@ -60,6 +60,8 @@ class LawFit:
     def with_added(self, covariance: FloatArray, series: DecaySeries) -> "LawFit":
         """Return the fit with a covariance (p, p) added to its own."""
         total = self.covariance + covariance
+        if self.covariance[LAW_SHAPE, LAW_SHAPE] == 0:
+            total = _without_shape(total)
         fitted = replace(self.fitted, covariance=_own_covariance(self.joint, series, total))
         return replace(self, covariance=total, fitted=fitted)
 
