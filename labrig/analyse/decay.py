@@ -16,7 +16,7 @@ from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.surface import with_layer, with_reflectance
-from labrig.analyse.temperature import drift_warnings
+from labrig.analyse.temperature import drift_an_hour, drift_warnings
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State
@@ -31,6 +31,7 @@ from labrig.reduce import (
 )
 from labrig.region import Region
 from labrig.results import (
+    EXPONENTIALS,
     DecayPatch,
     DecayResult,
     FittedDecay,
@@ -213,6 +214,9 @@ def _decay_patch(
             ),
             patch,
             part.inputs.reflectance,
+        ),
+        drift_effect=(
+            drift_an_hour(part.run, fit.drift_effect_s) if fit.law == EXPONENTIALS else None
         ),
     )
 

@@ -106,5 +106,6 @@ def _test(fit: LeastSquaresFit, decays: int) -> OrderTest | None:
         shape=Measured(float(fit.parameters[0]), shape_sigma),
         shift=Measured(shift, shift_sigma),
         difference_sigma=float(np.sqrt(difference @ both @ difference)),
-        reduced_chi2=fit.reduced_chi2,
+        chi2=fit.chi2,
+        dof=fit.dof,
     )

@@ -349,7 +349,8 @@ def _warnings(patch: PatchSaturation) -> Iterator[str]:
             f"of {patch.fit.n_states} exponentials of fixed rates, as power laws are none; what "
             "was found holds for the charge it was measured at"
         )
-    if patch.order is not None and patch.order.verdict == "general order":
+    if patch.is_of_general_order:
+        assert patch.order is not None
         yield (
             f"the glow falls as that of a state of kinetic order {patch.order.order}, the more "
             "slowly the less it was charged: rates of exponentials hold for one charge only; "

@@ -16,12 +16,14 @@ from labrig.record import (
     relative_rate_change,
     time_text,
 )
-from labrig.results import Measured
+from labrig.results import FloatArray, Measured
 
 #: Change in K from which a warning is given: rates then change by 4 %, more than their usual σ.
 MOVED_K = 0.5
 #: Time over which a drift is looked for, least readings that tell it, and its significance in σ.
 DRIFT_SEEN_S, FEWEST_READINGS, CLEAR_SIGMAS = 3600.0, 20, 5.0
+#: Temperature of a room that nobody measured.
+ROOM_C = 21.0
 CHECK_IT = "check it before the next run (labrig rig check)"
 
 
@@ -112,6 +114,21 @@ def drift_warnings(
         f"eV deep, more than its σ of {100 * min(sigmas):.1g} %; rates are means over the decay, "
         "keep the room steadier to know them better",
     )
+
+
+def drift_an_hour(run: RunRecord, effect_s: FloatArray) -> FloatArray | None:
+    """Return what a drift of 1 K in an hour would change; None if the temperature was recorded.
+
+    Parameters
+    ----------
+    run
+        A recorded run.
+    effect_s
+        Relative changes of results if rates grow as 1 + γ t, over γ, in seconds.
+    """
+    if run.temperatures():
+        return None
+    return relative_rate_change(ROOM_C, ROOM_C + 1) / 3600 * effect_s
 
 
 def at_temperature(material: Material, run: RunRecord, roles: Collection[str]) -> Material:

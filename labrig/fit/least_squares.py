@@ -59,6 +59,8 @@ MIN_DAMPING_FACTOR = 1 / 10
 #: Number of entries of the Jacobian from which the search uses the normal equations.
 LARGE_JACOBIAN = 100_000
 POLISH_STEPS = 60
+#: Fall of χ² that matters: it moves no parameter by more than a tenth of its σ.
+GAIN_THAT_MATTERS = 0.01
 POLISH_PATIENCE = 3
 
 
@@ -116,6 +118,19 @@ class LeastSquaresFit:
     def converged(self) -> bool:
         """Whether the fit ended at a minimum that determines its parameters."""
         return self.ending is Ending.MINIMUM
+
+    @property
+    def creeps(self) -> bool:
+        """Whether it ended early, and a step more would gain what matters: residuals being in σ.
+
+        Where residuals are large, steps alternate about a minimum that is near enough for any use.
+        """
+        if self.ending is not Ending.CREEPING:
+            return False
+        free = self.jacobian[:, ~self.at_bound]
+        norms = _or_1(_column_lengths(free))
+        step = np.linalg.lstsq(free / norms, self.residuals, rcond=None)[0] / norms
+        return bool(np.linalg.norm(free @ step) ** 2 > GAIN_THAT_MATTERS)
 
     @property
     def reduced_chi2(self) -> float:

@@ -35,6 +35,7 @@ from labrig.report.timing import (
     frame_lateness,
     frame_timings,
 )
+from labrig.report.unrecorded_temperature import unrecorded_temperature
 from labrig.results import DecayPatch, DecayResult, FittedDecay, Series
 
 #: Signal-to-noise ratio of the mean signal below which a patch without a fit counts as dark.
@@ -245,7 +246,11 @@ def render(result: DecayResult, source: Source) -> Rendered:
     )
     lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
     results, method_sections = decay_sections(report, source.anchor)
-    return Rendered(results, lines, method_sections)
+    unrecorded = unrecorded_temperature(result)
+    if unrecorded:
+        text = tuple(f"{line[0].upper()}{line[1:]}." for line in unrecorded)
+        results = (*results, Section("Temperature", text))
+    return Rendered(results, (*lines, *unrecorded), method_sections)
 
 
 def decay_sections(

@@ -67,6 +67,10 @@ class DecayPatch:
         Noise budget; None where the fitted frames do not determine it.
     material
         Material by this decay alone, with rates and amplitudes; None without a fit.
+    drift_effect
+        Relative changes of rate and amplitude of every state, by falling rate, if the room had
+        warmed by 1 K in an hour while the sample glowed, traps being 0.65 eV deep, shape (n, 2).
+        None where the temperature was recorded, without a fit, or by a law without states.
     """
 
     region: Region | None
@@ -76,6 +80,7 @@ class DecayPatch:
     normalised_residuals: FloatArray | None = None
     noise: NoiseBudget | None = None
     material: Material | None = None
+    drift_effect: FloatArray | None = None
 
     def write_files(self, folder: Path) -> None:
         """Write `series.csv` and, where there is a fit, `fit.json` and `material.yaml`."""

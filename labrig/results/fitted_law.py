@@ -129,7 +129,8 @@ class FittedLaw:
         shape = Measured(self.shape, float(shape_sigma))
         time = Measured(1 / self.rate_per_s, float(rate_sigma) / self.rate_per_s**2, "s")
         if self.name == "otor":
-            return {"decay_time_s": time, "retrapping": shape}
+            # A shape without σ is held at the exponential: no retrapping is told.
+            return {"decay_time_s": time} | ({"retrapping": shape} if shape_sigma else {})
         if self.name == "stretched":
             return {"decay_time_s": time, "exponent": shape}
         if self.shape <= shape_sigma:

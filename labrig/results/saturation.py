@@ -141,8 +141,8 @@ class OrderTest:
         Exponent v of R ∝ lightᵛ: 0 where the rate does not depend on the charge, u of a state.
     difference_sigma
         Standard uncertainty of u − v.
-    reduced_chi2
-        χ² per degree of freedom; where it is above 1 all σ are enlarged by its root.
+    chi2, dof
+        χ² and degrees of freedom; where χ² is larger all σ are enlarged by the root of their ratio.
     """
 
     light: FloatArray
@@ -151,7 +151,13 @@ class OrderTest:
     shape: Measured
     shift: Measured
     difference_sigma: float
-    reduced_chi2: float
+    chi2: float
+    dof: int
+
+    @property
+    def reduced_chi2(self) -> float:
+        """χ² per degree of freedom."""
+        return self.chi2 / self.dof
 
     @property
     def verdict(self) -> Literal["first order", "general order", "neither", "not decided"]:
@@ -213,6 +219,22 @@ class PatchSaturation:
         if all(growth.value + SIGMAS * growth.sigma < 2 * PLATEAU for growth in growths):
             return "saturated in time"
         return "not decided"
+
+    @property
+    def is_of_general_order(self) -> bool:
+        """Whether a state of a kinetic order describes all decays better than states of the first.
+
+        Several states of first order that charges fill unequally make the rate at lamp off shift
+        with the charge, too, now and then as their shape would have it. The two models are compared
+        by the Bayesian information criterion: a rate and a light of each decay and one shape,
+        against shared rates and amplitudes of each decay.
+        """
+        if self.order is None or self.order.verdict != "general order":
+            return False
+        decays, states = self.rates.amplitude.shape
+        frames = sum(len(curve.t_s) for curve in self.curves.values())
+        added = states * (decays + 1) - (2 * decays + 1)
+        return bool(self.order.chi2 < self.rates.chi2_shared + added * np.log(frames))
 
     @property
     def is_of_no_law(self) -> bool:

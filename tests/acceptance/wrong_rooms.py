@@ -78,6 +78,11 @@ class Case:
         """Return the keys of the sensor."""
         return {**SENSOR, **self.simulation.get("sensor", {})}
 
+    @property
+    def drift_k_per_hour(self) -> float:
+        """Return by how much the room warms in an hour."""
+        return float(self.simulation.get("temperature", {}).get("drift_per_hour", 0.0))
+
     def room_seed(self, seed: int) -> int:
         """Return the seed of the room, which is another one in every case."""
         return 1000 * (zlib.crc32(self.name.encode()) % 1_000_000) + seed

@@ -196,6 +196,30 @@ def test_two_states_that_are_filled_unequally_are_a_law() -> None:
     assert replace(found, order=order, fit=one).is_of_no_law
 
 
+def test_two_states_that_are_filled_unequally_are_no_order() -> None:
+    """The rate at lamp off may shift with the charge as an order of that shape would have it."""
+    curves = [
+        decay([0.1, 0.01], amplitudes, seed)
+        for seed, amplitudes in enumerate(([1.0, 0.2], [0.5, 0.19], [0.2, 0.15]))
+    ]
+    found = judged(curves, [0.08, 0.02])
+    assert found.order is not None
+    alike = replace(found.order, shift=Measured(found.order.shape.value, 0.01))
+    assert alike.verdict == "general order"
+    assert not replace(found, order=alike).is_of_general_order
+
+
+def test_a_state_of_general_order_is_told_beside_many_exponentials() -> None:
+    curves = []
+    for seed, light in enumerate((1.0, 0.3, 0.1)):
+        true = light / (1 + 0.05 * np.sqrt(light) * T_S) ** 2
+        sigma = 0.005 * true + 1e-4
+        noise = sigma * np.random.default_rng(seed).standard_normal(len(T_S))
+        curves.append(Curve(T_S, np.zeros_like(T_S), true + noise, sigma, 0.0))
+    found = judged(curves, [0.1, 0.03])
+    assert found.is_of_general_order
+
+
 def test_amplitudes_of_two_states_change_without_their_rates() -> None:
     curves = [decay([0.1, 0.01], [1.0, 0.2], 0), decay([0.1, 0.01], [0.5, 0.19], 1)]
     test = compare_rates(curves, [0.08, 0.02])

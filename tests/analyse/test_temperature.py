@@ -11,6 +11,7 @@ from labrig.material import read_material
 from labrig.process import process_run
 from labrig.record import read_run
 from labrig.report import describe_phosphor
+from labrig.results import DecayResult
 from tests.analyse.recorded import record
 from tests.quick_yaml import read_quickly, write_quickly
 
@@ -119,3 +120,27 @@ def test_no_plan_takes_longer_for_it(tmp_path: Path) -> None:
         plans.append(plan(protocol, read_rig_file(tmp_path / f"{name}.yaml"), name))
         content["devices"].pop("thermometer", None)
     assert plans[0] == plans[1]
+
+
+def test_what_a_temperature_that_was_not_recorded_may_change_is_stated(tmp_path: Path) -> None:
+    """No data tell a drift of a kelvin an hour; without a thermometer its size is in the result."""
+
+    def change(rig: dict[str, Any]) -> None:
+        rig["simulation"] |= {"sensor": {"width": 48, "height": 32}}
+        del rig["devices"]["thermometer"]
+
+    often = DECAY | {"charge": "1 h", "every": "5 s", "for": "3 min", "exposure": "1 s"}
+    run = record(tmp_path / "without", often, change)
+    result = process_run(run)
+    assert isinstance(result, DecayResult)
+    assert not [line for line in result.warnings if "temperature" in line]
+    (patch,) = result.patches.values()
+    assert patch.fit is not None
+    assert patch.drift_effect is not None
+    # What light there is comes within some lifetimes, in which a rate changes by 9 % a kelvin.
+    lifetimes = patch.drift_effect[0, 0] / (0.091 / 3600) * patch.fit.states[0].k_r_per_s
+    assert 0.5 < lifetimes < 3
+    assert "The temperature was not recorded" in (run / "result" / "report.html").read_text()
+    known = process_run(recorded(tmp_path / "with"))
+    assert isinstance(known, DecayResult)
+    assert [patch.drift_effect for patch in known.patches.values()] == [None]

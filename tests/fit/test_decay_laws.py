@@ -131,3 +131,15 @@ def test_what_is_written_is_read_again() -> None:
             np.testing.assert_allclose(new, old)
     assert again.law == fit.law
     assert math.isclose(again.measured_until_s, fit.measured_until_s)
+
+
+@pytest.mark.parametrize("seed", range(300, 306))
+def test_a_signal_without_retrapping_is_predicted_with_a_small_sigma(seed: int) -> None:
+    """One trap's law is an exponential there, and its shape changes it as its rate does."""
+    truth = 0.05
+    values, sigma = measured(exponential_means(np.array([truth]), T_S, EXPOSURE_S)[:, 0], seed)
+    fit = fit_decay(T_S, values, sigma, exposure_s=EXPOSURE_S)
+    forecast = fit.forecast([1.0, 40.0, 100.0], 0.0)
+    true = np.exp(-truth * forecast.t_s)
+    assert np.all(abs(forecast.value - true) < 4.5 * forecast.sigma)
+    assert np.all(forecast.sigma < 0.01 * forecast.value + READ / 4)

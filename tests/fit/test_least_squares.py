@@ -93,3 +93,23 @@ def test_overflow_at_a_trial_point_is_only_refused() -> None:
 def test_start_must_be_finite() -> None:
     with pytest.raises(FitError, match="expected finite residuals"):
         least_squares(lambda x: (np.log(x), np.diag(1 / x)), [0.0])
+
+
+@pytest.mark.parametrize("curvature", [0.05, 0.12, 0.15])
+def test_steps_that_alternate_about_a_minimum_do_not_creep(curvature: float) -> None:
+    """Where residuals are large, undamped steps shrink slowly, or grow; the minimum is at 0."""
+
+    def residuals(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return np.array([x[0], curvature * x[0] ** 2 + 5]), np.array([[1], [2 * curvature * x[0]]])
+
+    fit = least_squares(residuals, [3.0], tolerance=1e-6)
+    assert abs(fit.parameters[0]) < 0.01
+    assert not fit.creeps
+
+
+def test_a_search_that_is_cut_off_in_a_valley_creeps() -> None:
+    def residuals(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]]), np.array([[-20 * x[0], 10], [-1, 0]])
+
+    assert least_squares(residuals, [-1.2, 1.0], max_iterations=8, tolerance=1e-6).creeps
+    assert not least_squares(residuals, [-1.2, 1.0], tolerance=1e-6).creeps

@@ -24,7 +24,7 @@ from labrig.fit.charge.model import (
 )
 from labrig.fit.charge.readings import Readings, readings_of
 from labrig.fit.charge.result import ChargeCandidate, ChargeFit, FittedReadings, OrderState
-from labrig.fit.least_squares import Ending, FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
 from labrig.material import MAX_ORDER
 from labrig.results import Measured
 
@@ -428,7 +428,7 @@ def _warnings(
     stimulated: float | None,
 ) -> Iterator[str]:
     """Yield what is doubtful about a fit."""
-    if fit.ending is Ending.CREEPING:
+    if fit.creeps:
         yield "the search did not end at a minimum: parameters may move further"
     if misfit > 1:
         charge, decay = chi2

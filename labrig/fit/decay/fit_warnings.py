@@ -24,7 +24,7 @@ from labrig.fit.decay.selection import CLEAR_BIC
 from labrig.fit.decay.sigma_scale import SigmaScale
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import Ending, FloatArray
+from labrig.fit.least_squares import FloatArray
 from labrig.number_format import rounded
 from labrig.results import (
     EXPONENTIALS,
@@ -192,7 +192,7 @@ def warnings_about(
             f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
             "signal: give a flicker measured elsewhere, or record more frames while it is bright"
         )
-    if joint.least_squares.ending is Ending.CREEPING:
+    if joint.least_squares.creeps:
         warnings.append(
             "the fit still creeps: rates and amplitudes may trade off; ask for fewer states "
             "(--states) or record longer"

@@ -16,7 +16,7 @@ from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.fit.least_squares import FloatArray, parameter_covariance
 from labrig.material import DECAY_LAWS, DecayLaw
 from labrig.results import FittedLaw
 
@@ -26,8 +26,8 @@ FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
 #: Sizes of the grid of rates and shapes, and smallest shape above 0 on it.
 GRID = (20, 8)
 LEAST_SHAPE = 0.05
-#: Place of the rate among the parameters.
-LAW_RATE = slice(1, 2)
+#: Places of the rate and of the shape among the parameters.
+LAW_RATE, LAW_SHAPE = slice(1, 2), 2
 MAX_ITERATIONS = 60
 TOLERANCE = 1e-5
 #: Gain in χ² of a step at which a fit ends: laws are compared by differences of several.
@@ -60,6 +60,8 @@ class LawFit:
     def with_added(self, covariance: FloatArray, series: DecaySeries) -> "LawFit":
         """Return the fit with a covariance (p, p) added to its own."""
         total = self.covariance + covariance
+        if self.covariance[LAW_SHAPE, LAW_SHAPE] == 0:
+            total = _without_shape(total)
         fitted = replace(self.fitted, covariance=_own_covariance(self.joint, series, total))
         return replace(self, covariance=total, fitted=fitted)
 
@@ -118,6 +120,13 @@ def fit_law(
     if fit.shape[0] == 0:
         return None
     covariances = covariances_under(series, shape, fit, noises)
+    # Near an exponential, retrapping changes the signal as the rate does: its σ has no limit there.
+    if not np.sqrt(fit.least_squares.covariance[LAW_SHAPE, LAW_SHAPE]) <= largest - least:
+        fit = _with_shape_held(fit)
+        held = _shape_held(shape)
+        covariances = [
+            _without_shape(each) for each in covariances_under(series, held, fit, noises)
+        ]
     covariance = np.mean(covariances, axis=0)
     with np.errstate(invalid="ignore"):
         covariance = np.where(covariance == 0, 0.0, student * covariance)
@@ -153,6 +162,33 @@ def _shape(series: DecaySeries, law: DecayLaw) -> Shape:
         return theta[0] * means, np.column_stack([means, theta[0] * slopes])
 
     return shape
+
+
+def _shape_held(shape: Shape) -> Shape:
+    """Return a law that does not depend on its shape."""
+
+    def held(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        values, slopes = shape(theta)
+        slopes[:, LAW_SHAPE] = 0.0
+        return values, slopes
+
+    return held
+
+
+def _with_shape_held(fit: JointFit) -> JointFit:
+    """Return a fit in whose covariance the shape is no parameter."""
+    jacobian = fit.least_squares.jacobian.copy()
+    jacobian[:, LAW_SHAPE] = 0.0
+    covariance = _without_shape(parameter_covariance(jacobian)[0])
+    solution = replace(fit.least_squares, jacobian=jacobian, covariance=covariance)
+    return replace(fit, least_squares=solution)
+
+
+def _without_shape(covariance: FloatArray) -> FloatArray:
+    """Return a covariance (p, p) with nothing of the shape."""
+    held = covariance.copy()
+    held[LAW_SHAPE, :] = held[:, LAW_SHAPE] = 0.0
+    return held
 
 
 def _best_on_grid(

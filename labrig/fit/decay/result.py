@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.bend import bend
+from labrig.fit.decay.drift import drift_effect
 from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.further_state import hidden_state
@@ -31,11 +32,15 @@ class DecayFit(FittedDecay):
     residuals, normalised_residuals
         Value − model, one row per frame in the order given, one column per channel: in the values'
         unit, and whitened (independent, of unit variance if the noise is as assumed).
+    drift_effect_s
+        Relative changes of rate and amplitude of every state if all rates of the sample grow as
+        1 + γ t while it glows, over γ, in seconds, shape (n_states, 2): NaN where held.
     """
 
     sigma: FloatArray
     residuals: FloatArray
     normalised_residuals: FloatArray
+    drift_effect_s: FloatArray
 
 
 def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayFit:
@@ -115,7 +120,17 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         sigma=sigma_used,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
+        drift_effect_s=_drift_effect_s(fit, data, states),
     )
+
+
+def _drift_effect_s(
+    fit: StatesFit, data: WhitenedSeries, states: tuple[DecayState, ...]
+) -> FloatArray:
+    to_units, _ = _to_units(fit, data)
+    changes = (to_units @ drift_effect(data, fit))[: 2 * fit.n_states].reshape(-1, 2)
+    values = np.array([[state.k_r_per_s, state.amplitude] for state in states])
+    return np.asarray(data.series.span_s * changes / values)
 
 
 def _noise_correlation(
@@ -175,15 +190,27 @@ def _covariances(
 
     The former is by falling rate, the latter has free rates first.
     """
+    to_units, to_log_rates = _to_units(fit, data)
+    return (
+        propagated_covariance(fitted_covariance, to_units),
+        propagated_covariance(fitted_covariance, to_log_rates),
+    )
+
+
+def _to_units(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
+    """Return derivatives of k₁, a₁, … and all offsets in the user's units, and of log k.
+
+    They are by the fitted parameters; the former by falling rate, the latter free rates first.
+    """
     series, n_free = data.series, fit.n_free
-    n_states = fit.n_states
+    n_states, n_parameters = fit.n_states, fit.joint.n_parameters
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates)
     b = fit.amplitudes
     # Amplitudes are fitted at the first frame, given at lamp off: a = b e^(k t₀).
     growth = np.exp(rates * series.start) * series.peak
-    transform = np.zeros((2 * n_states + len(series.channels), len(fitted_covariance)))
-    to_log_rates = np.zeros((n_states, len(fitted_covariance)))
+    transform = np.zeros((2 * n_states + len(series.channels), n_parameters))
+    to_log_rates = np.zeros((n_states, n_parameters))
     for rank, i in enumerate(order):
         if i < n_free:
             transform[2 * rank, 2 * i] = rates[i] / series.span_s
@@ -193,10 +220,7 @@ def _covariances(
         else:
             transform[2 * rank + 1, n_free + i] = growth[i]
     fitted = series.fitted_offsets
-    transform[
-        2 * n_states + fitted, len(fitted_covariance) - len(fitted) + np.arange(len(fitted))
-    ] = series.peak
-    return (
-        propagated_covariance(fitted_covariance, transform),
-        propagated_covariance(fitted_covariance, to_log_rates),
+    transform[2 * n_states + fitted, n_parameters - len(fitted) + np.arange(len(fitted))] = (
+        series.peak
     )
+    return transform, to_log_rates

@@ -349,7 +349,7 @@ def _warnings(
     problem: ExcitationProblem, solution: LeastSquaresFit, states: Sequence[ExcitedState]
 ) -> list[str]:
     messages = []
-    if solution.ending is Ending.CREEPING:
+    if solution.creeps:
         messages.append("the fit still creeps: rates and levels may trade off; charge for longer")
     elif solution.ending is Ending.RANK_DEFICIENT:
         messages.append(
