@@ -34,6 +34,8 @@ class Arrangement:
         Name of the colour filter before the lamp.
     wheel
         Name of the filter that the filter wheel has before the lamp.
+    camera_filter, camera_wheel
+        Names of the colour filter before the camera, and of the one that the wheel there has.
     is_monochromatic
         Whether the monochromator is between lamp and sample.
     monochromator_nm
@@ -61,6 +63,8 @@ class Arrangement:
     turned: bool = False
     filter: str | None = None
     wheel: str | None = None
+    camera_filter: str | None = None
+    camera_wheel: str | None = None
     is_monochromatic: bool = False
     monochromator_nm: float | None = None
     lamp: LampKind = "halogen"

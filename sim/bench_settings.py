@@ -94,7 +94,7 @@ class LedSettings(Part):
 
 
 class FilterWheelSettings(Part):
-    """A filter wheel before the lamp, a Thorlabs FW102C at `sim://room/wheel`.
+    """A Thorlabs FW102C, before the lamp at `sim://room/wheel` or `…/camera-wheel` before a camera.
 
     Attributes
     ----------

@@ -84,6 +84,8 @@ class Changer:
             "monochromator away": lambda: self._put_monochromator(False),
             "no filter": lambda: self._put_filter(None),
             "filter NAME": self._put_filter,
+            "no camera filter": lambda: self._put_camera_filter(None),
+            "camera filter NAME": self._put_camera_filter,
             "lamp halogen": lambda: self._change_lamp("halogen"),
             "lamp mercury": lambda: self._change_lamp("mercury"),
             "lamp at DISTANCE": self._move_lamp,
@@ -127,6 +129,10 @@ class Changer:
             raise UsageError("there is none in this room, see 'simulation.monochromator'")
         self._change(is_monochromatic=on)
 
+    def turn_camera_wheel(self, name: str | None) -> None:
+        """Have another filter of the wheel before the camera from now on."""
+        self._change(camera_wheel=name)
+
     def turn_wheel(self, name: str | None) -> None:
         """Have another filter of the filter wheel before the lamp from now on."""
         self._change(wheel=name)
@@ -143,6 +149,11 @@ class Changer:
             if skipped.is_on(now_s) and name is not None and skipped.name in (None, name):
                 return
         self._change(filter=name)
+
+    def _put_camera_filter(self, name: str | None) -> None:
+        if name is not None:
+            self._filters.check(name)
+        self._change(camera_filter=name)
 
     def _change_lamp(self, lamp: LampKind) -> None:
         self._change(lamp=lamp)

@@ -1,4 +1,4 @@
-"""Colour filters before the lamp: curves from a folder, in truth a little different."""
+"""Colour filters before lamp and camera: curves from a folder, in truth a little different."""
 
 import csv
 import zlib
@@ -89,6 +89,11 @@ class Filters:
         if arrangement.monochromator_nm is None:
             return np.zeros_like(passed)
         return passed * passed_by(self._monochromator, arrangement.monochromator_nm)
+
+    def before_camera(self, arrangement: Arrangement) -> FloatArray:
+        """Return what the filters before the camera let through, shape (wavelengths,)."""
+        by_hand = self.transmission(arrangement.camera_filter)
+        return by_hand * self.transmission(arrangement.camera_wheel)
 
     def transmission(self, name: str | None) -> FloatArray:
         """Return the filter's transmittance, shape (wavelengths,); no filter: 1."""

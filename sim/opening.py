@@ -37,8 +37,8 @@ from .temperature import TemperatureSensor
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/arduino`,
 #: `sim://room/servo`, `sim://room/changer`, `sim://room/camera`, `sim://room/spectrometer`; with
 #: LEDs on Thorlabs units `sim://room/dc4100-1` to `sim://room/dc4100-3`, with a bank of lamps
-#: `sim://room/lamps`, with a filter wheel `sim://room/wheel`, with a monochromator
-#: `sim://room/monochromator`.
+#: `sim://room/lamps`, with a filter wheel `sim://room/wheel`, with one before the
+#: camera `sim://room/camera-wheel`, with a monochromator `sim://room/monochromator`.
 NAME = "room"
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
@@ -104,6 +104,8 @@ class OpenRoom:
         selectors: dict[str, Fw102cBoard | CornerstoneBoard] = {}
         if simulation.filter_wheel is not None:
             selectors["wheel"] = Fw102cBoard(self.room.turn_wheel, clock)
+        if simulation.camera_filter_wheel is not None:
+            selectors["camera-wheel"] = Fw102cBoard(self.room.turn_camera_wheel, clock)
         if simulation.monochromator is not None:
             selectors["monochromator"] = CornerstoneBoard(self.room.tune, clock)
         changer = ChangerBoard(self.room.tasks)

@@ -16,6 +16,7 @@ from .aiming import (
 )
 from .angles import Spheres
 from .arrangement import Arrangement, Arrangements
+from .bench_settings import FilterWheelSettings
 from .cards import reflectances
 from .changer import Changer
 from .circuit import LampCircuit
@@ -184,9 +185,11 @@ class Room:
 
     def turn_wheel(self, slot: int) -> None:
         """Have a slot of the filter wheel, from 1 on, before the lamp."""
-        wheel = self._simulation.filter_wheel
-        filters = () if wheel is None else wheel.filters
-        self._changer.turn_wheel(filters[slot - 1] if slot <= len(filters) else None)
+        self._changer.turn_wheel(_in_slot(self._simulation.filter_wheel, slot))
+
+    def turn_camera_wheel(self, slot: int) -> None:
+        """Have a slot of the filter wheel before the camera, from 1 on, before it."""
+        self._changer.turn_camera_wheel(_in_slot(self._simulation.camera_filter_wheel, slot))
 
     def tune(self, wavelength_nm: float, is_open: bool) -> None:
         """Have the monochromator tuned to a wavelength, its shutter open or closed."""
@@ -421,6 +424,7 @@ class Room:
         glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
         opened = lights.openness((start_s + end_s) / 2)
         radiance_s = self._view.radiance_s(arrangement, glow_s, reflected, opened)
+        radiance_s *= self._filters.before_camera(arrangement)
         return self._curves.glow_electrons_per_s(radiance_s, f_number).astype(np.float32)
 
     def _shaded(
@@ -440,3 +444,9 @@ class Room:
             light - reradiated
         ) * spheres.reflected + reradiated * spheres.reradiated
         return np.maximum(shaded, 0.0).astype(np.float32)
+
+
+def _in_slot(wheel: FilterWheelSettings | None, slot: int) -> str | None:
+    """Return the name of the filter in a slot, from 1 on; None for an open one."""
+    filters = () if wheel is None else wheel.filters
+    return filters[slot - 1] if slot <= len(filters) else None

@@ -257,6 +257,8 @@ class Simulation(Part):
         filter; null: the shipped folder.
     filter_wheel
         Filter wheel before the lamp; null: none.
+    camera_filter_wheel
+        Filter wheel before the camera; null: none.
     monochromator
         Monochromator that can be put between lamp and sample; null: none.
     filters_bent
@@ -332,6 +334,7 @@ class Simulation(Part):
     lvf: LvfSettings | None = None
     filters: str | None = None
     filter_wheel: FilterWheelSettings | None = None
+    camera_filter_wheel: FilterWheelSettings | None = None
     monochromator: MonochromatorSettings | None = None
     filters_bent: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     grey_card: Annotated[Fraction, Field(gt=0, le=0.95)] = 0.18

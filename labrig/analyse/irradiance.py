@@ -1,5 +1,6 @@
 """Irradiance on the sample, of the lamp and through the LVF or of lights, from frames of a card."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -42,6 +43,8 @@ LEAST = 1e-6
 #: Error of a camera's curves for a light alone, which has no neighbours as the places of a strip
 #: have: published curves of one camera differ by 2 to 6 % of their peak (rms), 9 % of themselves.
 ALONE = CurveError(relative=0.09, added=0.015)
+#: Largest width in nm of the cells in which the spectra of lights are kept.
+CELL_NM = 2.5
 #: Relative σ of a light from which a warning is given.
 HARDLY_KNOWN = 0.1
 #: Relative σ of a lux meter's reading, with its mismatch to the eye.
@@ -152,20 +155,20 @@ def _file_of_lights(
     card: CardRatio,
     scale: StripScale,
 ) -> IrradianceFile:
-    edges = np.array(part.protocol.bands_nm)
+    edges, cells_nm = np.array(part.protocol.bands_nm), _cells_nm(part.protocol.bands_nm)
     direct = band_integrals(lamp.wavelength_nm, lamp.value, edges)
     norm = part.protocol.vector_length / float(np.linalg.norm(direct))
     factor = scale.value[:, np.newaxis] * norm
-    through, moved = (
+    through, moved, through_cells = (
         factor
         * np.array(
             [
                 band_integrals(one.spectrum.wavelength_nm + shift * one.wavelength_sigma_nm,
-                               one.spectrum.value, edges)
+                               one.spectrum.value, limits_nm)
                 for one in lights
             ]
         )
-        for shift in (0, 1)
+        for shift, limits_nm in ((0, edges), (1, edges), (0, cells_nm))
     )  # fmt: skip
     sigma = np.hypot(through * scale.relative_sigma[:, np.newaxis], moved - through)
     ratio = norm * direct.sum() / through.sum(axis=1)
@@ -181,7 +184,12 @@ def _file_of_lights(
         width_nm=tuple(width_nm.tolist()),
         through=tuple(tuple(row) for row in through.tolist()),
         through_sigma=tuple(tuple(row) for row in sigma.tolist()),
-        through_shift=tuple(tuple(row) for row in (moved - through).tolist()),
+        wavelength_sigma_nm=tuple(one.wavelength_sigma_nm for one in lights),
+        cells_nm=tuple(cells_nm.tolist()),
+        direct_cells=tuple(
+            (norm * band_integrals(lamp.wavelength_nm, lamp.value, cells_nm)).tolist()
+        ),
+        through_cells=tuple(tuple(row) for row in through_cells.tolist()),
         scale_sigma=card.common_sigma,
         ratio=tuple(ratio.tolist()),
         ratio_sigma=tuple((ratio * np.hypot(scale.relative_sigma, card.common_sigma)).tolist()),
@@ -190,6 +198,15 @@ def _file_of_lights(
         source=f"grey card by itself and by selected lights in {card.rounds} rounds, with labrig",
         run=part.run.folder.resolve().name,
     )
+
+
+def _cells_nm(bands_nm: Sequence[float]) -> FloatArray:
+    """Return the edges of cells of at most `CELL_NM` into which every band is divided evenly."""
+    cells = [
+        np.linspace(low, high, math.ceil((high - low) / CELL_NM), endpoint=False)
+        for low, high in pairwise(bands_nm)
+    ]
+    return np.append(np.concatenate(cells), bands_nm[-1])
 
 
 def _moments(light: Spectrum, edges_nm: FloatArray) -> tuple[float, float]:

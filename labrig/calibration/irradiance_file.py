@@ -3,7 +3,7 @@
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
 from labrig.errors import UsageError
@@ -67,8 +67,12 @@ class IrradianceFile(BaseModel):
     through, through_sigma
         Irradiance of each band behind the LVF, a row for each position, or of each of `lights`, and
         σ.
-    through_shift
-        Change of `through` by one σ of the wavelengths of each of `lights`; none of the LVF.
+    wavelength_sigma_nm
+        σ in nm of an error that all wavelengths of each of `lights` have in common.
+    cells_nm
+        Rising edges of narrow cells in nm, of which every band contains a number; none of the LVF.
+    direct_cells, through_cells
+        Irradiance of each cell directly under the lamp, and a row of them for each of `lights`.
     scale_sigma
         Relative standard uncertainty of `through` over `direct`, common to all rows.
     ratio, ratio_sigma
@@ -109,7 +113,10 @@ class IrradianceFile(BaseModel):
     width_nm: Numbers = ()
     through: tuple[Numbers, ...]
     through_sigma: tuple[Numbers, ...]
-    through_shift: tuple[tuple[FiniteFloat, ...], ...] = ()
+    wavelength_sigma_nm: Numbers = ()
+    cells_nm: tuple[Positive, ...] = ()
+    direct_cells: Numbers = ()
+    through_cells: tuple[Numbers, ...] = ()
     scale_sigma: NotNegative
     ratio: tuple[Positive, ...]
     ratio_sigma: Numbers
@@ -133,7 +140,6 @@ class IrradianceFile(BaseModel):
             self.direct_sigma,
             *self.through,
             *self.through_sigma,
-            *self.through_shift,
         )
         if any(len(row) != bands for row in rows):
             raise ValueError(f"expected {bands} numbers for each irradiance, one a band")
@@ -143,13 +149,32 @@ class IrradianceFile(BaseModel):
                 f"expected {places} entries, one a position or light, in 'through', 'ratio' and "
                 "their σ"
             )
-        of_lights = (self.through_shift, self.centre_nm, self.width_nm)
+        of_lights = (self.wavelength_sigma_nm, self.centre_nm, self.width_nm, self.through_cells)
         if any(len(column) != len(self.lights) for column in of_lights):
             raise ValueError(
-                f"expected {len(self.lights)} entries, one a light, in 'through_shift', "
-                "'centre_nm' and 'width_nm'"
+                f"expected {len(self.lights)} entries, one a light, in 'wavelength_sigma_nm', "
+                "'centre_nm', 'width_nm' and 'through_cells'"
             )
+        self._check_cells()
         return self
+
+    def _check_cells(self) -> None:
+        """Raise ValueError if the cells do not fill the bands, or have no irradiance."""
+        if not self.lights:
+            if self.cells_nm or self.direct_cells:
+                raise ValueError("expected 'cells_nm' and 'direct_cells' of 'lights' only")
+            return
+        _rising(self.cells_nm, "cells_nm")
+        if not set(self.bands_nm) <= set(self.cells_nm) or not (
+            self.cells_nm[0] == self.bands_nm[0] and self.cells_nm[-1] == self.bands_nm[-1]
+        ):
+            raise ValueError("expected every edge of 'bands_nm' in 'cells_nm', which end with them")
+        rows = (self.direct_cells, *self.through_cells)
+        if any(len(row) != len(self.cells_nm) - 1 for row in rows):
+            raise ValueError(
+                f"expected {len(self.cells_nm) - 1} numbers, one a cell, in 'direct_cells' and in "
+                "every row of 'through_cells'"
+            )
 
     def lvf_strip(self) -> Strip:
         """Return the position of the LVF on the sample.

@@ -77,6 +77,24 @@ def _lines(patch: PatchSpectrum) -> Iterator[str]:
         )
 
 
+def _seen_through(patch: PatchSpectrum) -> str:
+    return "scenes with and without a filter" if patch.filters else "positions along the filter"
+
+
+def _resolved(patch: PatchSpectrum) -> str:
+    """Return the statement on what is narrower than the filters."""
+    if patch.filters:
+        return (
+            f"{len(patch.filters)} filters and the camera's channels do not resolve what is "
+            "narrower than some 40 nm: σ is that of a spectrum with peaks of 25 nm and more. Of "
+            "lines only the sum is measured; a variable filter or a spectrometer tells them."
+        )
+    return (
+        "Of lines much narrower than the filter's band the sum of the light is measured; how "
+        "it is divided between neighbouring wavelengths is not, and their band is wide."
+    )
+
+
 def _shift(comparison: SpectralComparison) -> str:
     """Return the shift of the centroid with its σ in nm, as text."""
     return plus_minus(comparison.shift_nm, comparison.shift_sigma_nm)
@@ -96,10 +114,9 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
     yield Section(
         "Emission spectrum",
         (
-            f"Λ* from {places} positions along the filter in {len(frames)} frames, largest value "
+            f"Λ* from {places} {_seen_through(patch)} in {len(frames)} frames, largest value "
             f"1. {white}",
-            "Of lines much narrower than the filter's band the sum of the light is measured; how "
-            "it is divided between neighbouring wavelengths is not, and their band is wide.",
+            _resolved(patch),
         ),
         (
             Picture(

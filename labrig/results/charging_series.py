@@ -62,7 +62,7 @@ class Transient:
     @classmethod
     def none(cls, bands: int) -> Self:
         """Construct the transient of a lamp that switches instantly."""
-        return cls(np.zeros(0), np.zeros((0, bands)))
+        return cls(np.zeros(1), np.ones((1, bands)))
 
     @property
     def total_s(self) -> float:

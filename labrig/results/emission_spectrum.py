@@ -275,8 +275,11 @@ class PatchSpectrum:
     channels
         Channels of the camera.
     centre_nm
-        Centre of the filter's band in nm for every value of a frame, position by position and
-        within it channel by channel, shape (m,).
+        Centre of the filter's band in nm for every value of a frame, position by position, or
+        filter by filter, and within it channel by channel, shape (m,).
+    filters
+        Names of the colour filters before the camera; empty of the variable filter. With them the
+        first values of a frame are those without a filter.
     white_reference
         Whether the camera's curves were corrected by a grey card under the known lamp.
     charges
@@ -295,6 +298,7 @@ class PatchSpectrum:
     spectrum: EmissionSpectrum
     channels: tuple[str, ...]
     centre_nm: FloatArray
+    filters: tuple[str, ...]
     white_reference: bool
     charges: tuple[ChargeSpectrum, ...]
     times: tuple[SpectralComparison, ...]

@@ -9,6 +9,7 @@ import numpy as np
 
 from labrig.acquire import (
     CAMERA,
+    CAMERA_FILTER_WHEEL,
     FILTER_WHEEL,
     LAMP,
     LAMP_OFF,
@@ -22,6 +23,7 @@ from labrig.acquire import (
     Session,
     Shoot,
     Tune,
+    TurnCameraWheel,
     TurnWheel,
     Unit,
 )
@@ -54,7 +56,7 @@ _LVF = {
     "on sample": "put the variable filter between lamp and sample",
 }
 #: What is arranged, in the order in which it is asked for.
-THINGS = "lamp", "laid", "lvf", "filter", "monochromator_nm"
+THINGS = "lamp", "laid", "lvf", "filter", "camera_filter", "monochromator_nm"
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,8 @@ class Arrangement:
         Place of the linear variable filter.
     filter
         Name of the colour filter before the lamp.
+    camera_filter
+        Name of the colour filter before the camera.
     monochromator_nm
         Wavelength of the monochromator between lamp and sample in nm; None: it is not there.
     lamp
@@ -80,6 +84,7 @@ class Arrangement:
     stage: Stage = "sample"
     lvf: LvfPlace = "away"
     filter: str | None = None
+    camera_filter: str | None = None
     monochromator_nm: float | None = None
     lamp: LampKind = "halogen"
     chart_patch: int = 0
@@ -117,16 +122,23 @@ class Arrangement:
         if FILTER_WHEEL in session.rig:
             in_wheel = self.filter in session.rig[FILTER_WHEEL].filters()
             session.perform(TurnWheel(self.filter if in_wheel else None))
+        if CAMERA_FILTER_WHEEL in session.rig:
+            in_wheel = self.camera_filter in session.rig[CAMERA_FILTER_WHEEL].filters()
+            session.perform(TurnCameraWheel(self.camera_filter if in_wheel else None))
         if self.monochromator_nm is not None:
             session.perform(Tune(self.monochromator_nm))
 
     def _by_hand(self, rig: Rig) -> "Arrangement":
         """Return the part of the arrangement that is made by hand."""
-        filter_name = self.filter
+        filter_name, camera_filter = self.filter, self.camera_filter
         if FILTER_WHEEL in rig and filter_name in rig[FILTER_WHEEL].filters():
             filter_name = None
+        if CAMERA_FILTER_WHEEL in rig and camera_filter in rig[CAMERA_FILTER_WHEEL].filters():
+            camera_filter = None
         tuned_nm = None if self.monochromator_nm is None else 0.0
-        return replace(self, filter=filter_name, monochromator_nm=tuned_nm)
+        return replace(
+            self, filter=filter_name, camera_filter=camera_filter, monochromator_nm=tuned_nm
+        )
 
     def _step(self, name: str) -> tuple[str, str]:
         """Return the text of a step for a person, and for a changer."""
@@ -148,6 +160,11 @@ class Arrangement:
                 return "take the monochromator out of the lamp's light", "monochromator away"
             case "monochromator_nm":
                 return "put the monochromator between lamp and sample", "monochromator on"
+            case "camera_filter" if self.camera_filter is None:
+                return "take the colour filter before the camera away", "no camera filter"
+            case "camera_filter":
+                instruction = f"put the colour filter {self.camera_filter} before the camera"
+                return instruction, f"camera filter {self.camera_filter}"
             case _ if self.filter is None:
                 return "take the colour filter out", "no filter"
             case _:
@@ -185,11 +202,14 @@ def _thing_of(task: str) -> str | None:
         "lamp halogen": "lamp",
         "lamp mercury": "lamp",
         "no filter": "filter",
+        "no camera filter": "camera_filter",
         "monochromator on": "monochromator_nm",
         "monochromator away": "monochromator_nm",
     }
     if task in _STAGE or task.startswith("colorchecker "):
         return "laid"
+    if task.startswith("camera filter "):
+        return "camera_filter"
     if task.startswith(("lvf ", "filter ")):
         return task.partition(" ")[0]
     return words.get(task)

@@ -175,7 +175,7 @@ def measured(case: Case, material: str, seed: int) -> Outcome:
         common_mode=DARK, scale=scale_sigma(file), largest_factor=LARGEST_FACTOR,
     )  # fmt: skip
     fit = fitted(bench, sigmas, series)
-    closure = predicted_charging(series, file, sigmas, lambda one: fitted(bench, sigmas, one, fit))
+    closure = predicted_charging(series, sigmas, lambda one: fitted(bench, sigmas, one, fit))
     assert closure is not None
     assert fit.by_band is not None
     truth = np.array([state.k_e_per_s for state in bench.material.states])

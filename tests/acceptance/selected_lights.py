@@ -5,7 +5,8 @@
 For each way of selecting lights and each seed the room runs `irradiance` on the card and then
 `excitation` on the sample, with nothing told of what is true. Filters differ by 1 % from their
 files, the monochromator is 0.3 nm off, LEDs are skewed, and droop. Monochromator and LEDs are read
-by a spectrometer; `fine` are 15 bands of 20 nm by the monochromator. In half of the runs excitation
+by a spectrometer; `fine` are 15 bands of 20 nm by the monochromator with a band of 20 nm, `narrow`
+with one of 8 nm. In half of the runs excitation
 is a smooth function of the wavelength, which the fit with its bands does not assume.
 """
 
@@ -42,8 +43,8 @@ LARGE = 0.005
 
 def run(folder: Path, kind: str, seed: int, excitation: str) -> tuple[list[float], list[float]]:
     """Return relative deviations of the large rates and deviations of all in σ."""
-    read = kind in ("monochromator", "fine", "leds")
-    bands_nm = FINE_BANDS_NM if kind == "fine" else BANDS_NM
+    read = kind in ("monochromator", "fine", "narrow", "leds")
+    bands_nm = FINE_BANDS_NM if kind in ("fine", "narrow") else BANDS_NM
     card = {
         "protocol": "irradiance",
         "select": SELECTIONS[kind],
@@ -82,10 +83,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first", type=int, default=100)
+    parser.add_argument("--rooms", nargs="+", default=["steps", "smooth"])
     parser.add_argument("--kinds", nargs="+", default=list(SELECTIONS), choices=list(SELECTIONS))
     options = parser.parse_args()
     for kind in options.kinds:
-        for excitation in ("steps", "smooth"):
+        for excitation in options.rooms:
             off, pulls = [], []
             for seed in range(options.first, options.first + options.seeds):
                 with tempfile.TemporaryDirectory() as folder:

@@ -44,6 +44,7 @@ SELECTIONS: dict[str, dict[str, Any]] = {
     "monochromator": {"monochromator": list(TUNED_NM)},
     "leds": {"leds": list(LED_NAMES)},
     "fine": {"monochromator": list(FINE_NM)},
+    "narrow": {"monochromator": list(FINE_NM)},
 }
 QUICK: dict[str, Any] = {
     "protocol": "excitation",
@@ -74,12 +75,13 @@ def bench(
                 "address": "sim://room/wheel",
                 "filters": {name: number for number, name in enumerate(slots, 1) if name},
             }
-        if kind in ("monochromator", "fine"):
-            room["monochromator"] = {"fwhm": 20, "off_nm": 0.3}
+        if kind in ("monochromator", "fine", "narrow"):
+            fwhm_nm = 8 if kind == "narrow" else 20
+            room["monochromator"] = {"fwhm": fwhm_nm, "off_nm": 0.3}
             rig["devices"]["monochromator"] = {
                 "driver": "oriel_cornerstone",
                 "address": "sim://room/monochromator",
-                "fwhm": 20,
+                "fwhm": fwhm_nm,
                 "wavelength_sigma": 0.5,
             }
         if kind == "leds":
@@ -127,6 +129,7 @@ def true_spectra(kind: str, room: Simulation) -> FloatArray:
 def true_light(kind: str, room: Simulation, bands_nm: Sequence[float] = BANDS_NM) -> IrradianceFile:
     """What an irradiance run without error would find."""
     cells = band_cells(bands_nm)
+    cells_nm = np.linspace(bands_nm[0], bands_nm[-1], 15 * (len(bands_nm) - 1) + 1)
     direct = cells @ filament_spectrum(BURNING_K)
     norm = np.linalg.norm(direct)
     spectra = true_spectra(kind, room)
@@ -144,7 +147,10 @@ def true_light(kind: str, room: Simulation, bands_nm: Sequence[float] = BANDS_NM
         width_nm=tuple(np.sqrt((spectra * about_nm).sum(axis=1) / spectra.sum(axis=1))),
         through=tuple(map(tuple, through)),
         through_sigma=tuple(map(tuple, 0.005 * through)),
-        through_shift=tuple(map(tuple, 0 * through)),
+        wavelength_sigma_nm=(0.0,) * len(through),
+        cells_nm=tuple(cells_nm.tolist()),
+        direct_cells=tuple(band_cells(cells_nm) @ filament_spectrum(BURNING_K) / norm),
+        through_cells=tuple(map(tuple, spectra @ band_cells(cells_nm).T / norm)),
         scale_sigma=0.005,
         ratio=tuple(direct.sum() / through.sum(axis=1)),
         ratio_sigma=tuple(0.005 * direct.sum() / through.sum(axis=1)),

@@ -76,11 +76,15 @@ def test_a_light_whose_irradiance_is_not_known(tmp_path: Path) -> None:
 
 
 @pytest.mark.campaign
+@pytest.mark.parametrize("excitation", ["steps", "smooth"])
 @pytest.mark.parametrize(
     ("kind", "seed"), [("filters", 11), ("wheel", 12), ("monochromator", 13), ("leds", 14)]
 )
-def test_rates_are_the_rooms(kind: str, seed: int, tmp_path: Path) -> None:
-    """With the light known; `tests.acceptance.selected_lights` measures it, too."""
+def test_rates_are_the_rooms(kind: str, seed: int, excitation: str, tmp_path: Path) -> None:
+    """With the light known; `tests.acceptance.selected_lights` measures it, too.
+
+    Excitation is the same all over each band, which the fit does not assume, or falls smoothly.
+    """
     rig: dict[str, dict[str, object]] = {
         "devices": {"lamp": {}},
         "simulation": {"sample": "blue-paint", "lvf": {}, "filters_bent": 0.01},
@@ -88,7 +92,9 @@ def test_rates_are_the_rooms(kind: str, seed: int, tmp_path: Path) -> None:
     bench(kind, seed=seed)(rig)
     light = true_light(kind, Simulation.model_validate(rig["simulation"]))
     IRRADIANCE_KIND.write(tmp_path, light)
-    run = recorded(tmp_path, kind, tmp_path / "irradiance.yaml", seed=seed)
+    sample: dict[str, object] = {"material": "blue-paint", "region": [0.03, 0.1, 0.94, 0.8]}
+    sample["kinetics"] = {"excitation": excitation}
+    run = recorded(tmp_path, kind, tmp_path / "irradiance.yaml", seed=seed, sample=[sample])
     result = process_run(run)
     assert isinstance(result, ExcitationResult)
     assert_read_back(result)
@@ -97,6 +103,7 @@ def test_rates_are_the_rooms(kind: str, seed: int, tmp_path: Path) -> None:
     # The room's lamp is four times as bright as the irradiance to which Table 1's rates belong.
     (truth,) = 4 * true_rates()
     assert (np.abs(state.k_e_per_s - truth) < 3 * state.k_e_sigma_per_s + 1e-5).all()
-    assert state.k_e_per_s[:3] == pytest.approx(truth[:3], rel=0.1)
+    assert (state.k_e_sigma_per_s[:3] < [0.25, 0.15, 0.8] * truth[:3]).all()
+    assert any("excitation changes so much" in warning for warning in result.warnings)
     assert patch.closure is not None
     assert patch.closure.rms_sigma < 3

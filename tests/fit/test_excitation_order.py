@@ -25,7 +25,6 @@ from labrig.results import (
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.simulation import LampSettings
-from tests.analyse.excitation.test_excitation_run import true_irradiance
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
 from tests.results.made import decay_result
 
@@ -198,7 +197,6 @@ def test_closure_knows_what_earlier_charges_left() -> None:
         whole, charges=whole.charges[1:], values=whole.values[4:], sigma=whole.sigma[4:],
         earlier=EarlierCharges(whole.charges[:1], whole.irradiance, whole.rise, whole.fade),
     )  # fmt: skip
-    light = true_irradiance().model_copy(update={"direct": tuple(whole.irradiance[0])})
     through = sample.series("through LVF", LVF, (8.0, 64.0, 256.0), shots=5)
     fit = fitted([direct, through], B)
     one, three = np.ones(1), np.ones((1, 3))
@@ -208,7 +206,7 @@ def test_closure_knows_what_earlier_charges_left() -> None:
 
     def predicted(direct: ChargingSeries) -> Closure:
         charging = PatchCharging(through, direct, np.ones(1), whole_strip)
-        found = predicted_charging(charging, light, UNCERTAIN, lambda _: fit)
+        found = predicted_charging(charging, UNCERTAIN, lambda _: fit)
         assert found is not None
         return found
 

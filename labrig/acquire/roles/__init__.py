@@ -22,7 +22,13 @@ from labrig.acquire.roles.door_and_shield import (
     Shield,
     TrapDoor,
 )
-from labrig.acquire.roles.filter_wheel import FILTER_WHEEL, FilterWheel, TurnWheel
+from labrig.acquire.roles.filter_wheel import (
+    CAMERA_FILTER_WHEEL,
+    FILTER_WHEEL,
+    FilterWheel,
+    TurnCameraWheel,
+    TurnWheel,
+)
 from labrig.acquire.roles.illuminants import (
     ILLUMINANTS,
     ILLUMINANTS_OFF,
@@ -75,6 +81,7 @@ ROLES: dict[str, Role[Any]] = {
         SHIELD,
         DOOR,
         FILTER_WHEEL,
+        CAMERA_FILTER_WHEEL,
         MONOCHROMATOR,
         CHANGER,
         CAMERA,
@@ -89,6 +96,7 @@ LIGHTS = frozenset(key for key, role in ROLES.items() if role.state is not None)
 
 __all__ = [
     "CAMERA",
+    "CAMERA_FILTER_WHEEL",
     "CHANGER",
     "DARK",
     "DOOR",
@@ -148,6 +156,7 @@ __all__ = [
     "Thermometer",
     "TrapDoor",
     "Tune",
+    "TurnCameraWheel",
     "TurnWheel",
     "require_integration",
 ]

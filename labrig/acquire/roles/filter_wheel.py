@@ -1,4 +1,4 @@
-"""The filter wheel, which puts one of its filters before the lamp."""
+"""Filter wheels, which put one of their filters before the lamp, or before the camera."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from labrig.yaml_file import did_you_mean
 class FilterWheel(Device, Protocol):
     """A wheel, or a slide, with filters and an open slot. Safe state: at rest.
 
-    A filter that is in the wheel is put before the lamp by it; all others, by hand.
+    A filter that is in the wheel is put in place by it; all others, by hand.
     """
 
     def filters(self) -> tuple[str, ...]:
@@ -61,10 +61,11 @@ class PlannedFilterWheel(PlannedDevice):
 
 @dataclass(frozen=True)
 class TurnWheel:
-    """The action that turns the wheel to a filter, or to its open slot for None."""
+    """The action that turns the wheel before the lamp to a filter, or to its open slot for None."""
 
     filter: str | None
     device: ClassVar[str] = "filter_wheel"
+    before: ClassVar[str] = "lamp"
 
     def __str__(self) -> str:
         return f"filter {self.filter}" if self.filter else "no filter"
@@ -79,10 +80,18 @@ class TurnWheel:
         """
         if self.filter is not None and self.filter not in wheel.filters():
             raise ProtocolError(
-                f"the protocol puts the filter '{self.filter}' before the lamp, which the wheel "
-                f"has not; {did_you_mean(self.filter, wheel.filters())}"
+                f"the protocol puts the filter '{self.filter}' before the {self.before}, which the "
+                f"wheel has not; {did_you_mean(self.filter, wheel.filters())}"
             )
         wheel.put(self.filter)
+
+
+@dataclass(frozen=True)
+class TurnCameraWheel(TurnWheel):
+    """The action that turns the wheel before the camera."""
+
+    device: ClassVar[str] = "camera_filter_wheel"
+    before: ClassVar[str] = "camera"
 
 
 def _exercise(wheel: FilterWheel, context: ExerciseContext) -> Exercised:
@@ -95,12 +104,17 @@ def _exercise(wheel: FilterWheel, context: ExerciseContext) -> Exercised:
     return Exercised((*measured, Measured("to the open slot", duration_text(back_s))))
 
 
-FILTER_WHEEL: Role[FilterWheel] = Role(
-    key="filter_wheel",
-    protocol_class=FilterWheel,
-    name="filter wheel",
-    planned=lambda driver, settings, clock: PlannedFilterWheel(
-        clock, driver.declared_filters(settings), driver.declared_turn_s(settings)
-    ),
-    exercise=_exercise,
-)
+def _role(key: str, name: str) -> Role[FilterWheel]:
+    return Role(
+        key=key,
+        protocol_class=FilterWheel,
+        name=name,
+        planned=lambda driver, settings, clock: PlannedFilterWheel(
+            clock, driver.declared_filters(settings), driver.declared_turn_s(settings)
+        ),
+        exercise=_exercise,
+    )
+
+
+FILTER_WHEEL = _role(TurnWheel.device, "filter wheel")
+CAMERA_FILTER_WHEEL = _role(TurnCameraWheel.device, "filter wheel before the camera")

@@ -1,11 +1,18 @@
 """Analysis of an emission spectrum, from its frames to Λ* of each patch."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from labrig.analyse.emission_spectrum.camera_filters import (
+    filter_models,
+    glow_through_filters,
+    repeat_warnings,
+    white_through_filters,
+    with_repeats,
+)
 from labrig.analyse.emission_spectrum.comparison import (
     CombinedFrame,
     combined,
@@ -31,7 +38,13 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.errors import DataError
 from labrig.fit.spectrum import DECISIVE, SpectrumFit, fit_spectrum
-from labrig.protocols.emission_spectrum import SpectrumFrames, lamp_of
+from labrig.protocols.emission_spectrum import (
+    CameraFilters,
+    SpectrumFrames,
+    glow_unit,
+    lamp_of,
+    white_unit,
+)
 from labrig.reduce import SeriesFrame
 from labrig.results import (
     ChargeSpectrum,
@@ -45,6 +58,9 @@ from labrig.results import (
 #: Evidence of lines that is asked for where no grey card tells how far the camera's curves are off:
 #: broad emissions reach 7000.
 DECISIVE_WITHOUT_CARD = 2e4
+#: Largest weight of smoothness with filters before the camera, which cannot tell how smooth a
+#: spectrum is between them: emissions have peaks and shoulders of 25 nm.
+STIFFEST = 3.0
 #: Number of draws of the spectrum, and of those that are only shown.
 SAMPLES, FEW_SAMPLES = 400, 60
 #: Least brightness after another lamp relative to the glow left of the previous charge.
@@ -66,7 +82,7 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     Raises
     ------
     UsageError
-        There is no calibrated LVF, or there are no camera curves.
+        There is no calibrated LVF, or no file of a filter, or there are no camera curves.
     DataError
         No spectrum is complete, frames are damaged, nothing glows in them, or no patch lies below
         the filter.
@@ -76,7 +92,7 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     intact = intact_frames(part.run, part.overrides, SpectrumFrames.GLOW)
     frames, stray = without_stray_light(intact, part.inputs.blank)
     require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(SpectrumFrames.GLOW))
-    models, refused = forward_models(part, frames.decay[0])
+    models, refused = _models(part, frames.decay[0])
     white = steady_frames(part.run, part.overrides, SpectrumFrames.WHITE)
     reductions = reduce_places(
         [*frames.decay, *white],
@@ -97,6 +113,15 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     )
 
 
+def _models(
+    part: Part, frame: SeriesFrame
+) -> tuple[Mapping[StripPatch, ForwardModel], tuple[str, ...]]:
+    """Return the model of every patch, and the reasons for patches without one."""
+    if part.protocol.select is not None:
+        return filter_models(part, part.protocol.select, frame), ()
+    return forward_models(part, frame)
+
+
 def _patch_spectrum(
     part: Part,
     patch: StripPatch,
@@ -107,10 +132,22 @@ def _patch_spectrum(
     white: bool,
 ) -> tuple[PatchSpectrum, list[str]]:
     """Return the patch's spectrum, and warnings."""
-    model, warnings = with_white_reference(
-        model, part, reduction.of_unit("white") if white else None
-    )
-    charges, dead = _charges(reduction, frames)
+    select = part.protocol.select
+    charging_lamps = list(dict.fromkeys(lamp_of(frame.unit) for frame in frames))
+    card = _card(reduction, select) if white else None
+    model, warnings = with_white_reference(model, part, card)
+    if select is None:
+        glows = {lamp: reduction.of_unit(glow_unit(lamp)) for lamp in charging_lamps}
+        decisive = DECISIVE if model.white_reference else DECISIVE_WITHOUT_CARD
+        stiffest = np.inf
+    else:
+        through = {lamp: glow_through_filters(reduction, lamp, select) for lamp in charging_lamps}
+        glows = {lamp: glow.frames for lamp, glow in through.items()}
+        warnings = (*warnings, *repeat_warnings(through))
+        model = with_repeats(model, max(glow.repeated_sigma for glow in through.values()))
+        # Filters are too few and too broad to tell a line.
+        decisive, stiffest = np.inf, STIFFEST
+    charges, dead = _charges(glows)
 
     run = part.run.folder.resolve().name
 
@@ -120,7 +157,8 @@ def _patch_spectrum(
             frame.sigma,
             model.system,
             samples=samples,
-            decisive=DECISIVE if model.white_reference else DECISIVE_WITHOUT_CARD,
+            decisive=decisive,
+            stiffest=stiffest,
         )
 
     def spectrum_by(fit: SpectrumFit, lamp: str) -> EmissionSpectrum:
@@ -141,6 +179,7 @@ def _patch_spectrum(
         spectrum=spectrum_by(first_fit, first.lamp),
         channels=model.camera.channels,
         centre_nm=model.centre_nm,
+        filters=() if select is None else select.filters,
         white_reference=model.white_reference,
         charges=tuple(
             ChargeSpectrum(
@@ -170,9 +209,13 @@ def _patch_spectrum(
     ]
 
 
-def _charges(
-    reduction: PatchReduction, frames: Sequence[SeriesFrame]
-) -> tuple[list[_Charge], list[str]]:
+def _card(reduction: PatchReduction, select: CameraFilters | None) -> FilterFrames:
+    if select is None:
+        return reduction.of_unit(white_unit())
+    return white_through_filters(reduction, select)
+
+
+def _charges(glows: Mapping[str, FilterFrames]) -> tuple[list[_Charge], list[str]]:
     """Return the charges after which something glows, and a warning for each of the others.
 
     Raises
@@ -182,10 +225,9 @@ def _charges(
     """
     charges: list[_Charge] = []
     dead: list[str] = []
-    for unit in dict.fromkeys(frame.unit for frame in frames):
-        lamp = lamp_of(unit)
+    for lamp, frames in glows.items():
         try:
-            visible_frames = visible(reduction.of_unit(unit))
+            visible_frames = visible(frames)
         except DataError:
             if not charges:
                 raise

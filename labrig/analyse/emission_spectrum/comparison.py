@@ -76,8 +76,8 @@ def visible(frames: FilterFrames) -> FilterFrames:
     rows = [row for row in range(len(frames)) if combined(frames.take([row])).shows_light]
     if not rows:
         raise DataError(
-            "expected light through the LVF, got none above the noise: was the sample charged, is "
-            "the filter where it was calibrated? (raise camera.iso, expose longer)"
+            "expected light through the filter, got none above the noise: was the sample charged, "
+            "is the variable filter where it was calibrated? (raise camera.iso, expose longer)"
         )
     return frames.take(rows)
 

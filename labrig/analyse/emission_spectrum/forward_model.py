@@ -5,6 +5,7 @@ with them. A grey card under a known lamp, seen through the same filter, measure
 every position and channel, and constrains the model's errors.
 """
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -52,8 +53,6 @@ class ForwardModel:
     ----------
     slices, holder
         Regions in which the filter is read, and those of its opaque holder beside it.
-    lvfs
-        The filter at the middle of each slice's own pixels, for every channel.
     camera
         Curves of the camera.
     system
@@ -64,10 +63,31 @@ class ForwardModel:
 
     slices: Mapping[str, Region]
     holder: Mapping[str, Region]
-    lvfs: tuple[Lvf, ...]
     camera: CameraResponse
     system: SpectralSystem
     white_reference: bool = False
+
+    @property
+    @abstractmethod
+    def centre_nm(self) -> FloatArray:
+        """Middle of the band in which each value is read in nm, place by place, (m,)."""
+
+    @abstractmethod
+    def expected_of(self, light: Spectrum) -> FloatArray:
+        """Return the values of a light by the model, shape (m,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LvfModel(ForwardModel):
+    """Model of a frame through the variable filter.
+
+    Attributes
+    ----------
+    lvfs
+        The filter at the middle of each slice's own pixels, for every channel.
+    """
+
+    lvfs: tuple[Lvf, ...] = ()
 
     @property
     def centre_nm(self) -> FloatArray:
@@ -85,7 +105,7 @@ class ForwardModel:
 
 def forward_models(
     part: Part, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
-) -> tuple[dict[StripPatch, ForwardModel], tuple[str, ...]]:
+) -> tuple[dict[StripPatch, LvfModel], tuple[str, ...]]:
     """Return the model of every patch of a part, and the reasons for patches without one.
 
     Parameters
@@ -112,17 +132,17 @@ def forward_models(
             "process --optics"
         )
     layout, strip, lvf = sensor_layout(frame), calibration.before_camera, calibration.lvf
-    camera, holder = _camera_curves(part, layout.channels), _holder_regions(strip)
+    camera, holder = channel_curves(part, layout.channels), _holder_regions(strip)
     asked = strip_regions(part) if patches is None else patches
     sliced, refused = slice_strip(asked, strip, layout)
-    models = {}
+    models: dict[StripPatch, LvfModel] = {}
     for patch, slices in sliced.items():
         # At either end pixels reach a little beyond the places that were calibrated.
         seen = channel_positions(layout, strip, slices)
         places = np.clip(seen, lvf.position[0], lvf.position[-1])
         lvfs = tuple(lvf.at(positions) for positions in places)
         system = strip_system(lvfs, camera, KNOTS_NM)
-        models[patch] = ForwardModel(slices, holder, lvfs, camera, system)
+        models[patch] = LvfModel(slices, holder, camera, system, lvfs=lvfs)
     return models, refused
 
 
@@ -200,8 +220,14 @@ def card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
     return Spectrum(lamp.name, fine, lamp.at(fine) * card.at(fine))
 
 
-def _camera_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
-    """Return the curves of the camera, in the order of a frame's channels."""
+def channel_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
+    """Return the curves of the camera, in the order of a frame's channels.
+
+    Raises
+    ------
+    DataError
+        The camera has other channels.
+    """
     if len(channels) == 1:
         name = part.overrides.camera or part.rig.optics.camera
         if name is not None:

@@ -1,6 +1,6 @@
 """Analysis of an excitation run, from its frames to rates and a material of every patch."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,8 +18,8 @@ from labrig.analyse.excitation.lamp_light import (
     scale_sigma,
 )
 from labrig.analyse.excitation.material import excited_material
-from labrig.analyse.excitation.narrow_lights import narrow_light_warnings
-from labrig.analyse.excitation.orders import OrderFits
+from labrig.analyse.excitation.orders import ChosenOrders, OrderFits
+from labrig.analyse.excitation.selected_light import course_warnings, with_doubt, within_bands
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.analyse.radiometric_scale import RadiometricScale, radiometric_scale
@@ -42,8 +42,12 @@ from labrig.results import (
     PatchExcitation,
 )
 
+#: Function that fits all series of a patch.
+Fitting = Callable[[Sequence[ChargingSeries]], FittedExcitation]
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
+#: Fits after which the course of excitation within bands stays the same.
+COURSES = 2
 #: Fraction of the largest size of the light's errors from which a warning is given.
 AT_END = 0.9
 #: Deviation of the closure in σ that causes a warning.
@@ -116,9 +120,13 @@ def _patch_excitation(
         relative_sigmas = replace(relative_sigmas, flicker=flicker)
         choice = replace(choice, relative_sigmas=relative_sigmas)
     charging = evened(charging, choice.best)
-    fit = choice.fitted(_series(charging))
+    fitted: Fitting = choice.fitted
+    if irradiance.lights:
+        by_leds = bool(part.protocol.select.leds)
+        charging, fitted = _within_bands(charging, irradiance, choice, by_leds=by_leds)
+    fit = fitted(_series(charging))
     closure = predicted_charging(
-        charging, irradiance, relative_sigmas, lambda reduced: choice.fitted(_series(reduced))
+        charging, relative_sigmas, lambda reduced: fitted(_series(reduced))
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
@@ -143,11 +151,26 @@ def _patch_excitation(
             *(decay.warnings if fit.is_first_order else ()),
             *fit.warnings,
             *_light_warnings(fit),
-            *narrow_light_warnings(fit, irradiance),
+            *(course_warnings(fit, irradiance) if irradiance.lights else ()),
             *_closure_warnings(closure),
             *no_spectrum,
         ),
     )
+
+
+def _within_bands(
+    charging: PatchCharging, irradiance: IrradianceFile, choice: ChosenOrders, *, by_leds: bool
+) -> tuple[PatchCharging, Fitting]:
+    """Return the charging with its light as excitation sees it, and the function that fits it.
+
+    Each fit knows more of the course of excitation.
+    """
+    even = fit = choice.fitted(_series(charging))
+    for _ in range(COURSES):
+        charging = within_bands(charging, irradiance, fit, by_leds=by_leds)
+        fit = choice.fitted(_series(charging))
+    charging = within_bands(charging, irradiance, fit, by_leds=by_leds)
+    return charging, lambda series: with_doubt(choice.fitted(series), even)
 
 
 def _scale(

@@ -12,11 +12,10 @@ from labrig.analyse.excitation.lamp_light import (
     KNOWN,
     across_sites,
     lamp_transients,
-    light_modes,
     mode_kinds,
-    selected_light,
     site_modes,
 )
+from labrig.analyse.excitation.selected_light import selected_light
 from labrig.analyse.excitation.site_means import site_means, site_weights
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
@@ -207,10 +206,11 @@ def _through(
     """Return the series through the filter or by selected lights, without its values."""
     lit = (charges, *transients)
     if irradiance.lights:
-        light, _ = selected_light(irradiance, by_leds=by_leds)
-        modes = light_modes(irradiance, by_leds=by_leds)
-        kinds = np.full(len(modes), KNOWN)
-        return ChargingSeries("by selected lights", *lit, light, NOTHING, NOTHING, modes, kinds)
+        light = selected_light(irradiance, by_leds=by_leds)
+        kinds = np.full(len(light.modes), KNOWN)
+        return ChargingSeries(
+            "by selected lights", *lit, light.irradiance, NOTHING, NOTHING, light.modes, kinds
+        )
     return ChargingSeries(
         "through the filter", *lit, np.array(irradiance.through), NOTHING, NOTHING,
         site_modes(irradiance), mode_kinds(irradiance), across_sites(irradiance),

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_off
 from labrig.material import dark_concentration
 from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
@@ -17,7 +16,6 @@ STEP = 0.01
 
 def predicted_charging(
     charging: PatchCharging,
-    irradiance: IrradianceFile,
     relative_sigmas: RelativeSigmas,
     fit_of: Callable[[PatchCharging], FittedExcitation],
 ) -> Closure | None:
@@ -31,8 +29,6 @@ def predicted_charging(
     ----------
     charging
         Charging of a patch.
-    irradiance
-        Irradiance on the sample.
     relative_sigmas
         Relative uncertainties of the measurement.
     fit_of
@@ -68,7 +64,9 @@ def predicted_charging(
         frame_light = direct.frame_light[rows, :, channel].mean(axis=1)
         level = level - fit.veil.value * frame_light
         noise = np.hypot(noise, fit.veil.sigma * frame_light)
-    charge_s = _equivalent_charge_s(direct, fit, np.array(irradiance.direct))[list(first)]
+    # Every site is under the same lamp.
+    steady = direct.irradiance[0]
+    charge_s = _equivalent_charge_s(direct, fit, steady)[list(first)]
     starts, exposures = (
         np.concatenate([getattr(charge, name) for charge in direct.charges])[rows]
         for name in ("start_s", "exposure_s")
@@ -81,7 +79,7 @@ def predicted_charging(
 
     def predicted(theta: FloatArray) -> FloatArray:
         """Return the levels by k_r, amplitudes, k_e, fitted orders and ln of the light."""
-        light = np.array(irradiance.direct) * np.exp(theta[-1])
+        light = steady * np.exp(theta[-1])
         sample = Charging(
             theta[2 * n : end].reshape(n, -1),
             theta[:n],
@@ -117,7 +115,7 @@ def predicted_charging(
         charge_s,
         level,
         np.sqrt(noise**2 + np.maximum(rate_variance, 0.0) + charge_variance),
-        irradiance=irradiance.direct,
+        irradiance=steady,
         k_e_per_s=fit.k_e(),
         k_r_per_s=[state.k_r_per_s for state in fit.states],
         full_level=[state.amplitude for state in fit.states],

@@ -27,12 +27,6 @@ SMOOTH_MODES = 9
 WORST = 1.0
 #: Least light as a fraction of the most, for its logarithm.
 MIN_LIGHT = 1e-6
-#: Stray light of a filter or monochromator far from its own band, as a fraction of its light.
-#: Blocking of 10⁻⁴ lets through a thousandth of what a band of 25 nm has; it is known to a factor
-#: of some e.
-STRAY, STRAY_SIGMA = 3e-4, 1.5
-#: Part of a light's strongest band below which its share of another one is taken for exact.
-LEAST_SHARE = 0.01
 #: Wavelengths in nm and times in seconds in which a halogen lamp falls to 1/e (from literature),
 #: and time after which it is dark (Nalbach et al., section 4.6).
 USUAL_NM = (419.0, 650.0)
@@ -74,40 +68,6 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
             independent * bands,
         ]
     )
-
-
-def selected_light(irradiance: IrradianceFile, *, by_leds: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the irradiance of selected lights with that of filters and gratings beside, (L, B).
-
-    The second is that stray light of the lamp alone; LEDs have none.
-    """
-    through, direct = np.array(irradiance.through), np.array(irradiance.direct)
-    fraction = 0.0 if by_leds else STRAY
-    stray = fraction * through.sum(axis=1, keepdims=True) * direct / direct.sum()
-    return through + stray, stray
-
-
-def light_modes(irradiance: IrradianceFile, *, by_leds: bool) -> FloatArray:
-    """Return the error modes of selected lights: their levels, wavelengths and stray light.
-
-    Returns
-    -------
-    ndarray
-        Modes of the logarithm, of known size, shape (M, L, B).
-    """
-    light, stray = selected_light(irradiance, by_leds=by_leds)
-    through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
-    shift = np.array(irradiance.through_shift)
-    # A band of which a light has hardly anything gets another part of nothing.
-    has_light = through > LEAST_SHARE * through.max(axis=1, keepdims=True)
-    moved = np.where(has_light, shift / light, 0.0)
-    own = np.eye(len(through))[..., None]
-    level_variance = ((sigma**2 - shift**2) * through).sum(axis=1) / (through**3).sum(axis=1)
-    level = np.sqrt(np.clip(level_variance, 0.0, WORST**2))[:, None] * np.ones(through.shape[1])
-    modes = [own * level, own * np.clip(moved, -WORST, WORST)]
-    if not by_leds:
-        modes.append(own * STRAY_SIGMA * stray / light)
-    return np.concatenate(modes)
 
 
 def mode_kinds(irradiance: IrradianceFile) -> NDArray[np.intp]:

@@ -160,8 +160,8 @@ _Parts = list[tuple[float, FloatArray]]
 
 
 def _parts(transient: Transient) -> _Parts:
-    """Divide a transient into few parts."""
-    steps = len(transient.duration_s)
+    """Divide a transient into few parts; an instant one has none."""
+    steps = len(transient.duration_s) if transient.total_s else 0
     return [
         (
             float(transient.duration_s[part].sum()),
