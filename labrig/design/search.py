@@ -85,6 +85,9 @@ class Problem:
         Strongest irradiance of each group, shape (groups,).
     shortest_s, longest_s
         Shortest step, and time from the begin to the last key, in s.
+    near
+        Rates that are kept where no key depends on them, shape (states, groups + 1); None prefers
+        some that fill a good part of the states.
     """
 
     steps: tuple[Steps, ...]
@@ -96,6 +99,7 @@ class Problem:
     strongest: FloatArray
     shortest_s: float
     longest_s: float
+    near: FloatArray | None = None
 
     @classmethod
     def of(
@@ -171,6 +175,8 @@ class Problem:
 
         The strongest light fills a good part of the states in all of the time.
         """
+        if self.near is not None:
+            return np.clip(self.coordinates(self.near), *self.bounds)
         rates = np.append(PREFERRED / self.longest_s / self.strongest, 1 / self.longest_s)
         return self.coordinates(np.tile(rates, (self.n_states, 1)))
 
@@ -275,13 +281,11 @@ def search(problem: Problem, *, is_order_free: bool, order: float) -> tuple[Foun
     return tuple(sorted(found, key=lambda each: each.cost))
 
 
-def search_near(
-    problem: Problem, rates: FloatArray, *, is_order_free: bool, order: float
-) -> tuple[Found, ...]:
-    """Return where a search ends that starts at rates (states, groups + 1), in their basin."""
+def search_near(problem: Problem, *, is_order_free: bool, order: float) -> tuple[Found, ...]:
+    """Return where a search ends that starts at the preferred rates, in their basin."""
     if not problem.n_groups:
         return (_dark(problem),)
-    start = np.clip(problem.coordinates(rates), *problem.bounds)
+    start = problem.preferred
     if is_order_free:
         end, _ = _refined(problem, np.append(start, max(order, LEAST_ORDER)), None)
         return (_found(problem, end[:-1], float(end[-1])),)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -25,6 +26,8 @@ FloatArray = NDArray[np.float64]
 MOST_STATES = 2
 #: Relative σ with which a key is meant: a luminance that differs by 2 % looks the same.
 KEY_SIGMA = 0.02
+#: Light at all keys, over the strongest, below which a design near another keeps its albedo.
+FAINT = 0.01
 #: Bands lit in proportion whose names are all written.
 MOST_JOINED = 3
 #: Factor within its range from which a rate is not held by an end of it.
@@ -107,6 +110,14 @@ def solve(
     _check(programme, keys, bands, n_states, order, key_sigma)
     given = None if albedo is None else _albedo(albedo, bands)
     reflected = programme.at(keys.place, keys.time_s) / np.pi
+    unseen: tuple[Estimate, ...] = ()
+    if given is None and _is_dark(programme, reflected, near):
+        # One unknown less: no key is lit, so that any albedo does as well as none.
+        given = np.zeros(bands.count) if near is None else near.albedo
+        unseen = tuple(
+            Estimate(f"albedo {band}", float(value), np.inf, "", False)
+            for band, value in zip(bands.names, given, strict=True)
+        )
     seen = bands.to_rgb if keys.is_colour(bands) else None
     target = keys.radiance
     if given is not None:
@@ -120,7 +131,8 @@ def solve(
         ends = search(problem, is_order_free=order is None, order=order or 1.0)
     else:
         rates = np.column_stack([problem.of_groups(near.k_e_per_s), near.k_r_per_s])
-        ends = search_near(problem, rates, is_order_free=order is None, order=order or near.order)
+        problem = replace(problem, near=rates)
+        ends = search_near(problem, is_order_free=order is None, order=order or near.order)
     best = ends[0]
     if energy == "kept":
         best = keeping_energy(problem, ends, given, bands.energy)
@@ -140,11 +152,17 @@ def solve(
         albedo=given if given is not None else np.asarray(found.albedo),
         cost=best.cost,
         other_costs=tuple(end.cost for end in ends[1:]),
-        estimates=estimates,
+        estimates=(*estimates, *unseen),
         conflicts=fights,
         impossible=(),
     )
     return design.with_impossible(impossible_keys(design))
+
+
+def _is_dark(programme: LightProgramme, reflected: FloatArray, near: Design | None) -> bool:
+    """Return whether no key tells the albedo; a glow that is reflected tells next to nothing."""
+    light = FAINT * float(programme.irradiance.max()) / np.pi if near is not None else 0.0
+    return float(reflected.max()) <= light
 
 
 def _check(

@@ -257,3 +257,31 @@ def test_improper_lights_are_refused() -> None:
     ):
         with pytest.raises(UsageError, match="expected"):
             LightProgramme.checked(begin, light)
+
+
+def test_an_albedo_that_no_key_sees_is_none_and_said_to_be_open() -> None:
+    light = LightProgramme.checked([0.0, 60.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    wanted = np.multiply.outer([1.0, 0.5, 0.1], [0.001, 0.01, 0.002])
+    keys = Keys.checked(0, [61.0, 80.0, 150.0], wanted)
+    free, black = (solve(light, keys, three_bands(), albedo=albedo) for albedo in (None, 0.0))
+    assert free.cost == black.cost
+    assert free.albedo.tolist() == [0, 0, 0]
+    names = [each.name for each in free.estimates if not each.is_determined]
+    assert {"albedo R", "albedo G", "albedo B"} <= set(names)
+    assert len(free.estimates) == len(black.estimates) + 3
+
+
+def test_a_design_near_another_stays_in_its_basin() -> None:
+    light = LightProgramme.checked([0.0, 60.0], [[1.0, 0.8, 0.6], [0.0, 0.0, 0.0]])
+    keys = Keys.checked(0, [61.0, 80.0], np.multiply.outer([1.0, 0.5], [0.001, 0.01, 0.002]))
+    first = solve(light, keys, three_bands(), albedo=0.3)
+    glowing = light.irradiance[0] + [[0.0, 0.0, 0.0], [1e-4, 2e-3, 3e-4]]
+    again = solve(
+        LightProgramme.checked(light.begin_s, glowing), keys, three_bands(), albedo=0.3, near=first
+    )
+    # Not told apart by the keys, but for the little that is reflected.
+    assert np.abs(np.log(again.k_e_per_s / first.k_e_per_s)).max() < np.log(4)
+    reflected = 0.3 * 2e-3 / np.pi
+    k_r = np.log((0.01 - reflected) / (0.005 - reflected)) / 19
+    np.testing.assert_allclose(again.k_r_per_s, k_r, rtol=5e-3)
+    assert again.delta_e2000.max() < 0.05
