@@ -69,10 +69,10 @@ def _overview(comparison: LampsComparison) -> Table:
         ),
         rows=tuple(_lamp_row(lamp) for lamp in comparison.lamps),
         caption="CIEDE2000 between photographs and renderings, mean over the samples and, in "
-        "brackets, the largest; by errors: the root mean square that the errors of both alone would "
-        "make; reflected: CIEDE2000 to what is reflected only. Off: rendered over photographed light − 1, mean over all "
-        "samples and channels that are not dark, and the furthest value in σ. Re-radiated: "
-        "share of the luminance, mean and largest.",
+        "brackets, the largest; by errors: the root mean square that the errors of both alone "
+        "would make; reflected: CIEDE2000 to what is reflected only. Off: rendered over "
+        "photographed light − 1, mean over all samples and channels that are not dark, and the "
+        "furthest value in σ. Re-radiated: share of the luminance, mean and largest.",
     )
 
 
