@@ -154,13 +154,13 @@ class LampBench:
         return camera_values(folded[light][name], self.edges_nm, self.camera)
 
     def reradiated_luminance(self, strengths: Mapping[str, float], name: str) -> float:
-        """Return the share of a sample's luminance that is re-radiated."""
+        """Return the share of a sample's luminance that is re-radiated; NaN where it has none."""
         whole, reflected = (
             sum(strength * folded[light][name] for light, strength in strengths.items())
             for folded in (self.whole, self.reflected)
         )
         both = tristimulus(np.array([whole, reflected]), self.edges_nm)[:, 1]
-        return float(1 - both[1] / both[0])
+        return float(1 - both[1] / both[0]) if both[0] > 0 else float("nan")
 
     def _reradiated(self, light: str, name: str) -> FloatArray:
         """Return the camera's values (k,) of what a sample re-radiates under one light."""

@@ -23,6 +23,8 @@ from labrig.report import EDGE_PT, FONT_PT, INK, MUTED, SMALL_PT, WIDTH_PT, into
 
 #: Characters of a sample's name that fit below its colours, by their width in points.
 LETTER_PT = 5.0
+#: What stands where there is no number.
+NOTHING = "–"
 
 Block = tuple[str, str, tuple[tuple[str, RenderedSample], ...]]
 
@@ -78,8 +80,13 @@ def _written(sample: RenderedSample, look: str) -> str:
     return {
         "rendered": f"{sample.delta_e:.1f}",
         "reflected": f"{sample.delta_e_reflected:.1f}",
-        "re-radiated": f"{100 * sample.reradiated_luminance:.0f} %",
+        "re-radiated": f"{percent(sample.reradiated_luminance, '.0f')} %",
     }.get(look, "")
+
+
+def percent(fraction: float, form: str) -> str:
+    """Return a fraction in per cent, a dash for none."""
+    return NOTHING if np.isnan(fraction) else f"{100 * fraction:{form}}"
 
 
 def _on_screen(xyz: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from labrig.compare.lamps_figure import lamps_figure
+from labrig.compare.lamps_figure import NOTHING, lamps_figure, percent
 from labrig.compare.rendered_lamps import LampsComparison, RenderedLamp, RenderedSample
 from labrig.number_format import plus_minus
 from labrig.report import Picture, Section, Table
@@ -61,34 +61,40 @@ def _overview(comparison: LampsComparison) -> Table:
         head=(
             "lamp",
             "ΔE",
-            "by errors alone",
-            "without re-radiation",
-            "light off / %",
-            "furthest / σ",
+            "by errors",
+            "reflected",
+            "off / %",
+            "σ",
             "re-radiated / %",
         ),
         rows=tuple(_lamp_row(lamp) for lamp in comparison.lamps),
         caption="CIEDE2000 between photographs and renderings, mean over the samples and, in "
-        "brackets, the largest; the root mean square that the errors of both alone would make; "
-        "CIEDE2000 to what is reflected. Rendered over photographed light − 1, mean over all "
-        "samples and channels that are not dark, and the furthest value in σ. Share of the "
-        "luminance that is re-radiated, mean and largest.",
+        "brackets, the largest; by errors: the root mean square that the errors of both alone "
+        "would make; reflected: CIEDE2000 to what is reflected only. Off: rendered over "
+        "photographed light − 1, mean over all samples and channels that are not dark, and the "
+        "furthest value in σ. Re-radiated: share of the luminance, mean and largest.",
     )
 
 
 def _lamp_row(lamp: RenderedLamp) -> tuple[str, ...]:
     samples = list(lamp.samples.values())
     bright = max(float(sample.rendered.max()) for sample in samples)
-    off = np.concatenate([sample.excess[sample.rendered > DARK * bright] for sample in samples])
+    off = np.concatenate(
+        [
+            sample.excess[(sample.rendered > DARK * bright) & (sample.photographed > 0)]
+            for sample in samples
+        ]
+    )
     pulls = np.concatenate([sample.in_sigma for sample in samples])
+    shares = [sample.reradiated_luminance for sample in samples]
     return (
         lamp.name,
         _mean_and_most([sample.delta_e for sample in samples]),
         _mean_and_most([sample.delta_e_by_errors for sample in samples]),
         _mean_and_most([sample.delta_e_reflected for sample in samples]),
-        f"{100 * float(off.mean()):+.1f}",
+        percent(float(off.mean()), "+.1f") if len(off) else NOTHING,
         f"{float(pulls[np.abs(pulls).argmax()]):+.1f}",
-        _mean_and_most([100 * sample.reradiated_luminance for sample in samples], digits=0),
+        _mean_and_most([100 * share for share in shares if not np.isnan(share)] or [0.0], digits=0),
     )
 
 
@@ -132,7 +138,7 @@ def _rows(
             name,
             channel,
             *(plus_minus(100 * float(value), 100 * float(sigma)) for value, sigma in both),
-            f"{100 * sample.excess[number]:+.1f}",
+            percent(float(sample.excess[number]), "+.1f"),
             f"{sample.in_sigma[number]:+.1f}",
-            f"{100 * sample.reradiated[number]:.1f}",
+            percent(float(sample.reradiated[number]), ".1f"),
         )

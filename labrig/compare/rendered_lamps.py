@@ -54,7 +54,7 @@ class RenderedSample:
         The same of the rendering; σ is that of the lamp's spectrum, the camera's curves, the card
         and the matrix, shape (k,).
     reradiated
-        Share of the rendered light that is re-radiated, shape (k,).
+        Share of the rendered light that is re-radiated; NaN where there is none, shape (k,).
     reradiated_luminance
         The same of the luminance.
     delta_e, delta_e_reflected
@@ -78,8 +78,8 @@ class RenderedSample:
 
     @property
     def excess(self) -> FloatArray:
-        """Return rendered over photographed light − 1, shape (k,)."""
-        return np.asarray(self.rendered / self.photographed - 1)
+        """Return rendered over photographed light − 1; NaN where there is none, shape (k,)."""
+        return _over(self.rendered - self.photographed, self.photographed)
 
     @property
     def in_sigma(self) -> FloatArray:
@@ -316,13 +316,18 @@ def _sample(
         photographed_sigma=patch.sigma / reference,
         rendered=whole / reference,
         rendered_sigma=patch.predicted_sigma / reference,
-        reradiated=1 - reflected / whole,
+        reradiated=_over(whole - reflected, whole),
         reradiated_luminance=reradiated_luminance,
         delta_e=scale.difference(patch.value, whole),
         delta_e_reflected=scale.difference(patch.value, reflected),
         delta_e_by_errors=patch.delta_e_by_errors,
         xyz={what: to_picture * scale.xyz(values) for what, values in light.items()},
     )
+
+
+def _over(part: FloatArray, whole: FloatArray) -> FloatArray:
+    """Return a part over its whole, NaN where that is not above 0."""
+    return np.asarray(np.divide(part, whole, out=np.full(len(whole), np.nan), where=whole > 0))
 
 
 def _description(result: ValidateIlluminantsResult, conversion: Viewing) -> tuple[str, ...]:
