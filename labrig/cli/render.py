@@ -4,10 +4,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TextIO, cast
 
 import typer
 
+from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.completion import complete_scene
 
 if TYPE_CHECKING:
@@ -166,7 +167,7 @@ def _bar() -> Iterator[_Bar]:
         TimeRemainingColumn(),
         TextColumn("left"),
     )
-    console = Console(stderr=True)
+    console = Console(file=cast(TextIO, DetachableStream(sys.stderr)))
     with Progress(
         *columns, console=console, transient=True, disable=not sys.stderr.isatty()
     ) as progress:

@@ -170,6 +170,7 @@ def test_a_darker_texture_returns_less_light(tmp_path: Path) -> None:
             "texture coordinates",
         ),
         ({"reradiation": np.full((2, 2, 1, 8), 1e4)}, {}, {}, "less light than it takes"),
+        ({"k_r_per_s": np.ones((2, 2, 1))}, {"file": "order.yaml"}, {}, "material_map"),
     ],
 )
 def test_a_texture_that_does_not_fit_is_one_line(
@@ -180,6 +181,9 @@ def test_a_texture_that_does_not_fit_is_one_line(
     says: str,
 ) -> None:
     np.savez(tmp_path / "paint.npz", **arrays)
+    blue = read_material("blue-paint")
+    ordered = blue.states[0].model_copy(update={"kinetic_order": 2.0})
+    write_material(tmp_path / "order.yaml", blue.model_copy(update={"states": (ordered,)}))
     (tmp_path / "a.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
     )

@@ -295,7 +295,7 @@ def test_one_texel_is_the_mean_over_its_surface_not_over_its_texture() -> None:
     """A ball in the light of the sun gets a quarter of it; near its poles the texture is dense."""
     ball = Mesh.sphere((0, 0, 0), 0.5, rows=64)
     black = SurfaceMaterial("black", np.zeros((BANDS, BANDS), np.float32))
-    for samples, per_place in (((1, 1), 4096), ((2, 4), 1024)):
+    for samples, per_place in (((1, 1), 4096), ((2, 4), 1024), ((64, 1), 256)):
         geometry = Geometry.of([Surface("ball", ball, 0, samples=samples)])
         lamps = LampTable.of([Lamp("sun", "distant", np.ones(BANDS))], geometry)
         paths = list(Tracer(geometry, lamps, PathLength(1, 0.0)).from_surface(0, per_place, 1))

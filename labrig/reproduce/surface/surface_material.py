@@ -366,6 +366,11 @@ def _textured(name: str, rates: FieldParameters, texture: ParameterTexture) -> F
             )
         arrays.append(own if texels is None else texels)
     k_r, k_e, emitted = arrays
+    if texture.k_r_per_s is not None and (rates.order > 1).any():
+        raise UsageError(
+            f"{name}: expected a texture without k_r_per_s for states of an order above 1, whose "
+            "steps are tabulated, got one with; give each rate a material of its own (material_map)"
+        )
     return FieldParameters.checked(k_r, k_e, emitted, rates.order, rates.prompt)
 
 

@@ -142,8 +142,8 @@ class OnTexels:
         # Of triangles without an area in the texture there is no cell.
         density = mesh.areas_m2 / np.where(in_texture > 0, in_texture, np.inf)
         lit = (density > 0)[texel_map.face_at] & (texel_map.face_at >= 0)
-        size = texel_map.lookups
-        is_on_surface = lit.reshape(texel_map.rows, size, texel_map.columns, size).any(axis=(1, 3))
+        of_texels = lit.reshape(texel_map.rows, texel_map.up, texel_map.columns, texel_map.across)
+        is_on_surface = of_texels.any(axis=(1, 3))
         places = np.flatnonzero(is_on_surface).astype(np.int32)
         return cls(places, texel_map, corners.astype(np.float32), density)
 
@@ -151,15 +151,17 @@ class OnTexels:
         self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
     ) -> tuple[IntArray, FloatArray]:
         """Return triangles and weights of their corners; see `StartPoints`."""
-        texels, per_place, size = self.places[chosen], scattered.shape[1], self._map.lookups
+        texels, per_place = self.places[chosen], scattered.shape[1]
+        across, up = self._map.across, self._map.up
         faces = self._map.faces_in(texels)
         end = np.cumsum(np.where(faces >= 0, self._density[faces], 0.0)).reshape(faces.shape)
         low = np.r_[0.0, end[:-1, -1]][:, np.newaxis]
         evenly = (np.arange(per_place) + rng.random((len(texels), 1))) / per_place
         level = low + evenly * BELOW_ONE * (end[:, -1:] - low)
-        cell = np.searchsorted(end.ravel(), level.ravel(), side="right") % size**2
+        cell = np.searchsorted(end.ravel(), level.ravel(), side="right")
+        up_cell, across_cell = np.divmod(cell % (across * up), across)
         row, column = np.divmod(texels.repeat(per_place), self._map.columns)
-        at_row, at_column = row * size + cell // size, column * size + cell % size
+        at_row, at_column = row * up + up_cell, column * across + across_cell
         n_rows, n_columns = self._map.face_at.shape
         uv = np.stack(
             [

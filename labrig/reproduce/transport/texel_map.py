@@ -38,10 +38,10 @@ class TexelMap:
     ----------
     columns, rows
         Size of the texture in texels.
-    lookups
-        Points along each edge of a texel.
+    across, up
+        Points along the edges of a texel.
     face_at
-        Triangle at each point, -1 beside all, shape (rows · lookups, columns · lookups).
+        Triangle at each point, -1 beside all, shape (rows · up, columns · across).
     chart_of_face
         Chart of each triangle, shape (m,).
     chart_of_texel
@@ -50,7 +50,8 @@ class TexelMap:
 
     columns: int
     rows: int
-    lookups: int
+    across: int
+    up: int
     face_at: IntArray
     chart_of_face: IntArray
     chart_of_texel: IntArray
@@ -76,11 +77,11 @@ class TexelMap:
         """
         columns, rows = samples
         corners = texture_coordinates(name, mesh)[mesh.faces].astype(np.float32)
-        lookups = max(LEAST_LOOKUPS, math.ceil(LEAST_POINTS / max(samples)))
+        across, up = (max(LEAST_LOOKUPS, math.ceil(LEAST_POINTS / size)) for size in samples)
         face_at, n_shared = compiled("transport.tracing_kernels").rasterised(
-            corners, columns * lookups, rows * lookups
+            corners, columns * across, rows * up
         )
-        covered = int((face_at >= 0).sum())
+        covered = int((mesh.areas_m2 > 0)[face_at[face_at >= 0]].sum())
         if not covered:
             raise UsageError(f"{name}: expected texels on the surface, got none; see its texture")
         if n_shared > SHARED_POINTS * covered:
@@ -90,14 +91,14 @@ class TexelMap:
             )
         chart_of_face = _charts(mesh)
         cells = np.where(face_at >= 0, chart_of_face[face_at], -1)
-        by_texel = cells.reshape(rows, lookups, columns, lookups).swapaxes(1, 2)
-        chart_of_texel = _majority(by_texel.reshape(rows * columns, lookups**2))
-        return cls(columns, rows, lookups, face_at, chart_of_face, chart_of_texel)
+        by_texel = cells.reshape(rows, up, columns, across).swapaxes(1, 2)
+        chart_of_texel = _majority(by_texel.reshape(rows * columns, up * across))
+        return cls(columns, rows, across, up, face_at, chart_of_face, chart_of_texel)
 
     def faces_in(self, texels: IntArray) -> IntArray:
-        """Return the triangles at the points of some texels, shape (texels, lookups²)."""
+        """Return the triangles at the points of some texels, shape (texels, up · across)."""
         row, column = np.divmod(texels, self.columns)
-        blocks = self.face_at.reshape(self.rows, self.lookups, self.columns, self.lookups)
+        blocks = self.face_at.reshape(self.rows, self.up, self.columns, self.across)
         return np.ascontiguousarray(blocks[row, :, column, :].reshape(len(texels), -1))
 
 
