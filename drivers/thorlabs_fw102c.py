@@ -7,7 +7,7 @@ half a turn took 2.9 s. Whether the prompt waits for the wheel they do not say, 
 is read until it is the one that was asked for.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -16,6 +16,7 @@ from labrig.acquire import Connections
 from labrig.errors import DeviceError, UnclearAnswerError
 from labrig.quantity import DurationS
 
+from .named_places import FilterPlaces
 from .serial_line import SerialLine
 
 BAUDRATE = 115_200
@@ -26,7 +27,7 @@ MOST_SLOTS = 12
 LOOK_AGAIN_S = 0.1
 
 
-class ThorlabsFilterWheel:
+class ThorlabsFilterWheel(FilterPlaces[int]):
     """A filter wheel of Thorlabs on its USB serial port.
 
     Parameters
@@ -75,16 +76,12 @@ class ThorlabsFilterWheel:
             return self
 
     @classmethod
-    def declared_filters(cls, settings: Settings) -> Sequence[str]:
-        """Return the filters that the rig file names."""
-        return tuple(settings.filters)
-
-    @classmethod
     def declared_turn_s(cls, settings: Settings) -> float:
         """Return the time within which the wheel must have turned, in seconds."""
         return settings.takes_at_most
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        super().__init__(settings.filters, settings.open_slot)
         self._settings = settings
         self._clock = connections.clock
         self._name = f"the filter wheel at {address}"
@@ -108,19 +105,14 @@ class ThorlabsFilterWheel:
         """Return model and firmware of the wheel."""
         return " ".join(self._model.split())
 
-    def filters(self) -> tuple[str, ...]:
-        """Return the names of the filters in the wheel."""
-        return tuple(self._settings.filters)
-
-    def put(self, name: str | None) -> None:
-        """Turn to a filter or to the open slot; return when the wheel says that it is there.
+    def _move(self, slot: int) -> None:
+        """Turn to a slot; return when the wheel says that it is there.
 
         Raises
         ------
         UnclearAnswerError
             The wheel does not get there, or gives another answer.
         """
-        slot = self._settings.open_slot if name is None else self._settings.filters[name]
         if self._number("pos?") == slot:
             return
         if answer := self._ask(f"pos={slot}"):

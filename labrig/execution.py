@@ -11,6 +11,7 @@ from labrig.acquire import (
     CAMERA,
     CHANGER,
     LIGHTS,
+    SAMPLE_CHANGER,
     SPECTROMETER,
     Camera,
     Checkable,
@@ -109,6 +110,7 @@ def execute(
             _refuse_what_spoils(rig)
             if CAMERA in rig:
                 _refuse_what_the_camera_cannot(rig[CAMERA], protocol, folder, bench)
+            _place_sample(protocol.sample.name, rig, observer)
             devices = rig.identities()
             require_calibrated_camera(bench.file, devices)
             _arrange_again(manual_actions, rig, observer)
@@ -241,6 +243,20 @@ def _not_used(protocol: ProtocolModel, bench: Bench, laid_out: Plan) -> frozense
     except ProtocolError:
         return frozenset()
     return frozenset({key}) if without.steps == laid_out.steps else frozenset()
+
+
+def _place_sample(name: str, rig: Rig, observer: RunObserver) -> None:
+    """Have the sample changer bring the run's sample, or all of its samples into the dark."""
+    if SAMPLE_CHANGER not in rig:
+        return
+    changer = rig[SAMPLE_CHANGER]
+    samples = changer.samples()
+    if name not in samples:
+        observer.warn(
+            f"the sample changer has no sample '{name}' (it has {', '.join(samples)}): all of them "
+            "are in the dark during this run"
+        )
+    changer.put(name if name in samples else None)
 
 
 def _refuse_what_spoils(rig: Rig) -> None:

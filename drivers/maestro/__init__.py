@@ -1,7 +1,8 @@
-"""Pololu Maestro servo controllers, moving a trap door, a lamp shield and a filter wheel."""
+"""Pololu Maestro servo controllers, moving trap door, lamp shield, filter wheel, sample changer."""
 
 from .door import MaestroDoor
 from .filter_wheel import MaestroFilterWheel
+from .sample_changer import MaestroSampleChanger
 from .shield import MaestroShield
 
-__all__ = ["MaestroDoor", "MaestroFilterWheel", "MaestroShield"]
+__all__ = ["MaestroDoor", "MaestroFilterWheel", "MaestroSampleChanger", "MaestroShield"]

@@ -13,7 +13,7 @@ from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CardLight, IrradianceFile
 from labrig.errors import DataError, UsageError
-from labrig.fit.spectrum import CurveError, curve_modes
+from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.optics import (
     CameraResponse,
     Lvf,
@@ -454,7 +454,7 @@ def _factors(
     sensitivity = camera.at(nodes)
     total = light @ sensitivity
     expected = transmitted @ sensitivity / total
-    modes = curve_modes(curve_error, nodes, sensitivity, camera.sensitivity.max(axis=0))
+    modes = camera_modes(camera, nodes, curve_error)
     # (modes, p, channels) of the expected ratio.
     curve_errors = np.stack(
         [transmitted @ mode / total - expected * (light @ mode / total) for mode in modes]

@@ -15,7 +15,7 @@ from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CardLight, IrradianceFile, relative_sensitivity
 from labrig.errors import UsageError
-from labrig.fit.spectrum import CurveError, curve_modes
+from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.material import SEEN_FACTOR, Material, ScaleFactor, State
 from labrig.optics import (
     CameraResponse,
@@ -168,7 +168,7 @@ def scale_of(
     of_card = weights * lamp.at(nodes) * grey.at(nodes) / mean_lamp
     of_glow = weights * glow.at(nodes)
     ratio = float(of_card @ sensitivity[:, column]) / float(of_glow @ sensitivity[:, column])
-    modes = curve_modes(CurveError(), nodes, sensitivity, camera.sensitivity.max(axis=0))
+    modes = camera_modes(camera, nodes, CurveError())
     changes = [
         float(of_card @ mode[:, column]) / float(of_card @ sensitivity[:, column])
         - float(of_glow @ mode[:, column]) / float(of_glow @ sensitivity[:, column])

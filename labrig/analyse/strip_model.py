@@ -64,8 +64,14 @@ def strip_system(
 def channel_cameras(camera: CameraResponse) -> list[CameraResponse]:
     """Return each channel as a camera of its own."""
     return [
-        CameraResponse(camera.name, camera.wavelength_nm, column[:, np.newaxis], (name,))
-        for column, name in zip(camera.sensitivity.T, camera.channels, strict=True)
+        CameraResponse(
+            camera.name,
+            camera.wavelength_nm,
+            camera.sensitivity[:, [number]],
+            (name,),
+            None if camera.sigma is None else camera.sigma[:, [number]],
+        )
+        for number, name in enumerate(camera.channels)
     ]
 
 

@@ -1,13 +1,13 @@
 """The measurements of a queue, made one after another; what was interrupted goes on."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
 from filelock import FileLock, Timeout
 
-from labrig.acquire import RigFile, read_rig_file
+from labrig.acquire import SAMPLE_CHANGER, RigFile, driver_and_settings, read_rig_file
 from labrig.catalogue import summarise
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.execution import Watch
@@ -108,7 +108,7 @@ def _recorded(path: Path, runs: Path, entry: QueueEntry, before: str, attendant:
     if entry.summary is None:
         recording = _prepared(path, entry, attendant)
         sample = recording.protocol.sample.name
-        if before and sample != before:
+        if before and sample != before and sample not in _on_changer(recording):
             attendant.change_sample(before, sample)
         return recording.record(
             attendant.watch(recording.rig), lambda folder: _note(path, entry, folder.name)
@@ -117,6 +117,15 @@ def _recorded(path: Path, runs: Path, entry: QueueEntry, before: str, attendant:
     if summarise(folder).status != "recorded":
         resume_run(folder, attendant.watch(read_rig_file(folder / "rig.yaml")))
     return folder
+
+
+def _on_changer(recording: Recording) -> Sequence[str]:
+    """Return the samples that the rig's sample changer brings by itself."""
+    if SAMPLE_CHANGER.key not in recording.rig.devices:
+        return ()
+    driver, settings = driver_and_settings(recording.rig, SAMPLE_CHANGER.key, recording.rig.name)
+    samples: Sequence[str] = driver.declared_samples(settings)
+    return samples
 
 
 def _prepared(path: Path, entry: QueueEntry, attendant: Attendant) -> Recording:

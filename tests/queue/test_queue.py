@@ -31,7 +31,7 @@ from labrig.results import Measured
 from tests.acquire.fakes import Watching
 from tests.analyse.luminance_bench import luminance_after, write_rig
 from tests.conftest import Ended
-from tests.quick_yaml import write_quickly
+from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
@@ -201,6 +201,30 @@ def test_another_sample_is_asked_for(make_rig: Make, make_protocol: Make, tmp_pa
     person = Person(tmp_path)
     run_queue(path, tmp_path / "runs", person)
     assert person.samples == [("red", "blue")]
+
+
+def test_a_sample_changer_brings_the_samples_that_it_has(
+    make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    rig, _ = make_rig(), make_protocol()
+    content = read_quickly(rig.read_text())
+    content["devices"]["sample_changer"] = {
+        "driver": "maestro_sample_changer", "address": "sim://room/servo", "channel": 5,
+        "travel": "1 s", "away": "1000 us", "samples": {"red": "1300 us", "blue": "1600 us"},
+    }  # fmt: skip
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    rig.write_text(write_quickly(content))
+    names = ("red", "blue", "green")
+    path = with_runs(tmp_path / "queue.yaml", *(queued(**{"sample.name": name}) for name in names))
+    person = Person(tmp_path)
+    run_queue(path, tmp_path / "runs", person)
+    assert person.samples == [("blue", "green")]
+    runs = [
+        one.summary.folder for one in entries(read_queue(path), tmp_path / "runs") if one.summary
+    ]
+    told = [read_run(run).attempts[0].start["devices"]["sample_changer"] for run in runs]
+    assert [text.split("pulse ")[1] for text in told] == ["1300.00 µs", "1600.00 µs", "1000.00 µs"]
+    assert any("has no sample 'green'" in text for text in person.told)
 
 
 def test_a_queue_that_runs_is_not_run_twice(

@@ -61,6 +61,7 @@ from labrig.acquire.roles.role import (
     Role,
     Suggestion,
 )
+from labrig.acquire.roles.sample_changer import SAMPLE_CHANGER, SampleChanger
 from labrig.acquire.roles.spectrometer import (
     SPECTROMETER,
     ReadSpectrum,
@@ -84,6 +85,7 @@ ROLES: dict[str, Role[Any]] = {
         CAMERA_FILTER_WHEEL,
         MONOCHROMATOR,
         CHANGER,
+        SAMPLE_CHANGER,
         CAMERA,
         VIEWFINDER,
         SPECTROMETER,
@@ -113,6 +115,7 @@ __all__ = [
     "LIGHTS",
     "MONOCHROMATOR",
     "ROLES",
+    "SAMPLE_CHANGER",
     "SHIELD",
     "SHIELD_COVER",
     "SHIELD_UNCOVER",
@@ -148,6 +151,7 @@ __all__ = [
     "PlannedDevice",
     "ReadSpectrum",
     "Role",
+    "SampleChanger",
     "Shield",
     "Shoot",
     "Spectrometer",

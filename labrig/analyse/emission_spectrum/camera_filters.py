@@ -18,7 +18,7 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, strip_regions
 from labrig.bench_optics import filter_transmittances
 from labrig.errors import DataError
-from labrig.fit.spectrum import CurveError, SpectralSystem, curve_modes
+from labrig.fit.spectrum import CurveError, SpectralSystem, camera_modes
 from labrig.optics import Spectrum, Transmittance, hat_functions, quadrature
 from labrig.protocols.emission_spectrum import (
     AFTERWARDS,
@@ -104,10 +104,7 @@ def filter_models(
         seen = transmission[:, np.newaxis] * curves.T
         return np.asarray(seen.reshape(-1, len(nodes)) @ onto_knots)
 
-    peaks = camera.sensitivity.max(axis=0)
-    modes = [
-        design(passed, error) for error in curve_modes(CurveError(), nodes, sensitivity, peaks)
-    ]
+    modes = [design(passed, error) for error in camera_modes(camera, nodes, CurveError())]
     for number, each in enumerate(filters):
         if each is not None:
             modes += [

@@ -11,6 +11,7 @@ from labrig.fit.spectrum.minimum import nonnegative_minimum
 from labrig.fit.spectrum.system import (
     CurveError,
     SpectralSystem,
+    camera_modes,
     curve_modes,
     smooth_modes,
     system_through_lvf,
@@ -23,6 +24,7 @@ __all__ = [
     "LineFit",
     "SpectralSystem",
     "SpectrumFit",
+    "camera_modes",
     "curve_modes",
     "fit_line",
     "fit_spectrum",

@@ -96,10 +96,7 @@ def system_through_lvf(
 
     transmission = lvf.transmission(nodes)
     exact = design(transmission, sensitivity)
-    modes = [
-        design(transmission, error)
-        for error in curve_modes(curve_error, nodes, sensitivity, camera.sensitivity.max(axis=0))
-    ]
+    modes = [design(transmission, error) for error in camera_modes(camera, nodes, curve_error)]
     for position, change in _filter_changes(lvf, nodes):
         mode = np.zeros((len(transmission), sensitivity.shape[1], len(knots_nm)))
         mode[position] = (change[:, np.newaxis] * sensitivity).T @ onto_knots
@@ -135,6 +132,34 @@ def curve_modes(
                 change = np.zeros_like(sensitivity)
                 change[:, channel] = fraction * mode * shape
                 modes.append(change)
+    return modes
+
+
+def camera_modes(
+    camera: CameraResponse, nodes: FloatArray, unknown: CurveError | None
+) -> list[FloatArray]:
+    """Return changes of a camera's curves (q, channels), of one σ about one wavelength each.
+
+    Curves that were measured with their σ have that one; others err as published curves do.
+
+    Parameters
+    ----------
+    camera
+        Curves of the camera.
+    nodes
+        Wavelengths in nm, shape (q,).
+    unknown
+        Error of curves without σ, and distance at which errors are independent; None for none.
+    """
+    if unknown is None or camera.sigma is None:
+        return curve_modes(unknown, nodes, camera.at(nodes), camera.sensitivity.max(axis=0))
+    modes = []
+    for channel, sigma in enumerate(camera.sigma.T):
+        own = np.interp(nodes, camera.wavelength_nm, sigma, left=0.0, right=0.0)
+        for mode in smooth_modes(nodes, unknown.correlation_nm):
+            change = np.zeros((len(nodes), len(camera.channels)))
+            change[:, channel] = own * mode
+            modes.append(change)
     return modes
 
 
