@@ -27,6 +27,18 @@ from tests.material.reradiation.synthetic import ORANGE, YELLOW, measurement
 LABRIG = (sys.executable, "-m", "labrig")
 PICTURES = Path(__file__).parent / "pictures"
 WIDTH = 1280
+#: What a wall of the shipped box shall look like.
+WISH = """\
+name: sea
+states: 2
+albedo: 0.6
+scene: {file: cornell-box, material: phosphorescent, white_cd_per_m2: 440}
+pixels: {upper: [0.09, 0.35], lower: [0.09, 0.65]}
+keys:
+  - {at: 1 s, place: upper, colour: "#20c060", brightness: 3.0e-3}
+  - {at: 20 s, place: lower, colour: "#20a0a0", brightness: 1.2e-3}
+  - {at: 90 s, place: upper, colour: "#2060c0", brightness: 5.0e-4}
+"""
 #: Frames of the decay that the watched run has when its picture is taken.
 FRAMES_WATCHED = 22
 #: Time after which a live page has drawn what it is sent.
@@ -52,6 +64,14 @@ def main() -> None:
         subprocess.run([*LABRIG, "protocol", "new", "decay", str(protocol)], check=True)
         with served("rig", "view", "sim", "--protocol", str(protocol), "--no-browser") as address:
             page(chrome, address, "view", 900, SETTLE_S)
+        design_page(chrome, Path(scratch, "sea.yaml"))
+
+
+def design_page(chrome: Chrome, wish: Path) -> None:
+    """Take a picture of the page on which a material is designed, in a scene."""
+    wish.write_text(WISH, encoding="utf-8")
+    with served("design", "--open", str(wish), "--no-browser") as address:
+        page(chrome, address, "design", 1100, 4 * SETTLE_S)
 
 
 def mixture(chrome: Chrome, folder: Path) -> None:

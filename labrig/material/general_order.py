@@ -37,6 +37,8 @@ NEARLY_CONVERGED = 1e-8
 ALMOST_1 = 1 - 1e-16
 #: δ below which derivatives of φ(δ) are series.
 NEARLY_STEADY = 1e-5
+#: Captures over the level that is left without light, up to which light changes nothing.
+NEXT_TO_DARK = 1e-9
 #: Least argument of a logarithm.
 TINY = 1e-300
 
@@ -302,7 +304,11 @@ def lit_concentration(
     [0.2782, 0.3456, 0.3855]
     """
     approach, t = _approach(start, kappa_per_s, k_r_per_s, order, duration_s)
-    return approach.level(approach.position(t))
+    level = approach.level(approach.position(t))
+    # The approach to a steady level is lost in rounding where next to nothing is captured.
+    dark = dark_concentration(start, k_r_per_s, order, duration_s)
+    is_faint = np.asarray(kappa_per_s) * np.asarray(duration_s) < NEXT_TO_DARK * dark
+    return np.where(is_faint, dark, level)
 
 
 class LitStep(NamedTuple):

@@ -54,12 +54,15 @@ class Asked(BaseModel):
         Content of a file of wishes.
     by_hand
         Parameters that were set by hand; None to solve for those that meet the wishes best.
+    is_draft
+        Whether the wish still changes: the energy is then not kept, which takes up to a second.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     wish: dict[str, Any]
     by_hand: SetByHand | None = None
+    is_draft: bool = False
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Asked":

@@ -7,7 +7,6 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
 from labrig.design import (
     Design,
@@ -27,7 +26,7 @@ from labrig.finite import Finite, UnitFraction
 from labrig.material import Material
 from labrig.optics import srgb_bytes
 from labrig.reproduce import load_scene
-from labrig.studio.messages import SOURCE, Asked, SetByHand, wish_content
+from labrig.studio.messages import SOURCE, Asked, wish_content
 from labrig.studio.workbench import Workbench
 from labrig.yaml_file import validate
 
@@ -47,44 +46,32 @@ PERCENTILE, EXPOSED = 97.0, 0.7
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-class PictureAsked(BaseModel):
+class PictureAsked(Asked):
     """A picture that the page asks for.
 
     Attributes
     ----------
-    wish, by_hand
-        As of `Asked`.
     t_s
         Time in s.
     exposure_ev
         Exposure in stops; None to follow the glow.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    wish: dict[str, Any]
-    by_hand: SetByHand | None = None
     t_s: Finite
     exposure_ev: Finite | None = None
 
 
-class PointAsked(BaseModel):
+class PointAsked(Asked):
     """A point of the picture that the page asks about.
 
     Attributes
     ----------
-    wish, by_hand
-        As of `Asked`.
     x, y
         Fractions of the picture's width and height from its upper left.
     t_s
         Time in s.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    wish: dict[str, Any]
-    by_hand: SetByHand | None = None
     x: UnitFraction
     y: UnitFraction
     t_s: Finite
@@ -153,6 +140,18 @@ class SceneBench(Workbench):
             "pixels": {},
         }
         return wish_content(validate(content, WishFile, SOURCE))
+
+    def take(self, file: WishFile, source: str) -> dict[str, Any]:
+        """Return the wish of a file, with what it leaves to the scene written out.
+
+        Raises
+        ------
+        UsageError
+            It is malformed, or of another scene or material.
+        """
+        content = super().take(file, source)
+        content["scene"] = self.start()["scene"] | content["scene"]
+        return content
 
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the wishes, and what the page has to know of the scene."""

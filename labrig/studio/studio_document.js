@@ -18,6 +18,11 @@ export class History {
     return JSON.parse(this.#now);
   }
 
+  /** Whether a gesture is under way: what it comes to is not known yet. */
+  get isInGesture() {
+    return this.#gesture !== null;
+  }
+
   get canUndo() {
     return this.#past.length > 0;
   }
@@ -42,7 +47,9 @@ export class History {
 
   /** Ends a gesture: the next change is undone apart. */
   settle() {
+    if (!this.isInGesture) return;
     this.#gesture = null;
+    this.onChange();
   }
 
   undo() {

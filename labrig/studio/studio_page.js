@@ -27,11 +27,16 @@ let isStale = false;
 let playing = 0;
 
 async function post(path, content) {
-  const reply = await fetch(path, {
-    method: "POST",
-    headers: { "Content-Type": "application/json" },
-    body: JSON.stringify(content),
-  });
+  let reply;
+  try {
+    reply = await fetch(path, {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify(content),
+    });
+  } catch {
+    throw new Error("labrig does not answer; is it still running?");
+  }
   if (reply.ok) return reply;
   throw new Error((await reply.json()).error);
 }
@@ -40,6 +45,9 @@ function say(text) {
   $("message").hidden = !text;
   $("message").textContent = text ?? "";
 }
+
+/** What is designed; while a hand drags, an answer that is quick matters more than the last one. */
+const question = () => ({ ...history.now, is_draft: history.isInGesture });
 
 async function ask() {
   isStale = true;
@@ -50,7 +58,7 @@ async function ask() {
     isStale = false;
     const begin = performance.now();
     try {
-      const next = await (await post("look", history.now)).json();
+      const next = await (await post("look", question())).json();
       const isFirst = answer === null;
       const shownAt = answer && timeOf(answer.frames_s, view.frame);
       answer = next;
@@ -62,7 +70,7 @@ async function ask() {
       performance.measure("answer", { start: begin, end: performance.now() });
       $("speed").textContent = `Answered in ${Math.round(performance.now() - begin)} ms.`;
     } catch (error) {
-      say(error instanceof TypeError ? "labrig does not answer; is it still running?" : error.message);
+      say(error.message);
       if (answer === null) break;
     }
   }
@@ -152,10 +160,10 @@ function drawTime(all = { answer, wish: history.now.wish, ...view }) {
 
 /** Asks for the picture of a scene, unless it is the one that was asked for last. */
 function askPicture(t_s) {
-  const question = JSON.stringify([history.now, t_s, view.ev]);
-  if (question === view.asked) return;
-  view.asked = question;
-  picture.ask(history.now, t_s, view.ev);
+  const asked = JSON.stringify([question(), t_s, view.ev]);
+  if (asked === view.asked) return;
+  view.asked = asked;
+  picture.ask(question(), t_s, view.ev);
 }
 
 function show(frame) {
@@ -217,7 +225,7 @@ async function addKeyAt(u, v) {
     return;
   }
   try {
-    const seen = await (await post("seen", { ...history.now, x: u, y: v, t_s: answer.frames_s[view.frame] })).json();
+    const seen = await (await post("seen", { ...question(), x: u, y: v, t_s: answer.frames_s[view.frame] })).json();
     say();
     push(newDot(pixels), seen.rgb, [u, v].map((x) => Number(x.toFixed(4))));
   } catch (error) {
@@ -257,14 +265,14 @@ const timeline = new Timeline({
     view.chosenLight = number;
     draw();
   },
-  onKey: (number, { t_s, luminance: y, isTime, isLuminance }) => {
+  onKey: (number, { t_s, luminance: y, isTime, isLuminance }, gesture = null) => {
     changeKey(
       number,
       (key, judged) => ({
         ...(isLuminance ? withLuminance(key, judged, y) : key),
         at: isTime ? written(Number(t_s.toPrecision(4))) : key.at,
       }),
-      `drag ${number}`,
+      gesture,
     );
   },
   onSettled: () => history.settle(),

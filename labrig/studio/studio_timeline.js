@@ -43,7 +43,8 @@ export class Timeline {
       if (light) onLight(Number(light.dataset.light));
       if (key) {
         onChosen(Number(key.dataset.key));
-        this.#drag(event, (at) => onKey(Number(key.dataset.key), at), onSettled);
+        const number = Number(key.dataset.key);
+        this.#drag(event, (at) => onKey(number, at, `drag ${number}`), onSettled);
       } else this.#drag(event, ({ frame }) => onFrame(Math.round(frame)), () => {}, true);
     });
     this.svg.addEventListener("keydown", (event) => {

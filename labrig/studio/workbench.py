@@ -134,7 +134,7 @@ class Workbench:
             if wished.keeps_energy:
                 return wished, wish
             self._energy = describe_energy(wished).removeprefix("! ")
-            return wish.solve("kept"), wish
+            return wished if asked.is_draft else wish.solve("kept"), wish
         else:
             given = _to_begin_with(wish.bands, wish.file)
         weights = wish.file.weights

@@ -112,6 +112,16 @@ def test_long_light_ends_in_balance(kappa: float, k: float, b: float) -> None:
     assert lit_concentration(0.3, kappa, k, b, 1e7) == pytest.approx(steady, rel=1e-9)
 
 
+def test_next_to_no_light_changes_nothing() -> None:
+    kappa = 10.0 ** -np.arange(9.0, 34.0)
+    for b in (1.0, 1.5, 2.5, 4.0):
+        for t_s in (0.01, 60.0, 1e6):
+            dark = dark_concentration(0.999, 0.02, b, t_s)
+            level = lit_concentration(0.999, kappa, 0.02, b, t_s)
+            assert (level >= dark * (1 - 2e-9)).all()
+            assert (level <= dark * (1 + 2e-9) + kappa * t_s).all()
+
+
 @pytest.mark.parametrize("b", [1.0, 1.3, 2.0, 3.0])
 def test_light_in_the_dark_is_becquerel_s_law(b: float) -> None:
     start, k, t_s, exposure_s = 0.6, 0.05, np.array([0.0, 3.0, 200.0]), np.array([2.0, 1.0, 50.0])

@@ -118,6 +118,12 @@ def test_in_its_own_light_it_is_not_further_off(bench: SceneBench) -> None:
     assert max(key["delta_e"] for key in judged["keys"]) < 5
 
 
+def test_a_file_may_leave_the_light_to_the_scene(bench: SceneBench, scene: Path) -> None:
+    text = f"scene: {{file: '{scene}', material: paint}}\npixels: {{a: [0.5, 0.62]}}\nkeys: []\n"
+    assert bench.open(text)["scene"] == bench.start()["scene"]
+    assert bench.look({"wish": bench.open(text)})["places"][0]["name"] == "a"
+
+
 def test_what_is_meant_has_to_be_said(scene: Path, bench: SceneBench) -> None:
     with pytest.raises(UsageError, match="--material"):
         SceneBench(str(scene))

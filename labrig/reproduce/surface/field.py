@@ -27,8 +27,6 @@ Float32Array = NDArray[np.float32]
 IMPROPER = "expected an irradiance that is finite and ≥ 0, got a negative or infinite one, or NaN"
 #: Samples below which several threads cost more than they gain.
 FEW_SAMPLES = 65_536
-#: Captures in a step, as a level, up to which the light does not change how a level decays.
-NEXT_TO_DARK = 1e-9
 #: Samples up to which a solution for each takes less than a table for all steps of one length.
 FEW_FOR_TABLES = 64
 
@@ -171,9 +169,7 @@ class Field:
         if not (np.isfinite(rates).all() and rates.min(initial=0.0) >= 0):
             raise UsageError(IMPROPER)
         after = np.asarray(dark_concentration(before, k_r, order, duration_s))
-        # In next to no light the solution of lit levels is not found; captures just add up.
-        is_lit = rates * duration_s > NEXT_TO_DARK
-        after = np.minimum(after + rates * duration_s, 1.0)
+        is_lit = rates > 0
         if is_lit.any():
             after[is_lit] = lit_concentration(before[is_lit], rates[is_lit], k_r, order, duration_s)
         self._levels[state] = after
