@@ -17,7 +17,7 @@ def test_measured_curves_have_their_own_sigma() -> None:
     sigma = np.outer(np.linspace(0.01, 0.03, len(camera.wavelength_nm)), [1.0, 0.5, 2.0])
     modes = np.array(camera_modes(replace(camera, sigma=sigma), NODES, PUBLISHED))
     own = [np.interp(NODES, camera.wavelength_nm, column) for column in sigma.T]
-    assert np.sqrt((modes**2).sum(axis=0)).T == pytest.approx(np.array(own), rel=0.01)
+    assert pytest.approx(np.array(own), rel=0.01) == np.sqrt((modes**2).sum(axis=0)).T
     correlation = np.einsum("mqc,mrc->qr", modes, modes)
     assert correlation[0, 20] == pytest.approx(0, abs=1e-12)
     assert correlation[0, 1] > 0.9 * correlation[0, 0]
