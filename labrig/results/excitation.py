@@ -255,6 +255,7 @@ def _by_band(tests: BandTests) -> dict[str, Any]:
         "bands": tests.bands.tolist(),
         "light_variance": tests.light_variance.value,
         "light_variance_sigma": tests.light_variance.sigma,
+        "charged_glow_by_variance": tests.charged_glow_by_variance,
         "is_thick": tests.is_thick,
         **{
             name: {

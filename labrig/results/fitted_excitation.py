@@ -170,6 +170,9 @@ class BandTests:
     light_variance
         Variance of the exciting light over the depth of the layer, relative to its squared mean, of
         the light that is absorbed most: (D ln 10)²/12 of a layer of optical density D < 1.
+    charged_glow_by_variance
+        Relative change of the fitted glow of the fully charged sample by that variance, over it:
+        negative, since a thick layer saturates at its surface first. r(0) changes inversely.
     amplitude
         Glow of the fully charged sample, by the curvature of its charging.
     rate
@@ -180,6 +183,7 @@ class BandTests:
 
     bands: IntArray
     light_variance: Measured
+    charged_glow_by_variance: float
     amplitude: BandQuantity
     rate: BandQuantity
     hue: BandQuantity | None
@@ -192,8 +196,18 @@ class BandTests:
     @property
     def optical_density_upper(self) -> float:
         """Upper limit of D with 95 % probability, as far as it is below 1."""
+        return float(np.sqrt(12 * self._variance_upper) / np.log(10))
+
+    @property
+    def level_error_upper(self) -> float:
+        """Relative error of r(0) in a layer of that density, to first order of its variance."""
+        with np.errstate(over="ignore"):
+            return float(np.expm1(-self.charged_glow_by_variance * self._variance_upper))
+
+    @property
+    def _variance_upper(self) -> float:
         value, sigma = self.light_variance.value, self.light_variance.sigma
-        return float(np.sqrt(12 * (max(value, 0.0) + UPPER_SIGMAS * sigma)) / np.log(10))
+        return max(value, 0.0) + UPPER_SIGMAS * sigma
 
     @property
     def is_thick(self) -> bool:

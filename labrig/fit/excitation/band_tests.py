@@ -85,10 +85,23 @@ def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTes
     return BandTests(
         bands=bands,
         light_variance=Measured(float(of_depth.deviation[0, 0]), float(of_depth.sigma[0, 0])),
+        charged_glow_by_variance=_charged_glow_change(problem, rates, jacobian, whitened[:, 0]),
         amplitude=quantity([along(by_amplitude)]),
         rate=quantity([along(by_rate)]),
         hue=quantity(channels, HUE_SIGMA) if channels else None,
     )
+
+
+def _charged_glow_change(
+    problem: ExcitationProblem, rates: Rates, jacobian: FloatArray, column: FloatArray
+) -> float:
+    """Return the relative change of Σ A that a fit without a further column (m,) makes of it."""
+    norm = np.linalg.norm(jacobian, axis=0)
+    norm = np.where(norm > 0, norm, 1.0)
+    change = np.linalg.lstsq(jacobian / norm, column, rcond=None)[0] / norm
+    # θ has the inverse of a gain, of which A is the power b.
+    by_state = -rates.order * rates.gain * change[problem.parameters.columns.inverse_gain]
+    return float(by_state @ rates.amplitude / rates.amplitude.sum())
 
 
 def _by_depth(problem: ExcitationProblem, rates: Rates) -> list[FloatArray]:
