@@ -121,7 +121,7 @@ function draw() {
   $("again").hidden = !answer.scene;
   $("hint").textContent = answer.scene
     ? `Click on '${answer.scene.material}' to set a key: so it shall look there at this time. Drag a dot to move it.`
-    : "Click on the material to set a key: so it shall look at this time. The small square is a white card in the same light.";
+    : `Click on the ${answer.places.length > 1 ? "chosen patch" : "material"} to set a key: so it shall look at this time. The small square is a white card in the same light.`;
   $("impossible-section").hidden = !answer.impossible.length && !answer.conflicts.length && !answer.energy;
   const pairs = new Set(answer.conflicts.map((pair) => [...pair].sort((a, b) => a - b).map((i) => i + 1).join(" and ")));
   const fights = [...pairs].slice(0, MOST_FIGHTS).map((pair) => `Keys ${pair} work against each other.`);
@@ -215,7 +215,12 @@ function push(name, rgb, point = null) {
 async function addKeyAt(u, v) {
   if (!answer.scene) {
     const place = placeAt(answer, u, v);
-    if (place >= 0) addKey(place);
+    if (place === view.chosenPlace) addKey(place);
+    else if (place >= 0) {
+      // Another patch is chosen first, with its light.
+      view.chosenPlace = place;
+      draw();
+    }
     return;
   }
   const { pixels } = history.now.wish;

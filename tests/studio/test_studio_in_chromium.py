@@ -101,10 +101,10 @@ def test_three_keys_are_set_dragged_undone_and_met(
     chromium: Chrome, page: str, tmp_path: Path
 ) -> None:
     view = Page(chromium, page, tmp_path)
-    view.give("states", "2")
     view.set_key(110, "#20c060", -3)
     view.set_key(150, "#2098a0", -3.7)
     view.set_key(185, "#2060c0", -4.5)
+    view.give("states", "2")
     assert len(view.all("#keys li")) == 3
     assert view.one("#key-title").text == "Key 3"
 
