@@ -14,7 +14,13 @@ from scipy.special import chdtrc
 
 from labrig.analyse.inputs import Part
 from labrig.errors import DataError, UsageError
-from labrig.fit.spectrum import CurveError, SpectralSystem, curve_modes, fit_spectrum
+from labrig.fit.spectrum import (
+    CurveError,
+    SpectralSystem,
+    camera_modes,
+    curve_modes,
+    fit_spectrum,
+)
 from labrig.material import Material, read_material
 from labrig.optics import (
     CameraResponse,
@@ -304,10 +310,7 @@ class _Bench:
         weighted = step[:, np.newaxis] * sensitivity
         light = card.at(nodes)
         lit = light @ weighted
-        peaks = camera.sensitivity.max(axis=0)
-        curves = [
-            step[:, np.newaxis] * mode for mode in curve_modes(CURVES, nodes, sensitivity, peaks)
-        ]
+        curves = [step[:, np.newaxis] * mode for mode in camera_modes(camera, nodes, CURVES)]
         lamp_errors = _smooth_errors(nodes, card, _lamp_error(lamp))
         efficacy = step * photopic_efficacy(nodes)
         # The reading fixes the luminance of the light, so that only its distribution errs.

@@ -18,7 +18,7 @@ from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
 from labrig.errors import DataError
-from labrig.fit.spectrum import CurveError, curve_modes
+from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.number_format import plus_minus
 from labrig.optics import CameraResponse, Spectrum
 from labrig.protocols.fade import SWITCHED, LampFrames
@@ -132,7 +132,7 @@ def _places(
     light, sensitivity = lamp.at(nm)[:, np.newaxis], curves.at(nm)
     channel_light = (light * sensitivity).T
     if not part.protocol.through_lvf:
-        changes = curve_modes(CURVES, nm, sensitivity, curves.sensitivity.max(axis=0))
+        changes = camera_modes(curves, nm, CURVES)
         light_errors = np.array([(light * change).T for change in changes])
         card = {"card": part_region(part, part.protocol.card)}
         return card, _normalise(channel_light), _normalised_errors(channel_light, light_errors)

@@ -25,7 +25,7 @@ from scipy.linalg import solve_triangular
 from labrig.errors import UsageError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.leds import changed_spectrum
-from labrig.fit.spectrum import CurveError, curve_modes
+from labrig.fit.spectrum import CurveError, camera_modes, curve_modes
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -443,7 +443,7 @@ def fluorescence_system(
         seen(curves),
     )
     modes: list[_Response] = []
-    for change in curve_modes(curve_error, nodes, curves, camera.sensitivity.max(axis=0)):
+    for change in camera_modes(camera, nodes, curve_error):
         modes.append(
             _Response(reflected(lights, change), np.zeros_like(response.absorbed), seen(change))
         )

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.spectrum import CurveError, curve_modes
+from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.optics import CameraResponse, Spectrum, Transmittance, band_integrals
 
 #: Standard deviation of ln b and of ln g about a first guess: a factor of 20, and any at all.
@@ -271,7 +271,7 @@ class _Model:
         nodes = np.arange(grid_nm[0], grid_nm[-1] + NODE_NM, NODE_NM)
         card = self._card.at(nodes)
         curves = self._camera.at(nodes)
-        changes = curve_modes(self._error, nodes, curves, self._camera.sensitivity.max(axis=0))
+        changes = camera_modes(self._camera, nodes, self._error)
         sensitivities = np.array([curves, *changes]) * card[:, np.newaxis]
 
         def seen(spectrum: Spectrum) -> FloatArray:

@@ -15,7 +15,7 @@ from labrig.fit.leds.brightness import (
     WIDTH_SIGMA,
     changed_spectrum,
 )
-from labrig.fit.spectrum import CurveError, curve_modes
+from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 
 #: Standard uncertainty in nm of an LED's wavelengths by its data sheet.
@@ -123,7 +123,7 @@ class _Matcher:
         self._value, self._variance = value, variance
         nodes = np.arange(camera.wavelength_nm[0], camera.wavelength_nm[-1] + 1.0, 1.0)
         curves = camera.at(nodes)
-        by_curves = curve_modes(curve_error, nodes, curves, camera.sensitivity.max(axis=0))
+        by_curves = camera_modes(camera, nodes, curve_error)
         sensitivities = np.array([curves, *by_curves]) * card.at(nodes)[:, np.newaxis]
         self._seen = {}
         for name, light in lights.items():

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.spectrum.system import CurveError, curve_modes
+from labrig.fit.spectrum.system import CurveError, camera_modes
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -96,8 +96,7 @@ class StripProblem:
         self._hat_functions = hat_functions(self.knots_nm, self.grid_nm)
         sensitivity = camera.at(nodes)
         illumination = weights * lamp.at(nodes) * card.at(nodes)
-        peaks = camera.sensitivity.max(axis=0)
-        modes = np.array(curve_modes(curve_error, nodes, sensitivity, peaks))
+        modes = np.array(camera_modes(camera, nodes, curve_error))
         modes = modes.reshape(-1, *sensitivity.shape)
         # The card by itself is as bright in every channel as was measured, however curves are bent.
         fraction = np.einsum("q,mqc->mc", illumination, modes) / (illumination @ sensitivity)
