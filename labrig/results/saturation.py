@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from labrig.results.fitted_decay import FittedDecay
+from labrig.results.fitted_law import EXPONENTIALS
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
@@ -225,12 +226,15 @@ class PatchSaturation:
         """Whether a state of a kinetic order describes all decays better than states of the first.
 
         Several states of first order that charges fill unequally make the rate at lamp off shift
-        with the charge, too, now and then as their shape would have it. The two models are compared
-        by the Bayesian information criterion: a rate and a light of each decay and one shape,
-        against shared rates and amplitudes of each decay.
+        with the charge, too, now and then as their shape would have it. Where exponentials describe
+        the longest charge's decay, the two models are compared by the Bayesian information
+        criterion: a rate and a light of each decay and one shape, against shared rates and
+        amplitudes of each decay.
         """
         if self.order is None or self.order.verdict != "general order":
             return False
+        if self.fit.law != EXPONENTIALS:
+            return True
         decays, states = self.rates.amplitude.shape
         frames = sum(len(curve.t_s) for curve in self.curves.values())
         added = states * (decays + 1) - (2 * decays + 1)

@@ -8,9 +8,9 @@ light each by a rate of its own, which the seed draws as it does rates and share
 mixture changes with the charge and the glow after it falls by another rate; so does that of a state
 of general order and of a trap with retrapping. One state of first order is beside them.
 
-Printed are, per sample, what labrig says: how often that is right, how often an order is told that
-is none, how often a dependence on the charge is told that is none, and how often nothing is said of
-an order (at most 2 % of those whose charges differ enough).
+Printed are, per sample, how often it is right that an order is told, or none; what is said; and the
+verdicts of the test of an order by itself, which is often not decided, since the charges of a
+sample that saturates soon hardly differ.
 """
 
 import argparse
@@ -48,7 +48,7 @@ BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
 #: Relative excitation rates of the bands.
 EXCITED = (0.4, 1.0, 0.08, 0.0, 0.0, 0.0, 0.0, 0.0)
 SENSOR = {"width": 96, "height": 72}
-FIRST = "first order"
+NO_ORDER = "no order"
 #: What is said, by the words of its warning, what claims most first.
 WORDS = {
     "order": "as that of a state of kinetic order",
@@ -73,7 +73,7 @@ class Outcome:
     Attributes
     ----------
     said
-        `first order`, or what was warned of: `order`, `rates` that depend on the charge, `no law`.
+        `no order`, or what was warned of: `order`, `rates` that depend on the charge, `no law`.
     verdict
         Verdict of the test of an order.
     shift, shift_sigma
@@ -91,8 +91,8 @@ class Outcome:
 
     @property
     def is_right(self) -> bool:
-        """Whether an order is told where there is one, and first order where there is none."""
-        return (self.said == FIRST) == self.is_first_order
+        """Whether an order is told where there is one, and none where there is none."""
+        return (self.said == NO_ORDER) == self.is_first_order
 
 
 def material(states: Iterable[tuple[float, float, float]]) -> dict[str, Any]:
@@ -213,7 +213,7 @@ def outcome(
 ) -> Outcome:
     """Return what was said of a sample."""
     said = next(
-        (what for what, words in WORDS.items() if any(words in line for line in lines)), FIRST
+        (what for what, words in WORDS.items() if any(words in line for line in lines)), NO_ORDER
     )
     test = patch.order
     return Outcome(

@@ -23,7 +23,7 @@ from labrig.sim.truth import Truth
 from tests.acceptance.decays_of_all_materials import shipped_rig
 from tests.analyse.excitation.test_excitation_run import HEIGHT, QUICK, WIDTH, true_irradiance
 
-#: The room's lamp, in multiples of the irradiance to which Table 1's rates belong.
+#: The room's usual lamp, in multiples of the irradiance to which Table 1's rates belong.
 LAMP = 4.0
 #: Relative σ of the lamp's transients, and of the deficit of a cold lamp.
 FADE_SIGMA, DEFICIT_SIGMA = 0.005, 0.1
@@ -69,12 +69,15 @@ class Charging:
         Keys of `simulation:`, beside those of the shipped rig for phosphors.
     kinetics
         Keys of `kinetics` of the sample; None: as in its file.
+    lamp
+        Light of the room's lamp in multiples of the irradiance to which Table 1's rates belong.
     """
 
     name: str
     assumption: str
     simulation: dict[str, Any] = field(default_factory=dict)
     kinetics: dict[str, Any] | None = None
+    lamp: float = LAMP
 
     def material(self, seed: int) -> str:
         """Return the name of the sample's material, which is the same for all seeds."""
@@ -94,6 +97,7 @@ class Charging:
             sensor={"width": WIDTH, "height": HEIGHT},
             seed=1000 * (zlib.crc32(self.name.encode()) % 1_000_000) + seed,
         )
+        rig["simulation"]["lamp"] = rig["simulation"].get("lamp", {}) | {"irradiance": self.lamp}
         for key, value in self.simulation.items():
             of_rig = rig["simulation"].get(key)
             rig["simulation"][key] = of_rig | value if isinstance(of_rig, dict) else value
@@ -118,7 +122,8 @@ class Charging:
         k_e_per_s = read_material(self.material(0)).states[0].k_e_per_s
         assert k_e_per_s is not None
         for band, k_e in enumerate(k_e_per_s):
-            found, sigma = state.k_e_per_s[band] / LAMP, state.k_e_sigma_per_s[band] / LAMP
+            found = state.k_e_per_s[band] / self.lamp
+            sigma = state.k_e_sigma_per_s[band] / self.lamp
             yield f"k_e {band + 1}", (found - k_e, sigma, max(k_e_per_s))
         level, r0 = patch.fit.at_off[-1], true.concentration
         assert r0 is not None
@@ -133,6 +138,12 @@ CHARGES = [
         kinetics={"charging_offset": 0.3},
     ),
     Charging("charging: density 1", "a layer is thin", kinetics={"optical_density": 1}),
+    Charging(
+        "charging: density 1, lamp 2", "a layer is thin", kinetics={"optical_density": 1}, lamp=2.0
+    ),
+    Charging(
+        "charging: density 1, lamp 1", "a layer is thin", kinetics={"optical_density": 1}, lamp=1.0
+    ),
     Charging("charging: density 4", "a layer is thin", kinetics={"optical_density": 4}),
     Charging(
         "charging: smooth", "excitation is even within a band", kinetics={"excitation": "smooth"}

@@ -16,6 +16,9 @@ MISFIT_LEVEL = 5e-4
 FEWEST_FOR_ORDER = 8
 #: Reduced χ² below which σ is doubted: 0.6 of the scatter that it says, if not by chance.
 TOO_SMALL_CHI2 = 0.36
+#: σ of log k from which a rate is said to be known badly: errors of such a rate are far from
+#: symmetric, and beyond 3 σ more often than σ says.
+KNOWN_BADLY = 0.2
 #: Ratio to the slowest rate searched below which a rate is at that bound.
 NEAR_BOUND = 1.001
 BELOW_ZERO_SIGMAS = 5.0
@@ -196,7 +199,7 @@ def state_warnings(
                 f"{rate} is the fastest rate the steps in time can tell: take the first frames "
                 "closer together, or start after the lamp's own glow (labrig fit decay --from)"
             )
-        elif sigma[number - 1] > ILL_DETERMINED:
+        elif sigma[number - 1] > KNOWN_BADLY:
             long_lived = number == len(states) and lifetime_s > span_s
             warnings.append(
                 f"{rate} is known to {100 * sigma[number - 1]:.0f} % only: "
@@ -218,7 +221,7 @@ def state_warnings(
             "the free offset and the slowest state can hardly be told apart: give the offset "
             "(labrig fit decay --offset zero, or the σ of what was subtracted) or record longer"
         )
-    if lifetime_s > span_s and not is_fixed and sigma[-1] <= ILL_DETERMINED:
+    if lifetime_s > span_s and not is_fixed and sigma[-1] <= KNOWN_BADLY:
         warnings.append(
             f"the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s recorded: "
             "record longer to be sure of it"
