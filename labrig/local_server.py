@@ -109,6 +109,10 @@ class LocalConversation(BaseHTTPRequestHandler):
                 self.answer(path)
         except LabrigError as error:
             self.refuse(HTTPStatus.BAD_REQUEST, str(error))
+        except ConnectionError:
+            raise
+        except Exception as error:
+            self._confess(error)
 
     def accept(self, path: str, body: bytes) -> None:
         """Handle a POST."""
@@ -126,6 +130,17 @@ class LocalConversation(BaseHTTPRequestHandler):
             self.refuse(HTTPStatus.INSUFFICIENT_STORAGE, str(error))
         except LabrigError as error:
             self.refuse(HTTPStatus.BAD_REQUEST, str(error))
+        except ConnectionError:
+            raise
+        except Exception as error:
+            self._confess(error)
+
+    def _confess(self, error: Exception) -> None:
+        """Say that labrig is at fault: without an answer a page would take it for gone."""
+        self.refuse(
+            HTTPStatus.INTERNAL_SERVER_ERROR,
+            f"a fault in labrig itself ({error!r:.200}); please report it",
+        )
 
     def path_behind_secret(self) -> str | None:
         """Return the path behind the secret, or None after a refusal."""

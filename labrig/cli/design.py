@@ -58,16 +58,24 @@ def design(
     ] = False,
 ) -> None:
     """Find the phosphorescent material that glows as you want it to: on a page, or from a file."""
+    from labrig.errors import UsageError
+
     if constraints is not None:
+        for_page = {"SCENE": scene, "--material": material, "--open": begin_with, "--port": port}
+        if given := [name for name, value in for_page.items() if value]:
+            raise UsageError(
+                f"expected --constraints without {', '.join(given)}: the file says in which scene; "
+                "without --constraints a page is opened"
+            )
         _solve(constraints, out, picture, nearest)
         return
     if out is not None or picture is not None or nearest:
-        from labrig.errors import UsageError
-
         raise UsageError(
             "expected --constraints with --out, --picture and --nearest, got none; on the page the "
             "same is behind its buttons"
         )
+    if material is not None and scene is None and begin_with is None:
+        raise UsageError("expected a scene with --material, got none: labrig design SCENE")
     _serve(begin_with, scene, material, port, no_browser)
 
 
@@ -92,20 +100,27 @@ def _serve(
 
 def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: bool) -> None:
     from labrig.design import nearest_materials, read_wish, solve_in_scene, to_material
+    from labrig.errors import DiskError, UsageError
     from labrig.report import (
         describe_design,
         describe_energy,
         describe_scene_design,
         draw_design,
         draw_scene_design,
+        require_picture,
     )
 
+    for path in (out, picture):
+        if path is not None and not path.absolute().parent.is_dir():
+            raise DiskError(f"{path}: cannot be written (there is no such folder)")
+    if picture is not None:
+        require_picture(picture)
     wish = read_wish(constraints)
     if wish.scene is not None:
+        if nearest:
+            raise UsageError("expected --nearest with a light programme, got a scene")
         in_scene = solve_in_scene(wish)
         typer.echo(describe_scene_design(in_scene))
-        if nearest:
-            typer.echo("--nearest is for a light programme, not for a scene", err=True)
         if out is not None:
             _write(in_scene.material, out)
         if picture is not None:
@@ -116,8 +131,8 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
     found = wished if wished.keeps_energy else wish.solve("kept")
     measured = [each for each in nearest_materials(found) if each] if nearest else []
     typer.echo(describe_design(found, wish.places, measured))
-    if found is not wished:
-        typer.echo(describe_energy(wished))
+    if found is not wished and (cost := describe_energy(wished, found)):
+        typer.echo(cost)
     if out is not None:
         _write(to_material(found, wish.file.name), out)
     if picture is not None:

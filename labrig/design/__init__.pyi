@@ -47,6 +47,7 @@ from .scene_design import (
     solve_in_scene as solve_in_scene,
 )
 from .scene_light import (
+    PLACEHOLDER as PLACEHOLDER,
     SceneLight as SceneLight,
 )
 from .scene_spectra import (

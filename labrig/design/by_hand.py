@@ -16,6 +16,9 @@ from labrig.material import MAX_ORDER
 
 FloatArray = NDArray[np.float64]
 
+#: Largest rate or Λ.
+LARGEST = 1e9
+
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
@@ -64,10 +67,13 @@ class Parameters:
         >>> glow.albedo.tolist()
         [0.6, 0.6, 0.6]
         """
-        k_r, k_e, emitted, reflected = (
-            np.asarray(each, dtype=np.float64)
-            for each in (k_r_per_s, k_e_per_s, reradiation, albedo)
-        )
+        try:
+            k_r, k_e, emitted, reflected = (
+                np.asarray(each, dtype=np.float64)
+                for each in (k_r_per_s, k_e_per_s, reradiation, albedo)
+            )
+        except ValueError:
+            raise UsageError("expected as many k_e and Λ of each state as bands") from None
         shape = (k_r.size, reflected.size)
         if k_r.ndim != 1 or reflected.ndim != 1 or not k_e.shape == emitted.shape == shape:
             raise UsageError(
@@ -77,6 +83,8 @@ class Parameters:
         for name, each in (("k_r", k_r), ("k_e", k_e), ("Λ", emitted), ("the albedo", reflected)):
             if not (np.isfinite(each).all() and each.min(initial=0.0) >= 0):
                 raise UsageError(f"expected {name} that is finite and ≥ 0, got {each.tolist()}")
+            if each.max(initial=0.0) > LARGEST:
+                raise UsageError(f"expected {name} up to {LARGEST:g}, got {each.max():g}")
         if not k_r.size or k_r.min() == 0:
             raise UsageError("expected one or more k_r above 0, got none or 0")
         if reflected.max(initial=0.0) > 1:

@@ -13,6 +13,8 @@ FloatArray = NDArray[np.float64]
 
 #: Singular value, relative to the largest, below which a combination of parameters changes no key.
 NO_EFFECT = 1e-9
+#: Derivative below which nothing depends on a parameter.
+LEAST = 1e-100
 #: Part of a parameter in such combinations from which it is not determined.
 PART_UNKNOWN = 1e-4
 #: Relative σ of a rate, and of Λ to its largest value, from which it is not determined.
@@ -71,11 +73,13 @@ class Conflict:
 def covariance(jacobian: FloatArray) -> FloatArray:
     """Return the covariance of parameters for residuals of unit σ; infinite where undetermined."""
     lengths = np.linalg.norm(jacobian, axis=0)
-    scaled = jacobian / np.where(lengths > 0, lengths, 1.0)
+    # The inverse square of what is less would be no number.
+    lengths = np.where(lengths > LEAST, lengths, 0.0)
+    scaled = np.where(lengths > 0, jacobian, 0.0) / np.where(lengths > 0, lengths, 1.0)
     _, singular, turned = np.linalg.svd(scaled, full_matrices=True)
     sizes = np.zeros(len(turned))
     sizes[: len(singular)] = singular
-    known = sizes > NO_EFFECT * max(float(sizes.max(initial=0.0)), 1e-300)
+    known = sizes > NO_EFFECT * max(float(sizes.max(initial=0.0)), LEAST)
     inverse = turned[known].T / sizes[known]
     found = inverse @ inverse.T
     unknown = (turned[~known] ** 2).sum(axis=0) > PART_UNKNOWN

@@ -158,7 +158,8 @@ def _refuse_contradiction(
 ) -> None:
     scale = np.abs(wanted[[first, second]]).max()
     if np.abs(wanted[first] - wanted[second]).max() > SAME * scale:
-        mean = (wanted[first] + wanted[second]) / 2
+        # In the unit of files, in which a white card is 1.
+        mean = np.pi * (wanted[first] + wanted[second]) / 2
         raise UsageError(
             f"expected one wish for each place and time, got two different ones at "
             f"{time_s[first]:g} s (keys {first + 1} and {second + 1}); the nearest to both is "

@@ -17,6 +17,8 @@ FloatArray = NDArray[np.float64]
 
 #: Bands in nm of a design of three channels, as wide as its smooth spectra allow.
 EDGES_NM = np.arange(400.0, 701.0, 20.0)
+#: Largest part of a glow that excites it anew in a closed room.
+FADING, TINY = 0.99, 1e-9
 SOURCE = "Designed by labrig from wished-for colours, not measured"
 SMOOTH = (
     "Designed in three channels (linear sRGB): re-radiation, excitation rates and albedo are the "
@@ -76,11 +78,11 @@ def to_material(design: Design, name: str, light: SceneSpectra | None = None) ->
     >>> material.scale, len(material.states[0].reradiation)
     ('relative', 15)
     """
-    if light is not None:
-        material = _in_scene(design, name, light)
-        return _with_provenance(design, material, light)
-    material = _under_own_light(design, name)
-    return _with_provenance(design, material, None)
+    material = _under_own_light(design, name) if light is None else _in_scene(design, name, light)
+    material, factor = _fading(material)
+    differences = written_differences(design, material, light)
+    note = _note(design, factor, float(differences.max()) if design.keys.count else None)
+    return material.model_copy(update={"provenance": Provenance(source=SOURCE, note=note)})
 
 
 def _under_own_light(design: Design, name: str) -> Material:
@@ -144,10 +146,29 @@ def _in_scene(design: Design, name: str, light: SceneSpectra) -> Material:
     )
 
 
-def _with_provenance(design: Design, material: Material, light: SceneSpectra | None) -> Material:
-    differences = written_differences(design, material, light)
-    provenance = Provenance(source=SOURCE, note=_note(design, float(differences.max())))
-    return material.model_copy(update={"provenance": provenance})
+def _fading(material: Material) -> tuple[Material, float]:
+    """Return a material whose glow fades in a closed room of its own, and the factor of its Λ.
+
+    The bands of a design may keep the energy where the spectra in them do not: in weak light a
+    state emits Λ κ in the end, and what comes back is reflected 1/(1 − albedo) times.
+    """
+    assert material.bands_nm is not None
+    assert material.albedo is not None
+    k_e = np.array([state.k_e_per_s for state in material.states])
+    emitted = np.array([state.reradiation for state in material.states])
+    if material.scale == "absolute":
+        # Rates belong to the irradiance of a whole band, else to its mean.
+        k_e = k_e * np.diff(material.bands_nm)
+    lasting = 1 / np.maximum(1 - np.array(material.albedo.value), TINY)
+    among = np.pi * np.einsum("ib,jb->ij", k_e * lasting, emitted)
+    factor = FADING / max(float(np.abs(np.linalg.eigvals(among)).max()), TINY)
+    if factor >= 1:
+        return material, 1.0
+    states = tuple(
+        state.model_copy(update={"reradiation": _numbers(factor * np.array(state.reradiation))})
+        for state in material.states
+    )
+    return material.model_copy(update={"states": states}), factor
 
 
 def written_differences(
@@ -200,7 +221,7 @@ def written_differences(
     return design.differences_to(radiance @ conversion.to_rgb.T)
 
 
-def _note(design: Design, largest_difference: float) -> str:
+def _note(design: Design, factor: float, largest_difference: float | None) -> str:
     notes = []
     if design.bands.edges_nm is None:
         notes.append(SMOOTH)
@@ -210,7 +231,12 @@ def _note(design: Design, largest_difference: float) -> str:
     if unknown:
         notes.append(f"Not determined by the wishes: {', '.join(unknown)}")
     notes += [f"Not possible: {wish}" for wish in design.impossible]
-    notes.append(f"Largest ΔE2000 of a wish: {math.ceil(10 * largest_difference) / 10:g}")
+    if factor < 1:
+        notes.append(
+            f"Its glow is {factor:.2g} of the design's, which would be more light than it takes"
+        )
+    if largest_difference is not None:
+        notes.append(f"Largest ΔE2000 of a wish: {math.ceil(10 * largest_difference) / 10:g}")
     return ". ".join(notes) + "."
 
 

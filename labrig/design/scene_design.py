@@ -52,8 +52,8 @@ class SceneDesign:
         ΔE2000 of all keys in the rendered scene after each round, shape (keys,) each.
     best
         Number of the round that is kept.
-    wished
-        The design that need not keep the energy, for what is not possible.
+    wished, kept
+        The designs under the lamps alone: one that need not keep the energy, and one that does.
     """
 
     wish: Wish
@@ -65,6 +65,7 @@ class SceneDesign:
     rounds: tuple[FloatArray, ...]
     best: int
     wished: Design
+    kept: Design
 
     @property
     def delta_e2000(self) -> FloatArray:
@@ -126,7 +127,7 @@ def solve_in_scene(wish: Wish) -> SceneDesign:
         raise UsageError("expected a wish in a scene, got a light programme; solve it by itself")
     light, spectra = wish.scene, wish.scene.spectra(wish.scene_places)
     wished = wish.solve()
-    design = wished if wished.keeps_energy else wish.solve("kept")
+    kept = design = wished if wished.keeps_energy else wish.solve("kept")
     rounds: list[SceneDesign] = []
     for number in range(1 + AGAIN):
         if number:
@@ -134,7 +135,7 @@ def solve_in_scene(wish: Wish) -> SceneDesign:
         light = light.with_albedo(design.albedo)
         material = to_material(design, wish.file.name, spectra)
         found = SceneDesign(
-            wish, design, light, spectra, material, np.zeros((0, 3)), (), number, wished
+            wish, design, light, spectra, material, np.zeros((0, 3)), (), number, wished, kept
         )
         rgb, spectra = _rendered(found)
         rounds.append(replace(found, rendered_rgb=rgb, rounds=(design.differences_to(rgb),)))

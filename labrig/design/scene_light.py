@@ -411,7 +411,9 @@ def _used(scene: Scene) -> NDArray[np.bool_]:
 
 
 def _require_colours(scene: Scene, bands: DesignBands) -> None:
-    """Refuse lamps that three channels cannot hold."""
+    """Refuse darkness, and lamps that three channels cannot hold."""
+    if not _used(scene).any():
+        raise UsageError(f"{scene.file.name}: expected a lamp that shines at some time, got none")
     if bands.edges_nm is not None:
         return
     for lamp, is_used in zip(scene.lamps(0.0), _used(scene), strict=True):

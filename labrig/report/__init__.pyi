@@ -25,6 +25,7 @@ from .decay_figures import (
 )
 from .design import (
     describe_design as describe_design,
+    describe_energy as describe_energy,
     describe_nearest as describe_nearest,
     draw_design as draw_design,
 )
@@ -75,6 +76,9 @@ from .page import (
 from .phosphor_picture import (
     draw_phosphor as draw_phosphor,
 )
+from .picture_file import (
+    require_picture as require_picture,
+)
 from .renderers import (
     render as render,
 )
@@ -88,7 +92,6 @@ from .run_sections import (
     temperature_sections as temperature_sections,
 )
 from .scene_design import (
-    describe_energy as describe_energy,
     describe_scene_design as describe_scene_design,
     draw_scene_design as draw_scene_design,
 )

@@ -77,6 +77,40 @@ def describe_design(
     )
 
 
+def describe_energy(wished: Design, kept: Design) -> str | None:
+    """Say what it costs that a material emits no more light than it absorbs.
+
+    Parameters
+    ----------
+    wished
+        Design that need not keep the energy.
+    kept
+        The nearest that does.
+
+    Returns
+    -------
+    str or None
+        A line of text; None if the keys are met as well.
+
+    Examples
+    --------
+    >>> from labrig.design import Keys, LightProgramme, solve, three_bands
+    >>> from labrig.report import describe_energy
+    >>> light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    >>> keys = Keys.checked(0, [11.0, 90.0], [[0.01, 0.2, 0.02], [0.005, 0.1, 0.01]])
+    >>> kept = solve(light, keys, three_bands(), energy="kept")
+    >>> describe_energy(solve(light, keys, three_bands()), kept)[:48]
+    '! no more light can be emitted than is absorbed:'
+    """
+    before, after = float(wished.delta_e2000.max()), float(kept.delta_e2000.max())
+    if after < before + SEEN:
+        return None
+    return (
+        f"! no more light can be emitted than is absorbed: ΔE2000 is {after:.1f} at most, and "
+        f"would be {before:.1f} otherwise; fainter keys, or more light before them, can be met"
+    )
+
+
 def describe_nearest(found: NearestMaterial) -> str:
     """Say which measured material comes near, and how near.
 
@@ -157,7 +191,7 @@ def time_text(t_s: float) -> str:
 
 
 def _parameters(design: Design) -> Iterator[str]:
-    width = max(len(each.name) for each in design.estimates)
+    width = max((len(each.name) for each in design.estimates), default=0)
     units = {"1/s": " s⁻¹", "s/sr": " s sr⁻¹", "": ""}
     for each in design.estimates:
         if each.is_determined:

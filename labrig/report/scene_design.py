@@ -7,10 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.design import RGB_TO_Y, Design, SceneDesign
+from labrig.design import RGB_TO_Y, SceneDesign
 from labrig.number_format import rounded
 from labrig.optics import srgb_bytes
-from labrig.report.design import SHOWN_Y, describe_design, draw_curve, draw_patches, time_text
+from labrig.report.design import (
+    SHOWN_Y,
+    describe_design,
+    describe_energy,
+    draw_curve,
+    draw_patches,
+    time_text,
+)
 from labrig.report.figure_style import INK, figure_style
 from labrig.report.picture_file import require_picture, save_picture
 
@@ -24,36 +31,6 @@ FloatArray = NDArray[np.float64]
 MOST_FRAMES = 6
 #: Part of the pixels that may be brighter than white where no key says how bright a frame is.
 UNCLIPPED_PER_CENT = 99.0
-
-
-def describe_energy(wished: Design) -> str:
-    """Say that a design would not keep the energy, which the nearest to it does.
-
-    Parameters
-    ----------
-    wished
-        Design that emits more light than it absorbs.
-
-    Returns
-    -------
-    str
-        A line of text.
-
-    Examples
-    --------
-    >>> from labrig.design import Keys, LightProgramme, solve, three_bands
-    >>> from labrig.report import describe_energy
-    >>> light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
-    >>> keys = Keys.checked(0, [11.0, 90.0], [[0.01, 0.2, 0.02], [0.005, 0.1, 0.01]])
-    >>> wished = solve(light, keys, three_bands())
-    >>> if not wished.keeps_energy:
-    ...     print(describe_energy(wished).split(";")[0])
-    ! a material with ΔE2000 up to 0.0 would emit more light than it absorbs
-    """
-    return (
-        f"! a material with ΔE2000 up to {wished.delta_e2000.max():.1f} would emit more light than "
-        "it absorbs; this is the nearest that does not"
-    )
 
 
 def describe_scene_design(found: SceneDesign) -> str:
@@ -137,8 +114,8 @@ def draw_scene_design(found: SceneDesign, path: Path) -> None:
 
 
 def _in_the_scene(found: SceneDesign) -> Iterator[str]:
-    if not found.wished.keeps_energy:
-        yield describe_energy(found.wished)
+    if cost := describe_energy(found.wished, found.kept):
+        yield cost
     for number, residuals in enumerate(found.rounds):
         values = ", ".join(f"{each:.1f}" for each in residuals)
         kept = ", which is kept" if number == found.best and len(found.rounds) > 1 else ""

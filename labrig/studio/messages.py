@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.design import RGB_TO_Y, Design, Parameters, Wish, WishFile
+from labrig.design import RGB_TO_Y, Design, Estimate, Parameters, Wish, WishFile
 from labrig.finite import NotNegative, Positive, UnitFraction
 from labrig.studio.timeline import timeline_of
 from labrig.yaml_file import validate
@@ -17,6 +17,10 @@ FloatArray = NDArray[np.float64]
 
 #: Name of the page in messages about what it sent.
 SOURCE = "the page"
+#: Pairs of keys that are named, and the ΔE2000 from which a key is not met.
+MOST_CONFLICTS, SEEN = 3, 1.0
+#: Most states and bands of a material that is set by hand.
+MOST_STATES, MOST_BANDS = 2, 100
 #: Digits of the numbers that are sent.
 DIGITS = 5
 
@@ -32,10 +36,10 @@ class SetByHand(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    k_r_per_s: tuple[Positive, ...]
-    k_e_per_s: tuple[tuple[NotNegative, ...], ...]
-    reradiation: tuple[tuple[NotNegative, ...], ...]
-    albedo: tuple[UnitFraction, ...]
+    k_r_per_s: Annotated[tuple[Positive, ...], Field(max_length=MOST_STATES)]
+    k_e_per_s: Annotated[tuple[tuple[NotNegative, ...], ...], Field(max_length=MOST_STATES)]
+    reradiation: Annotated[tuple[tuple[NotNegative, ...], ...], Field(max_length=MOST_STATES)]
+    albedo: Annotated[tuple[UnitFraction, ...], Field(max_length=MOST_BANDS)]
     order: Positive = 1.0
 
     def parameters(self) -> Parameters:
@@ -116,21 +120,55 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
             {"name": name, "rgb": _numbers(own), "card": _numbers(lit)}
             for name, own, lit in zip(wish.places, rgb, card.reshape(rgb.shape), strict=True)
         ],
-        "parameters": {
-            "k_r_per_s": _numbers(design.k_r_per_s),
-            "k_e_per_s": _numbers(design.k_e_per_s),
-            "reradiation": _numbers(design.reradiation),
-            "albedo": _numbers(design.albedo),
-            "order": design.order,
-        },
-        "open": [each.name for each in design.estimates if not each.is_determined],
+        "parameters": parameters_content(design),
+        "open": [name for name, each in _estimates(design) if not each.is_determined],
         "sigma": {
-            each.name: _number(each.sigma) for each in design.estimates if each.is_determined
+            name: _number(each.sigma) for name, each in _estimates(design) if each.is_determined
         },
         "keys": _keys(design),
         "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
-        "conflicts": [[fight.key, fight.other] for fight in design.conflicts],
+        "conflicts": _conflicts(design),
     }
+
+
+def parameters_content(design: Design) -> dict[str, Any]:
+    """Return the parameters of a design as the page sends them back, see `SetByHand`."""
+    return {
+        "k_r_per_s": _numbers(design.k_r_per_s),
+        "k_e_per_s": _numbers(design.k_e_per_s),
+        "reradiation": _numbers(design.reradiation),
+        "albedo": _numbers(design.albedo),
+        "order": design.order,
+    }
+
+
+def _estimates(design: Design) -> list[tuple[str, Estimate]]:
+    """Return the estimates by the names of single bands: those lit in proportion share one."""
+    found = []
+    for each in design.estimates:
+        symbol, *rest = each.name.split(" ", 1)
+        joined = rest[0] if rest else ""
+        state, _, names = joined.partition(" ") if joined[:1].isdecimal() else ("", "", joined)
+        own = [symbol, state] if state else [symbol]
+        if symbol != "k_e" or (design.n_states > 1 and not names):
+            found.append((each.name, each))
+        elif " … " in names:
+            first, last = (design.bands.names.index(name) for name in names.split(" … "))
+            members = design.bands.names[first : last + 1]
+            found += [(" ".join([*own, name]), each) for name in members]
+        else:
+            found += [(" ".join([*own, name]), each) for name in names.split(" + ")]
+    return found
+
+
+def _conflicts(design: Design) -> list[list[int]]:
+    """Return pairs of keys that work against each other, each once, and not if both are met."""
+    pairs: list[list[int]] = []
+    for fight in design.conflicts:
+        pair = sorted((fight.key, fight.other))
+        if pair not in pairs and design.delta_e2000[pair].max() >= SEEN:
+            pairs.append(pair)
+    return pairs[:MOST_CONFLICTS]
 
 
 def _keys(design: Design) -> list[dict[str, Any]]:

@@ -1,16 +1,21 @@
 """Answers to the page about a material in a scene: its picture, and designs for dots on it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from labrig.design import (
+    PLACEHOLDER,
+    RGB_TO_Y,
     Design,
     Keys,
+    SceneDesign,
     SceneLight,
     SceneWish,
     Wish,
@@ -25,8 +30,9 @@ from labrig.errors import UsageError
 from labrig.finite import Finite, UnitFraction
 from labrig.material import Material
 from labrig.optics import srgb_bytes
-from labrig.reproduce import load_scene
-from labrig.studio.messages import SOURCE, Asked, wish_content
+from labrig.report import describe_energy
+from labrig.reproduce import load_scene, read_scene
+from labrig.studio.messages import SOURCE, Asked, parameters_content, wish_content
 from labrig.studio.workbench import Workbench
 from labrig.yaml_file import validate
 
@@ -43,7 +49,8 @@ MOST_LIGHTS = 4
 ALBEDO = 0.6
 #: Percentile of the picture's luminance that automatic exposure shows so bright.
 PERCENTILE, EXPOSED = 97.0, 0.7
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+#: Bands of the scene that are one of the design, where three channels do not hold its lamps.
+MERGED = 2
 
 
 class PictureAsked(Asked):
@@ -58,7 +65,7 @@ class PictureAsked(Asked):
     """
 
     t_s: Finite
-    exposure_ev: Finite | None = None
+    exposure_ev: Annotated[float, Field(ge=-60, le=60)] | None = None
 
 
 class PointAsked(Asked):
@@ -93,6 +100,15 @@ class Picture:
     exposure: float
 
 
+@dataclass(frozen=True)
+class Size:
+    """How finely a scene is traced, and the luminance of its white in cd/m², None by the scene."""
+
+    width_px: int
+    paths: int
+    white: float | None
+
+
 class SceneBench(Workbench):
     """What answers a page about a material in a scene, whose light is traced once.
 
@@ -114,28 +130,51 @@ class SceneBench(Workbench):
     def __init__(
         self, scene: str, material: str | None = None, width_px: int = WIDTH_PX, paths: int = PATHS
     ) -> None:
-        self._width_px, self._paths = width_px, paths
-        self._scene = scene
-        self._material = material or _only_glowing(scene)
-        self._white: float | None = None
-        self._of_bands: dict[tuple[float, ...] | None, SceneLight] = {}
-        self._lights: dict[object, SceneLight] = {}
-        first = self._traced(None)
-        self._white, self._built = first.white_cd_per_m2, first.scene
         super().__init__()
+        self._scene = str(Path(scene).resolve()) if Path(scene).suffix else scene
+        self._material = material or _only_glowing(scene)
+        self._size = Size(width_px, paths, None)
+        self._traced_lights: dict[object, SceneLight] = {}
+        self._lights: dict[object, SceneLight] = {}
+        self._again: tuple[str, SceneDesign] | None = None
+        self._edges_nm, first = self._first()
+        self._size = Size(width_px, paths, first.white_cd_per_m2)
+        self._built = first.scene
+
+    def _first(self) -> tuple[tuple[float, ...] | None, SceneLight]:
+        """Return the bands that hold the lamps' colours, three or some of wavelengths, and light.
+
+        Of lamps that no eye sees nothing says what white is: 1 cd/m².
+        """
+        entry = read_scene(self._scene)[0].bands
+        step_nm = (entry.last_nm - entry.first_nm) / entry.count
+        edges = tuple(
+            entry.first_nm + MERGED * step_nm * n for n in range(entry.count // MERGED + 1)
+        )
+        tried: list[tuple[tuple[float, ...] | None, float | None]]
+        tried = [(None, None), (edges, None), (edges, 1.0)]
+        for number, (bands_nm, white) in enumerate(tried):
+            try:
+                return bands_nm, self._traced(bands_nm, replace(self._size, white=white))
+            except UsageError as error:
+                is_about_light = "bands_nm" in str(error) or "white_cd_per_m2" in str(error)
+                if not is_about_light or number == len(tried) - 1:
+                    raise
+        raise AssertionError("the last try returns or raises")
 
     def start(self) -> dict[str, Any]:
         """Return the wish with which a page begins: the scene and its light, and no dot."""
         content = {
             "name": self._material,
             "albedo": ALBEDO,
+            "bands_nm": self._edges_nm,
             "scene": {
                 "file": self._scene,
                 "material": self._material,
-                "white_cd_per_m2": self._white,
+                "white_cd_per_m2": self._size.white,
                 "programme": [part.model_dump() for part in self._built.file.programme],
-                "width_px": self._width_px,
-                "paths": self._paths,
+                "width_px": self._size.width_px,
+                "paths": self._size.paths,
             },
             "pixels": {},
         }
@@ -150,19 +189,23 @@ class SceneBench(Workbench):
             It is malformed, or of another scene or material.
         """
         content = super().take(file, source)
-        content["scene"] = self.start()["scene"] | content["scene"]
+        content["scene"] = self.start()["scene"] | content["scene"] | {"file": self._scene}
         return content
 
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the wishes, and what the page has to know of the scene."""
-        camera = self._built.file.camera
-        return super().look(content) | {
+        answered = super().look(content)
+        _, wish = self.design(content)
+        assert wish.scene is not None
+        camera = wish.scene.scene.file.camera
+        return answered | {
             "scene": {
                 "material": self._material,
                 "lamps": list(self._built.file.lamps),
                 "width_px": camera.width_px,
                 "height_px": camera.height_px,
-            }
+            },
+            "is_rendered_again": self._found_again(Asked.of(content)) is not None,
         }
 
     def picture_of_scene(self, content: Mapping[str, Any]) -> Picture:
@@ -180,7 +223,7 @@ class SceneBench(Workbench):
         if asked.exposure_ev is not None:
             exposure = 2.0**asked.exposure_ev
         else:
-            bright = float(np.percentile(rgb @ LUMINANCE, PERCENTILE))
+            bright = float(np.percentile(rgb @ RGB_TO_Y, PERCENTILE))
             exposure = EXPOSED / bright if bright > 0 else 1.0
         good, png = cv2.imencode(".png", srgb_bytes(exposure * rgb)[..., ::-1])
         assert good
@@ -202,22 +245,37 @@ class SceneBench(Workbench):
         return [float(x) for x in np.pi * there.rgb_at(0, [asked.t_s])[0]]
 
     def again(self, content: Mapping[str, Any]) -> dict[str, Any]:
-        """Design again in the light that the glow itself adds, and render the scene with it."""
-        found = solve_in_scene(self._wish(Asked.of(content).file(), SOURCE))
+        """Design again in the light that the glow itself adds, and render the scene with it.
+
+        The answer has the parameters found; a question with them gets that material.
+        """
+        asked = Asked.of(content)
+        found = solve_in_scene(self._wish(asked.file(), SOURCE))
         lines = [
             f"Round {number}: ΔE2000 {float(each.max()):.1f} at most, {float(each.mean()):.1f} in "
             f"the mean{', which is kept' if number == found.best + 1 else ''}"
             for number, each in enumerate(found.rounds, start=1)
         ]
-        design = found.design
-        parameters = {
-            "k_r_per_s": design.k_r_per_s.tolist(),
-            "k_e_per_s": design.k_e_per_s.tolist(),
-            "reradiation": design.reradiation.tolist(),
-            "albedo": design.albedo.tolist(),
-            "order": design.order,
-        }
-        return {"lines": lines, "parameters": parameters}
+        if cost := describe_energy(found.wished, found.kept):
+            lines.append(cost.removeprefix("! "))
+        by_hand = parameters_content(found.design)
+        same = Asked.of({"wish": asked.wish, "by_hand": by_hand})
+        self._again, self._last = (same.model_dump_json(exclude={"is_draft"}), found), None
+        return {"lines": lines, "parameters": by_hand}
+
+    def _found_again(self, asked: Asked) -> SceneDesign | None:
+        """Return the design in its own light, if the page asks for that."""
+        is_it = self._again is not None and self._again[0] == asked.model_dump_json(
+            exclude={"is_draft"}
+        )
+        return self._again[1] if is_it and self._again is not None else None
+
+    def _designed(self, asked: Asked) -> tuple[Design, Wish]:
+        found = self._found_again(asked)
+        if found is None:
+            return super()._designed(asked)
+        self._energy = None
+        return found.design, found.wish
 
     def _wish(self, file: WishFile, source: str) -> Wish:
         if file.scene is None:
@@ -225,7 +283,9 @@ class SceneBench(Workbench):
                 f"{source}: expected keys in a scene, got some on patches; design there: labrig "
                 "design --open FILE"
             )
-        if (file.scene.file, file.scene.material) != (self._scene, self._material):
+        # A file that was moved names its scene by a path that is not there any more.
+        is_same = Path(file.scene.file).name == Path(self._scene).name
+        if not is_same or file.scene.material != self._material:
             raise UsageError(
                 f"{source}: expected '{self._material}' of {self._scene}, got "
                 f"'{file.scene.material}' of {file.scene.file}; design it there: labrig design "
@@ -240,34 +300,54 @@ class SceneBench(Workbench):
         return Wish(file, light.bands, programme, Keys.none(), (BRIGHTEST,), light, (brightest,))
 
     def _light_for(self, file: WishFile, scene: SceneWish) -> SceneLight:
-        """Return the light in the bands, by the lamps and with the albedo of a wish."""
-        albedo = ALBEDO if isinstance(file.albedo, str) else file.albedo
-        key = (file.bands_nm, scene.model_dump_json(), albedo)
-        if key not in self._lights:
-            while len(self._lights) >= MOST_LIGHTS:
-                self._lights.pop(next(iter(self._lights)))
-            light = self._traced(file.bands_nm)
+        """Return the light in the bands and white, by the lamps and with the albedo of a wish."""
+        albedo = PLACEHOLDER if isinstance(file.albedo, str) else file.albedo
+        size = Size(
+            scene.width_px or self._size.width_px,
+            scene.paths or self._size.paths,
+            scene.white_cd_per_m2 or self._size.white,
+        )
+
+        def lit() -> SceneLight:
+            light = self._traced(file.bands_nm, size)
             if scene.programme is not None:
                 light = light.with_programme(scene.programme)
-            self._lights[key] = light.with_albedo(albedo)
-        return self._lights[key]
+            return light.with_albedo(albedo)
 
-    def _traced(self, edges_nm: tuple[float, ...] | None) -> SceneLight:
-        """Return the light in bands of a design, in the same white."""
-        if edges_nm not in self._of_bands:
-            self._of_bands[edges_nm] = SceneLight.of(
+        return _kept(self._lights, (file.bands_nm, scene.model_dump_json(), albedo), lit)
+
+    def _traced(self, edges_nm: tuple[float, ...] | None, size: Size) -> SceneLight:
+        """Return the light by the scene's own lamps."""
+
+        def traced() -> SceneLight:
+            return SceneLight.of(
                 self._scene,
                 self._material,
-                white_cd_per_m2=self._white,
+                white_cd_per_m2=size.white,
                 bands=three_bands() if edges_nm is None else spectral_bands(edges_nm),
-                width_px=self._width_px,
-                paths=self._paths,
+                width_px=size.width_px,
+                paths=size.paths,
             )
-        return self._of_bands[edges_nm]
+
+        return _kept(self._traced_lights, (edges_nm, size), traced)
 
     def _material_of(self, design: Design, wish: Wish) -> Material:
+        if self._again is not None and self._again[1].design is design:
+            return self._again[1].material
         assert wish.scene is not None
         return to_material(design, wish.file.name, wish.scene.spectra(wish.scene_places))
+
+
+def _kept(
+    lights: dict[object, SceneLight], key: object, make: Callable[[], SceneLight]
+) -> SceneLight:
+    """Return light that was made before, or make it; the oldest is forgotten."""
+    if key not in lights:
+        made = make()
+        while len(lights) >= MOST_LIGHTS:
+            lights.pop(next(iter(lights)))
+        lights[key] = made
+    return lights[key]
 
 
 def _without_question(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Server of the page of `labrig design`, for browsers on this PC only."""
 
+import json
 import threading
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
@@ -38,10 +39,6 @@ PAGES: Mapping[str, Path] = {
         )
     },
 }
-
-
-#: What only a page about a scene asks for.
-SCENE_PATHS = ("scene.png", "seen", "again")
 
 
 class StudioServer(LocalServer):
@@ -89,32 +86,42 @@ class _Conversation(LocalConversation):
         """Answer a question of the page."""
         bench, content = self.server.workbench, self.json_object(body)
         with self.server.turn:
-            if path == "look":
-                self.send_json(HTTPStatus.OK, bench.look(content))
-            elif path == "open":
-                self.send_json(HTTPStatus.OK, {"wish": bench.open(_text(content))})
-            elif isinstance(bench, SceneBench) and path in SCENE_PATHS:
-                self._answer_of_scene(bench, path, content)
-            elif path == "nearest":
-                self.send_json(HTTPStatus.OK, {"nearest": bench.nearest(content)})
-            elif path == "material.yaml":
-                self.send(HTTPStatus.OK, "application/yaml", bench.material(content).encode())
-            elif path == "constraints.yaml":
-                self.send(HTTPStatus.OK, "application/yaml", bench.constraints(content).encode())
-            elif path == "picture.png":
-                self.send(HTTPStatus.OK, "image/png", bench.picture(content))
-            else:
-                self.refuse(HTTPStatus.NOT_FOUND, "no such thing here")
+            kind, data, more = _answer(bench, path, content)
+        if data is None:
+            self.refuse(HTTPStatus.NOT_FOUND, "no such thing here")
+        else:
+            self.send(HTTPStatus.OK, kind, data, more)
 
-    def _answer_of_scene(self, bench: SceneBench, path: str, content: Mapping[str, Any]) -> None:
+
+def _answer(
+    bench: Workbench, path: str, content: Mapping[str, Any]
+) -> tuple[str, bytes | None, Mapping[str, str]]:
+    """Return kind, data and headers of an answer to the page; no data of what nobody knows."""
+    if isinstance(bench, SceneBench):
         if path == "scene.png":
             picture = bench.picture_of_scene(content)
-            more = {"X-Exposure": repr(picture.exposure)}
-            self.send(HTTPStatus.OK, "image/png", picture.png, more)
-        elif path == "seen":
-            self.send_json(HTTPStatus.OK, {"rgb": bench.seen(content)})
-        else:
-            self.send_json(HTTPStatus.OK, bench.again(content))
+            return "image/png", picture.png, {"X-Exposure": repr(picture.exposure)}
+        if path == "seen":
+            return _as_json({"rgb": bench.seen(content)})
+        if path == "again":
+            return _as_json(bench.again(content))
+    if path == "look":
+        return _as_json(bench.look(content))
+    if path == "open":
+        return _as_json({"wish": bench.open(_text(content))})
+    if path == "nearest":
+        return _as_json({"nearest": bench.nearest(content)})
+    if path == "material.yaml":
+        return "application/yaml", bench.material(content).encode(), {}
+    if path == "constraints.yaml":
+        return "application/yaml", bench.constraints(content).encode(), {}
+    if path == "picture.png":
+        return "image/png", bench.picture(content), {}
+    return "", None, {}
+
+
+def _as_json(content: Mapping[str, Any]) -> tuple[str, bytes, Mapping[str, str]]:
+    return "application/json", json.dumps(content).encode(), {}
 
 
 def _text(content: Mapping[str, Any]) -> str:
@@ -174,7 +181,9 @@ def design_on_page(
     """
     wished = None if start is None else read_model(start, WishFile)
     if wished is not None and wished.scene is not None:
-        scene, material = scene or wished.scene.file, material or wished.scene.material
+        named = wished.scene.file
+        beside = str(start.parent / named) if start and Path(named).suffix else named
+        scene, material = scene or beside, material or wished.scene.material
     workbench = Workbench() if scene is None else SceneBench(scene, material)
     first = workbench.start() if wished is None else workbench.take(wished, str(start))
     with StudioServer(workbench, first, port) as server, server.running():

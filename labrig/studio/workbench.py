@@ -105,6 +105,8 @@ class Workbench:
     def picture(self, content: Mapping[str, Any]) -> bytes:
         """Return a figure of a design over time as a PNG."""
         design, wish = self.design(content)
+        if not wish.keys.count:
+            raise UsageError("expected at least one key to be drawn, got none")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "design.png"
             draw_design(design, wish.places, path)
@@ -131,10 +133,12 @@ class Workbench:
             given = asked.by_hand.parameters()
         elif wish.keys.count:
             wished = wish.solve()
-            if wished.keeps_energy:
+            # While a hand drags, a quick answer matters more than the energy.
+            if wished.keeps_energy or asked.is_draft:
                 return wished, wish
-            self._energy = describe_energy(wished).removeprefix("! ")
-            return wished if asked.is_draft else wish.solve("kept"), wish
+            kept = wish.solve("kept")
+            self._energy = (describe_energy(wished, kept) or "").removeprefix("! ") or None
+            return kept, wish
         else:
             given = _to_begin_with(wish.bands, wish.file)
         weights = wish.file.weights

@@ -64,8 +64,9 @@ def glow(design: Design, path: Path) -> np.ndarray:
 @pytest.mark.parametrize("n_states", [1, 2])
 def test_three_channels_become_spectra_that_look_the_same(tmp_path: Path, n_states: int) -> None:
     truth = Truth.of([0.2, 0.01], [[0.004, 0.02, 0.1], [0.001, 0.01, 0.05]],
-                     [[0.01, 0.2, 0.5], [0.5, 2.0, 0.3]], [0.5, 0.3, 0.2])  # fmt: skip
-    design = solve(DAY, keys_of(truth, DAY, TIMES_S), THREE, n_states=n_states)
+                     [[0.002, 0.04, 0.1], [0.1, 0.4, 0.06]], [0.5, 0.3, 0.2])  # fmt: skip
+    keys = keys_of(truth, DAY, TIMES_S)
+    design = solve(DAY, keys, THREE, n_states=n_states, energy="kept")
     rendered = glow(design, tmp_path / "made.yaml")
     difference = differences(design.got_rgb, rendered)
     assert difference.max() < 2
@@ -115,3 +116,18 @@ def test_without_light_there_is_no_material() -> None:
     design = solve(dark, Keys.checked(0, [1.0], [[0.0, 0.0, 0.0]]), THREE)
     with pytest.raises(DataError, match="light"):
         to_material(design, "dark")
+
+
+def test_what_would_never_fade_is_written_weaker() -> None:
+    # In its bands it may glow with more light than it takes.
+    keys = Keys.checked(0, [101.0, 160.0], [[0.0, 0.3, 0.1], [0.0, 0.1, 0.03]])
+    design = solve(DAY, keys, THREE, albedo=0.5)
+    assert not design.keeps_energy
+    material = to_material(design, "bright")
+    k_e = np.array([state.k_e_per_s for state in material.states])
+    emitted = np.array([state.reradiation for state in material.states])
+    among = np.pi * 2 * k_e @ emitted.T
+    assert np.abs(np.linalg.eigvals(among)).max() == pytest.approx(0.99, abs=0.02)
+    assert material.provenance is not None
+    assert "more light than it takes" in (material.provenance.note or "")
+    assert written_differences(design, material).max() > 2

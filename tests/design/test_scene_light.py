@@ -184,7 +184,7 @@ MOVED = {"wall": {"material": "wall", "rectangle": {**FLOOR, "parts": 8},
         ({"objects": MOVED, "step_s": 1.0}, "paint", "nothing moves"),
         ({"materials": {"paint": {"albedo": 0.4, "levels": 0.5}, "wall": {"albedo": 0.6}}},
          "paint", "begin empty"),
-        ({"programme": [{"at_s": -300, "lamps": {"sun": 0}}]}, "paint", "no light"),
+        ({"programme": [{"at_s": -300, "lamps": {"sun": 0}}]}, "paint", "a lamp that shines"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_designed_is_said(
