@@ -107,21 +107,35 @@ class SpreadDesign:
         """
         times = np.asarray(time_s, dtype=np.float64)
         places = np.broadcast_to(np.asarray(place, dtype=np.intp), times.shape)
-        light = self.spectra
-        per_band = LightProgramme(light.begin_s, light.irradiance * np.diff(light.edges_nm))
-        falling = LightProgramme(light.begin_s, light.irradiance).at(places, times)
-        radiance = np.zeros_like(falling)
+        found = np.zeros((len(times), 3))
         for number in np.unique(places).tolist():
             own = places == number
-            made = self.material_at(number)
-            assert made.albedo is not None
-            glow = material_radiance(made, per_band, number, times[own])
-            radiance[own] = glow + falling[own] * made.albedo.value / np.pi
-        return light.rgb(radiance) / np.pi
+            made = self.material_at(self.texel_of(number))
+            found[own] = _rgb(made, self.spectra, number, times[own])
+        return found
 
-    def material_at(self, place: int) -> Material:
-        """Return the material of the texel of a place of the wish, in the units of the scene."""
-        row, column = self.texel_of(place)
+    def rgb_seen(self, x: float, y: float, time_s: ArrayLike) -> FloatArray:
+        """Return linear sRGB per sr, as `rgb_at`, of what the picture shows somewhere.
+
+        Parameters
+        ----------
+        x, y
+            As of `SceneLight.place_at`.
+        time_s
+            Times in s, shape (n,).
+
+        Raises
+        ------
+        UsageError
+            Something else than the material is seen there.
+        """
+        place = self.light.place_at(x, y)
+        made = self.material_at(_texels(self.light, [place])[0])
+        times = np.asarray(time_s, dtype=np.float64)
+        return _rgb(made, self.light.spectra([place]), 0, times)
+
+    def material_at(self, texel: Texel) -> Material:
+        """Return the material of a texel, in the units of the scene."""
         texture, base = self.texture, self.material
         assert texture.k_r_per_s is not None
         assert texture.k_e_per_s is not None
@@ -137,18 +151,22 @@ class SpreadDesign:
             )
             for state, k_r, k_e, emitted in zip(
                 base.states,
-                texture.k_r_per_s[row, column],
-                texture.k_e_per_s[row, column],
-                texture.reradiation[row, column],
+                texture.k_r_per_s[texel],
+                texture.k_e_per_s[texel],
+                texture.reradiation[texel],
                 strict=True,
             )
         )
         albedo = base.albedo
         if texture.albedo_factor is not None:
-            factor = float(texture.albedo_factor[row, column])
+            factor = float(texture.albedo_factor[texel])
             values = tuple(factor * each for each in albedo.value)
             albedo = albedo.model_copy(update={"value": values})
         return base.model_copy(update={"states": states, "albedo": albedo})
+
+    def rendered(self) -> "SpreadDesign":
+        """Return it with what the keys look like where the glow lights its surroundings, too."""
+        return replace(self, rendered_rgb=_rendered(self)[0])
 
     @property
     def rendered_delta_e2000(self) -> FloatArray:
@@ -273,7 +291,9 @@ def _rendered(found: SpreadDesign) -> tuple[FloatArray, SceneSpectra]:
     light = found.light
     renderer = light.renderer(found.material, found.texture)
     places = range(len(found.wish.places))
-    albedo = np.array([light.albedo_of(found.material_at(place)) for place in places])
+    albedo = np.array(
+        [light.albedo_of(found.material_at(found.texel_of(place))) for place in places]
+    )
     return rendered_at_keys(found.wish, light, renderer, albedo, found.spectra)
 
 
@@ -364,6 +384,17 @@ class Spreading:
             self._shares = np.concatenate([of_dots, np.maximum(rest, 0.0)], axis=-1)
             self._key = key
         return self._shares
+
+
+def _rgb(material: Material, light: SceneSpectra, place: int, time_s: FloatArray) -> FloatArray:
+    """Return linear sRGB per sr of a material at times (n,), of one of the lit places."""
+    assert material.albedo is not None
+    per_band = LightProgramme(light.begin_s, light.irradiance * np.diff(light.edges_nm))
+    falling = LightProgramme(light.begin_s, light.irradiance).at(
+        np.full(len(time_s), place), time_s
+    )
+    radiance = material_radiance(material, per_band, place, time_s)
+    return light.rgb(radiance + falling * material.albedo.value / np.pi) / np.pi
 
 
 def _texels(light: SceneLight, places: Sequence[int]) -> list[Texel]:

@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from labrig.design import RGB_TO_Y, Design, Parameters, Wish, WishFile
+from labrig.design import (
+    RGB_TO_Y,
+    Design,
+    DesignBands,
+    Keys,
+    Parameters,
+    SpreadDesign,
+    Wish,
+    WishFile,
+)
 from labrig.finite import NotNegative, Positive, UnitFraction
 from labrig.studio.timeline import timeline_of
 from labrig.yaml_file import validate
@@ -113,6 +122,38 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
             {"name": name, "rgb": _numbers(own), "card": _numbers(lit)}
             for name, own, lit in zip(wish.places, rgb, card.reshape(rgb.shape), strict=True)
         ],
+        **_material(design),
+        "keys": _judged(design),
+        "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
+        "conflicts": [[fight.key, fight.other] for fight in design.conflicts],
+    }
+
+
+def spread_answer(found: SpreadDesign) -> dict[str, Any]:
+    """Return materials that are spread over a surface, as `answer`, with those of every place."""
+    wish, keys = found.wish, found.wish.keys
+    content = answer(found.base, wish)
+    times = np.array(content["frames_s"])
+    for number, (place, design) in enumerate(zip(content["places"], found.of_places, strict=True)):
+        place["rgb"] = _numbers(np.pi * found.rgb_at(number, times))
+        place["material"] = _material(design)
+    impossible, conflicts = [], []
+    for design in {id(each): each for each in found.of_places if each is not found.base}.values():
+        own = np.flatnonzero(np.isin(keys.place, design.keys.place)).tolist()
+        impossible += [
+            {"keys": [own[key] for key in each.keys], "text": str(each)}
+            for each in design.impossible
+        ]
+        conflicts += [[own[fight.key], own[fight.other]] for fight in design.conflicts]
+    return content | {
+        "keys": _keys(keys, wish.bands, found.rgb, found.delta_e2000),
+        "impossible": impossible,
+        "conflicts": conflicts,
+    }
+
+
+def _material(design: Design) -> dict[str, Any]:
+    return {
         "parameters": {
             "k_r_per_s": _numbers(design.k_r_per_s),
             "k_e_per_s": _numbers(design.k_e_per_s),
@@ -124,16 +165,19 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
         "sigma": {
             each.name: _number(each.sigma) for each in design.estimates if each.is_determined
         },
-        "keys": _keys(design),
-        "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
-        "conflicts": [[fight.key, fight.other] for fight in design.conflicts],
     }
 
 
-def _keys(design: Design) -> list[dict[str, Any]]:
+def _judged(design: Design) -> list[dict[str, Any]]:
     if not design.keys.count:
         return []
-    wanted, got = np.pi * design.keys.rgb(design.bands), np.pi * design.got_rgb
+    return _keys(design.keys, design.bands, design.got_rgb, design.delta_e2000)
+
+
+def _keys(
+    keys: Keys, bands: DesignBands, got_rgb: FloatArray, delta_e2000: FloatArray
+) -> list[dict[str, Any]]:
+    wanted, got = np.pi * keys.rgb(bands), np.pi * got_rgb
     return [
         {
             "place": int(place),
@@ -144,7 +188,7 @@ def _keys(design: Design) -> list[dict[str, Any]]:
             "delta_e": round(float(difference), 2),
         }
         for place, time_s, first, second, difference in zip(
-            design.keys.place, design.keys.time_s, wanted, got, design.delta_e2000, strict=True
+            keys.place, keys.time_s, wanted, got, delta_e2000, strict=True
         )
     ]
 

@@ -1,7 +1,9 @@
 """Answers to the page about a material in a scene: its picture, and designs for dots on it."""
 
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -14,6 +16,8 @@ from labrig.design import (
     Keys,
     SceneLight,
     SceneWish,
+    SpreadDesign,
+    Spreading,
     Wish,
     WishFile,
     solve_in_scene,
@@ -24,10 +28,11 @@ from labrig.design import (
 )
 from labrig.errors import UsageError
 from labrig.finite import Finite, UnitFraction
-from labrig.material import Material
+from labrig.material import Material, material_text
 from labrig.optics import srgb_bytes
-from labrig.reproduce import load_scene
-from labrig.studio.messages import SOURCE, Asked, SetByHand, wish_content
+from labrig.report import describe_energy, draw_scene_design
+from labrig.reproduce import load_scene, write_parameter_texture
+from labrig.studio.messages import SOURCE, Asked, SetByHand, spread_answer, wish_content
 from labrig.studio.workbench import Workbench
 from labrig.yaml_file import validate
 
@@ -115,6 +120,8 @@ class SceneBench(Workbench):
         Scene file, or the name of a shipped scene.
     material
         Name of the material to be designed; None for the only one that glows.
+    folder
+        Folder to which the path of a picture of the surface is relative.
 
     Raises
     ------
@@ -122,8 +129,10 @@ class SceneBench(Workbench):
         The scene is malformed or moves, or does not say which material is meant.
     """
 
-    def __init__(self, scene: str, material: str | None = None) -> None:
-        self._scene = scene
+    def __init__(self, scene: str, material: str | None = None, folder: Path = Path()) -> None:
+        self._scene, self._folder = scene, folder
+        self._spreading = Spreading()
+        self._spread: tuple[str, SpreadDesign] | None = None
         self._material = material or _only_glowing(scene)
         self._white: float | None = None
         self._of_bands: dict[tuple[float, ...] | None, SceneLight] = {}
@@ -152,7 +161,9 @@ class SceneBench(Workbench):
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the wishes, and what the page has to know of the scene."""
         camera = self._built.file.camera
-        return super().look(content) | {
+        spread = self._spread_of(Asked.of(content))
+        found = super().look(content) if spread is None else _look(spread)
+        return found | {
             "scene": {
                 "material": self._material,
                 "lamps": list(self._built.file.lamps),
@@ -170,9 +181,13 @@ class SceneBench(Workbench):
             The message or the wish is malformed.
         """
         asked = validate(content, PictureAsked, SOURCE)
-        design, wish = self.design(_without_question(content))
-        assert wish.scene is not None
-        rgb = wish.scene.picture(design, asked.t_s)
+        about = _without_question(content)
+        if (spread := self._spread_of(Asked.of(about))) is not None:
+            rgb = spread.picture(asked.t_s)
+        else:
+            design, wish = self.design(about)
+            assert wish.scene is not None
+            rgb = wish.scene.picture(design, asked.t_s)
         if asked.exposure_ev is not None:
             exposure = 2.0**asked.exposure_ev
         else:
@@ -191,7 +206,10 @@ class SceneBench(Workbench):
             Something else is seen there.
         """
         asked = validate(content, PointAsked, SOURCE)
-        design, wish = self.design(_without_question(content))
+        about = _without_question(content)
+        if (spread := self._spread_of(Asked.of(about))) is not None:
+            return [float(x) for x in np.pi * spread.rgb_seen(asked.x, asked.y, [asked.t_s])[0]]
+        design, wish = self.design(about)
         assert wish.scene is not None
         place = wish.scene.place_at(asked.x, asked.y)
         there = replace(design, programme=wish.scene.programme([place]))
@@ -199,6 +217,13 @@ class SceneBench(Workbench):
 
     def again(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Design again in the light that the glow itself adds, and render the scene with it."""
+        if (spread := self._spread_of(Asked.of(content))) is not None:
+            residuals = spread.rendered().rendered_delta_e2000
+            line = (
+                f"Rendered: ΔE2000 {float(residuals.max()):.1f} at most, "
+                f"{float(residuals.mean()):.1f} in the mean"
+            )
+            return {"lines": [line], "parameters": None}
         found = solve_in_scene(self._wish(Asked.of(content).file(), SOURCE))
         lines = [
             f"Round {number}: ΔE2000 {float(each.max()):.1f} at most, {float(each.mean()):.1f} in "
@@ -214,6 +239,49 @@ class SceneBench(Workbench):
             "order": design.order,
         }
         return {"lines": lines, "parameters": parameters}
+
+    def material(self, content: Mapping[str, Any]) -> str:
+        """Return the text of the material file; of several materials that of all keys together."""
+        spread = self._spread_of(Asked.of(content))
+        return super().material(content) if spread is None else material_text(spread.material)
+
+    def texture(self, content: Mapping[str, Any]) -> bytes:
+        """Return the file of the texture of materials that are spread over the surface.
+
+        Raises
+        ------
+        UsageError
+            One material is asked for, or no dot has a key.
+        """
+        spread = self._spread_of(Asked.of(content))
+        if spread is None:
+            raise UsageError("expected keys of dots with a material each, got one material for all")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "texture.npz"
+            write_parameter_texture(path, spread.texture)
+            return path.read_bytes()
+
+    def picture(self, content: Mapping[str, Any]) -> bytes:
+        """Return a figure of a design over time as a PNG."""
+        spread = self._spread_of(Asked.of(content))
+        if spread is None:
+            return super().picture(content)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "design.png"
+            draw_scene_design(spread.rendered(), path)
+            return path.read_bytes()
+
+    def _spread_of(self, asked: Asked) -> SpreadDesign | None:
+        """Return the materials of dots; None where one is for all, or there is no key."""
+        file = asked.file()
+        is_one = file.scene is None or file.scene.spread is None
+        if is_one or asked.by_hand is not None or not file.keys:
+            return None
+        key = asked.model_dump_json()
+        if self._spread is None or self._spread[0] != key:
+            wish = self._wish(file, SOURCE)
+            self._spread = key, self._spreading.solve(wish, self._folder)
+        return self._spread[1]
 
     def _wish(self, file: WishFile, source: str) -> Wish:
         if file.scene is None:
@@ -238,7 +306,7 @@ class SceneBench(Workbench):
     def _light_for(self, file: WishFile, scene: SceneWish) -> SceneLight:
         """Return the light in the bands, by the lamps and with the albedo of a wish."""
         albedo = ALBEDO if isinstance(file.albedo, str) else file.albedo
-        key = (file.bands_nm, scene.model_dump_json(), albedo)
+        key = (file.bands_nm, scene.model_dump_json(exclude={"spread"}), albedo)
         if key not in self._lights:
             while len(self._lights) >= MOST_LIGHTS:
                 self._lights.pop(next(iter(self._lights)))
@@ -264,6 +332,16 @@ class SceneBench(Workbench):
     def _material_of(self, design: Design, wish: Wish) -> Material:
         assert wish.scene is not None
         return to_material(design, wish.file.name, wish.scene.spectra(wish.scene_places))
+
+
+def _look(spread: SpreadDesign) -> dict[str, Any]:
+    """Return the materials of dots as the page shows them, with what takes too much energy."""
+    told = [
+        f"{name}: {describe_energy(wished).removeprefix('! ')}"
+        for name, wished in zip(spread.wish.places, spread.wished, strict=True)
+        if wished is not None
+    ]
+    return spread_answer(spread) | {"energy": "; ".join(told) or None}
 
 
 def _without_question(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -33,6 +33,7 @@ PAGES: Mapping[str, Path] = {
             "studio_material.js",
             "studio_patches.js",
             "studio_scene.js",
+            "studio_spread.js",
             "studio_timeline.js",
             "studio_words.js",
         )
@@ -41,7 +42,7 @@ PAGES: Mapping[str, Path] = {
 
 
 #: What only a page about a scene asks for.
-SCENE_PATHS = ("scene.png", "seen", "again")
+SCENE_PATHS = ("scene.png", "seen", "again", "texture.npz")
 
 
 class StudioServer(LocalServer):
@@ -113,6 +114,8 @@ class _Conversation(LocalConversation):
             self.send(HTTPStatus.OK, "image/png", picture.png, more)
         elif path == "seen":
             self.send_json(HTTPStatus.OK, {"rgb": bench.seen(content)})
+        elif path == "texture.npz":
+            self.send(HTTPStatus.OK, "application/octet-stream", bench.texture(content))
         else:
             self.send_json(HTTPStatus.OK, bench.again(content))
 
@@ -175,7 +178,8 @@ def design_on_page(
     wished = None if start is None else read_model(start, WishFile)
     if wished is not None and wished.scene is not None:
         scene, material = scene or wished.scene.file, material or wished.scene.material
-    workbench = Workbench() if scene is None else SceneBench(scene, material)
+    folder = Path() if start is None else start.parent
+    workbench = Workbench() if scene is None else SceneBench(scene, material, folder)
     first = workbench.start() if wished is None else workbench.take(wished, str(start))
     with StudioServer(workbench, first, port) as server, server.running():
         tell(server.url)
