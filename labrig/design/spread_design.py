@@ -35,6 +35,8 @@ Texel: TypeAlias = tuple[int, int]
 UNSEEN = 2e-3
 #: How strongly rates of dots stay as the base's, and rates that do not change at all.
 HELD, FIXED = 1e-3, 1e3
+#: What is emitted over what is absorbed from which on it is all.
+ALL = 0.999
 #: Materials of dots that are kept from one wish to the next.
 MOST_KEPT = 64
 #: Largest albedo of a texel: light has to be lost at every bounce.
@@ -184,22 +186,16 @@ class SpreadDesign:
             own[texel] = wish.solve("kept", spectra.programme, before, keys, albedo, held=HELD)
         return _blended(wish, self.base, own, self.shares, self.light, spectra)
 
-    @cached_property
-    def wished(self) -> tuple[Design | None, ...]:
-        """Material of each place that would meet its keys better, but emit more than it absorbs.
-
-        None where there is no such material.
-        """
-        found: list[Design | None] = []
-        for design in self.of_places:
-            free = None
-            if design is not self.base and design.cost > _unseen(design.keys):
-                free = self.wish.solve(
-                    "free", design.programme, keys=design.keys, albedo=design.albedo
-                )
-            is_better = free is not None and free.cost + _unseen(design.keys) < design.cost
-            found.append(free if is_better else None)
-        return tuple(found)
+    @property
+    def short_of_energy(self) -> tuple[int, ...]:
+        """Places that miss their keys and give back all the light that they absorb."""
+        return tuple(
+            place
+            for place, design in enumerate(self.of_places)
+            if design is not self.base
+            and design.cost > _unseen(design.keys)
+            and design.emitted_over_absorbed_at_most > ALL
+        )
 
     def design_at(self, place: int) -> Design:
         """Return the material of a place of the wish, with all keys."""

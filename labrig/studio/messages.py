@@ -108,20 +108,11 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
 
     A colour is linear R, G, B; 1, 1, 1 is a white card under D65 of strength 1.
     """
-    timeline = timeline_of(wish)
-    n_frames = len(timeline.frames_s)
-    places = np.repeat(np.arange(len(wish.places)), n_frames)
-    times = np.tile(timeline.frames_s, len(wish.places))
-    rgb = np.pi * design.rgb_at(places, times).reshape(len(wish.places), n_frames, 3)
-    card = wish.programme.at(places, times) @ wish.bands.to_rgb.T
+    n_places, times = len(wish.places), timeline_of(wish).frames_s
+    places = np.repeat(np.arange(n_places), len(times))
+    rgb = design.rgb_at(places, np.tile(times, n_places)).reshape(n_places, len(times), 3)
     return {
-        "frames_s": _numbers(timeline.frames_s),
-        "first": timeline.first,
-        "bands": wish.bands.names,
-        "places": [
-            {"name": name, "rgb": _numbers(own), "card": _numbers(lit)}
-            for name, own, lit in zip(wish.places, rgb, card.reshape(rgb.shape), strict=True)
-        ],
+        **_over_time(wish, rgb),
         **_material(design),
         "keys": _judged(design),
         "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
@@ -132,10 +123,10 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
 def spread_answer(found: SpreadDesign) -> dict[str, Any]:
     """Return materials that are spread over a surface, as `answer`, with those of every place."""
     wish, keys = found.wish, found.wish.keys
-    content = answer(found.base, wish)
-    times = np.array(content["frames_s"])
-    for number, (place, design) in enumerate(zip(content["places"], found.of_places, strict=True)):
-        place["rgb"] = _numbers(np.pi * found.rgb_at(number, times))
+    times = timeline_of(wish).frames_s
+    rgb = np.array([found.rgb_at(place, times) for place in range(len(wish.places))])
+    content = _over_time(wish, rgb) | _material(found.base)
+    for place, design in zip(content["places"], found.of_places, strict=True):
         place["material"] = _material(design)
     impossible, conflicts = [], []
     for design in {id(each): each for each in found.of_places if each is not found.base}.values():
@@ -149,6 +140,24 @@ def spread_answer(found: SpreadDesign) -> dict[str, Any]:
         "keys": _keys(keys, wish.bands, found.rgb, found.delta_e2000),
         "impossible": impossible,
         "conflicts": conflicts,
+    }
+
+
+def _over_time(wish: Wish, rgb_per_sr: FloatArray) -> dict[str, Any]:
+    """Return the frames, and colours (places, frames, 3) of every place in them."""
+    timeline = timeline_of(wish)
+    places = np.repeat(np.arange(len(wish.places)), len(timeline.frames_s))
+    times = np.tile(timeline.frames_s, len(wish.places))
+    card = wish.programme.at(places, times) @ wish.bands.to_rgb.T
+    rgb = np.pi * rgb_per_sr
+    return {
+        "frames_s": _numbers(timeline.frames_s),
+        "first": timeline.first,
+        "bands": wish.bands.names,
+        "places": [
+            {"name": name, "rgb": _numbers(own), "card": _numbers(lit)}
+            for name, own, lit in zip(wish.places, rgb, card.reshape(rgb.shape), strict=True)
+        ],
     }
 
 

@@ -30,7 +30,7 @@ from labrig.errors import UsageError
 from labrig.finite import Finite, UnitFraction
 from labrig.material import Material, material_text
 from labrig.optics import srgb_bytes
-from labrig.report import describe_energy, draw_scene_design
+from labrig.report import describe_shortage, draw_scene_design
 from labrig.reproduce import load_scene, write_parameter_texture
 from labrig.studio.messages import SOURCE, Asked, SetByHand, spread_answer, wish_content
 from labrig.studio.workbench import Workbench
@@ -162,7 +162,10 @@ class SceneBench(Workbench):
         """Return the material that meets the wishes, and what the page has to know of the scene."""
         camera = self._built.file.camera
         spread = self._spread_of(Asked.of(content))
-        found = super().look(content) if spread is None else _look(spread)
+        if spread is None:
+            found = super().look(content)
+        else:
+            found = spread_answer(spread) | {"energy": describe_shortage(spread) or None}
         return found | {
             "scene": {
                 "material": self._material,
@@ -332,16 +335,6 @@ class SceneBench(Workbench):
     def _material_of(self, design: Design, wish: Wish) -> Material:
         assert wish.scene is not None
         return to_material(design, wish.file.name, wish.scene.spectra(wish.scene_places))
-
-
-def _look(spread: SpreadDesign) -> dict[str, Any]:
-    """Return the materials of dots as the page shows them, with what takes too much energy."""
-    told = [
-        f"{name}: {describe_energy(wished).removeprefix('! ')}"
-        for name, wished in zip(spread.wish.places, spread.wished, strict=True)
-        if wished is not None
-    ]
-    return spread_answer(spread) | {"energy": "; ".join(told) or None}
 
 
 def _without_question(content: Mapping[str, Any]) -> dict[str, Any]:
