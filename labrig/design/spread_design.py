@@ -309,7 +309,7 @@ class Spreading:
             raise UsageError("expected at least one key, got none; say when it should glow how")
         spread = wish.file.scene.spread
         groups = _groups(wish.scene, wish)
-        base = _base(wish, self._free(wish, wish.programme, None, None))
+        base = _base(wish, self._together(wish, groups))
         light = wish.scene.with_albedo(base.albedo)
         spectra = light.spectra(wish.scene_places)
         if light is not wish.scene:
@@ -323,6 +323,12 @@ class Spreading:
         if found.texture.albedo_factor is None:
             return found
         return found.under(found.light.spectra(wish.scene_places))
+
+    def _together(self, wish: Wish, groups: Mapping[Texel, Sequence[int]]) -> Design:
+        """Return the material of all keys, searched for from that of the dot with most of them."""
+        most = max(groups.values(), key=lambda places: wish.keys.at_places(places).count)
+        first = self._free(wish, wish.programme, wish.keys.at_places(most), None)
+        return first if len(groups) == 1 else wish.solve("kept", near=first)
 
     def _own(
         self, wish: Wish, programme: LightProgramme, base: Design, places: Sequence[int]
@@ -346,13 +352,12 @@ class Spreading:
         self,
         wish: Wish,
         programme: LightProgramme,
-        keys: Keys | None,
+        keys: Keys,
         albedo: FloatArray | None,
     ) -> Design:
         """Return the best material of some keys, searched for once while they do not change."""
-        wanted = wish.keys if keys is None else keys
         given = wish.file.albedo if albedo is None else tuple(albedo.tolist())
-        arrays = (wanted.place, wanted.time_s, wanted.radiance, programme.begin_s,
+        arrays = (keys.place, keys.time_s, keys.radiance, programme.begin_s,
                   programme.irradiance)  # fmt: skip
         key = (wish.file.states, wish.file.weights, wish.file.key_sigma, wish.file.bands_nm, given,
                *(each.tobytes() for each in arrays))  # fmt: skip

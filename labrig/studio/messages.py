@@ -28,6 +28,8 @@ FloatArray = NDArray[np.float64]
 SOURCE = "the page"
 #: Digits of the numbers that are sent.
 DIGITS = 5
+#: ΔE2000 from which a dot's keys are said to work against each other.
+SEEN = 1.0
 
 
 class SetByHand(BaseModel):
@@ -135,7 +137,11 @@ def spread_answer(found: SpreadDesign) -> dict[str, Any]:
             {"keys": [own[key] for key in each.keys], "text": str(each)}
             for each in design.impossible
         ]
-        conflicts += [[own[fight.key], own[fight.other]] for fight in design.conflicts]
+        conflicts += [
+            [own[fight.key], own[fight.other]]
+            for fight in design.conflicts
+            if found.delta_e2000[own[fight.key]] > SEEN
+        ]
     return content | {
         "keys": _keys(keys, wish.bands, found.rgb, found.delta_e2000),
         "impossible": impossible,

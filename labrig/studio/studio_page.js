@@ -302,10 +302,10 @@ const material = new Material({
 
 const spread = new Spread({
   onSpread: (change, gesture = null) => wish((now) => withSpread(now, change), gesture),
-  onStroke: (dot, point) => {
+  onStroke: (dot, points) => {
     wish((now) => {
       const strokes = (now.scene.spread.strokes ??= {});
-      (strokes[dot] ??= []).push(point);
+      (strokes[dot] ??= []).push(...points);
     }, "stroke");
   },
   onSettled: () => {

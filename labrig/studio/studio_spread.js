@@ -36,7 +36,7 @@ export class Spread {
   draw({ answer, wish }) {
     const spread = wish.scene?.spread;
     $("spread-choice").hidden = !answer.scene;
-    $("spread-tools").hidden = !spread;
+    for (const id of ["spread-tools", "paint-tools"]) $(id).hidden = !spread;
     $("spread").value = spread ? "own" : "one";
     // Rates that differ from texel to texel are of order 1.
     $("order").disabled = Boolean(spread);
@@ -47,6 +47,8 @@ export class Spread {
       if (!slider.matches(":active")) slider.value = String(Math.log10(value));
       $(`spread-${name}-said`).textContent = name === "appearance" ? short(value, 2) : `${short(value, 2)} texels`;
     }
+    // Without a picture of the surface its texels look alike.
+    $("spread-by-appearance").hidden = !spread.appearance_file;
     $("unpaint").disabled = !Object.keys(spread.strokes ?? {}).length;
     $("paint").disabled = !Object.keys(wish.pixels).length;
   }
@@ -64,9 +66,14 @@ export class Spread {
     const radius = $("spread-width").valueAsNumber;
     let last = null;
     const paint = (point) => {
-      if (last && apart(point, last) < SPACING * radius) return;
+      const steps = last ? Math.floor(apart(point, last) / (SPACING * radius)) : 1;
+      if (steps < 1) return;
+      // A fast pointer skips what lies between.
+      const from = last ?? point;
+      const points = Array.from({ length: steps }, (_, i) => from.map((x, axis) => x + ((i + 1) / steps) * (point[axis] - x)));
       last = point;
-      this.onStroke(dot, [...point.map((x) => Number(Math.min(Math.max(x, 0), 1).toFixed(4))), radius]);
+      const within = (x) => Number(Math.min(Math.max(x, 0), 1).toFixed(4));
+      this.onStroke(dot, points.map((each) => [...each.map(within), radius]));
     };
     const follow = (event) => paint(pointOf(event));
     const end = () => {
