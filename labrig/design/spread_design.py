@@ -35,8 +35,8 @@ Texel: TypeAlias = tuple[int, int]
 UNSEEN = 2e-3
 #: How strongly rates of dots stay as the base's, and rates that do not change at all.
 HELD, FIXED = 1e-3, 1e3
-#: What is emitted over what is absorbed from which on it is all.
-ALL = 0.999
+#: What is emitted over what is absorbed from which on it is nearly all.
+NEARLY_ALL = 0.9
 #: Materials of dots that are kept from one wish to the next.
 MOST_KEPT = 64
 #: Largest albedo of a texel: light has to be lost at every bounce.
@@ -187,15 +187,23 @@ class SpreadDesign:
         return _blended(wish, self.base, own, self.shares, self.light, spectra)
 
     @property
-    def short_of_energy(self) -> tuple[int, ...]:
-        """Places that miss their keys and give back all the light that they absorb."""
-        return tuple(
-            place
-            for place, design in enumerate(self.of_places)
-            if design is not self.base
-            and design.cost > _unseen(design.keys)
-            and design.emitted_over_absorbed_at_most > ALL
-        )
+    def notes(self) -> tuple[str, ...]:
+        """Why keys of some dots are missed, one sentence each."""
+        names, found = self.wish.places, []
+        for places in _groups(self.light, self.wish).values():
+            own, design = " and ".join(names[each] for each in places), self.of_places[places[0]]
+            if len(places) > 1:
+                found.append(
+                    f"{own} lie in one texel, and share a material; give the object more texels "
+                    "(samples)"
+                )
+            is_spent = design.emitted_over_absorbed_at_most > NEARLY_ALL
+            if is_spent and design.cost > _unseen(design.keys):
+                found.append(
+                    f"{own}: keys are missed where nearly all light that is absorbed is given back, "
+                    "so that it can hardly glow brighter"
+                )
+        return tuple(found)
 
     def design_at(self, place: int) -> Design:
         """Return the material of a place of the wish, with all keys."""

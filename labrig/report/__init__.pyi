@@ -88,7 +88,6 @@ from .run_sections import (
 from .scene_design import (
     describe_energy as describe_energy,
     describe_scene_design as describe_scene_design,
-    describe_shortage as describe_shortage,
     describe_spread as describe_spread,
     draw_scene_design as draw_scene_design,
 )

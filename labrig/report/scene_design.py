@@ -112,44 +112,12 @@ def describe_spread(found: SpreadDesign) -> str:
     return "\n".join(_of_dots(found))
 
 
-def describe_shortage(found: SpreadDesign) -> str:
-    """Say which dots miss their keys because they give back all the light that they absorb.
-
-    Parameters
-    ----------
-    found
-        Materials, some of which are short of energy.
-
-    Returns
-    -------
-    str
-        A sentence; empty if it is none.
-
-    Examples
-    --------
-    >>> from labrig.design import SceneWish, SpreadWish, WishedKey, WishFile, solve_spread, to_wish
-    >>> from labrig.report import describe_shortage
-    >>> scene = SceneWish(
-    ...     file="cornell-box", material="phosphorescent", width_px=16, paths=8, spread=SpreadWish()
-    ... )
-    >>> late = WishedKey(at="1000 s", colour=(0.2, 0.3, 0.2))
-    >>> file = WishFile(scene=scene, pixels={"wall": (0.1, 0.5)}, albedo=0.5, keys=(late,))
-    >>> describe_shortage(solve_spread(to_wish(file, "mine")))[:40]
-    'wall: gives back all light that is absor'
-    """
-    names = ", ".join(found.wish.places[place] for place in found.short_of_energy)
-    if not names:
-        return ""
-    return f"{names}: gives back all light that is absorbed there, and cannot glow brighter"
-
-
 def _of_dots(found: SpreadDesign) -> Iterator[str]:
     names = found.wish.places
     for place in sorted(set(found.wish.keys.place.tolist())):
         yield f"{names[place]}:"
         yield describe_design(found.of_places[place], names)
-    if found.short_of_energy:
-        yield f"! {describe_shortage(found)}"
+    yield from (f"! {note}" for note in found.notes)
     yield f"spread: ΔE2000 {_listed(found.delta_e2000)}"
     if found.rendered_rgb is not None:
         yield f"rendered: ΔE2000 {_listed(found.rendered_delta_e2000)}"

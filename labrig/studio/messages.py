@@ -130,7 +130,8 @@ def spread_answer(found: SpreadDesign) -> dict[str, Any]:
     content = _over_time(wish, rgb) | _material(found.base)
     for place, design in zip(content["places"], found.of_places, strict=True):
         place["material"] = _material(design)
-    impossible, conflicts = [], []
+    impossible: list[dict[str, Any]] = [{"keys": [], "text": note} for note in found.notes]
+    conflicts: list[list[int]] = []
     for design in {id(each): each for each in found.of_places if each is not found.base}.values():
         own = np.flatnonzero(np.isin(keys.place, design.keys.place)).tolist()
         impossible += [
@@ -144,6 +145,7 @@ def spread_answer(found: SpreadDesign) -> dict[str, Any]:
         ]
     return content | {
         "keys": _keys(keys, wish.bands, found.rgb, found.delta_e2000),
+        "energy": None,
         "impossible": impossible,
         "conflicts": conflicts,
     }

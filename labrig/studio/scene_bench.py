@@ -30,7 +30,7 @@ from labrig.errors import UsageError
 from labrig.finite import Finite, UnitFraction
 from labrig.material import Material, material_text
 from labrig.optics import srgb_bytes
-from labrig.report import describe_shortage, draw_scene_design
+from labrig.report import draw_scene_design
 from labrig.reproduce import load_scene, write_parameter_texture
 from labrig.studio.messages import SOURCE, Asked, SetByHand, spread_answer, wish_content
 from labrig.studio.workbench import Workbench
@@ -162,10 +162,7 @@ class SceneBench(Workbench):
         """Return the material that meets the wishes, and what the page has to know of the scene."""
         camera = self._built.file.camera
         spread = self._spread_of(Asked.of(content))
-        if spread is None:
-            found = super().look(content)
-        else:
-            found = spread_answer(spread) | {"energy": describe_shortage(spread) or None}
+        found = super().look(content) if spread is None else spread_answer(spread)
         return found | {
             "scene": {
                 "material": self._material,
