@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from labrig.design import Wish
     from labrig.material import Material
+
+NOT_IN_SCENES = "--nearest is for a light programme, not for a scene"
 
 
 def design(
@@ -116,6 +119,9 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
     if picture is not None:
         require_picture(picture)
     wish = read_wish(constraints)
+    if wish.file.scene is not None and wish.file.scene.spread is not None:
+        _spread(wish, constraints.parent, out, picture, nearest)
+        return
     if wish.scene is not None:
         if nearest:
             raise UsageError("expected --nearest with a light programme, got a scene")
@@ -137,6 +143,31 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
         _write(to_material(found, wish.file.name), out)
     if picture is not None:
         draw_design(found, wish.places, picture)
+        typer.echo(f"drawn into {picture}")
+
+
+def _spread(
+    wish: "Wish", folder: Path, out: Path | None, picture: Path | None, nearest: bool
+) -> None:
+    from labrig.design import solve_spread
+    from labrig.report import describe_spread, draw_scene_design
+    from labrig.reproduce import write_parameter_texture
+
+    found = solve_spread(wish, folder)
+    typer.echo(describe_spread(found))
+    if nearest:
+        typer.echo(NOT_IN_SCENES, err=True)
+    if out is not None:
+        texture = out.with_name(f"{out.stem}-texture.npz")
+        _write(found.material, out)
+        write_parameter_texture(texture, found.texture)
+        typer.echo(f"written: {texture}")
+        typer.echo(
+            f"In the scene, beside both files:\nmaterials:\n  {found.light.material}: "
+            f"{{file: {out.name}, texture: {texture.name}}}"
+        )
+    if picture is not None:
+        draw_scene_design(found, picture)
         typer.echo(f"drawn into {picture}")
 
 

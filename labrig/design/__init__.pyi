@@ -59,6 +59,14 @@ from .smooth_spectrum import (
 from .solver import (
     solve as solve,
 )
+from .spread_design import (
+    SpreadDesign as SpreadDesign,
+    Spreading as Spreading,
+    solve_spread as solve_spread,
+)
+from .spread_wish import (
+    SpreadWish as SpreadWish,
+)
 from .wish_file import (
     LightChange as LightChange,
     SceneWish as SceneWish,

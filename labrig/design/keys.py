@@ -1,7 +1,8 @@
 """Constraints of a design: the wanted radiance at places and times."""
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 import numpy as np
@@ -91,6 +92,12 @@ class Keys:
     def none(cls) -> Self:
         """Return no keys: nothing is wanted yet, and a material can only be looked at."""
         return cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros((0, 3)))
+
+    def at_places(self, places: Sequence[int]) -> Self:
+        """Return the keys at some places only, in their order."""
+        own = np.isin(self.place, places)
+        return replace(self, place=self.place[own], time_s=self.time_s[own],
+                       radiance=self.radiance[own])  # fmt: skip
 
     @property
     def count(self) -> int:

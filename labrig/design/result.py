@@ -161,12 +161,17 @@ class Design:
         return replace(self, cost=cost)
 
     @property
-    def keeps_energy(self) -> bool:
-        """Whether light of no band, however weak, makes it emit more than is absorbed of it."""
+    def emitted_over_absorbed_at_most(self) -> float:
+        """What weak light makes it emit over what is absorbed of it, in the worst band."""
         ratio = emitted_over_absorbed(
             self.k_e_per_s, self.reradiation, self.albedo, self.bands.energy
         )
-        return bool(ratio.max(initial=0.0) <= 1 + ROUNDED)
+        return float(ratio.max(initial=0.0))
+
+    @property
+    def keeps_energy(self) -> bool:
+        """Whether light of no band, however weak, makes it emit more than is absorbed of it."""
+        return self.emitted_over_absorbed_at_most <= 1 + ROUNDED
 
     def with_impossible(self, impossible: tuple[Impossible, ...]) -> "Design":
         """Return the design with wishes that cannot be met."""

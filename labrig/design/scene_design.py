@@ -18,6 +18,7 @@ from labrig.design.scene_spectra import SceneSpectra
 from labrig.design.wish_file import Wish
 from labrig.errors import UsageError
 from labrig.material import Material
+from labrig.reproduce import Renderer
 
 FloatArray = NDArray[np.float64]
 
@@ -71,6 +72,10 @@ class SceneDesign:
     def delta_e2000(self) -> FloatArray:
         """ΔE2000 of all keys in the rendered scene, shape (keys,)."""
         return self.rounds[self.best]
+
+    def design_at(self, place: int) -> Design:
+        """Return the material of a place of the wish: the same everywhere."""
+        return self.design
 
     def pictures(self, times_s: Sequence[float]) -> FloatArray:
         """Return rendered pictures at rising times in s, not before the programme.
@@ -148,10 +153,26 @@ def solve_in_scene(wish: Wish) -> SceneDesign:
 
 def _rendered(found: SceneDesign) -> tuple[FloatArray, SceneSpectra]:
     """Return linear sRGB at the keys (keys, 3), and the light on the places over time."""
-    light, keys = found.light, found.wish.keys
-    renderer = light.renderer(found.material)
-    own = light.places[list(found.wish.scene_places)]
-    albedo = light.albedo_of(found.material)
+    light = found.light
+    renderer, albedo = light.renderer(found.material), light.albedo_of(found.material)
+    return rendered_at_keys(found.wish, light, renderer, albedo, found.spectra)
+
+
+def rendered_at_keys(
+    wish: Wish, light: SceneLight, renderer: Renderer, albedo: FloatArray, spectra: SceneSpectra
+) -> tuple[FloatArray, SceneSpectra]:
+    """Return linear sRGB per sr at the keys (keys, 3), and the light on the places over time.
+
+    Parameters
+    ----------
+    wish, light, spectra
+        What was wished for, and the light for which it was designed.
+    renderer
+        Renderer of the scene with what was designed.
+    albedo
+        Albedo, one or of each place of the wish, in the bands of the scene.
+    """
+    keys, own = wish.keys, light.places[list(wish.scene_places)]
     begin: list[float] = []
     fallen: list[FloatArray] = []
 
@@ -167,11 +188,10 @@ def _rendered(found: SceneDesign) -> tuple[FloatArray, SceneSpectra]:
         renderer.advance(t_s, lambda begin_s, light: record(begin_s, light[own]))
         irradiance = renderer.irradiance()[own]
         radiance = renderer.emitted()[own] + irradiance * albedo / np.pi
-        rgb[at] = found.spectra.rgb(radiance)[keys.place[at]] / np.pi
+        rgb[at] = spectra.rgb(radiance)[keys.place[at]] / np.pi
         record(t_s, irradiance)
-    return rgb, replace(
-        found.spectra, begin_s=_apart(np.array(begin)), irradiance=np.stack(fallen, axis=1)
-    )
+    return rgb, replace(spectra, begin_s=_apart(np.array(begin)),
+                        irradiance=np.stack(fallen, axis=1))  # fmt: skip
 
 
 def _apart(begin_s: FloatArray) -> FloatArray:

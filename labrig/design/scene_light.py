@@ -19,12 +19,14 @@ from labrig.design.bands import DesignBands, three_bands
 from labrig.design.light import LightProgramme
 from labrig.design.result import Design
 from labrig.design.scene_spectra import SceneSpectra, checked_edges
+from labrig.design.texel_surface import TexelSurface
 from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.reproduce import (
     Bands,
     Field,
     FieldParameters,
+    ParameterTexture,
     ProgrammeEntry,
     Renderer,
     Scene,
@@ -38,6 +40,7 @@ from labrig.yaml_file import did_you_mean
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int32]
+BoolArray = NDArray[np.bool_]
 
 #: Albedo of the material before it is designed.
 PLACEHOLDER = 0.5
@@ -45,6 +48,8 @@ PLACEHOLDER = 0.5
 TYPICAL = 8
 #: Times at which the glow of other phosphors is kept.
 MOST_KEPT = 256
+#: Half of the diagonal of a pixel.
+HALF_PIXEL = 0.5**0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +236,17 @@ class SceneLight:
         """Return the light on some places of the material, in the bands and white of the design."""
         return self.spectra(places).programme
 
-    def picture(self, material: Material | Design | None, t_s: float) -> FloatArray:
+    def with_texture(self, material: Material, texture: ParameterTexture) -> Self:
+        """Return the light with the albedo of a material and its texture; no path is traced."""
+        surface = self._measured(material, texture)
+        return self._on(self.scene.with_material(self.material, surface), self.albedo)
+
+    def picture(
+        self,
+        material: Material | Design | None,
+        t_s: float,
+        texture: ParameterTexture | None = None,
+    ) -> FloatArray:
         """Return the picture with a material, its own glow on other surfaces included.
 
         Levels are those that the stored light charges. The light between surfaces is complete, but
@@ -243,6 +258,8 @@ class SceneLight:
             The material; None shows the placeholder, which does not glow.
         t_s
             Time in s.
+        texture
+            Parameters of each texel that take the place of those of a `Material`.
 
         Returns
         -------
@@ -252,22 +269,29 @@ class SceneLight:
         glow = self._others.at(t_s).copy()
         renderer = self._renderer
         if material is not None:
-            surface = self._surface(material)
+            surface = self._surface(material, texture)
             renderer = self._with(surface)
             glow[self.places] = self._glow(surface, t_s)
         unit = np.pi / self._typical.unit_w_per_m2_nm
         to_rgb = unit * self._typical.to_rgb
         return renderer.colours(glow, self.scene.levels(t_s), to_rgb).astype(np.float64)
 
-    def renderer(self, material: Material) -> Renderer:
+    def renderer(self, material: Material, texture: ParameterTexture | None = None) -> Renderer:
         """Return a renderer of the scene with a material, on the paths that are kept.
+
+        Parameters
+        ----------
+        material
+            The material.
+        texture
+            Parameters of each texel that take the place of the material's.
 
         Raises
         ------
         UsageError
             The material lacks something, or would glow ever more.
         """
-        return self._with(self._measured(material))
+        return self._with(self._measured(material, texture))
 
     @cached_property
     def places(self) -> IntArray:
@@ -277,6 +301,42 @@ class SceneLight:
     def albedo_of(self, material: Material) -> FloatArray:
         """Return the albedo of a material in the bands of the scene."""
         return np.diagonal(self._measured(material).matrix).astype(np.float64)
+
+    @cached_property
+    def texels(self) -> TexelSurface:
+        """The object of the material, over whose texels parameters are spread.
+
+        Raises
+        ------
+        UsageError
+            Several objects are made of it, or it has no texels.
+        """
+        return TexelSurface.of(self.scene, self.material)
+
+    def texels_under(self, x: float, y: float, radius: float) -> BoolArray:
+        """Return the texels of the material that a round stroke on the picture covers.
+
+        Parameters
+        ----------
+        x, y
+            Its middle, as fractions of the picture's width and height from its upper left.
+        radius
+            Its radius as a fraction of the picture's height.
+
+        Returns
+        -------
+        ndarray
+            Whether a texel is covered, top row first, shape (rows, columns).
+        """
+        places = self._renderer.first_places
+        height, width = places.shape[:2]
+        row, column = np.indices((height, width))
+        across, down = (column + 0.5 - x * width) / height, (row + 0.5) / height - y
+        # Even the finest stroke covers what its own pixel shows.
+        found = places[np.hypot(across, down) <= max(radius, HALF_PIXEL / height)]
+        covered = np.zeros(self.texels.shape, np.bool_)
+        covered[self.texels.texels_of(np.intersect1d(found, self.places))] = True
+        return covered
 
     def _with(self, surface: SurfaceMaterial) -> Renderer:
         scene = self.scene.with_material(self.material, surface)
@@ -310,10 +370,12 @@ class SceneLight:
         light = self._of_programme(range(self.n_places))
         return float(light.rgb(light.irradiance / np.pi)[..., 1].max(initial=0.0))
 
-    def _surface(self, material: Material | Design) -> SurfaceMaterial:
+    def _surface(
+        self, material: Material | Design, texture: ParameterTexture | None = None
+    ) -> SurfaceMaterial:
         """Return a material in the bands of the scene."""
         if isinstance(material, Material):
-            return self._measured(material)
+            return self._measured(material, texture)
         light, widths_nm = self._typical, self.scene.bands.width_nm
         parameters = FieldParameters.checked(
             material.k_r_per_s,
@@ -324,15 +386,23 @@ class SceneLight:
         reflected = np.diag(light.albedo(material.albedo)).astype(np.float32)
         return SurfaceMaterial("design", reflected, parameters)
 
-    def _measured(self, material: Material) -> SurfaceMaterial:
+    def _measured(
+        self, material: Material, texture: ParameterTexture | None = None
+    ) -> SurfaceMaterial:
         entry, scene = self.scene.file.materials[self.material], self.scene
         albedo, scale = entry.assume_albedo, entry.assume_scale
-        return of_phosphor(material, scene.bands, scene.bench_light, albedo, scale)
+        return of_phosphor(material, scene.bands, scene.bench_light, albedo, scale, texture=texture)
 
     def _glow(self, surface: SurfaceMaterial, t_s: float) -> Float32Array:
         """Return the radiance that the material emits at a time (places, bands)."""
         assert surface.parameters is not None
-        states = Field(surface.parameters, self.n_places)
+        parameters = surface.parameters
+        if surface.texture is not None:
+            uv = self.texels.surface.uv_of_places
+            assert uv is not None
+            own = surface.texture.texel_at(uv[self.places - self.texels.first_place])
+            parameters = parameters.at(own)
+        states = Field(parameters, self.n_places)
         begin = [part.at_s for part in self.scene.file.programme if part.at_s < t_s]
         for first, last in pairwise([*begin, t_s]):
             light = np.tensordot(self.scene.levels(first), self._of_lamps, 1)

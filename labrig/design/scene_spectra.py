@@ -5,7 +5,7 @@ spectra that do under the scene's own light what the design's do in its bands.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ class SceneSpectra:
     @cached_property
     def to_rgb(self) -> FloatArray:
         """Linear sRGB of light by the scene's bands, shape (3, bands of the scene)."""
-        return spectral_bands(self.edges_nm).to_rgb
+        return _rgb_of_bands(tuple(self.edges_nm.tolist()))
 
     @cached_property
     def programme(self) -> LightProgramme:
@@ -131,6 +131,11 @@ class SceneSpectra:
         unit = flat / (flat @ self.to_rgb.T @ RGB_TO_Y)[:, np.newaxis]
         unit = np.unique(unit.round(9), axis=0)
         return np.asarray(unit[:: -(-len(unit) // MOST_LIGHTS) or 1])
+
+
+@lru_cache(maxsize=16)
+def _rgb_of_bands(edges_nm: tuple[float, ...]) -> FloatArray:
+    return spectral_bands(edges_nm).to_rgb
 
 
 def checked_edges(bands: DesignBands, edges_nm: FloatArray) -> None:

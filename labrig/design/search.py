@@ -85,9 +85,11 @@ class Problem:
         Strongest irradiance of each group, shape (groups,).
     shortest_s, longest_s
         Shortest step, and time from the begin to the last key, in s.
-    near
-        Rates that are kept where no key depends on them, shape (states, groups + 1); None prefers
-        some that fill a good part of the states.
+    around
+        Rates that are taken where no key depends on them, shape (states, groups + 1); None for
+        those with which the strongest light fills a good part of the states.
+    held
+        Relative error of the keys for which a rate departs from the preferred one by a factor of e.
     """
 
     steps: tuple[Steps, ...]
@@ -99,7 +101,8 @@ class Problem:
     strongest: FloatArray
     shortest_s: float
     longest_s: float
-    near: FloatArray | None = None
+    around: FloatArray | None = None
+    held: float = PREFERENCE
 
     @classmethod
     def of(
@@ -171,12 +174,9 @@ class Problem:
 
     @cached_property
     def preferred(self) -> FloatArray:
-        """Coordinates of rates that are taken where no key depends on them.
-
-        The strongest light fills a good part of the states in all of the time.
-        """
-        if self.near is not None:
-            return np.clip(self.coordinates(self.near), *self.bounds)
+        """Coordinates of rates that are taken where no key depends on them."""
+        if self.around is not None:
+            return np.clip(self.coordinates(self.around), *self.bounds)
         rates = np.append(PREFERRED / self.longest_s / self.strongest, 1 / self.longest_s)
         return self.coordinates(np.tile(rates, (self.n_states, 1)))
 
@@ -197,7 +197,7 @@ class Problem:
     @cached_property
     def preference(self) -> float:
         """Weight of the residuals by which rates are kept near the preferred ones."""
-        return PREFERENCE * math.sqrt(self.scale)
+        return self.held * math.sqrt(self.scale)
 
     @cached_property
     def scale(self) -> float:

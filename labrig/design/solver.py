@@ -16,7 +16,14 @@ from labrig.design.light import LightProgramme
 from labrig.design.linear_part import Coefficients, Wanted, linear_part
 from labrig.design.possible import impossible_keys
 from labrig.design.result import Design
-from labrig.design.search import Found, Problem, residuals_and_slopes, search, search_near
+from labrig.design.search import (
+    PREFERENCE,
+    Found,
+    Problem,
+    residuals_and_slopes,
+    search,
+    search_near,
+)
 from labrig.errors import UsageError
 from labrig.material import MAX_ORDER
 
@@ -48,6 +55,7 @@ def solve(
     key_sigma: float = KEY_SIGMA,
     energy: Literal["free", "kept"] = "free",
     near: Design | None = None,
+    held: float = PREFERENCE,
 ) -> Design:
     """Find the phosphorescent material whose radiance is closest to the keys.
 
@@ -79,6 +87,8 @@ def solve(
     near
         Design under nearly the same light, from whose rates alone is searched, so that what keys do
         not determine stays as it is.
+    held
+        Relative error of the keys for which a rate departs from that of `near` by a factor of e.
 
     Returns
     -------
@@ -131,7 +141,7 @@ def solve(
         ends = search(problem, is_order_free=order is None, order=order or 1.0)
     else:
         rates = np.column_stack([problem.of_groups(near.k_e_per_s), near.k_r_per_s])
-        problem = replace(problem, near=rates)
+        problem = replace(problem, around=rates, held=held)
         ends = search_near(problem, is_order_free=order is None, order=order or near.order)
     best = ends[0]
     if energy == "kept":

@@ -15,7 +15,9 @@ from labrig.design.bands import XYZ_TO_RGB, DesignBands, spectral_bands, three_b
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme
 from labrig.design.result import Design
+from labrig.design.search import PREFERENCE
 from labrig.design.solver import KEY_SIGMA, MOST_STATES, solve
+from labrig.design.spread_wish import SpreadWish
 from labrig.errors import UsageError
 from labrig.finite import Finite, NotNegative, Positive, UnitFraction
 from labrig.material import MAX_ORDER
@@ -139,6 +141,9 @@ class SceneWish(_Part):
         Width of the picture. Default: the scene's.
     paths
         Paths of light for each pixel and each place of the material. Default: the scene's.
+    spread
+        That every dot has a material of its own, and how they are spread over the surface. Default:
+        one material for all dots.
     """
 
     file: Annotated[str, Field(min_length=1)]
@@ -147,6 +152,7 @@ class SceneWish(_Part):
     programme: tuple[ProgrammeEntry, ...] | None = None
     width_px: Annotated[int, Field(ge=1, le=8192)] | None = None
     paths: Annotated[int, Field(ge=1, le=65536)] | None = None
+    spread: SpreadWish | None = None
 
 
 class WishFile(_Part):
@@ -205,6 +211,8 @@ class WishFile(_Part):
             raise ValueError("expected 'pixels' beside 'scene' only")
         if self.scene is not None and self.keys and not self.pixels:
             raise ValueError("expected 'pixels', the places of the keys in the scene, got none")
+        if self.scene is not None and self.scene.spread is not None:
+            self._check_spread(self.scene.spread)
         for name, changes in self.programmes.items():
             if not changes:
                 raise ValueError(f"expected at least one light of '{name}', got none")
@@ -213,6 +221,19 @@ class WishFile(_Part):
         if self.scene is None and not self.programmes:
             raise ValueError("expected at least one of 'places', got none")
         return self
+
+    def _check_spread(self, spread: SpreadWish) -> None:
+        if self.order != 1:
+            raise ValueError(
+                f"expected 'order: 1' beside 'spread', whose rates differ from texel to texel, got "
+                f"{self.order}"
+            )
+        pixels = self.pixels or {}
+        for name in spread.strokes:
+            if name not in pixels:
+                raise ValueError(
+                    f"the strokes of 'spread' are for '{name}'; {did_you_mean(name, list(pixels))}"
+                )
 
     @property
     def programmes(self) -> Mapping[str, tuple[LightChange, ...]]:
@@ -253,28 +274,37 @@ class Wish:
         energy: Literal["free", "kept"] = "free",
         programme: LightProgramme | None = None,
         near: Design | None = None,
+        keys: Keys | None = None,
+        albedo: FloatArray | None = None,
+        held: float = PREFERENCE,
     ) -> Design:
         """Return the material that meets the wish best.
 
         Parameters
         ----------
-        energy, near
+        energy, near, held
             As of `solve`.
         programme
             Light on the places instead of the wish's.
+        keys
+            Some of the keys instead of all.
+        albedo
+            Albedo of each band instead of the wish's, shape (bands,).
         """
         file = self.file
+        given = None if isinstance(file.albedo, str) else file.albedo
         return solve(
             self.programme if programme is None else programme,
-            self.keys,
+            self.keys if keys is None else keys,
             self.bands,
             n_states=file.states,
             order=None if isinstance(file.order, str) else file.order,
-            albedo=None if isinstance(file.albedo, str) else file.albedo,
+            albedo=given if albedo is None else albedo,
             weights=file.weights,
             key_sigma=file.key_sigma,
             energy=energy,
             near=near,
+            held=held,
         )
 
 

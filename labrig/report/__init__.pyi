@@ -93,6 +93,7 @@ from .run_sections import (
 )
 from .scene_design import (
     describe_scene_design as describe_scene_design,
+    describe_spread as describe_spread,
     draw_scene_design as draw_scene_design,
 )
 from .sections import (

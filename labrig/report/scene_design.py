@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.design import RGB_TO_Y, SceneDesign
+from labrig.design import RGB_TO_Y, SceneDesign, SpreadDesign
 from labrig.number_format import rounded
 from labrig.optics import srgb_bytes
 from labrig.report.design import (
@@ -60,7 +60,51 @@ def describe_scene_design(found: SceneDesign) -> str:
     return "\n".join([describe_design(found.design, found.wish.places), *_in_the_scene(found)])
 
 
-def draw_scene_design(found: SceneDesign, path: Path) -> None:
+def describe_spread(found: SpreadDesign) -> str:
+    """Describe materials that are spread over a surface: each dot's, and how it looks rendered.
+
+    Parameters
+    ----------
+    found
+        The materials.
+
+    Returns
+    -------
+    str
+        Lines of text.
+
+    Examples
+    --------
+    >>> from labrig.design import SceneWish, SpreadWish, WishedKey, WishFile, solve_spread, to_wish
+    >>> from labrig.report import describe_spread
+    >>> scene = SceneWish(
+    ...     file="cornell-box", material="phosphorescent", width_px=16, paths=8, spread=SpreadWish()
+    ... )
+    >>> key = WishedKey(at="1 s", colour=(0, 2e-3, 2e-3))
+    >>> file = WishFile(scene=scene, pixels={"wall": (0.1, 0.5)}, albedo=0.5, keys=(key,))
+    >>> text = describe_spread(solve_spread(to_wish(file, "mine")))
+    >>> [line.split(":")[0] for line in text.splitlines() if ":" in line]
+    ['wall', 'spread', 'rendered']
+    """
+    return "\n".join(_of_dots(found))
+
+
+def _of_dots(found: SpreadDesign) -> Iterator[str]:
+    names = found.wish.places
+    for place in sorted(set(found.wish.keys.place.tolist())):
+        yield f"{names[place]}:"
+        yield describe_design(found.of_places[place], names)
+    yield from (f"! {note}" for note in found.notes)
+    yield f"spread: ΔE2000 {_listed(found.delta_e2000)}"
+    if found.rendered_rgb is not None:
+        yield f"rendered: ΔE2000 {_listed(found.rendered_delta_e2000)}"
+
+
+def _listed(residuals: FloatArray) -> str:
+    return ", ".join(f"{each:.1f}" for each in residuals)
+
+
+def draw_scene_design(found: SceneDesign | SpreadDesign, path: Path) -> None:
     """Draw frames of the scene at the keys' times, above the glow of each place over time.
 
     Parameters
@@ -108,8 +152,8 @@ def draw_scene_design(found: SceneDesign, path: Path) -> None:
         heights = [4, 1.2] * len(numbers)
         rows = below.subplots(2 * len(numbers), 1, height_ratios=heights)
         for row, number in enumerate(numbers):
-            draw_curve(rows[2 * row], found.design, number, found.wish.places[number])
-            draw_patches(rows[2 * row + 1], found.design, number, found.rendered_rgb)
+            draw_curve(rows[2 * row], found.design_at(number), number, found.wish.places[number])
+            draw_patches(rows[2 * row + 1], found.design_at(number), number, found.rendered_rgb)
         save_picture(figure, path)
 
 
@@ -117,16 +161,17 @@ def _in_the_scene(found: SceneDesign) -> Iterator[str]:
     if cost := describe_energy(found.wished, found.kept):
         yield cost
     for number, residuals in enumerate(found.rounds):
-        values = ", ".join(f"{each:.1f}" for each in residuals)
         kept = ", which is kept" if number == found.best and len(found.rounds) > 1 else ""
-        yield f"rendered, round {number + 1}: ΔE2000 {values}{kept}"
+        yield f"rendered, round {number + 1}: ΔE2000 {_listed(residuals)}{kept}"
 
 
-def _draw_frame(axes: "Axes", found: SceneDesign, t_s: float, picture: FloatArray) -> None:
+def _draw_frame(
+    axes: "Axes", found: SceneDesign | SpreadDesign, t_s: float, picture: FloatArray
+) -> None:
     """Draw a frame so bright that its brightest key is shown at half of a screen's white."""
     keys = found.wish.keys
     own = np.flatnonzero(keys.time_s == t_s)
-    y = float((np.pi * keys.rgb(found.design.bands)[own] @ RGB_TO_Y).max())
+    y = float((np.pi * keys.rgb(found.wish.bands)[own] @ RGB_TO_Y).max())
     if y <= 0:
         y = SHOWN_Y * float(np.percentile(picture @ RGB_TO_Y, UNCLIPPED_PER_CENT))
     axes.imshow(srgb_bytes(picture * (SHOWN_Y / y if y > 0 else 1.0)), interpolation="nearest")

@@ -8,7 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.design import RGB_TO_Y, Design, Estimate, Parameters, Wish, WishFile
+from labrig.design import (
+    RGB_TO_Y,
+    Design,
+    DesignBands,
+    Estimate,
+    Keys,
+    Parameters,
+    SpreadDesign,
+    Wish,
+    WishFile,
+)
 from labrig.finite import NotNegative, Positive, UnitFraction
 from labrig.studio.timeline import timeline_of
 from labrig.yaml_file import validate
@@ -106,12 +116,54 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
 
     A colour is linear R, G, B; 1, 1, 1 is a white card under D65 of strength 1.
     """
+    n_places, times = len(wish.places), timeline_of(wish).frames_s
+    places = np.repeat(np.arange(n_places), len(times))
+    rgb = design.rgb_at(places, np.tile(times, n_places)).reshape(n_places, len(times), 3)
+    return {
+        **_over_time(wish, rgb),
+        **_material(design),
+        "keys": _judged(design),
+        "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
+        "conflicts": [[fight.key, fight.other] for fight in design.conflicts],
+    }
+
+
+def spread_answer(found: SpreadDesign) -> dict[str, Any]:
+    """Return materials that are spread over a surface, as `answer`, with those of every place."""
+    wish, keys = found.wish, found.wish.keys
+    times = timeline_of(wish).frames_s
+    rgb = np.array([found.rgb_at(place, times) for place in range(len(wish.places))])
+    content = _over_time(wish, rgb) | _material(found.base)
+    for place, design in zip(content["places"], found.of_places, strict=True):
+        place["material"] = _material(design)
+    impossible: list[dict[str, Any]] = [{"keys": [], "text": note} for note in found.notes]
+    conflicts: list[list[int]] = []
+    for design in {id(each): each for each in found.of_places if each is not found.base}.values():
+        own = np.flatnonzero(np.isin(keys.place, design.keys.place)).tolist()
+        impossible += [
+            {"keys": [own[key] for key in each.keys], "text": str(each)}
+            for each in design.impossible
+        ]
+        conflicts += [
+            [own[fight.key], own[fight.other]]
+            for fight in design.conflicts
+            if found.delta_e2000[own[fight.key]] > SEEN
+        ]
+    return content | {
+        "keys": _keys(keys, wish.bands, found.rgb, found.delta_e2000),
+        "energy": None,
+        "impossible": impossible,
+        "conflicts": conflicts,
+    }
+
+
+def _over_time(wish: Wish, rgb_per_sr: FloatArray) -> dict[str, Any]:
+    """Return the frames, and colours (places, frames, 3) of every place in them."""
     timeline = timeline_of(wish)
-    n_frames = len(timeline.frames_s)
-    places = np.repeat(np.arange(len(wish.places)), n_frames)
+    places = np.repeat(np.arange(len(wish.places)), len(timeline.frames_s))
     times = np.tile(timeline.frames_s, len(wish.places))
-    rgb = np.pi * design.rgb_at(places, times).reshape(len(wish.places), n_frames, 3)
     card = wish.programme.at(places, times) @ wish.bands.to_rgb.T
+    rgb = np.pi * rgb_per_sr
     return {
         "frames_s": _numbers(timeline.frames_s),
         "first": timeline.first,
@@ -120,14 +172,16 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
             {"name": name, "rgb": _numbers(own), "card": _numbers(lit)}
             for name, own, lit in zip(wish.places, rgb, card.reshape(rgb.shape), strict=True)
         ],
+    }
+
+
+def _material(design: Design) -> dict[str, Any]:
+    return {
         "parameters": parameters_content(design),
         "open": [name for name, each in _estimates(design) if not each.is_determined],
         "sigma": {
             name: _number(each.sigma) for name, each in _estimates(design) if each.is_determined
         },
-        "keys": _keys(design),
-        "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
-        "conflicts": _conflicts(design),
     }
 
 
@@ -171,10 +225,16 @@ def _conflicts(design: Design) -> list[list[int]]:
     return pairs[:MOST_CONFLICTS]
 
 
-def _keys(design: Design) -> list[dict[str, Any]]:
+def _judged(design: Design) -> list[dict[str, Any]]:
     if not design.keys.count:
         return []
-    wanted, got = np.pi * design.keys.rgb(design.bands), np.pi * design.got_rgb
+    return _keys(design.keys, design.bands, design.got_rgb, design.delta_e2000)
+
+
+def _keys(
+    keys: Keys, bands: DesignBands, got_rgb: FloatArray, delta_e2000: FloatArray
+) -> list[dict[str, Any]]:
+    wanted, got = np.pi * keys.rgb(bands), np.pi * got_rgb
     return [
         {
             "place": int(place),
@@ -185,7 +245,7 @@ def _keys(design: Design) -> list[dict[str, Any]]:
             "delta_e": round(float(difference), 2),
         }
         for place, time_s, first, second, difference in zip(
-            design.keys.place, design.keys.time_s, wanted, got, design.delta_e2000, strict=True
+            keys.place, keys.time_s, wanted, got, delta_e2000, strict=True
         )
     ]
 

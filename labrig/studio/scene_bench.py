@@ -1,5 +1,6 @@
 """Answers to the page about a material in a scene: its picture, and designs for dots on it."""
 
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +19,8 @@ from labrig.design import (
     SceneDesign,
     SceneLight,
     SceneWish,
+    SpreadDesign,
+    Spreading,
     Wish,
     WishFile,
     solve_in_scene,
@@ -28,11 +31,17 @@ from labrig.design import (
 )
 from labrig.errors import UsageError
 from labrig.finite import Finite, UnitFraction
-from labrig.material import Material
+from labrig.material import Material, material_text
 from labrig.optics import srgb_bytes
-from labrig.report import describe_energy
-from labrig.reproduce import load_scene, read_scene
-from labrig.studio.messages import SOURCE, Asked, parameters_content, wish_content
+from labrig.report import describe_energy, draw_scene_design
+from labrig.reproduce import load_scene, read_scene, write_parameter_texture
+from labrig.studio.messages import (
+    SOURCE,
+    Asked,
+    parameters_content,
+    spread_answer,
+    wish_content,
+)
 from labrig.studio.workbench import Workbench
 from labrig.yaml_file import validate
 
@@ -120,6 +129,8 @@ class SceneBench(Workbench):
         Name of the material to be designed; None for the only one that glows.
     width_px, paths
         Width of the picture, and paths for each of its pixels and each place.
+    folder
+        Folder to which the path of a picture of the surface is relative.
 
     Raises
     ------
@@ -128,8 +139,16 @@ class SceneBench(Workbench):
     """
 
     def __init__(
-        self, scene: str, material: str | None = None, width_px: int = WIDTH_PX, paths: int = PATHS
+        self,
+        scene: str,
+        material: str | None = None,
+        folder: Path = Path(),
+        width_px: int = WIDTH_PX,
+        paths: int = PATHS,
     ) -> None:
+        self._folder = folder
+        self._spreading = Spreading()
+        self._spread: tuple[str, SpreadDesign] | None = None
         super().__init__()
         self._scene = str(Path(scene).resolve()) if Path(scene).suffix else scene
         self._material = material or _only_glowing(scene)
@@ -194,18 +213,20 @@ class SceneBench(Workbench):
 
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the wishes, and what the page has to know of the scene."""
-        answered = super().look(content)
-        _, wish = self.design(content)
-        assert wish.scene is not None
-        camera = wish.scene.scene.file.camera
-        return answered | {
+        asked = Asked.of(content)
+        spread = self._spread_of(asked)
+        found = super().look(content) if spread is None else spread_answer(spread)
+        light = self._wish(asked.file(), SOURCE).scene
+        assert light is not None
+        camera = light.scene.file.camera
+        return found | {
             "scene": {
                 "material": self._material,
                 "lamps": list(self._built.file.lamps),
                 "width_px": camera.width_px,
                 "height_px": camera.height_px,
             },
-            "is_rendered_again": self._found_again(Asked.of(content)) is not None,
+            "is_rendered_again": self._found_again(asked) is not None,
         }
 
     def picture_of_scene(self, content: Mapping[str, Any]) -> Picture:
@@ -217,9 +238,13 @@ class SceneBench(Workbench):
             The message or the wish is malformed.
         """
         asked = validate(content, PictureAsked, SOURCE)
-        design, wish = self.design(_without_question(content))
-        assert wish.scene is not None
-        rgb = wish.scene.picture(design, asked.t_s)
+        about = _without_question(content)
+        if (spread := self._spread_of(Asked.of(about))) is not None:
+            rgb = spread.picture(asked.t_s)
+        else:
+            design, wish = self.design(about)
+            assert wish.scene is not None
+            rgb = wish.scene.picture(design, asked.t_s)
         if asked.exposure_ev is not None:
             exposure = 2.0**asked.exposure_ev
         else:
@@ -238,7 +263,10 @@ class SceneBench(Workbench):
             Something else is seen there.
         """
         asked = validate(content, PointAsked, SOURCE)
-        design, wish = self.design(_without_question(content))
+        about = _without_question(content)
+        if (spread := self._spread_of(Asked.of(about))) is not None:
+            return [float(x) for x in np.pi * spread.rgb_seen(asked.x, asked.y, [asked.t_s])[0]]
+        design, wish = self.design(about)
         assert wish.scene is not None
         place = wish.scene.place_at(asked.x, asked.y)
         there = replace(design, programme=wish.scene.programme([place]))
@@ -250,6 +278,13 @@ class SceneBench(Workbench):
         The answer has the parameters found; a question with them gets that material.
         """
         asked = Asked.of(content)
+        if (spread := self._spread_of(asked)) is not None:
+            residuals = spread.rendered().rendered_delta_e2000
+            line = (
+                f"Rendered: ΔE2000 {float(residuals.max()):.1f} at most, "
+                f"{float(residuals.mean()):.1f} in the mean"
+            )
+            return {"lines": [line], "parameters": None}
         found = solve_in_scene(self._wish(asked.file(), SOURCE))
         lines = [
             f"Round {number}: ΔE2000 {float(each.max()):.1f} at most, {float(each.mean()):.1f} in "
@@ -276,6 +311,49 @@ class SceneBench(Workbench):
             return super()._designed(asked)
         self._energy = None
         return found.design, found.wish
+
+    def material(self, content: Mapping[str, Any]) -> str:
+        """Return the text of the material file; of several materials that of all keys together."""
+        spread = self._spread_of(Asked.of(content))
+        return super().material(content) if spread is None else material_text(spread.material)
+
+    def texture(self, content: Mapping[str, Any]) -> bytes:
+        """Return the file of the texture of materials that are spread over the surface.
+
+        Raises
+        ------
+        UsageError
+            One material is asked for, or no dot has a key.
+        """
+        spread = self._spread_of(Asked.of(content))
+        if spread is None:
+            raise UsageError("expected keys of dots with a material each, got one material for all")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "texture.npz"
+            write_parameter_texture(path, spread.texture)
+            return path.read_bytes()
+
+    def picture(self, content: Mapping[str, Any]) -> bytes:
+        """Return a figure of a design over time as a PNG."""
+        spread = self._spread_of(Asked.of(content))
+        if spread is None:
+            return super().picture(content)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "design.png"
+            draw_scene_design(spread.rendered(), path)
+            return path.read_bytes()
+
+    def _spread_of(self, asked: Asked) -> SpreadDesign | None:
+        """Return the materials of dots; None where one is for all, or there is no key."""
+        file = asked.file()
+        is_one = file.scene is None or file.scene.spread is None
+        if is_one or asked.by_hand is not None or not file.keys:
+            return None
+        key = asked.model_dump_json()
+        if self._spread is None or self._spread[0] != key:
+            wish = self._wish(file, SOURCE)
+            self._spread = key, self._spreading.solve(wish, self._folder)
+        return self._spread[1]
 
     def _wish(self, file: WishFile, source: str) -> Wish:
         if file.scene is None:
@@ -314,7 +392,9 @@ class SceneBench(Workbench):
                 light = light.with_programme(scene.programme)
             return light.with_albedo(albedo)
 
-        return _kept(self._lights, (file.bands_nm, scene.model_dump_json(), albedo), lit)
+        return _kept(
+            self._lights, (file.bands_nm, scene.model_dump_json(exclude={"spread"}), albedo), lit
+        )
 
     def _traced(self, edges_nm: tuple[float, ...] | None, size: Size) -> SceneLight:
         """Return the light by the scene's own lamps."""

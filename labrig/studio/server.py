@@ -34,6 +34,7 @@ PAGES: Mapping[str, Path] = {
             "studio_material.js",
             "studio_patches.js",
             "studio_scene.js",
+            "studio_spread.js",
             "studio_timeline.js",
             "studio_words.js",
         )
@@ -103,6 +104,8 @@ def _answer(
             return "image/png", picture.png, {"X-Exposure": repr(picture.exposure)}
         if path == "seen":
             return _as_json({"rgb": bench.seen(content)})
+        if path == "texture.npz":
+            return "application/octet-stream", bench.texture(content), {}
         if path == "again":
             return _as_json(bench.again(content))
     if path == "look":
@@ -184,7 +187,8 @@ def design_on_page(
         named = wished.scene.file
         beside = str(start.parent / named) if start and Path(named).suffix else named
         scene, material = scene or beside, material or wished.scene.material
-    workbench = Workbench() if scene is None else SceneBench(scene, material)
+    folder = Path() if start is None else start.parent
+    workbench = Workbench() if scene is None else SceneBench(scene, material, folder)
     first = workbench.start() if wished is None else workbench.take(wished, str(start))
     with StudioServer(workbench, first, port) as server, server.running():
         tell(server.url)

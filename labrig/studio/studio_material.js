@@ -73,6 +73,10 @@ export class Material {
     const parts = parameters.k_r_per_s.map((_, state) => this.#state(answer, state));
     parts.push(this.#albedo(answer));
     $("parameters").replaceChildren(...parts);
+    // Of materials that are spread those of the dots follow from their keys alone.
+    for (const input of document.querySelectorAll("#parameters input")) {
+      input.disabled = Boolean(wish.scene?.spread && wish.keys.length);
+    }
   }
 
   /** Whether a slider is being dragged, which must not be replaced. */

@@ -9,6 +9,7 @@ import { Light, changesOf } from "./studio_light.js";
 import { Material } from "./studio_material.js";
 import { drawPatches, exposureAt, placeAt } from "./studio_patches.js";
 import { ScenePicture, dotAt, newDot } from "./studio_scene.js";
+import { Spread, answerAt, withSpread } from "./studio_spread.js";
 import { Timeline, frameOf, timeOf } from "./studio_timeline.js";
 import { $, duration, seconds, tag, written } from "./studio_words.js";
 
@@ -115,7 +116,8 @@ function draw() {
   timeline.draw(all);
   keys.draw(all);
   light.draw(all);
-  material.draw({ answer, wish: now, byHand: by_hand });
+  material.draw({ answer: answerAt(answer, view.chosenPlace), wish: now, byHand: by_hand });
+  spread.draw({ answer, wish: now });
   for (const id of ["add-place", "remove-place"]) $(id).hidden = Boolean(answer.scene);
   $("remove-place").disabled = answer.places.length < 2;
   $("again").hidden = !answer.scene;
@@ -146,6 +148,7 @@ function drawTime(all = { answer, wish: history.now.wish, ...view }) {
   const drawn = { ...all, keys: all.wish.keys, near: near(all.wish.keys), exposure: exposure() };
   if (answer.scene) {
     picture.draw({ ...drawn, pixels: all.wish.pixels });
+    spread.drawStrokes($("picture"), all.wish);
     askPicture(t_s);
   } else drawPatches(drawn);
   const change = changesOf(all.wish, placeShown()).filter((each) => each.at_s <= t_s).at(-1);
@@ -242,7 +245,10 @@ function removeKey(number) {
   view.chosen = -1;
   wish((now) => {
     const [{ place }] = now.keys.splice(number, 1);
-    if (now.pixels && !now.keys.some((key) => key.place === place)) delete now.pixels[place];
+    if (now.pixels && !now.keys.some((key) => key.place === place)) {
+      delete now.pixels[place];
+      delete now.scene.spread?.strokes?.[place];
+    }
   });
 }
 
@@ -307,6 +313,20 @@ const material = new Material({
   },
 });
 
+const spread = new Spread({
+  onSpread: (change, gesture = null) => wish((now) => withSpread(now, change), gesture),
+  onStroke: (dot, points) => {
+    wish((now) => {
+      const strokes = (now.scene.spread.strokes ??= {});
+      (strokes[dot] ??= []).push(...points);
+    }, "stroke");
+  },
+  onSettled: () => {
+    history.settle();
+    draw();
+  },
+});
+
 $("undo").addEventListener("click", () => history.undo());
 $("redo").addEventListener("click", () => history.redo());
 $("name").addEventListener("change", (event) => {
@@ -327,6 +347,12 @@ $("picture").addEventListener("click", (event) => {
 $("picture").addEventListener("pointerdown", (event) => {
   if (!answer?.scene) return;
   const start = pointOf(event);
+  const { wish: now } = history.now;
+  if (spread.begins(event, now)) {
+    view.wasDragged = true;
+    spread.stroke(start, pointOf, answer, now.pixels);
+    return;
+  }
   const dot = dotAt(answer, history.now.wish.pixels, ...start);
   if (!dot) return;
   view.wasDragged = false;
@@ -409,7 +435,12 @@ $("remove-place").addEventListener("click", () => {
     now.keys = now.keys.filter((key) => key.place !== name);
   });
 });
-$("save-material").addEventListener("click", () => save("material.yaml", `${fileName()}.yaml`));
+$("save-material").addEventListener("click", async () => {
+  await save("material.yaml", `${fileName()}.yaml`);
+  if (!answer.places.some((each) => each.material)) return;
+  await save("texture.npz", `${fileName()}-texture.npz`);
+  say(`In the scene, beside both files: materials: {${answer.scene.material}: {file: ${fileName()}.yaml, texture: ${fileName()}-texture.npz}}`);
+});
 $("save-constraints").addEventListener("click", () => save("constraints.yaml", `${fileName()}-keys.yaml`));
 $("save-picture").addEventListener("click", () => save("picture.png", `${fileName()}.png`));
 $("open").addEventListener("change", async (event) => {
@@ -430,7 +461,7 @@ $("render-again").addEventListener("click", async () => {
   try {
     const { lines, parameters } = await (await post("again", history.now)).json();
     $("rendered-again").replaceChildren(...lines.map((text) => tag("li", text)));
-    history.set({ wish: history.now.wish, by_hand: parameters });
+    if (parameters) history.set({ wish: history.now.wish, by_hand: parameters });
   } catch (error) {
     $("rendered-again").replaceChildren();
     say(error.message);

@@ -1,10 +1,11 @@
 """How fast the page of `labrig design` answers while a key is dragged, in a real browser.
 
-    python -m tests.acceptance.design_page [--scene cornell-box]
+    python -m tests.acceptance.design_page [--scene cornell-box [--spread]]
 
 A key is dragged along the time line in steps of one pixel; from each step until the page has drawn
 the new material is one answer. Given are the median, the 90th percentile and the slowest; with a
-scene, too, the time until its picture is drawn.
+scene, too, the time until its picture is drawn. With `--spread` there is another dot, and each
+has a material of its own.
 """
 
 import argparse
@@ -28,13 +29,17 @@ KEYS = ((1, "#20c060", 4e-3), (5, "#20b060", 2e-3), (20, "#20a060", 1e-3), (60, 
 DARK_S = 300.0
 #: A dot on the left wall of the shipped box.
 DOT = (0.1, 0.55)
+#: Another one above it, and its glow.
+OTHER, OTHER_KEYS = (0.1, 0.25), ((1, "#4060f0", 3e-3), (60, "#4060f0", 8e-4))
 
 
 def main() -> None:
     """Drag a key, and print how fast the page followed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene")
-    scene: str | None = parser.parse_args().scene
+    parser.add_argument("--spread", action="store_true")
+    arguments = parser.parse_args()
+    scene: str | None = arguments.scene
     bench = Workbench() if scene is None else SceneBench(scene)
     first = bench.start()
     begin_s, place = (DARK_S, "patch") if scene is None else (0.0, "dot 1")
@@ -44,6 +49,13 @@ def main() -> None:
         {"at": f"{begin_s + after_s} s", "place": place, "colour": colour, "brightness": brightness}
         for after_s, colour, brightness in KEYS
     ]
+    if arguments.spread:
+        first["scene"]["spread"] = {}
+        first["pixels"]["dot 2"] = OTHER
+        first["keys"] += [
+            {"at": f"{at_s} s", "place": "dot 2", "colour": colour, "brightness": brightness}
+            for at_s, colour, brightness in OTHER_KEYS
+        ]
     with (
         StudioServer(bench, first) as server,
         server.running(),

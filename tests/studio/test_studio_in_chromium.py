@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from selenium.webdriver import Chrome
@@ -17,7 +18,9 @@ from labrig.material import read_material
 from labrig.studio.scene_bench import SceneBench
 from labrig.studio.server import StudioServer
 from labrig.studio.workbench import Workbench
+from labrig.yaml_file import parse_yaml
 from tests.design.small_scene import corner
+from tests.design.test_spread_design import OBJECTS, PIXELS, keys
 
 #: Where screenshots are kept for a person to look at.
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")
@@ -32,14 +35,14 @@ def page() -> Iterator[str]:
 
 
 class Page:
-    def __init__(self, browser: Chrome, url: str, downloads: Path) -> None:
+    def __init__(self, browser: Chrome, url: str, downloads: Path, first: str = "glow") -> None:
         self.browser = browser
         self.downloads = downloads
         browser.execute_cdp_cmd(
             "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(downloads)}
         )
         browser.get(url)
-        self.wait(lambda: "glow" in self.one("#status").text)
+        self.wait(lambda: first in self.one("#status").text)
 
     def wait(self, until: object) -> None:
         assert callable(until)
@@ -79,6 +82,13 @@ class Page:
         path = self.downloads / name
         self.wait(path.exists)
         return path
+
+    def strokes(self) -> dict[str, Any]:
+        """Return the strokes of the wish as the page saves it."""
+        path = self.download("#save-constraints", "paint-keys.yaml")
+        saved = parse_yaml(path.read_text(encoding="utf-8"), "keys")
+        path.unlink()
+        return dict(saved["scene"]["spread"].get("strokes", {}))
 
     def screenshot(self, name: str) -> None:
         if SCREENSHOTS:
@@ -238,3 +248,30 @@ def test_dots_on_a_picture_of_a_scene(chromium: Chrome, page_of_scene: str, tmp_
     level.send_keys("0.5", Keys.TAB)
     view.settle()
     assert "0.5" in view.one('#timeline [data-light="0"]').text
+
+
+def test_a_stroke_on_a_scene_is_kept_and_undone(chromium: Chrome, tmp_path: Path) -> None:
+    bench = SceneBench(str(corner(tmp_path, objects=OBJECTS)), "paint")
+    first = bench.start()
+    first["pixels"], first["keys"] = PIXELS, keys()
+    with StudioServer(bench, first) as server, server.running():
+        view = Page(chromium, server.url, tmp_path, "ΔE2000")
+        view.give("spread", "own")
+        assert "met" in view.one("#status").text
+        view.one("#paint").click()
+        picture = view.one("#picture")
+        chromium.execute_script("arguments[0].scrollIntoView({block: 'start'})", picture)
+        across, down = picture.size["width"] / 2, picture.size["height"] / 2
+        ActionChains(chromium, duration=20).move_to_element_with_offset(
+            picture, int(-0.2 * across), int(0.5 * down)
+        ).click_and_hold().move_by_offset(0, 40).move_by_offset(0, 40).release().perform()
+        view.settle()
+        view.screenshot("design-spread")
+        (strokes,) = view.strokes().values()
+        assert list(view.strokes()) == ["left"]
+        assert len(strokes) >= 6
+        view.one("#undo").click()
+        view.settle()
+        assert view.strokes() == {}
+        assert len(view.all("#keys li")) == len(first["keys"])
+        assert severe(chromium) == []

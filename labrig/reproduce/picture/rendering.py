@@ -341,6 +341,16 @@ class Renderer:
         """Places that some pixel shows, rising."""
         return self._view_at(self._t_s).seen_places()
 
+    @property
+    def first_places(self) -> IntArray:
+        """Places that the paths of each pixel meet first, shape (height, width, paths).
+
+        A lamp is −2 less its number, and nothing −1.
+        """
+        camera, paths = self._scene.camera, self._view_at(self._t_s).of_camera()
+        found = np.concatenate([each.first_places for each in paths])
+        return found.reshape(camera.height_px, camera.width_px, -1)
+
     def _view_at(self, t_s: float) -> "_View":
         """Return paths; they are traced anew only where something moves."""
         if self._view is None or (self._scene.is_moving and self._view.t_s != t_s):
