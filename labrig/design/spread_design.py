@@ -200,8 +200,8 @@ class SpreadDesign:
             is_spent = design.emitted_over_absorbed_at_most > NEARLY_ALL
             if is_spent and design.cost > _unseen(design.keys):
                 found.append(
-                    f"{own}: keys are missed where nearly all light that is absorbed is given back, "
-                    "so that it can hardly glow brighter"
+                    f"{own}: keys are missed where nearly all light that is absorbed is given "
+                    "back, so that it can hardly glow brighter"
                 )
         return tuple(found)
 
