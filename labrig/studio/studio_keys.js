@@ -25,12 +25,21 @@ export function wantedLuminance(key, judged) {
 
 export const ofWhite = (y) => (y > 0 ? `${short(y, 3)} of white` : "black");
 
-/** Gives a key another luminance and keeps its colour. */
+/** Gives a key another luminance and keeps its colour, however that is given. */
 export function withLuminance(key, judged, y) {
-  const hex = swatch(key, judged);
-  const own = luminance(linearOf(hex)) || 1;
+  const now = wantedLuminance(key, judged);
+  if (now > 0) return { ...key, brightness: Number((((key.brightness ?? 1) * y) / now).toPrecision(4)) };
+  // Black has no colour to keep.
   const { xyz, spectrum, ...rest } = key;
-  return { ...rest, colour: hex, brightness: Number((y / own).toPrecision(4)) };
+  return { ...rest, colour: "#ffffff", brightness: Number(y.toPrecision(4)) };
+}
+
+/** Gives a key another colour, as bright as the one before, or as what is there instead of black. */
+export function withColour(key, judged, hex) {
+  const y = wantedLuminance(key, judged) || (judged?.luminance[1] ?? 0) || luminance(linearOf(hex));
+  const { xyz, spectrum, ...rest } = key;
+  const own = luminance(linearOf(hex));
+  return { ...rest, colour: hex, brightness: own > 0 ? Number((y / own).toPrecision(4)) : 1 };
 }
 
 /** What comes of all keys, in a sentence. */

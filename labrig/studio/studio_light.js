@@ -33,8 +33,8 @@ function levelsAt(wish, lamps, number) {
 }
 
 export class Light {
-  constructor({ onWish, onChosen, timeShown }) {
-    Object.assign(this, { onWish, onChosen, timeShown });
+  constructor({ onWish, onChosen, timeShown, wishNow }) {
+    Object.assign(this, { onWish, onChosen, timeShown, wishNow });
     for (const name of KNOWN) $("known-lights").append(new Option(name));
     $("add-light").addEventListener("click", () => this.#add());
     $("remove-light").addEventListener("click", () => this.#remove());
@@ -53,7 +53,6 @@ export class Light {
   }
 
   draw({ answer, wish, chosenPlace, chosenLight }) {
-    this.wish = wish;
     this.lamps = answer.scene?.lamps ?? [];
     this.name = answer.places[chosenPlace].name;
     this.chosen = Math.min(chosenLight, this.#entries.length - 1);
@@ -74,15 +73,15 @@ export class Light {
   }
 
   get #entries() {
-    return this.wish.scene ? this.wish.scene.programme : this.wish.places[this.name];
+    return this.wishNow().scene ? this.wishNow().scene.programme : this.wishNow().places[this.name];
   }
 
   #at_s(change) {
-    return this.wish.scene ? change.at_s : seconds(change.at);
+    return this.wishNow().scene ? change.at_s : seconds(change.at);
   }
 
   #timed(change, at_s) {
-    return this.wish.scene ? { ...change, at_s } : { ...change, at: written(at_s) };
+    return this.wishNow().scene ? { ...change, at_s } : { ...change, at: written(at_s) };
   }
 
   #drawLamps() {
@@ -90,7 +89,7 @@ export class Light {
     if (box.childElementCount !== this.lamps.length) {
       box.replaceChildren(...this.lamps.map((name) => this.#lamp(name)));
     }
-    const levels = levelsAt(this.wish, this.lamps, this.chosen);
+    const levels = levelsAt(this.wishNow(), this.lamps, this.chosen);
     for (const name of this.lamps) set(`lamp-${name}`, String(levels[name]));
   }
 
@@ -113,11 +112,10 @@ export class Light {
   /** Gives the changes in the order of their times; the one that was edited stays chosen. */
   #give(changes, chosen) {
     const sorted = [...changes].sort((a, b) => this.#at_s(a) - this.#at_s(b));
-    this.onChosen(sorted.indexOf(chosen));
     this.onWish((now) => {
       if (now.scene) now.scene.programme = sorted;
       else now.places[this.name] = sorted;
-    });
+    }, sorted.indexOf(chosen));
   }
 
   #add() {
@@ -127,14 +125,14 @@ export class Light {
       this.onChosen(same);
       return;
     }
-    const before = changesOf(this.wish, this.name).filter((each) => each.at_s < at_s).at(-1);
+    const before = changesOf(this.wishNow(), this.name).filter((each) => each.at_s < at_s).at(-1);
     const added = this.#timed(this.#turned(before?.isDark ?? true), at_s);
     this.#give([...this.#entries, added], added);
   }
 
   /** A light after darkness, and darkness after light. */
   #turned(isDark) {
-    if (!this.wish.scene) return { light: isDark ? "D65" : "none" };
+    if (!this.wishNow().scene) return { light: isDark ? "D65" : "none" };
     return { lamps: Object.fromEntries(this.lamps.map((name) => [name, isDark ? 1 : 0])) };
   }
 

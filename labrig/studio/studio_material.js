@@ -7,6 +7,9 @@ import { $, duration, field, short, tag } from "./studio_words.js";
 const RANGES = { k_r: [-6, 3], k_e: [-8, 3], reradiation: [-9, 3] };
 const FEW_BANDS = 3;
 
+/** σ of 1/x. */
+const inverse = (sigma, x) => (sigma ? sigma / x ** 2 : undefined);
+
 function slider({ name, value, sigma, isOpen, unit, range, mayBeZero, onInput, onSettled, words }) {
   const row = tag("div", undefined, isOpen ? "parameter open" : "parameter");
   const head = tag("label");
@@ -18,7 +21,7 @@ function slider({ name, value, sigma, isOpen, unit, range, mayBeZero, onInput, o
   });
   const said = tag("output");
   const show = (now) => {
-    said.textContent = words ? words(now) : `${short(now)}${sigma ? ` ± ${short(sigma, 1)}` : ""} ${unit}`.trim();
+    said.textContent = words ? words(now, sigma) : `${short(now)}${sigma ? ` ± ${short(sigma, 1)}` : ""} ${unit}`.trim();
   };
   input.value = String(range ? (value > 0 ? Math.log10(value) : range[0]) : value);
   show(value);
@@ -37,8 +40,8 @@ function slider({ name, value, sigma, isOpen, unit, range, mayBeZero, onInput, o
 }
 
 export class Material {
-  constructor({ onWish, onByHand, onSolve, onSettled }) {
-    Object.assign(this, { onByHand, onSettled });
+  constructor({ onWish, onByHand, onSolve, onSettled, byHandNow }) {
+    Object.assign(this, { onByHand, onSettled, byHandNow });
     $("states").addEventListener("change", (event) => onWish({ states: Number(event.target.value) }));
     $("order").addEventListener("change", (event) => {
       onWish({ order: event.target.value === "free" ? "free" : 1 });
@@ -55,7 +58,7 @@ export class Material {
     $("solve").addEventListener("click", onSolve);
   }
 
-  draw({ answer, wish, byHand }) {
+  draw({ answer, wish, byHand, isRenderedAgain }) {
     $("states").value = String(wish.states ?? 1);
     $("order").value = wish.order === "free" ? "free" : "1";
     const albedo = wish.albedo ?? "free";
@@ -67,12 +70,17 @@ export class Material {
     const choice = wish.bands_nm ? String(width) : "three";
     $("bands").value = [...$("bands").options].some((each) => each.value === choice) ? choice : "";
     $("by-hand").hidden = !byHand;
+    $("by-hand-said").textContent = isRenderedAgain ? "As rendered in its own light." : "Set by hand.";
     $("solve").disabled = !wish.keys.length;
     if (this.isHeld()) return;
     const { parameters } = answer;
     const parts = parameters.k_r_per_s.map((_, state) => this.#state(answer, state));
     parts.push(this.#albedo(answer));
+    // Another set of sliders: who moves one by keys goes on.
+    const sliders = () => [...document.querySelectorAll("#parameters input")];
+    const focused = sliders().indexOf(document.activeElement);
     $("parameters").replaceChildren(...parts);
+    sliders()[focused]?.focus();
     // Of materials that are spread those of the dots follow from their keys alone.
     for (const input of document.querySelectorAll("#parameters input")) {
       input.disabled = Boolean(wish.scene?.spread && wish.keys.length);
@@ -159,12 +167,11 @@ export class Material {
     return slider({
       ...rest,
       value: turned(value),
-      sigma: inverted ? undefined : answer.sigma[of],
-      // Names of bands that are lit in proportion are joined: k_e R + G + B.
-      isOpen: answer.open.some((name) => name === of || (of.startsWith("k_e") && name.startsWith(of.slice(0, of.lastIndexOf(" "))) && name.includes("+"))),
-      words: inverted ? (now) => duration(now) : rest.words,
+      sigma: inverted ? inverse(answer.sigma[of], value) : answer.sigma[of],
+      isOpen: answer.open.includes(of),
+      words: inverted ? (now, sigma) => duration(now) + (sigma ? ` ± ${short(sigma, 1)} s` : "") : rest.words,
       onInput: (now) => {
-        const made = JSON.parse(JSON.stringify(answer.parameters));
+        const made = this.byHandNow() ?? JSON.parse(JSON.stringify(answer.parameters));
         put(made, turned(now));
         this.onByHand(made, of);
       },

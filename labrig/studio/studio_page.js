@@ -2,8 +2,8 @@
 // way, and the last change is always answered.
 
 import { luminance } from "./studio_colour.js";
-import { History } from "./studio_document.js";
-import { Keys } from "./studio_key_list.js";
+import { History } from "./studio_history.js";
+import { Keys } from "./studio_key_panel.js";
 import { keyColour, summary, withLuminance } from "./studio_keys.js";
 import { Light, changesOf } from "./studio_light.js";
 import { Material } from "./studio_material.js";
@@ -11,16 +11,20 @@ import { drawPatches, exposureAt, placeAt } from "./studio_patches.js";
 import { ScenePicture, dotAt, newDot } from "./studio_scene.js";
 import { Spread, answerAt, withSpread } from "./studio_spread.js";
 import { Timeline, frameOf, timeOf } from "./studio_timeline.js";
-import { $, duration, seconds, tag, written } from "./studio_words.js";
+import { $, duration, seconds, tag, whileDragged, written } from "./studio_words.js";
 
 const PLAY_MS = 50;
 const DEFAULT_GREEN = [0.014, 0.527, 0.117];
 /** Frames around a key at which its ring is shown. */
 const NEAR = 1.5;
-const MOST_FIGHTS = 3;
-const DRIVEN = 8; // frames by which PageUp and PageDown go
+/** Wishes that cannot be met, and are written one by one. */
+const MOST_LINES = 20;
+/** Frames by which PageUp and PageDown go. */
+const PAGE_FRAMES = 8;
+/** Step of the cross that the keyboard moves over the picture of a scene. */
+const CROSS_STEP = 0.02;
 
-const view = { frame: 0, chosen: -1, chosenPlace: 0, chosenLight: 0, ev: null, asked: null, wasDragged: false };
+const view = { frame: 0, chosen: -1, chosenPlace: 0, chosenLight: 0, ev: null, asked: null, wasDragged: false, judged: null, cross: null };
 let answer = null;
 let history = null;
 let isAsking = false;
@@ -50,9 +54,15 @@ function say(text) {
 /** What is designed; while a hand drags, an answer that is quick matters more than the last one. */
 const question = () => ({ ...history.now, is_draft: history.isInGesture });
 
-async function ask() {
+/** Is kept when the last change is answered. */
+let answered = Promise.resolve();
+
+function ask() {
   isStale = true;
-  if (isAsking) return;
+  if (!isAsking) answered = askUntilAnswered();
+}
+
+async function askUntilAnswered() {
   isAsking = true;
   document.body.dataset.busy = "yes";
   while (isStale) {
@@ -67,12 +77,16 @@ async function ask() {
       if (shownAt !== null) view.frame = Math.round(frameOf(answer.frames_s, shownAt));
       if (isFirst) view.frame = Math.min(answer.first.at(-1) + 12, answer.frames_s.length - 1);
       say();
+      delete document.body.dataset.refused;
       draw();
       performance.measure("answer", { start: begin, end: performance.now() });
       $("speed").textContent = `Answered in ${Math.round(performance.now() - begin)} ms.`;
     } catch (error) {
       say(error.message);
       if (answer === null) break;
+      // What is shown belongs to the wish before.
+      document.body.dataset.refused = "yes";
+      $("status").textContent = "The last change is not answered: mend it, or undo it.";
     }
   }
   isAsking = false;
@@ -111,12 +125,23 @@ function draw() {
   view.chosenLight = Math.min(view.chosenLight, changesOf(now, placeShown()).length - 1);
   view.frame = Math.min(view.frame, answer.frames_s.length - 1);
   const all = { answer, wish: now, ...view };
+  const judged = JSON.stringify({ ...now, name: "" });
+  if (judged !== view.judged) {
+    view.judged = judged;
+    $("nearest").replaceChildren();
+    $("rendered-again").replaceChildren();
+  }
   if (document.activeElement !== $("name")) $("name").value = now.name ?? "design";
   drawTime(all);
   timeline.draw(all);
   keys.draw(all);
   light.draw(all);
-  material.draw({ answer: answerAt(answer, view.chosenPlace), wish: now, byHand: by_hand });
+  material.draw({
+    answer: answerAt(answer, view.chosenPlace),
+    wish: now,
+    byHand: by_hand,
+    isRenderedAgain: answer.is_rendered_again,
+  });
   spread.draw({ answer, wish: now });
   for (const id of ["add-place", "remove-place"]) $(id).hidden = Boolean(answer.scene);
   $("remove-place").disabled = answer.places.length < 2;
@@ -125,10 +150,12 @@ function draw() {
     ? `Click on '${answer.scene.material}' to set a key: so it shall look there at this time. Drag a dot to move it.`
     : `Click on the ${answer.places.length > 1 ? "chosen patch" : "material"} to set a key: so it shall look at this time. The small square is a white card in the same light.`;
   $("impossible-section").hidden = !answer.impossible.length && !answer.conflicts.length && !answer.energy;
-  const pairs = new Set(answer.conflicts.map((pair) => [...pair].sort((a, b) => a - b).map((i) => i + 1).join(" and ")));
-  const fights = [...pairs].slice(0, MOST_FIGHTS).map((pair) => `Keys ${pair} work against each other.`);
+  const fights = answer.conflicts.map(([a, b]) => `Keys ${a + 1} and ${b + 1} work against each other.`);
+  const wishes = answer.impossible.map((each) => each.text);
+  const more = wishes.length > MOST_LINES ? [`${wishes.length - MOST_LINES} more wishes are not possible.`] : [];
+  const energy = answer.energy ? [answer.energy] : [];
   $("impossible").replaceChildren(
-    ...[...answer.impossible.map((each) => each.text), ...(answer.energy ? [answer.energy] : []), ...fights].map(begun).map((text) => tag("li", text)),
+    ...[...wishes.slice(0, MOST_LINES), ...more, ...energy, ...fights].map((text) => tag("li", begun(text))),
   );
   const result = summary(answer.keys);
   $("status").textContent = result || "No keys yet: a plain green glow to look at.";
@@ -137,13 +164,15 @@ function draw() {
   $("find-nearest").disabled = !now.keys.length;
 }
 
-const placeShown = () => answer.places[view.chosenPlace].name;
+/** The place that is chosen, of those that are answered for. */
+const placeNumber = () => Math.min(view.chosenPlace, answer.places.length - 1);
+const placeShown = () => answer.places[placeNumber()].name;
 
 function exposure() {
   return answer.scene ? picture.exposure : exposureAt(answer, view.frame, view.ev);
 }
 
-function drawTime(all = { answer, wish: history.now.wish, ...view }) {
+function drawTime(all = { answer, wish: history.now.wish, ...view, chosenPlace: placeNumber() }) {
   const t_s = answer.frames_s[view.frame];
   const drawn = { ...all, keys: all.wish.keys, near: near(all.wish.keys), exposure: exposure() };
   if (answer.scene) {
@@ -161,6 +190,13 @@ function drawTime(all = { answer, wish: history.now.wish, ...view }) {
   if (view.ev === null) $("ev").value = stops;
 }
 
+/** A time with few digits of the delay since the light last changed, which is what matters. */
+function tidy(t_s) {
+  const change = changesOf(history.now.wish, placeShown()).filter((each) => each.at_s <= t_s).at(-1);
+  const since_s = change ? change.at_s : 0;
+  return since_s + Number((t_s - since_s).toPrecision(3));
+}
+
 /** Asks for the picture of a scene, unless it is the one that was asked for last. */
 function askPicture(t_s) {
   const asked = JSON.stringify([question(), t_s, view.ev]);
@@ -173,7 +209,7 @@ function show(frame) {
   view.frame = Math.min(Math.max(frame, 0), answer.frames_s.length - 1);
   const { wish: now } = history.now;
   drawTime();
-  timeline.draw({ answer, wish: now, ...view });
+  timeline.draw({ answer, wish: now, ...view, chosenPlace: placeNumber() });
 }
 
 function choose(number) {
@@ -201,9 +237,7 @@ function addKey(place) {
 }
 
 /** Adds a key of a colour, at a new dot of the picture if a point of it is given. */
-function push(name, rgb, point = null) {
-  const t_s = answer.frames_s[view.frame];
-  const factor = exposure();
+function push(name, rgb, point = null, t_s = answer.frames_s[view.frame], factor = exposure()) {
   const isDark = !(luminance(rgb) > 0);
   const colour = keyColour(isDark ? DEFAULT_GREEN.map((x) => x / factor) : rgb, factor);
   view.chosen = history.now.wish.keys.length;
@@ -232,10 +266,11 @@ async function addKeyAt(u, v) {
     addKey(answer.places.findIndex((each) => each.name === dot));
     return;
   }
+  const [t_s, factor] = [answer.frames_s[view.frame], exposure()];
   try {
-    const seen = await (await post("seen", { ...question(), x: u, y: v, t_s: answer.frames_s[view.frame] })).json();
+    const seen = await (await post("seen", { ...question(), x: u, y: v, t_s })).json();
     say();
-    push(newDot(pixels), seen.rgb, [u, v].map((x) => Number(x.toFixed(4))));
+    push(newDot(history.now.wish.pixels), seen.rgb, [u, v].map((x) => Number(x.toFixed(4))), t_s, factor);
   } catch (error) {
     say(error.message);
   }
@@ -281,7 +316,7 @@ const timeline = new Timeline({
       number,
       (key, judged) => ({
         ...(isLuminance ? withLuminance(key, judged, y) : key),
-        at: isTime ? written(Number(t_s.toPrecision(4))) : key.at,
+        at: isTime ? written(tidy(t_s)) : key.at,
       }),
       gesture,
     );
@@ -295,15 +330,20 @@ const keys = new Keys({
   onSettled: () => history.settle(),
 });
 const light = new Light({
-  timeShown: () => Number(answer.frames_s[view.frame].toPrecision(4)),
+  timeShown: () => tidy(answer.frames_s[view.frame]),
+  wishNow: () => history.now.wish,
+  onWish: (change, chosen) => {
+    if (chosen !== undefined) view.chosenLight = chosen;
+    wish(change, null, true);
+  },
   onChosen: (number) => {
     view.chosenLight = number;
     draw();
   },
-  onWish: (change) => wish(change, null, true),
 });
 const picture = new ScenePicture(post, () => drawTime());
 const material = new Material({
+  byHandNow: () => history.now.by_hand,
   onWish: (content) => wish((now) => ({ ...now, ...content })),
   onByHand: (parameters, gesture) => history.set({ wish: history.now.wish, by_hand: parameters }, `slider ${gesture}`),
   onSolve: () => history.set({ wish: history.now.wish, by_hand: null }),
@@ -334,7 +374,7 @@ $("name").addEventListener("change", (event) => {
   if (name) wish((now) => ({ ...now, name }), null, true);
 });
 $("frame").addEventListener("input", (event) => show(event.target.valueAsNumber));
-$("add-key").addEventListener("click", () => addKey(view.chosenPlace));
+$("add-key").addEventListener("click", () => addKey(placeNumber()));
 const pointOf = (event) => {
   const box = $("picture").getBoundingClientRect();
   return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
@@ -355,27 +395,40 @@ $("picture").addEventListener("pointerdown", (event) => {
   }
   const dot = dotAt(answer, history.now.wish.pixels, ...start);
   if (!dot) return;
+  let isMoved = false;
   view.wasDragged = false;
   const follow = (next) => {
     const point = pointOf(next);
-    if (!view.wasDragged && Math.hypot(point[0] - start[0], point[1] - start[1]) < 0.008) return;
-    view.wasDragged = true;
+    if (!isMoved && Math.hypot(point[0] - start[0], point[1] - start[1]) < 0.008) return;
+    isMoved = view.wasDragged = true;
     wish((now) => {
       now.pixels[dot] = point.map((x) => Number(Math.min(Math.max(x, 0), 1).toFixed(4)));
     }, `dot ${dot}`, true);
   };
-  const end = () => {
-    removeEventListener("pointermove", follow);
-    removeEventListener("pointerup", end);
+  whileDragged(follow, async () => {
     history.settle();
-  };
-  addEventListener("pointermove", follow);
-  addEventListener("pointerup", end);
+    await answered;
+    // Off the material there is nothing to be dragged to.
+    if (isMoved && document.body.dataset.refused) {
+      history.undo();
+      await answered;
+      say("A dot stays on the material.");
+    }
+  });
 });
 $("picture").addEventListener("keydown", (event) => {
-  const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -DRIVEN, PageDown: DRIVEN }[event.key];
-  if (step) show(view.frame + step);
-  else if (event.key === "Enter") addKey(view.chosenPlace);
+  const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -PAGE_FRAMES, PageDown: PAGE_FRAMES }[event.key];
+  const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+  if (answer.scene && event.shiftKey && move) {
+    const [x, y] = view.cross ?? [0.5, 0.5];
+    const within = (value) => Math.min(Math.max(value, 0), 1);
+    view.cross = [within(x + move[0] * CROSS_STEP), within(y + move[1] * CROSS_STEP)];
+    drawTime();
+  } else if (step) show(view.frame + step);
+  else if (event.key === "Enter" && answer.scene) {
+    if (view.cross) addKeyAt(...view.cross);
+    else say("Move the cross by Shift and arrows onto the material, or click there.");
+  } else if (event.key === "Enter") addKey(placeNumber());
   else if (event.key === "Delete" && view.chosen >= 0) removeKey(view.chosen);
   else return;
   event.preventDefault();
@@ -457,20 +510,31 @@ $("open").addEventListener("change", async (event) => {
   event.target.value = "";
 });
 $("render-again").addEventListener("click", async () => {
-  $("rendered-again").replaceChildren(tag("li", "The scene is rendered with the light of the glow itself …"));
+  const asked = history.now;
+  const list = $("rendered-again");
+  list.replaceChildren(tag("li", "The scene is rendered with the light of the glow itself …"));
   try {
-    const { lines, parameters } = await (await post("again", history.now)).json();
-    $("rendered-again").replaceChildren(...lines.map((text) => tag("li", text)));
-    if (parameters) history.set({ wish: history.now.wish, by_hand: parameters });
+    const { lines, parameters } = await (await post("again", asked)).json();
+    if (JSON.stringify(history.now.wish) !== JSON.stringify(asked.wish)) {
+      list.replaceChildren(tag("li", "The wish has changed since; render again."));
+      return;
+    }
+    list.replaceChildren(...lines.map((text) => tag("li", text)));
+    if (parameters) history.set({ wish: asked.wish, by_hand: parameters });
   } catch (error) {
-    $("rendered-again").replaceChildren();
+    list.replaceChildren();
     say(error.message);
   }
 });
 $("find-nearest").addEventListener("click", async () => {
   $("nearest").replaceChildren(tag("li", "…"));
   try {
-    const { nearest } = await (await post("nearest", history.now)).json();
+    const asked = history.now;
+    const { nearest } = await (await post("nearest", asked)).json();
+    if (JSON.stringify(history.now.wish) !== JSON.stringify(asked.wish)) {
+      $("nearest").replaceChildren();
+      return;
+    }
     $("nearest").replaceChildren(...nearest.map((text) => tag("li", text.replace("nearest measured: ", ""))));
   } catch (error) {
     $("nearest").replaceChildren();

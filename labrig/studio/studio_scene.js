@@ -45,7 +45,7 @@ export class ScenePicture {
     delete document.body.dataset.painting;
   }
 
-  draw({ answer, keys, pixels, near, chosen, chosenPlace }) {
+  draw({ answer, keys, pixels, near, chosen, chosenPlace, cross }) {
     const canvas = $("picture");
     const { width_px, height_px } = answer.scene;
     const height = Math.round((canvas.width * height_px) / width_px);
@@ -82,6 +82,12 @@ export class ScenePicture {
       pen.fillStyle = "#fff";
       pen.fillText(numbers.join(" "), x, y + radius + 4);
       pen.textAlign = "left";
+    }
+    if (cross) {
+      const [x, y] = [cross[0] * canvas.width, cross[1] * canvas.height];
+      pen.lineWidth = 2;
+      pen.strokeStyle = "#fff";
+      pen.strokeRect(x - radius / 2, y - radius / 2, radius, radius);
     }
   }
 }

@@ -1,6 +1,6 @@
 // A material of its own for each dot: how far it reaches, and what is painted to have it.
 
-import { $, short } from "./studio_words.js";
+import { $, short, whileDragged } from "./studio_words.js";
 
 /** Distances in texels and differences of colours where a wish says nothing. */
 const DEFAULTS = { position: 20, appearance: 0.1, brush: 2 };
@@ -75,15 +75,8 @@ export class Spread {
       const within = (x) => Number(Math.min(Math.max(x, 0), 1).toFixed(4));
       this.onStroke(dot, points.map((each) => [...each.map(within), radius]));
     };
-    const follow = (event) => paint(pointOf(event));
-    const end = () => {
-      removeEventListener("pointermove", follow);
-      removeEventListener("pointerup", end);
-      this.onSettled();
-    };
     paint(first);
-    addEventListener("pointermove", follow);
-    addEventListener("pointerup", end);
+    whileDragged((event) => paint(pointOf(event)), () => this.onSettled());
   }
 
   /** Draws what was painted over the picture, while somebody paints. */

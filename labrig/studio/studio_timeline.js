@@ -4,7 +4,7 @@
 import { luminance, shown } from "./studio_colour.js";
 import { changesOf } from "./studio_light.js";
 import { swatch, wantedLuminance } from "./studio_keys.js";
-import { $, duration, powerOfTen, short, svg } from "./studio_words.js";
+import { $, duration, powerOfTen, short, svg, whileDragged } from "./studio_words.js";
 
 const [WIDTH, HEIGHT, TRACK, LEFT, RIGHT, TOP] = [1000, 240, 34, 50, 10, 8];
 const FLOOR = HEIGHT - TRACK - 26;
@@ -87,14 +87,8 @@ export class Timeline {
         });
       }
     };
-    const end = () => {
-      removeEventListener("pointermove", follow);
-      removeEventListener("pointerup", end);
-      settled();
-    };
     if (fromStart) follow(event);
-    addEventListener("pointermove", follow);
-    addEventListener("pointerup", end);
+    whileDragged(follow, settled);
   }
 
   #point(event) {

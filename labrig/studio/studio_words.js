@@ -37,6 +37,18 @@ export function short(value, digits = 3) {
   return `${Number(head)} × 10${raised(Number(power))}`;
 }
 
+/** Calls `follow` while a pointer is dragged, and `end` once, whatever ends it. */
+export function whileDragged(follow, end) {
+  const ends = ["pointerup", "pointercancel", "blur"];
+  const done = () => {
+    removeEventListener("pointermove", follow);
+    for (const name of ends) removeEventListener(name, done);
+    end();
+  };
+  addEventListener("pointermove", follow);
+  for (const name of ends) addEventListener(name, done);
+}
+
 /** Seconds of a time as a file has it, such as "300 s". */
 export const seconds = (text) => Number.parseFloat(text);
 /** A time as a file has it. */
@@ -44,7 +56,13 @@ export const written = (s) => `${Number(s.toPrecision(9))} s`;
 
 export function duration(s) {
   if (s < 0) return `−${duration(-s)}`;
-  if (s >= 3600) return `${Math.floor(s / 3600)} h ${Math.round((s % 3600) / 60)} min`;
-  if (s >= 60) return `${Math.floor(s / 60)} min ${Number((s % 60).toFixed(s < 600 ? 1 : 0))} s`;
+  if (s >= 3600) {
+    const minutes = Math.round(s / 60);
+    return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+  }
+  if (s >= 60) {
+    const tenths = s < 600 ? Math.round(10 * s) / 10 : Math.round(s);
+    return `${Math.floor(tenths / 60)} min ${Number((tenths % 60).toFixed(1))} s`;
+  }
   return `${short(s)} s`;
 }

@@ -243,6 +243,19 @@ def test_dots_on_a_picture_of_a_scene(chromium: Chrome, page_of_scene: str, tmp_
     assert y == pytest.approx(0.62 + 10 / picture.size["height"], abs=0.02)
     view.wait(lambda: not chromium.execute_script("return document.body.dataset.painting"))
     view.screenshot("design-scene")
+    # off the floor it goes back, and by keys another one is set
+    across, down = offsets(x, y)
+    ActionChains(chromium, duration=20).move_to_element_with_offset(
+        picture, across, down
+    ).click_and_hold().move_by_offset(5, -100).move_by_offset(5, -60).release().perform()
+    view.wait(lambda: "stays on the material" in view.one("#message").text)
+    view.settle()
+    assert chromium.execute_script("return document.body.dataset.refused") is None
+    for _ in range(8):
+        picture.send_keys(Keys.SHIFT, Keys.ARROW_DOWN)
+    picture.send_keys(Keys.ENTER)
+    view.wait(lambda: len(view.all("#keys li")) == 2)
+    view.settle()
     level = view.one("#lamps input")
     level.send_keys(Keys.CONTROL, "a")
     level.send_keys("0.5", Keys.TAB)

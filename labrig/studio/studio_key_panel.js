@@ -1,7 +1,7 @@
 // The list of keys: what is wanted when, what comes out, and the fields of the chosen one.
 
-import { besides, linearOf, luminance, shown } from "./studio_colour.js";
-import { ofWhite, swatch, wantedLuminance, withLuminance } from "./studio_keys.js";
+import { besides, shown } from "./studio_colour.js";
+import { ofWhite, swatch, wantedLuminance, withColour, withLuminance } from "./studio_keys.js";
 import { $, duration, field, seconds, tag, written } from "./studio_words.js";
 
 const [FAINTEST, BRIGHTEST] = [-8, 1];
@@ -20,9 +20,11 @@ export class Keys {
   draw({ answer, wish, chosen }) {
     const list = $("keys");
     $("no-keys").hidden = wish.keys.length > 0;
+    const focused = [...list.querySelectorAll("button")].indexOf(document.activeElement);
     list.replaceChildren(
       ...wish.keys.map((key, i) => this.#row(key, answer.keys[i], i, chosen, answer)),
     );
+    list.querySelectorAll("button")[focused]?.focus();
     this.#editor(wish, answer, chosen);
   }
 
@@ -93,12 +95,7 @@ export class Keys {
     colour.addEventListener("input", () => {
       this.onChange(
         chosen,
-        (key, judged) => {
-          // Another colour is as bright as the one before.
-          const y = wantedLuminance(key, judged) || luminance(linearOf(colour.value));
-          const { xyz, spectrum, ...rest } = key;
-          return withLuminance({ ...rest, colour: colour.value }, judged, y);
-        },
+        (key, judged) => withColour(key, judged, colour.value),
         `colour ${chosen}`,
       );
     });
