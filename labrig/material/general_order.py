@@ -306,9 +306,10 @@ def lit_concentration(
     approach, t = _approach(start, kappa_per_s, k_r_per_s, order, duration_s)
     level = approach.level(approach.position(t))
     # The approach to a steady level is lost in rounding where next to nothing is captured.
-    dark = dark_concentration(start, k_r_per_s, order, duration_s)
+    filled = np.asarray(start, dtype=np.float64)
+    dark = dark_concentration(np.where(filled > 0, filled, 1.0), k_r_per_s, order, duration_s)
     is_faint = np.asarray(kappa_per_s) * np.asarray(duration_s) < NEXT_TO_DARK * dark
-    return np.where(is_faint, dark, level)
+    return np.where(is_faint & (filled > 0), dark, level)
 
 
 class LitStep(NamedTuple):

@@ -14,7 +14,24 @@ DPI = 150
 
 
 def require_picture(path: Path) -> None:
-    """Refuse, before anything is drawn, a file name that is not that of a picture."""
+    """Refuse, before anything is drawn, a file name that is not that of a picture.
+
+    Parameters
+    ----------
+    path
+        Path of the picture.
+
+    Raises
+    ------
+    UsageError
+        It does not end in `.png`, `.svg` or `.pdf`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.report import require_picture
+    >>> require_picture(Path("glow.png"))
+    """
     if path.suffix.lower() not in PICTURES:
         raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
 

@@ -164,8 +164,6 @@ def test_what_gives_no_sigma_is_refused_in_one_line() -> None:
         instrument_noise([replace(sample.measured, reradiation=column)])
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
 @pytest.mark.parametrize("emits", [True, False])
 def test_one_light_suffices_to_tell_re_radiation(emits: bool) -> None:
     """LEDs measure single columns; what one of them excites has no neighbour that agrees."""
@@ -185,6 +183,8 @@ def test_one_light_suffices_to_tell_re_radiation(emits: bool) -> None:
     assert ("none above the noise" in told) != emits
 
 
+@pytest.mark.shared_data
+@pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
 class TestRealTiles:
     """Tiles do not re-radiate: what is there off the diagonal is the error."""
 
