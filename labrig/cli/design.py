@@ -102,11 +102,18 @@ def _serve(
 
 
 def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: bool) -> None:
-    from labrig.design import nearest_materials, read_wish, solve_in_scene, to_material
+    from labrig.design import (
+        nearest_materials,
+        read_wish,
+        solve_in_scene,
+        to_material,
+        written_factor,
+    )
     from labrig.errors import DiskError, UsageError
     from labrig.report import (
         describe_design,
         describe_energy,
+        describe_factor,
         describe_scene_design,
         draw_design,
         draw_scene_design,
@@ -128,6 +135,8 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
         in_scene = solve_in_scene(wish)
         typer.echo(describe_scene_design(in_scene))
         if out is not None:
+            if weaker := describe_factor(written_factor(in_scene.design, in_scene.spectra)):
+                typer.echo(f"! {weaker}")
             _write(in_scene.material, out)
         if picture is not None:
             draw_scene_design(in_scene, picture)
@@ -140,6 +149,8 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
     if found is not wished and (cost := describe_energy(wished, found)):
         typer.echo(cost)
     if out is not None:
+        if weaker := describe_factor(written_factor(found)):
+            typer.echo(f"! {weaker}")
         _write(to_material(found, wish.file.name), out)
     if picture is not None:
         draw_design(found, wish.places, picture)

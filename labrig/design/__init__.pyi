@@ -27,6 +27,7 @@ from .light import (
 from .material_file import (
     to_material as to_material,
     written_differences as written_differences,
+    written_factor as written_factor,
 )
 from .nearest import (
     NearestMaterial as NearestMaterial,

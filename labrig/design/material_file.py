@@ -171,6 +171,35 @@ def _fading(material: Material) -> tuple[Material, float]:
     return material.model_copy(update={"states": states}), factor
 
 
+def written_factor(design: Design, light: SceneSpectra | None = None) -> float:
+    """Return the factor of Λ by which the written material glows less than a design.
+
+    The bands of a design may keep the energy where spectra in them do not.
+
+    Parameters
+    ----------
+    design
+        The design.
+    light
+        Spectral light of a scene on the places of the design.
+
+    Returns
+    -------
+    float
+        1, or below it.
+
+    Examples
+    --------
+    >>> from labrig.design import Keys, LightProgramme, solve, three_bands, written_factor
+    >>> light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    >>> keys = Keys.checked(0, [11.0, 30.0], [[0.001, 0.01, 0.002], [0.0001, 0.001, 0.0002]])
+    >>> written_factor(solve(light, keys, three_bands(), albedo=0.5))
+    1.0
+    """
+    material = _under_own_light(design, "any") if light is None else _in_scene(design, "any", light)
+    return _fading(material)[1]
+
+
 def written_differences(
     design: Design, material: Material, light: SceneSpectra | None = None
 ) -> FloatArray:

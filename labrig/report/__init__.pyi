@@ -26,6 +26,7 @@ from .decay_figures import (
 from .design import (
     describe_design as describe_design,
     describe_energy as describe_energy,
+    describe_factor as describe_factor,
     describe_nearest as describe_nearest,
     draw_design as draw_design,
 )

@@ -25,6 +25,8 @@ FloatArray = NDArray[np.float64]
 MOST_LINES = 20
 #: Keys that work against each other and are named, and the ΔE2000 from which one is.
 MOST_CONFLICTS, SEEN = 3, 1.0
+#: Part of a glow whose loss is told.
+SEEN_FACTOR = 0.01
 #: Luminance of a screen's white with which a wanted patch is shown, its faintness taken away.
 SHOWN_Y = 0.5
 #: Times at which a curve is drawn.
@@ -108,6 +110,34 @@ def describe_energy(wished: Design, kept: Design) -> str | None:
     return (
         f"! no more light can be emitted than is absorbed: ΔE2000 is {after:.1f} at most, and "
         f"would be {before:.1f} otherwise; fainter keys, or more light before them, can be met"
+    )
+
+
+def describe_factor(factor: float) -> str | None:
+    """Say that a written material glows less than its design.
+
+    Parameters
+    ----------
+    factor
+        Factor of Λ, as `labrig.design.written_factor` returns it.
+
+    Returns
+    -------
+    str or None
+        A sentence; None if it does not.
+
+    Examples
+    --------
+    >>> from labrig.report import describe_factor
+    >>> describe_factor(1.0)
+    >>> describe_factor(0.92)[-41:]
+    'the written material glows 0.92 as bright'
+    """
+    if factor > 1 - SEEN_FACTOR:
+        return None
+    return (
+        "at single wavelengths more light would be emitted than is absorbed: the written material "
+        f"glows {factor:.2g} as bright"
     )
 
 

@@ -18,6 +18,7 @@ from labrig.design import (
     Keys,
     SceneDesign,
     SceneLight,
+    SceneSpectra,
     SceneWish,
     SpreadDesign,
     Spreading,
@@ -26,7 +27,6 @@ from labrig.design import (
     solve_in_scene,
     spectral_bands,
     three_bands,
-    to_material,
     to_wish,
 )
 from labrig.errors import UsageError
@@ -42,7 +42,7 @@ from labrig.studio.messages import (
     spread_answer,
     wish_content,
 )
-from labrig.studio.workbench import Workbench
+from labrig.studio.workbench import Designed, Workbench
 from labrig.yaml_file import validate
 
 FloatArray = NDArray[np.float64]
@@ -242,7 +242,7 @@ class SceneBench(Workbench):
         if (spread := self._spread_of(Asked.of(about))) is not None:
             rgb = spread.picture(asked.t_s)
         else:
-            design, wish = self.design(about)
+            design, wish, _ = self.design(about)
             assert wish.scene is not None
             rgb = wish.scene.picture(design, asked.t_s)
         if asked.exposure_ev is not None:
@@ -266,7 +266,7 @@ class SceneBench(Workbench):
         about = _without_question(content)
         if (spread := self._spread_of(Asked.of(about))) is not None:
             return [float(x) for x in np.pi * spread.rgb_seen(asked.x, asked.y, [asked.t_s])[0]]
-        design, wish = self.design(about)
+        design, wish, _ = self.design(about)
         assert wish.scene is not None
         place = wish.scene.place_at(asked.x, asked.y)
         there = replace(design, programme=wish.scene.programme([place]))
@@ -305,12 +305,15 @@ class SceneBench(Workbench):
         )
         return self._again[1] if is_it and self._again is not None else None
 
-    def _designed(self, asked: Asked) -> tuple[Design, Wish]:
+    def _designed(self, asked: Asked) -> Designed:
         found = self._found_again(asked)
         if found is None:
             return super()._designed(asked)
-        self._energy = None
-        return found.design, found.wish
+        return Designed(found.design, found.wish, None)
+
+    def _light_of(self, wish: Wish) -> SceneSpectra | None:
+        assert wish.scene is not None
+        return wish.scene.spectra(wish.scene_places)
 
     def material(self, content: Mapping[str, Any]) -> str:
         """Return the text of the material file; of several materials that of all keys together."""
@@ -349,11 +352,11 @@ class SceneBench(Workbench):
         is_one = file.scene is None or file.scene.spread is None
         if is_one or asked.by_hand is not None or not file.keys:
             return None
-        key = asked.model_dump_json()
-        if self._spread is None or self._spread[0] != key:
+        key, last = asked.model_dump_json(), self._spread
+        if last is None or last[0] != key:
             wish = self._wish(file, SOURCE)
-            self._spread = key, self._spreading.solve(wish, self._folder)
-        return self._spread[1]
+            last = self._spread = key, self._spreading.solve(wish, self._folder)
+        return last[1]
 
     def _wish(self, file: WishFile, source: str) -> Wish:
         if file.scene is None:
@@ -414,8 +417,7 @@ class SceneBench(Workbench):
     def _material_of(self, design: Design, wish: Wish) -> Material:
         if self._again is not None and self._again[1].design is design:
             return self._again[1].material
-        assert wish.scene is not None
-        return to_material(design, wish.file.name, wish.scene.spectra(wish.scene_places))
+        return super()._material_of(design, wish)
 
 
 def _kept(

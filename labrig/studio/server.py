@@ -63,8 +63,8 @@ class StudioServer(LocalServer):
     def __init__(self, workbench: Workbench, first: Mapping[str, Any], port: int = 0) -> None:
         self.workbench = workbench
         self.first = first
-        #: One design at a time: each takes all processors.
-        self.turn = threading.Lock()
+        #: One design and one picture at a time: both may be asked for while a hand drags.
+        self.turns = {is_picture: threading.Lock() for is_picture in (False, True)}
         super().__init__(port, _Conversation)
 
 
@@ -86,7 +86,7 @@ class _Conversation(LocalConversation):
     def accept(self, path: str, body: bytes) -> None:
         """Answer a question of the page."""
         bench, content = self.server.workbench, self.json_object(body)
-        with self.server.turn:
+        with self.server.turns[path == "scene.png"]:
             kind, data, more = _answer(bench, path, content)
         if data is None:
             self.refuse(HTTPStatus.NOT_FOUND, "no such thing here")

@@ -3,7 +3,7 @@
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from labrig.design import (
     Design,
     DesignBands,
     Parameters,
+    SceneSpectra,
     Wish,
     WishFile,
     judge,
@@ -18,10 +19,11 @@ from labrig.design import (
     smooth_spectrum,
     to_material,
     to_wish,
+    written_factor,
 )
 from labrig.errors import UsageError
 from labrig.material import Material, material_text
-from labrig.report import describe_energy, describe_nearest, draw_design
+from labrig.report import describe_energy, describe_factor, describe_nearest, draw_design
 from labrig.studio.messages import SOURCE, Asked, answer, wish_content
 from labrig.yaml_file import parse_yaml, validate, yaml_text
 
@@ -40,13 +42,27 @@ START: Mapping[str, Any] = {
 GREEN, BRIGHTNESS, K_R_PER_S, K_E_PER_S, ALBEDO = (0.1, 1.0, 0.3), 0.1, 0.02, 1e-3, 0.6
 
 
+class Designed(NamedTuple):
+    """A design that a page asked for.
+
+    Attributes
+    ----------
+    design, wish
+        The material, and what was wished for.
+    energy
+        What of it would take more energy than there is, in a sentence.
+    """
+
+    design: Design
+    wish: Wish
+    energy: str | None
+
+
 class Workbench:
     """What answers a page about patches under a light of their own."""
 
     def __init__(self) -> None:
-        self._last: tuple[str, tuple[Design, Wish]] | None = None
-        #: What of the last wishes would take more energy than there is.
-        self._energy: str | None = None
+        self._last: tuple[str, Designed] | None = None
 
     def start(self) -> dict[str, Any]:
         """Return the wish with which a page begins."""
@@ -75,11 +91,11 @@ class Workbench:
 
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the page's wishes, or that was set by hand."""
-        design, wish = self.design(content)
-        return answer(design, wish) | {"energy": self._energy}
+        found = self.design(content)
+        return answer(found.design, found.wish) | {"energy": found.energy}
 
-    def design(self, content: Mapping[str, Any]) -> tuple[Design, Wish]:
-        """Return the design that a page asks for, and its wish.
+    def design(self, content: Mapping[str, Any]) -> "Designed":
+        """Return the design that a page asks for.
 
         Raises
         ------
@@ -88,14 +104,15 @@ class Workbench:
         """
         asked = Asked.of(content)
         # Numbers, pictures and files are asked for one after another.
-        key = asked.model_dump_json()
-        if self._last is None or self._last[0] != key:
-            self._last = key, self._designed(asked)
-        return self._last[1]
+        key, last = asked.model_dump_json(), self._last
+        if last is None or last[0] != key:
+            last = self._last = key, self._designed(asked)
+        return last[1]
 
     def material(self, content: Mapping[str, Any]) -> str:
         """Return the text of the material file of a design."""
-        return material_text(self._material_of(*self.design(content)))
+        found = self.design(content)
+        return material_text(self._material_of(found.design, found.wish))
 
     def constraints(self, content: Mapping[str, Any]) -> str:
         """Return the text of a file of wishes, as `labrig design --constraints` reads it."""
@@ -104,17 +121,17 @@ class Workbench:
 
     def picture(self, content: Mapping[str, Any]) -> bytes:
         """Return a figure of a design over time as a PNG."""
-        design, wish = self.design(content)
-        if not wish.keys.count:
+        found = self.design(content)
+        if not found.wish.keys.count:
             raise UsageError("expected at least one key to be drawn, got none")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "design.png"
-            draw_design(design, wish.places, path)
+            draw_design(found.design, found.wish.places, path)
             return path.read_bytes()
 
     def nearest(self, content: Mapping[str, Any]) -> list[str]:
         """Return the measured materials that come nearest to the wishes, one sentence each."""
-        design, _ = self.design(content)
+        design = self.design(content).design
         return [describe_nearest(each) for each in nearest_materials(design) if each]
 
     def _wish(self, file: WishFile, source: str) -> Wish:
@@ -126,26 +143,37 @@ class Workbench:
             )
         return to_wish(file, source)
 
-    def _designed(self, asked: Asked) -> tuple[Design, Wish]:
+    def _designed(self, asked: Asked) -> "Designed":
         wish = self._wish(asked.file(), SOURCE)
-        self._energy = None
-        if asked.by_hand is not None:
-            given = asked.by_hand.parameters()
-        elif wish.keys.count:
-            wished = wish.solve()
-            # While a hand drags, a quick answer matters more than the energy.
-            if wished.keeps_energy or asked.is_draft:
-                return wished, wish
-            kept = wish.solve("kept")
-            self._energy = (describe_energy(wished, kept) or "").removeprefix("! ") or None
-            return kept, wish
-        else:
-            given = _to_begin_with(wish.bands, wish.file)
-        weights = wish.file.weights
-        return judge(given, wish.programme, wish.keys, wish.bands, weights), wish
+        if asked.by_hand is not None or not wish.keys.count:
+            given = (
+                _to_begin_with(wish.bands, wish.file)
+                if asked.by_hand is None
+                else asked.by_hand.parameters()
+            )
+            design = judge(given, wish.programme, wish.keys, wish.bands, wish.file.weights)
+            return Designed(design, wish, self._weaker(design, wish, asked))
+        wished = wish.solve()
+        # While a hand drags, a quick answer matters more than the energy.
+        if wished.keeps_energy or asked.is_draft:
+            return Designed(wished, wish, self._weaker(wished, wish, asked))
+        kept = wish.solve("kept")
+        cost = (describe_energy(wished, kept) or "").removeprefix("! ")
+        return Designed(kept, wish, cost or self._weaker(kept, wish, asked))
+
+    def _weaker(self, design: Design, wish: Wish, asked: Asked) -> str | None:
+        """Say that the material that is saved glows less, if it does."""
+        if asked.is_draft or not wish.programme.irradiance.any():
+            return None
+        factor = written_factor(design, self._light_of(wish))
+        return describe_factor(factor)
+
+    def _light_of(self, wish: Wish) -> SceneSpectra | None:
+        """Return the spectral light of a scene on the places of a wish; None of patches."""
+        return None
 
     def _material_of(self, design: Design, wish: Wish) -> Material:
-        return to_material(design, wish.file.name)
+        return to_material(design, wish.file.name, self._light_of(wish))
 
 
 def _to_begin_with(bands: DesignBands, file: WishFile) -> Parameters:
