@@ -35,6 +35,9 @@ from .nearest import (
     nearest_materials as nearest_materials,
     presets as presets,
 )
+from .preset import (
+    preset_parameters as preset_parameters,
+)
 from .propagation import (
     Reach as Reach,
     propagate as propagate,

@@ -185,7 +185,7 @@ def _material(design: Design) -> dict[str, Any]:
     }
 
 
-def parameters_content(design: Design) -> dict[str, Any]:
+def parameters_content(design: Design | Parameters) -> dict[str, Any]:
     """Return the parameters of a design as the page sends them back, see `SetByHand`."""
     return {
         "k_r_per_s": _numbers(design.k_r_per_s),

@@ -81,7 +81,10 @@ class _Conversation(LocalConversation):
         if path != "start":
             super().answer(path)
             return
-        self.send_json(HTTPStatus.OK, {"wish": self.server.first})
+        self.send_json(
+            HTTPStatus.OK,
+            {"wish": self.server.first, "presets": self.server.workbench.preset_names()},
+        )
 
     def accept(self, path: str, body: bytes) -> None:
         """Answer a question of the page."""
@@ -112,6 +115,8 @@ def _answer(
         return _as_json(bench.look(content))
     if path == "open":
         return _as_json({"wish": bench.open(_text(content))})
+    if path == "preset":
+        return _as_json({"parameters": bench.preset(content)})
     if path == "nearest":
         return _as_json({"nearest": bench.nearest(content)})
     if path == "material.yaml":

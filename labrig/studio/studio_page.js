@@ -551,6 +551,19 @@ function useTheme(isRed) {
 $("theme").addEventListener("click", () => useTheme(document.documentElement.dataset.theme !== "red"));
 useTheme(localStorage.getItem("theme") === "red");
 
-const { wish: first } = await (await fetch("start")).json();
+$("preset").addEventListener("change", async (event) => {
+  const name = event.target.value;
+  event.target.value = "";
+  if (!name) return;
+  try {
+    const { parameters } = await (await post("preset", { wish: history.now.wish, name })).json();
+    history.set({ wish: { ...history.now.wish, states: parameters.k_r_per_s.length }, by_hand: parameters });
+  } catch (error) {
+    say(error.message);
+  }
+});
+
+const { wish: first, presets } = await (await fetch("start")).json();
+for (const name of presets) $("preset").append(new Option(name));
 history = new History({ wish: first, by_hand: null }, changed);
 changed();

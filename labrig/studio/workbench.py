@@ -16,6 +16,8 @@ from labrig.design import (
     WishFile,
     judge,
     nearest_materials,
+    preset_parameters,
+    presets,
     smooth_spectrum,
     to_material,
     to_wish,
@@ -24,7 +26,14 @@ from labrig.design import (
 from labrig.errors import UsageError
 from labrig.material import Material, material_text
 from labrig.report import describe_energy, describe_factor, describe_nearest, draw_design
-from labrig.studio.messages import SOURCE, Asked, answer, wish_content
+from labrig.studio.messages import (
+    MOST_STATES,
+    SOURCE,
+    Asked,
+    answer,
+    parameters_content,
+    wish_content,
+)
 from labrig.yaml_file import parse_yaml, validate, yaml_text
 
 #: Name of a file that was opened, in messages.
@@ -133,6 +142,26 @@ class Workbench:
         """Return the measured materials that come nearest to the wishes, one sentence each."""
         design = self.design(content).design
         return [describe_nearest(each) for each in nearest_materials(design) if each]
+
+    def preset_names(self) -> list[str]:
+        """Return the names of the measured materials with which a design may begin."""
+        return [each.name for each in presets() if len(each.states) <= MOST_STATES]
+
+    def preset(self, content: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the parameters of a measured material, as if they were set by hand.
+
+        Raises
+        ------
+        UsageError
+            There is no such material, or the design has other bands than three channels.
+        """
+        name = content.get("name")
+        wish = self._wish(Asked.of({"wish": content.get("wish")}).file(), SOURCE)
+        found = [each for each in presets() if each.name == name]
+        if not found:
+            raise UsageError(f"expected a measured material, got {name!r:.60}")
+        albedo = ALBEDO if isinstance(wish.file.albedo, str) else wish.file.albedo
+        return parameters_content(preset_parameters(found[0], wish.programme, wish.bands, albedo))
 
     def _wish(self, file: WishFile, source: str) -> Wish:
         """Return a file's wish in the form in which it is solved."""

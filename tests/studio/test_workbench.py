@@ -137,6 +137,18 @@ def test_sliders_out_of_range_are_one_line() -> None:
         Parameters.checked([0.1], [[1e-3]], [[0.1, 0.1]], [0.5, 0.5])
 
 
+def test_a_measured_material_is_a_beginning() -> None:
+    bench = Workbench()
+    wish = asked()["wish"]
+    blue = bench.preset({"wish": wish, "name": "blue-paint"})
+    measured = read_material("blue-paint").states[0]
+    assert blue["k_r_per_s"] == pytest.approx([measured.k_r_per_s], rel=1e-4)
+    glow = np.array(bench.look({"wish": wish, "by_hand": blue})["places"][0]["rgb"])[-1]
+    assert glow.argmax() == 2
+    with pytest.raises(UsageError, match="measured material"):
+        bench.preset({"wish": wish, "name": "blue"})
+
+
 def test_a_file_is_opened_from_its_text() -> None:
     bench = Workbench()
     text = "light: [{at: 0 s, light: A}, {at: 9 s, light: none}]\nkeys: []\n"
@@ -165,7 +177,9 @@ def test_the_server_answers_whom_it_knows() -> None:
             return response.status, json.loads(data) if is_json else data
 
         own = f"/{server.token}/"
-        assert reply("GET", own + "start") == (200, {"wish": bench.start()})
+        status, begun = reply("GET", own + "start")
+        assert (status, begun["wish"]) == (200, bench.start())
+        assert "blue-paint" in begun["presets"]
         status, answer = reply("POST", own + "look", asked())
         assert status == 200
         assert len(answer["keys"]) == 2
