@@ -37,8 +37,7 @@ def preset_parameters(
 
     Returns
     -------
-
-    Parameters
+    parameters : labrig.design.Parameters
         Rates, Λ and albedo, for `judge`.
 
     Raises

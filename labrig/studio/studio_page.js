@@ -158,7 +158,7 @@ function draw() {
     ...[...wishes.slice(0, MOST_LINES), ...more, ...energy, ...fights].map((text) => tag("li", begun(text))),
   );
   const result = summary(answer.keys);
-  $("status").textContent = result || "No keys yet: a plain green glow to look at.";
+  $("status").textContent = result || (by_hand ? "No keys yet: a glow that is set by hand." : "No keys yet: a plain green glow to look at.");
   $("save-material").disabled = false;
   $("save-picture").disabled = !now.keys.length;
   $("find-nearest").disabled = !now.keys.length;
