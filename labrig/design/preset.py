@@ -37,7 +37,7 @@ def preset_parameters(
 
     Returns
     -------
-    parameters : labrig.design.Parameters
+    labrig.design.Parameters
         Rates, Λ and albedo, for `judge`.
 
     Raises
