@@ -19,7 +19,7 @@ from tests.analyse.lvf_calibration.room_truth import simulation_of
 from tests.analyse.recorded import record
 from tests.analyse.selected_lights import BANDS_NM, LED_NAMES, SITES, FloatArray, bench, true_light
 
-CURVES = Path("/work/shared/data/camera_sensitivity")
+CURVES = Path(__file__).parents[3] / "shared" / "data" / "camera_sensitivity"
 ANOTHER_LABORATORY = CURVES / "ampas_rawtoaces_2017/canon_eos_5d_mark_ii_380_780_5.json"
 KEYS = {
     "protocol": "irradiance",

@@ -12,7 +12,7 @@ from labrig.fit.excitation import excitation_course
 
 FloatArray = NDArray[np.float64]
 
-DYES = Path("/work/shared/data/fluorophores/mcnamara_boswell_excitation.csv")
+DYES = Path(__file__).parents[3] / "shared/data/fluorophores/mcnamara_boswell_excitation.csv"
 BANDS_NM: dict[str, FloatArray] = {
     "wide": np.linspace(400.0, 700.0, 9),
     "narrow": np.linspace(400.0, 700.0, 16),
