@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.page import NoBrowserOption, PortOption, announcing
+
 if TYPE_CHECKING:
     from labrig.design import Wish
     from labrig.material import Material
@@ -53,12 +55,8 @@ def design(
         Path | None,
         typer.Option("--open", help="A .yaml of wishes with which the page begins."),
     ] = None,
-    port: Annotated[
-        int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
-    ] = 0,
-    no_browser: Annotated[
-        bool, typer.Option("--no-browser", help="Only print the page's address.")
-    ] = False,
+    port: PortOption = 0,
+    no_browser: NoBrowserOption = False,
 ) -> None:
     """Find the phosphorescent material that glows as you want it to: on a page, or from a file."""
     from labrig.errors import UsageError
@@ -89,16 +87,9 @@ def _serve(
     from labrig.signals import interrupting
     from labrig.studio import design_on_page
 
-    def tell(url: str) -> None:
-        typer.echo(url)
-        if not no_browser:
-            import webbrowser
-
-            webbrowser.open(url)
-
     clock = SystemClock()
     with interrupting(clock):
-        design_on_page(begin_with, scene, material, port, clock, tell)
+        design_on_page(begin_with, scene, material, port, clock, announcing(no_browser))
 
 
 def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: bool) -> None:
@@ -142,8 +133,7 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
             draw_scene_design(in_scene, picture)
             typer.echo(f"drawn into {picture}")
         return
-    wished = wish.solve()
-    found = wished if wished.keeps_energy else wish.solve("kept")
+    wished, found = wish.solve_kept()
     measured = [each for each in nearest_materials(found) if each] if nearest else []
     typer.echo(describe_design(found, wish.places, measured))
     if found is not wished and (cost := describe_energy(wished, found)):

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from labrig.cli.completion import complete_run
+from labrig.cli.page import NoBrowserOption, PortOption, announcing
 
 
 def watch(
@@ -16,12 +17,8 @@ def watch(
         ),
     ] = Path("last"),
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
-    port: Annotated[
-        int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
-    ] = 0,
-    no_browser: Annotated[
-        bool, typer.Option("--no-browser", help="Only print the page's address.")
-    ] = False,
+    port: PortOption = 0,
+    no_browser: NoBrowserOption = False,
 ) -> None:
     """A page for the screen outside the dark room: live decay, timeline, state. Ctrl-C ends it."""
     from labrig.catalogue import find_run
@@ -29,13 +26,6 @@ def watch(
     from labrig.signals import interrupting
     from labrig.watch import watch_run
 
-    def tell(url: str) -> None:
-        typer.echo(url)
-        if not no_browser:
-            import webbrowser
-
-            webbrowser.open(url)
-
     clock = SystemClock()
     with interrupting(clock):
-        watch_run(find_run(run, runs), port, clock, tell)
+        watch_run(find_run(run, runs), port, clock, announcing(no_browser))

@@ -17,6 +17,7 @@ from .conversion import (
 from .determined import (
     Conflict as Conflict,
     Estimate as Estimate,
+    visible_conflicts as visible_conflicts,
 )
 from .keys import (
     Keys as Keys,

@@ -64,6 +64,11 @@ class Conversion:
         """Return irradiance or radiance (…, bands) in bands of wavelengths (…, n)."""
         return np.asarray(light @ self.of_light.T)
 
+    def strongest_light(self, light: FloatArray) -> FloatArray:
+        """Return the strongest of some irradiances (…, bands) in bands of wavelengths (n,)."""
+        lights = self.light(light).reshape(-1, len(self.of_light))
+        return np.asarray(lights[int(np.linalg.norm(lights, axis=1).argmax())])
+
     def emission(self, emitted: FloatArray) -> FloatArray:
         """Return Λ (bands,) in bands of wavelengths (n,)."""
         if self.bands.edges_nm is None:

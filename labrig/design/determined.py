@@ -4,6 +4,7 @@ Both follow from the curvature of the sum of squares at its minimum, with all pa
 once. What changes no key is not determined.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ PART_UNKNOWN = 1e-4
 POOR = 0.3
 #: σ of an albedo from which it is not determined.
 POOR_ALBEDO = 0.15
+#: Conflicts that are named, and the ΔE2000 from which a key is seen not to be met.
+MOST_CONFLICTS, SEEN = 3, 1.0
 #: Part of a key's own squares that another key has to cost it to be said to work against it.
 WORTH_SAYING = 0.2
 
@@ -128,3 +131,35 @@ def conflicts(
             for other in np.flatnonzero(gains > WORTH_SAYING)
         ]
     return tuple(sorted(found, key=lambda conflict: -conflict.part))
+
+
+def visible_conflicts(found: Sequence[Conflict], delta_e2000: FloatArray) -> tuple[Conflict, ...]:
+    """Return the worst conflicts that cost a key a difference that is seen, each pair once.
+
+    Parameters
+    ----------
+    found
+        Conflicts, the worst first.
+    delta_e2000
+        ΔE2000 of all keys, shape (keys,).
+
+    Returns
+    -------
+    tuple of Conflict
+        At most three.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.design import Conflict, visible_conflicts
+    >>> both = Conflict(key=0, other=1, part=0.9), Conflict(key=1, other=0, part=0.8)
+    >>> [conflict.part for conflict in visible_conflicts(both, np.array([2.0, 3.0]))]
+    [0.9]
+    >>> visible_conflicts(both, np.array([0.1, 0.2]))
+    ()
+    """
+    pairs: dict[frozenset[int], Conflict] = {}
+    for conflict in found:
+        if delta_e2000[conflict.other] >= SEEN:
+            pairs.setdefault(frozenset((conflict.key, conflict.other)), conflict)
+    return tuple(pairs.values())[:MOST_CONFLICTS]

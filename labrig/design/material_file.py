@@ -35,11 +35,10 @@ def _reference_light(design: Design, conversion: Conversion) -> FloatArray:
 
     The excitation rates of the material belong to it, and Λ is relative to its mean.
     """
-    lights = conversion.light(design.programme.irradiance).reshape(-1, len(conversion.of_light))
-    strongest = lights[int(np.linalg.norm(lights, axis=1).argmax())]
+    strongest = conversion.strongest_light(design.programme.irradiance)
     if not strongest.any():
         raise DataError("expected light in the programme of a design to be kept, got none")
-    return np.asarray(strongest)
+    return strongest
 
 
 def to_material(design: Design, name: str, light: SceneSpectra | None = None) -> Material:

@@ -183,11 +183,10 @@ class _Part:
         assert material.irradiance_norm is not None
         conversion = Conversion.to(design.bands, material.bands_nm)
         lit = conversion.light(design.programme.irradiance)
-        lengths = np.linalg.norm(lit, axis=-1)
-        strongest = np.unravel_index(int(lengths.argmax()), lengths.shape)
-        scale = material.irradiance_norm.value / max(float(lengths[strongest]), 1e-300)
+        strongest = conversion.strongest_light(design.programme.irradiance)
+        scale = material.irradiance_norm.value / max(float(np.linalg.norm(strongest)), 1e-300)
         # On a scale relative to the lamp, the lamp's mean spectral irradiance is the unit.
-        unit = float(lit[strongest].mean()) if material.scale == "relative" else 1.0
+        unit = float(strongest.mean()) if material.scale == "relative" else 1.0
         keys = design.keys
         scaled = LightProgramme(design.programme.begin_s, scale * lit)
         emitted = unit * material_radiance(material, scaled, keys.place, keys.time_s)

@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from labrig.design.bands import DesignBands
 from labrig.design.by_hand import Parameters
 from labrig.design.conversion import Conversion
+from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.light import LightProgramme
 from labrig.errors import UsageError
 from labrig.material import Material
@@ -61,15 +62,12 @@ def preset_parameters(
     assert material.bands_nm is not None
     assert material.irradiance_norm is not None
     conversion = Conversion.to(bands, material.bands_nm)
-    lit = conversion.light(programme.irradiance).reshape(-1, len(material.bands_nm) - 1)
-    length = float(np.linalg.norm(lit, axis=1).max())
+    length = float(np.linalg.norm(conversion.strongest_light(programme.irradiance)))
     k_e = np.array([state.k_e_per_s for state in material.states]) @ conversion.of_light
     k_e *= material.irradiance_norm.value / length
     measured = np.array([state.reradiation for state in material.states])
     emitted = np.maximum(measured @ conversion.to_rgb.T, 0.0)
     reflected = np.broadcast_to(np.asarray(albedo, dtype=np.float64), (bands.count,))
-    absorbed = (1 - reflected) * bands.energy
-    returned = np.pi * (emitted @ bands.energy) @ k_e
-    scale = EFFICIENCY / float((returned / np.maximum(absorbed, 1e-9)).max())
+    scale = EFFICIENCY / float(emitted_over_absorbed(k_e, emitted, reflected, bands.energy).max())
     k_r = [state.k_r_per_s for state in material.states]
     return Parameters.checked(k_r, k_e, scale * emitted, reflected, orders.pop())

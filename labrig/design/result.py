@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.design.appearance import key_differences
 from labrig.design.bands import DesignBands
-from labrig.design.determined import Conflict, Estimate
+from labrig.design.determined import Conflict, Estimate, visible_conflicts
 from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.glow import captures, emission
 from labrig.design.keys import Keys
@@ -127,6 +127,11 @@ class Design:
     def delta_e2000(self) -> FloatArray:
         """ΔE2000 of each key, both sides scaled so that it has half a white's luminance (keys,)."""
         return self.differences_to(self.got_rgb)
+
+    @property
+    def visible_conflicts(self) -> tuple[Conflict, ...]:
+        """The worst conflicts that cost a key a difference that is seen, each pair once."""
+        return visible_conflicts(self.conflicts, self.delta_e2000)
 
     def differences_to(self, rgb: FloatArray) -> FloatArray:
         """Return ΔE2000 of other colours (keys, 3), in linear sRGB per sr, to the wanted ones."""

@@ -131,8 +131,8 @@ def solve_in_scene(wish: Wish) -> SceneDesign:
     if wish.scene is None:
         raise UsageError("expected a wish in a scene, got a light programme; solve it by itself")
     light, spectra = wish.scene, wish.scene.spectra(wish.scene_places)
-    wished = wish.solve()
-    kept = design = wished if wished.keeps_energy else wish.solve("kept")
+    wished, kept = wish.solve_kept()
+    design = kept
     rounds: list[SceneDesign] = []
     for number in range(1 + AGAIN):
         if number:

@@ -307,6 +307,11 @@ class Wish:
             held=held,
         )
 
+    def solve_kept(self) -> tuple[Design, Design]:
+        """Return the material that meets the wish best, and the best that keeps the energy."""
+        best = self.solve()
+        return best, best if best.keeps_energy else self.solve("kept")
+
 
 def read_wish(path: Path) -> Wish:
     """Read how something should glow from a YAML file.

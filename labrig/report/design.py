@@ -23,8 +23,8 @@ FloatArray = NDArray[np.float64]
 
 #: Lines of keys, conflicts and wishes that are written one by one.
 MOST_LINES = 20
-#: Keys that work against each other and are named, and the ΔE2000 from which one is.
-MOST_CONFLICTS, SEEN = 3, 1.0
+#: ΔE2000 from which a difference is seen.
+SEEN = 1.0
 #: Part of a glow whose loss is told.
 SEEN_FACTOR = 0.01
 #: Luminance of a screen's white with which a wanted patch is shown, its faintness taken away.
@@ -254,18 +254,11 @@ def _keys(design: Design, places: Sequence[str]) -> Iterator[str]:
 
 
 def _conflicts(design: Design) -> Iterator[str]:
-    named: set[frozenset[int]] = set()
-    for conflict in design.conflicts:
-        pair = frozenset((conflict.key, conflict.other))
-        if pair in named or design.delta_e2000[conflict.other] < SEEN:
-            continue
-        named.add(pair)
+    for conflict in design.visible_conflicts:
         yield (
             f"key {conflict.key + 1} works against key {conflict.other + 1}: without it "
             f"{100 * conflict.part:.0f} % of the other's squared residual would go"
         )
-        if len(named) == MOST_CONFLICTS:
-            return
 
 
 def _impossible(design: Design) -> Iterator[str]:

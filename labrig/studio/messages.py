@@ -18,6 +18,7 @@ from labrig.design import (
     SpreadDesign,
     Wish,
     WishFile,
+    visible_conflicts,
 )
 from labrig.finite import NotNegative, Positive, UnitFraction
 from labrig.studio.timeline import timeline_of
@@ -27,8 +28,6 @@ FloatArray = NDArray[np.float64]
 
 #: Name of the page in messages about what it sent.
 SOURCE = "the page"
-#: Pairs of keys that are named, and the ΔE2000 from which a key is not met.
-MOST_CONFLICTS, SEEN = 3, 1.0
 #: Most states and bands of a material that is set by hand.
 MOST_STATES, MOST_BANDS = 2, 100
 #: Digits of the numbers that are sent.
@@ -124,7 +123,7 @@ def answer(design: Design, wish: Wish) -> dict[str, Any]:
         **_material(design),
         "keys": _judged(design),
         "impossible": [{"keys": wish.keys, "text": str(wish)} for wish in design.impossible],
-        "conflicts": [[fight.key, fight.other] for fight in design.conflicts],
+        "conflicts": [[each.key, each.other] for each in design.visible_conflicts],
     }
 
 
@@ -145,9 +144,8 @@ def spread_answer(found: SpreadDesign) -> dict[str, Any]:
             for each in design.impossible
         ]
         conflicts += [
-            [own[fight.key], own[fight.other]]
-            for fight in design.conflicts
-            if found.delta_e2000[own[fight.key]] > SEEN
+            [own[each.key], own[each.other]]
+            for each in visible_conflicts(design.conflicts, found.delta_e2000[own])
         ]
     return content | {
         "keys": _keys(keys, wish.bands, found.rgb, found.delta_e2000),
@@ -213,16 +211,6 @@ def _estimates(design: Design) -> list[tuple[str, Estimate]]:
         else:
             found += [(" ".join([*own, name]), each) for name in names.split(" + ")]
     return found
-
-
-def _conflicts(design: Design) -> list[list[int]]:
-    """Return pairs of keys that work against each other, each once, and not if both are met."""
-    pairs: list[list[int]] = []
-    for fight in design.conflicts:
-        pair = sorted((fight.key, fight.other))
-        if pair not in pairs and design.delta_e2000[pair].max() >= SEEN:
-            pairs.append(pair)
-    return pairs[:MOST_CONFLICTS]
 
 
 def _judged(design: Design) -> list[dict[str, Any]]:

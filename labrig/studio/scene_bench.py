@@ -214,11 +214,12 @@ class SceneBench(Workbench):
     def look(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the material that meets the wishes, and what the page has to know of the scene."""
         asked = Asked.of(content)
-        spread = self._spread_of(asked)
-        found = super().look(content) if spread is None else spread_answer(spread)
-        light = self._wish(asked.file(), SOURCE).scene
-        assert light is not None
-        camera = light.scene.file.camera
+        if (spread := self._spread_of(asked)) is not None:
+            found, wish = spread_answer(spread), spread.wish
+        else:
+            found, wish = super().look(content), self.design(content).wish
+        assert wish.scene is not None
+        camera = wish.scene.scene.file.camera
         return found | {
             "scene": {
                 "material": self._material,

@@ -4,7 +4,7 @@
 import { luminance, shown } from "./studio_colour.js";
 import { changesOf } from "./studio_light.js";
 import { swatch, wantedLuminance } from "./studio_keys.js";
-import { $, duration, powerOfTen, short, svg, whileDragged } from "./studio_words.js";
+import { $, duration, powerOfTen, svg, whileDragged } from "./studio_words.js";
 
 const [WIDTH, HEIGHT, TRACK, LEFT, RIGHT, TOP] = [1000, 240, 34, 50, 10, 8];
 const FLOOR = HEIGHT - TRACK - 26;

@@ -182,11 +182,10 @@ class Workbench:
             )
             design = judge(given, wish.programme, wish.keys, wish.bands, wish.file.weights)
             return Designed(design, wish, self._weaker(design, wish, asked))
-        wished = wish.solve()
         # While a hand drags, a quick answer matters more than the energy.
-        if wished.keeps_energy or asked.is_draft:
-            return Designed(wished, wish, self._weaker(wished, wish, asked))
-        kept = wish.solve("kept")
+        if asked.is_draft:
+            return Designed(wish.solve(), wish, None)
+        wished, kept = wish.solve_kept()
         cost = (describe_energy(wished, kept) or "").removeprefix("! ")
         return Designed(kept, wish, cost or self._weaker(kept, wish, asked))
 

@@ -60,6 +60,17 @@ def test_every_frame_has_the_colour_of_its_time() -> None:
     assert (card[some[2] :] == 0).all()
 
 
+def test_only_keys_that_are_seen_to_be_missed_fight() -> None:
+    assert Workbench().look(asked())["conflicts"] == []
+    rising = [{"at": f"{301 + n} s", "colour": "#20c060", "brightness": 1e-3 * 4**n}
+              for n in range(4)]  # fmt: skip
+    answer = Workbench().look(asked(keys=rising))
+    pairs = answer["conflicts"]
+    assert 1 <= len(pairs) <= 3
+    assert len({frozenset(pair) for pair in pairs}) == len(pairs)
+    assert all(answer["keys"][missed]["delta_e"] >= 1 for _, missed in pairs)
+
+
 def test_what_is_set_by_hand_is_judged_not_solved() -> None:
     bench = Workbench()
     solved = bench.look(asked())
