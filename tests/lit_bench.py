@@ -277,7 +277,7 @@ def _has_guard(folder: Path) -> bool:
     """Whether such a guard runs; it has the environment of its labrig."""
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
-            is_guard = b"labrig.guard_process" in (process / "cmdline").read_bytes()
+            is_guard = b"labrig.bench.guard_process" in (process / "cmdline").read_bytes()
             if is_guard and bytes(folder) in (process / "environ").read_bytes():
                 return True
     return False

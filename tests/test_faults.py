@@ -68,7 +68,7 @@ def stands(monkeypatch: pytest.MonkeyPatch) -> list[Bench]:
             opened.append(stand)
             yield stand
 
-    monkeypatch.setattr("labrig.recording.open_bench", remembered)
+    monkeypatch.setattr("labrig.bench.recording.open_bench", remembered)
     return opened
 
 

@@ -17,7 +17,8 @@ import sys
 sys.path.insert(0, {folder!r})
 {before}
 import labrig
-from labrig import bench, resources
+from labrig import resources
+from labrig.bench import opening as bench
 from labrig import plugins
 import labrig.drivers.numato, labrig.protocols.decay, labrig.sim
 for module in (labrig.drivers, labrig.protocols, labrig.sim):

@@ -15,13 +15,12 @@ import event_model
 import pytest
 
 from labrig.acquire import LAMP, Plan, RunObserver, plan, read_protocol, read_rig_file
-from labrig.bench import Bench, open_bench
+from labrig.bench import Bench, Recording, open_bench, resume_run
+from labrig.bench.execution import execute
 from labrig.clock import Clock, Interrupted, VirtualClock
 from labrig.errors import DeviceError
-from labrig.execution import execute
 from labrig.record import RunFolder, read_run
 from labrig.record.journal import read_journal
-from labrig.recording import Recording, resume_run
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended
 

@@ -14,7 +14,7 @@ from labrig.quantity import duration_text
 from labrig.record import PERSON, size_text
 
 if TYPE_CHECKING:
-    from labrig.recording import Recording
+    from labrig.bench import Recording
 
 #: Waits that are shorter in all are left out, in seconds.
 SHORT_S = 60.0

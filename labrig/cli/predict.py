@@ -10,8 +10,8 @@ from labrig.cli.completion import complete_material
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from labrig.bench import Recording
     from labrig.predict import PatchPrediction, Prediction, Remedy
-    from labrig.recording import Recording
 
 PredictOption = Annotated[
     list[str] | None,

@@ -18,13 +18,13 @@ from rich.table import Table
 from rich.text import Text
 
 from labrig.acquire import ExposureSettings, ManualStep, Plan, RunObserver
+from labrig.bench import logging_to
 from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.prompt import Terminal
 from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
-from labrig.run_log import logging_to
 from labrig.watch import Previews, RenderedPreview
 
 #: Width of the last frame's thumbnail in characters.

@@ -12,10 +12,9 @@ from labrig.cli.protocol import protocol_path
 
 if TYPE_CHECKING:
     from labrig.acquire import RigFile
+    from labrig.bench import Recording, Watch
     from labrig.cli.prompt import Terminal
-    from labrig.execution import Watch
     from labrig.queue import QueuedRun, QueueEntry
-    from labrig.recording import Recording
 
 app = typer.Typer(help="Measurements one after another.", no_args_is_help=True)
 
@@ -121,7 +120,7 @@ class _Person:
         self._verbose = verbose
 
     def prepare(self, queued: "QueuedRun") -> "Recording":
-        from labrig.recording import Recording
+        from labrig.bench import Recording
 
         rig = None if queued.rig is None else _at(self._folder, queued.rig)
         protocol = protocol_path(_at(self._folder, queued.protocol))

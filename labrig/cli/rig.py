@@ -67,8 +67,7 @@ def check(
     from json import dumps
 
     from labrig.acquire import read_rig_file
-    from labrig.bench import open_bench
-    from labrig.run_log import logging_to
+    from labrig.bench import logging_to, open_bench
     from labrig.setup import check_rig
 
     path = rig_path(rig)

@@ -16,7 +16,7 @@ from labrig.clock import Interrupted
 from labrig.errors import UsageError
 
 if TYPE_CHECKING:
-    from labrig.recording import Recording
+    from labrig.bench import Recording
 
 Protocol = Annotated[
     str,
@@ -82,8 +82,8 @@ def plan(
 
     With --predict: how well it will know the rates of a material, and what would halve their σ.
     """
+    from labrig.bench import free_disk_bytes
     from labrig.cli.plan_text import folded_units, summary
-    from labrig.recording import free_disk_bytes
 
     recording = _prepared(protocol, rig, runs)
     if not json:
@@ -121,10 +121,10 @@ def resume(
     If only the result is missing, the run is processed.
     """
     from labrig.acquire import read_rig_file
+    from labrig.bench import resume_run
     from labrig.catalogue import find_run, summarise
     from labrig.cli.on_finish import notify_at_end
     from labrig.cli.progress import progress
-    from labrig.recording import resume_run
 
     folder = find_run(run, runs)
     is_processed = summarise(folder).status == "processed"
@@ -150,7 +150,7 @@ def resume(
 
 
 def _prepared(protocol: str, rig: str | None, runs: Path) -> "Recording":
-    from labrig.recording import Recording
+    from labrig.bench import Recording
 
     recording = Recording.prepare(protocol_path(protocol), rig_path(rig), runs)
     for note in recording.notes():

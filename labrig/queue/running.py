@@ -8,13 +8,12 @@ from typing import Protocol
 from filelock import FileLock, Timeout
 
 from labrig.acquire import SAMPLE_CHANGER, RigFile, driver_and_settings, read_rig_file
+from labrig.bench import Recording, Watch, resume_run
 from labrig.catalogue import summarise
 from labrig.errors import DataError, LabrigError, UsageError
-from labrig.execution import Watch
 from labrig.process import process_and_report
 from labrig.queue.queue_file import Queue, QueuedRun, change_queue, read_queue
 from labrig.queue.results import QueueEntry, entries, write_results
-from labrig.recording import Recording, resume_run
 
 #: Status of a run that needs nothing more.
 COMPLETE = "processed"

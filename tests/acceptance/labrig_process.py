@@ -17,8 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from labrig import recording
-from labrig.bench import Bench, open_bench
+from labrig.bench import Bench, open_bench, recording
 from labrig.cli.exit_codes import guarded
 
 LOOK_S = 0.002

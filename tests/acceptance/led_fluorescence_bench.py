@@ -34,6 +34,7 @@ import yaml
 
 from labrig import resources
 from labrig.analyse.led_fluorescence import analyse
+from labrig.bench import Recording
 from labrig.material import (
     ReradiationMatrix,
     appearance,
@@ -43,7 +44,6 @@ from labrig.material import (
 )
 from labrig.optics import read_light
 from labrig.process import process_run
-from labrig.recording import Recording
 from labrig.results import LedFluorescenceResult
 from tests.acceptance.mixture_colours import FOLDER, LEAST_FRACTION
 from tests.analyse.recorded import part_of, quietly

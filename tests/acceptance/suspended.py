@@ -31,8 +31,8 @@ from labrig.acquire import (
     read_rig_file,
 )
 from labrig.bench import open_bench
+from labrig.bench.execution import execute
 from labrig.cli.progress import progress
-from labrig.execution import execute
 from labrig.record import RunFolder, read_run
 from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard
 from tests.terminal import on_a_terminal

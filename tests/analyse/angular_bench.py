@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from labrig import resources
+from labrig.bench import Recording
 from labrig.calibration import CameraFile
 from labrig.optics import Flat
 from labrig.record import read_run
-from labrig.recording import Recording
 from labrig.sim.optics import vignetting
 from tests.analyse.recorded import quietly
 from tests.quick_yaml import read_quickly, write_quickly

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import resources
+from labrig.bench import Recording
 from labrig.calibration import LVF_KIND
-from labrig.recording import Recording
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from labrig.sim.optics import bent_curves, measured_curves

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import resources
+from labrig.bench import Recording
 from labrig.material import read_any_material
 from labrig.optics import band_integrals, edges_from_centres
-from labrig.recording import Recording
 from labrig.sim.bench_settings import LedSettings
 from labrig.sim.cards import reflectances
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM

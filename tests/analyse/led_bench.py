@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from labrig import resources
-from labrig.recording import Recording
+from labrig.bench import Recording
 from tests.analyse.recorded import quietly
 from tests.quick_yaml import read_quickly, write_quickly
 

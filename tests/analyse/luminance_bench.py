@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from labrig import resources
 from labrig.acquire import RigFile, read_rig_file
-from labrig.bench import open_bench
+from labrig.bench import Recording, open_bench
 from labrig.protocols.luminance import LuminanceFrames
 from labrig.record import PERSON, read_run
-from labrig.recording import Recording
 from tests.analyse.recorded import quietly
 from tests.quick_yaml import read_quickly, write_quickly
 

@@ -13,11 +13,10 @@ from labrig import resources
 from labrig.acquire import Plan, RunObserver
 from labrig.analyse import Inputs, Overrides, Part
 from labrig.analyse.overrides import read_run_protocol
+from labrig.bench import Recording, Watch, resume_run
 from labrig.clock import Clock
-from labrig.execution import Watch
 from labrig.process.provenance import describe_run
 from labrig.record import RunRecord, read_run
-from labrig.recording import Recording, resume_run
 from labrig.report import Source
 from tests.acquire.fakes import Watching
 from tests.quick_yaml import read_quickly, write_quickly

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from labrig import resources
 from labrig.acquire import Plan, RunObserver
+from labrig.bench import Recording
 from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.clock import Clock
 from labrig.material import read_material
 from labrig.optics import Bands, Strip
 from labrig.optics.piecewise import band_means, edges_from_centres
-from labrig.recording import Recording
 from labrig.region import region_pixels
 from labrig.results.emission_spectrum import WAVELENGTH_NM
 from labrig.sim.bench_settings import LvfSettings

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from labrig.bench import Recording
 from labrig.errors import UsageError
 from labrig.process import process_run
-from labrig.recording import Recording
 from labrig.results import EmissionSpectrumResult, ExcitationResult, PhosphorResult
 from tests.analyse.camera_filters_bench import FILTERS, IN_WHEEL, PLACE, QUICK, recorded
 from tests.analyse.selected_lights import FILTERS as LAMP_FILTERS, QUICK as EXCITATION, true_rates

@@ -20,13 +20,13 @@ from labrig.acquire import (
     plan,
     read_rig_file,
 )
+from labrig.bench import Recording
+from labrig.bench.found_calibrations import FoundCalibrations
 from labrig.cli.progress import progress
 from labrig.cli.prompt import Terminal
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
-from labrig.found_calibrations import FoundCalibrations
 from labrig.record import read_run
-from labrig.recording import Recording
 from tests.quick_yaml import read_quickly, write_quickly
 from tests.test_doors import middle
 

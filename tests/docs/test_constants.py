@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from labrig import execution, guard
 from labrig.acquire.roles import camera
 from labrig.analyse.excitation import lamp_light
+from labrig.bench import execution, guard
 from labrig.fit import luminance
 from labrig.fit.decay import (
     bend,

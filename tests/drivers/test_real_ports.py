@@ -32,7 +32,7 @@ devices:
 @pytest.fixture(autouse=True)
 def unguarded(monkeypatch: pytest.MonkeyPatch) -> None:
     """No process of Python's is started for each bench; tests/test_guard.py has the real one."""
-    monkeypatch.setattr("labrig.guard._started", idle_guard)
+    monkeypatch.setattr("labrig.bench.guard._started", idle_guard)
 
 
 @pytest.fixture

@@ -10,12 +10,12 @@ import pytest
 from labrig import resources
 from labrig.acquire import Plan, RunObserver, read_rig_file
 from labrig.analyse.overrides import read_run_protocol
+from labrig.bench import Recording
 from labrig.clock import Clock
 from labrig.process import process_run
 from labrig.process.provenance import describe_run
 from labrig.record import read_run
 from labrig.record.history import RunDescription
-from labrig.recording import Recording
 from labrig.results import read_result
 from labrig.results.decay import DecayResult
 from tests.acquire.fakes import Watching

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Plan, RigFile, RunObserver, read_protocol, read_rig_file
+from labrig.bench import Recording, Watch
 from labrig.clock import Clock, Interrupted
 from labrig.errors import DataError, UsageError
-from labrig.execution import Watch
 from labrig.fit import fit_power_law
 from labrig.queue import (
     Queue,
@@ -26,7 +26,6 @@ from labrig.queue import (
     run_queue,
 )
 from labrig.record import FrameRecord, read_run
-from labrig.recording import Recording
 from labrig.results import Measured
 from tests.acquire.fakes import Watching
 from tests.analyse.luminance_bench import luminance_after, write_rig

@@ -21,12 +21,12 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from labrig import resources
 from labrig.acquire import read_protocol
+from labrig.bench import resume_run
 from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import thumbnail
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import UsageError
 from labrig.record import UNDONE, ActionRecord, RunFolder, read_run
-from labrig.recording import resume_run
 from labrig.watch.previews import Previews
 from labrig.watch.run_follower import RunFollower, State
 from labrig.watch.server import UpdateFeed, WatchServer, watch_run

@@ -146,7 +146,7 @@ def _started(order: dict[str, Any]) -> "subprocess.Popen[bytes]":
     """
     try:
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "labrig.guard_process"],
+            [sys.executable, "-P", "-m", "labrig.bench.guard_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from labrig.acquire import Plan, RunObserver
+from labrig.bench import Recording
 from labrig.clock import Clock, Interrupted
 from labrig.errors import DeviceError
 from labrig.record import read_run
-from labrig.recording import Recording
 from labrig.sim.camera.usb.backend import CameraBackend
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from labrig.device_lock import (
+from labrig.bench.device_lock import (
     held,
     lock_folder,
     network_devices,
@@ -70,7 +70,7 @@ def test_the_place_of_the_locks_is_one_for_all(
 def test_what_is_held_is_held_once_and_free_afterwards(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("labrig.device_lock.lock_folder", lambda: tmp_path)
+    monkeypatch.setattr("labrig.bench.device_lock.lock_folder", lambda: tmp_path)
     for _ in range(2):
         with (
             held("serial-1-2", "COM3"),
@@ -84,7 +84,7 @@ def test_what_is_held_is_held_once_and_free_afterwards(
 def test_a_lock_file_that_another_user_left_is_a_lock_file(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("labrig.device_lock.lock_folder", lambda: tmp_path)
+    monkeypatch.setattr("labrig.bench.device_lock.lock_folder", lambda: tmp_path)
     before = os.umask(0o077)
     try:
         with held("serial-1-2", "COM3"):
@@ -101,7 +101,7 @@ def test_a_lock_that_cannot_be_made_is_one_line(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr("labrig.device_lock.lock_folder", lambda: tmp_path / "file")
+    monkeypatch.setattr("labrig.bench.device_lock.lock_folder", lambda: tmp_path / "file")
     with pytest.raises(UsageError, match="COM3 cannot be kept") as caught, held("x", "COM3"):
         pass
     assert "\n" not in str(caught.value)

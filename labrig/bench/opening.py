@@ -22,13 +22,13 @@ from labrig.acquire import (
     in_safe_order,
     load_driver,
 )
-from labrig.awake import kept_awake
+from labrig.bench.awake import kept_awake
+from labrig.bench.device_lock import held, network_devices, serial_devices, usb_device
+from labrig.bench.guard import Guard, guarding
+from labrig.bench.serial_ports import SerialPorts
 from labrig.clock import Clock, SystemClock
-from labrig.device_lock import held, network_devices, serial_devices, usb_device
 from labrig.errors import DeviceError, LabrigError, UsageError
-from labrig.guard import Guard, guarding
 from labrig.record import REAL_DISK, Disk
-from labrig.serial_ports import SerialPorts
 from labrig.signals import interrupting, pausing
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ def with_frame_size(file: RigFile, source: str) -> RigFile:
     >>> from labrig.bench import with_frame_size
     >>> rig = labrig.read_rig_file("runs/decay/rig.yaml")
     >>> with_frame_size(rig, "rig.yaml").devices["camera"].settings()["frame_pixels"]
-    [384, 64]
+    [96, 64]
     """
     if file.simulation is None:
         return file
@@ -258,6 +258,22 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
         The rig is not simulated, or the port is taken.
     Interrupted
         A stop was requested, which is the only way to end.
+
+    Examples
+    --------
+    >>> import signal
+    >>> import labrig
+    >>> from labrig.bench import serve_camera
+    >>> from labrig.clock import Interrupted
+    >>> def tell(address):
+    ...     print(address.partition(":")[0])
+    ...     raise Interrupted(signal.SIGINT)  # Ctrl-C, as soon as the camera can be reached
+    >>> try:
+    ...     serve_camera(labrig.read_rig_file("runs/decay/rig.yaml"), "rig.yaml", 0, tell)
+    ... except Interrupted:
+    ...     print("stopped")
+    ptpip
+    stopped
     """
     if file.simulation is None:
         raise UsageError(

@@ -77,6 +77,23 @@ def logging_to(handler: logging.Handler, clock: Clock) -> Iterator[None]:
         Handler of Python's logging; it is closed at the end.
     clock
         Clock of the rig: in a simulated room that of the room, as in the journal.
+
+    Yields
+    ------
+    None
+        Nothing; the handler writes until the block ends.
+
+    Examples
+    --------
+    >>> import io
+    >>> import logging
+    >>> from labrig.bench import logging_to
+    >>> from labrig.clock import VirtualClock
+    >>> text = io.StringIO()
+    >>> with logging_to(logging.StreamHandler(text), VirtualClock()):
+    ...     logging.getLogger("labrig.example").info("lamp on")
+    >>> text.getvalue().strip().endswith("lamp on")
+    True
     """
     handler.setFormatter(_Formatter(clock))
     level = _LABRIG.level

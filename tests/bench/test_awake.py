@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from labrig.awake import ES_CONTINUOUS, ES_SYSTEM_REQUIRED, kept_awake
+from labrig.bench.awake import ES_CONTINUOUS, ES_SYSTEM_REQUIRED, kept_awake
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="stands in for commands by shell scripts")
 
@@ -25,7 +25,7 @@ echo ended >> "$0.log"
 REFUSES = "echo 'Failed to inhibit: Access denied' >&2; exit 1"
 KILLED = """
 import os
-from labrig.awake import kept_awake
+from labrig.bench.awake import kept_awake
 with kept_awake(print, "linux"):
     os.kill(os.getpid(), 9)
 """

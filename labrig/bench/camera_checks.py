@@ -1,12 +1,12 @@
 """Comparison of camera and lens with those with which a bench was calibrated, as a run begins."""
 
 from labrig.acquire import CAMERA, RigFile, RunObserver
+from labrig.bench.run_log import LoggedObserver
 from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, ReferenceFile
 from labrig.errors import ProtocolError
 from labrig.record import FrameRecord
 from labrig.reduce import read_exif
-from labrig.run_log import LoggedObserver
 
 ANEW = "calibrate the bench with this one (labrig run calibration), or use the other"
 

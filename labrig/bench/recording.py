@@ -16,13 +16,13 @@ from labrig.acquire import (
     read_protocol,
     read_rig_file,
 )
-from labrig.bench import open_bench, wall_at_start, with_frame_size
+from labrig.bench.execution import Watch, execute
+from labrig.bench.found_calibrations import FoundCalibrations, find_calibrations
+from labrig.bench.opening import open_bench, wall_at_start, with_frame_size
+from labrig.bench.run_log import run_log
 from labrig.bench_optics import require_optics
 from labrig.errors import DiskError, ProtocolError, UsageError
-from labrig.execution import Watch, execute
-from labrig.found_calibrations import FoundCalibrations, find_calibrations
 from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
-from labrig.run_log import run_log
 from labrig.yaml_file import yaml_text
 
 #: Protocol that compares a bench with its calibration.
@@ -151,12 +151,34 @@ class Recording:
 
 
 def resume_run(path: Path, watch: Watch) -> Path:
-    """Complete the run in `path` and return the path.
+    """Complete a run: units that were not finished are done, again if need be.
+
+    Parameters
+    ----------
+    path
+        The run's folder.
+    watch
+        What is told of steps and devices, and asked for what is done by hand.
+
+    Returns
+    -------
+    Path
+        The run's folder.
 
     Raises
     ------
     UsageError
         The path is not a run folder.
+    DiskError
+        The disk has no room for the frames and results that are missing.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.bench import resume_run
+    >>> resume_run(Path("somewhere"), watch=None)
+    Traceback (most recent call last):
+    labrig.errors.UsageError: somewhere: expected a run folder with protocol.yaml in it; see --runs
     """
     if not (path / "protocol.yaml").is_file():
         raise UsageError(f"{path}: expected a run folder with protocol.yaml in it; see --runs")
@@ -205,7 +227,25 @@ def _require_free_disk(folder: Path, size: RunSize) -> None:
 
 
 def free_disk_bytes(folder: Path) -> int:
-    """Return the free space in bytes of the disk on which a folder is or will be."""
+    """Return the free space of a disk.
+
+    Parameters
+    ----------
+    folder
+        A folder on the disk, which need not exist yet.
+
+    Returns
+    -------
+    int
+        Free space in bytes.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.bench import free_disk_bytes
+    >>> free_disk_bytes(Path("runs")) > 0
+    True
+    """
     return shutil.disk_usage(_existing_parent(folder)).free
 
 

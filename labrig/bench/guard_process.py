@@ -1,6 +1,6 @@
 """The guard's process, which switches the lights off when labrig dies or hangs.
 
-    python -P -m labrig.guard_process
+    python -P -m labrig.bench.guard_process
 
 It reads from its standard input a line of JSON with the lights to switch off, then a byte per
 second that says whether a light may be on. The end of its input is the end of labrig.
@@ -18,10 +18,7 @@ from typing import BinaryIO
 
 from labrig import plugins
 from labrig.acquire import RigFile
-from labrig.bench import Bench
-from labrig.clock import SystemClock
-from labrig.errors import LabrigError
-from labrig.guard import (
+from labrig.bench.guard import (
     ALL_OFF,
     HANG_TIMEOUT_S,
     HEARTBEAT_INTERVAL_S,
@@ -29,7 +26,10 @@ from labrig.guard import (
     READY,
     TRIES_FOR_S,
 )
-from labrig.serial_ports import SerialPorts
+from labrig.bench.opening import Bench
+from labrig.bench.serial_ports import SerialPorts
+from labrig.clock import SystemClock
+from labrig.errors import LabrigError
 
 #: Pauses between two attempts. The first ones are short: the port of a killed process is free some
 #: milliseconds after its end.

@@ -24,8 +24,9 @@ from labrig.acquire import (
     plan,
     run_units,
 )
-from labrig.bench import Bench
-from labrig.calibrated_bench import LensObserver, require_calibrated_camera
+from labrig.bench.camera_checks import LensObserver, require_calibrated_camera
+from labrig.bench.opening import Bench
+from labrig.bench.trial_frame import offers_with_frame_size
 from labrig.clock import Clock, Interrupted, Slept
 from labrig.errors import (
     DataError,
@@ -38,7 +39,6 @@ from labrig.errors import (
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
 from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
-from labrig.trial_frame import offers_with_frame_size
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 

@@ -12,11 +12,10 @@ from pathlib import Path
 import pytest
 import serial
 
-from labrig import guard as guard_module, guard_process
 from labrig.acquire import LAMP, read_rig_file
-from labrig.bench import Bench, open_bench
+from labrig.bench import Bench, guard as guard_module, guard_process, open_bench
+from labrig.bench.guard import ALL_OFF, MAY_BE_ON, Guard, guarding
 from labrig.errors import DeviceError
-from labrig.guard import ALL_OFF, MAY_BE_ON, Guard, guarding
 from labrig.record import read_run
 
 pytest.importorskip("pty", reason="Windows has no pseudo terminals")

@@ -10,6 +10,8 @@ import pytest
 
 from labrig import resources
 from labrig.acquire import CalibrationRules, RigFile, read_protocol, read_rig_file
+from labrig.bench import Recording
+from labrig.bench.found_calibrations import find_calibrations
 from labrig.calibration import (
     CAMERA_KIND,
     FADE_KIND,
@@ -25,12 +27,10 @@ from labrig.calibration import (
 )
 from labrig.errors import DataError, ProtocolError, UsageError
 from labrig.fit.lvf import compare_card_pictures, place_means
-from labrig.found_calibrations import find_calibrations
 from labrig.optics import Flat, Strip
 from labrig.process import process_run
 from labrig.protocols.phosphor import Phosphor
 from labrig.record import CALIBRATIONS_FILE, read_run
-from labrig.recording import Recording
 from labrig.reduce import find_strip, read_hdr_frame, strip_profile
 from labrig.results import CalibrationCheckResult
 from tests.analyse.excitation.test_excitation_run import true_irradiance

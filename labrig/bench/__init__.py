@@ -1,0 +1,8 @@
+"""The bench: devices opened, guarded and kept to oneself, and a run carried out on them.
+
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
