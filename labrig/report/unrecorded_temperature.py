@@ -33,9 +33,9 @@ def _sentence(patch: DecayPatch) -> str:
         for column, row in enumerate(in_sigmas.argmax(axis=0))
     )
     return (
-        "the temperature was not recorded: if the room warmed or cooled by 1 K in an hour, rates "
-        f"are off by up to {rates} and amplitudes by up to {amplitudes}, which is not in σ (traps "
-        "0.65 eV deep); a thermometer in the rig would tell"
+        "the temperature was not recorded: 1 K in an hour, with traps 0.65 eV deep, would change "
+        f"rates by up to {rates} and amplitudes by up to {amplitudes}, which is not in σ; a "
+        "thermometer in the rig would tell"
     )
 
 
