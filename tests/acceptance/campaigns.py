@@ -121,6 +121,7 @@ CAMPAIGNS = {
         _module("decay_fit_example"),
         _module("veiling_glare"),
         _module("luminance_pulls", "--seeds", "50"),
+        _module("camera_curves"),
         _module("law_confusion", "--seeds", "100"),
         *(
             _module(
@@ -178,6 +179,7 @@ CAMPAIGNS = {
         _module("chart_colours"),
         _module("dark_room"),
         _module("fluorescent_room"),
+        _module("design_recovery"),
         Campaign(
             "benchmarks",
             ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),

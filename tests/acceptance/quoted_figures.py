@@ -238,7 +238,23 @@ def _light_errors(printed: str) -> str:
     )
 
 
+def _camera_curves(printed: str) -> str:
+    rows = {
+        "52 shipped, chart": "each of the 52 shipped, by the others",
+        "52 shipped, chart and filter": "the same, with the filter",
+        "32 of others, chart": "32 cameras of two other laboratories",
+        "32 of others, chart and filter": "the same, with the filter",
+    }
+    lines = []
+    for case, text in rows.items():
+        row = rf"^{re.escape(case)} +([\d.]+)% +([\d.]+)% +([\d.]+)%  \S+ +[\d.]+% +([\d.]+)"
+        median, most, worst, pulls = (column[0] for column in columns(row, printed))
+        lines.append(f"| {text} | {median:.1f} % | {most:.1f} % | {worst:.1f} % | {pulls:.2f} |")
+    return "\n".join(lines)
+
+
 QUOTES = (
+    Quote(f"{HOW_TO}/colours.md", "camera_curves", _camera_curves),
     Quote(f"{EXPLANATION}/excitation_fit.md", "excitation_light", _light_errors),
     *quoted_examples.QUOTES,
     *quoted_decay_fit.QUOTES,
