@@ -18,11 +18,12 @@ from zlib import crc32
 
 from labrig.catalogue.run_summary import RunSummary
 from labrig.clock import SystemClock
+from labrig.results import SUMMARY
 
 FILE = ".runs-index"
 PROTOCOL = "protocol.yaml"
 #: Files on which every run's summary depends; the fits in its result are added to them.
-FILES = (PROTOCOL, "made.txt", "journal.jsonl", "result")
+FILES = (PROTOCOL, "made.txt", "journal.jsonl", "result", f"result/{SUMMARY}")
 #: Modules whose code decides what a summary says.
 _MODULES = (
     "catalogue/index.py",
@@ -30,6 +31,7 @@ _MODULES = (
     "catalogue/summarising.py",
     "results/fitted_decay.py",
     "results/measured.py",
+    "results/summary.py",
 )
 #: Age from which another change of a file shows in its time: file systems count by up to 2 s.
 SETTLED_S = 3.0
@@ -70,6 +72,7 @@ class _Entry:
                     }
                     for place, parameters in summary.parameters.items()
                 },
+                "headline": summary.headline,
             },
         )
 

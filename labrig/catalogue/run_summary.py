@@ -50,6 +50,8 @@ class RunSummary:
         What tells the course of each decay, by name: rates, or the parameters of the law that
         describes it; by the folder of its fit in the result, such as `decay/left-paint`, which is
         "" if the fit lies in the result itself.
+    headline
+        What the result says first, for people; "" if there is no result.
     """
 
     folder: Path
@@ -62,6 +64,7 @@ class RunSummary:
     units: int | None
     frames: int
     parameters: "Mapping[str, Mapping[str, Measured]]"
+    headline: str = ""
 
     def at_present(self) -> "RunSummary":
         """Return the summary with status `running` if a process records the missing units now."""

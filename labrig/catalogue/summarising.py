@@ -6,7 +6,7 @@ from labrig.acquire import read_protocol
 from labrig.catalogue.run_summary import RunStatus, RunSummary, status_of, utc
 from labrig.errors import DataError, DiskError, LabrigError
 from labrig.record import read_run, time_made
-from labrig.results import read_fitted_decay
+from labrig.results import read_fitted_decay, read_summary
 from labrig.yaml_file import read_yaml
 
 
@@ -59,6 +59,7 @@ def summarise(folder: Path) -> RunSummary:
         units=number,
         frames=sum(len(attempt.frames) for attempt in completed.values()),
         parameters=parameters,
+        headline=next(iter(read_summary(folder / "result")), ""),
     )
 
 

@@ -1,6 +1,5 @@
 """`labrig process`: from a recorded run to its result."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -105,16 +104,7 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
     for warning in processed.result.warnings:
         typer.echo(f"warning: {warning}", err=True)
     for text in processed.lines:
-        typer.echo(_without_warnings(text, processed.result.warnings))
+        typer.echo(text)
     for number, line in enumerate(processed.changes):
         typer.echo(f"  {line}" if number else line)
     typer.echo(f"report: {processed.report}")
-
-
-def _without_warnings(text: str, warnings: Sequence[str]) -> str:
-    """Return a summary without those of its lines that repeat a warning."""
-    return "\n".join(
-        line
-        for line in text.splitlines()
-        if not (line.startswith("! ") and any(each.endswith(line[2:]) for each in warnings))
-    )

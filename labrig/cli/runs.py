@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +17,10 @@ from labrig.errors import UsageError
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
     from labrig.results import Measured
+
+
+#: Longest result that is listed in one line of a run.
+HEADLINE_LENGTH = 100
 
 
 class _ListsByDefault(TyperGroup):
@@ -230,8 +234,6 @@ def _print_runs(summaries: Sequence["RunSummary"]) -> None:
     """Print a table; never folded, so that every name can be copied."""
     from rich.cells import cell_len
 
-    from labrig.results import with_uncertainty
-
     def padded(text: str, width: int) -> str:
         return text + " " * (width - cell_len(text))
 
@@ -239,18 +241,24 @@ def _print_runs(summaries: Sequence["RunSummary"]) -> None:
         (_printable(run.folder.name), _printable(run.sample), _status(run)) for run in summaries
     ]
     heading = ("run", "sample", "status")
+    last_heading = "result; of a decay k_r in 1/s, or its law"
     widths = [max(map(cell_len, column)) for column in zip(heading, *rows, strict=True)]
-    lines = ["  ".join([*map(padded, heading, widths), "k_r in 1/s, or law"])]
+    lines = ["  ".join([*map(padded, heading, widths), last_heading])]
     for run, (name, sample, status) in zip(summaries, rows, strict=True):
-        decays = [
-            _printable(_decay_text(*decay, with_uncertainty)) for decay in run.parameters.items()
-        ] or [""]
+        decays = [_printable(_decay_text(*decay)) for decay in run.parameters.items()] or [
+            _shortened(_printable(run.headline))
+        ]
         cells = [padded(name, widths[0]), padded(sample, widths[1]), padded(status, widths[2])]
         if run.status in _COLOURS:
             cells[2] = typer.style(cells[2], fg=_COLOURS[run.status])
         lines.append("  ".join([*cells, decays[0]]).rstrip())
         lines += [" " * (sum(widths) + 6) + decay for decay in decays[1:]]
     typer.echo("\n".join(lines))
+
+
+def _shortened(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= HEADLINE_LENGTH else f"{text[: HEADLINE_LENGTH - 2]} …"
 
 
 def _printable(text: str) -> str:
@@ -295,17 +303,15 @@ def _print_comparison(comparison: "Comparison") -> None:
 
 def _print_results(folder: Path) -> None:
     """Print each result and the settings in which it differs from the one before it."""
-    from labrig.number_format import plus_minus
     from labrig.process import other_settings
-    from labrig.results import read_fitted_decays
+    from labrig.results import read_summary
 
     results = _result_folders(folder)
     for result, before in itertools.zip_longest(results, results[1:]):
-        for patch, fit in read_fitted_decays(folder / result).items():
-            unit = " /s" if fit.chosen_law is None else ""
-            typer.echo(f"  {result}: {_decay_text(patch, fit.parameters, plus_minus)}{unit}")
-            for warning in fit.warnings:
-                typer.echo(f"    warning: {warning}")
+        if lines := read_summary(folder / result):
+            typer.echo(f"  {result}:")
+            for line in lines:
+                typer.echo(f"    {_printable(line)}")
         if before is not None:
             for line in other_settings(folder / before, folder / result):
                 typer.echo(f"    {line}")
@@ -320,16 +326,12 @@ def _result_folders(folder: Path) -> list[str]:
     return ["result", *earlier]
 
 
-def _decay_text(
-    patch: str,
-    parameters: Mapping[str, "Measured"],
-    number_text: Callable[[float, float], str],
-) -> str:
+def _decay_text(patch: str, parameters: Mapping[str, "Measured"]) -> str:
     """Return the rates of a decay, or the parameters of its law with their symbols and units."""
-    from labrig.results import parameter_text
+    from labrig.results import parameter_text, with_uncertainty
 
     text = ",  ".join(
-        parameter_text(name, number_text(each.value, each.sigma))
+        parameter_text(name, with_uncertainty(each.value, each.sigma))
         for name, each in parameters.items()
     )
     return f"{patch}: {text}" if patch else text

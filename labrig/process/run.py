@@ -1,6 +1,7 @@
 """Processing of a run of any protocol, from its folder to result, report and exports."""
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from labrig.report import (
     write_figures_pdf,
     write_report,
 )
-from labrig.results import RunResult, read_result, write_result
+from labrig.results import RunResult, read_result, write_result, write_summary
 from labrig.yaml_file import write_yaml
 
 _EARLIER = "result-"
@@ -195,6 +196,8 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     write_result(result_folder, result)
     write_nexus(result_folder / "run.nxs", run, about, result)
     rendered = _render(result, Source(run, protocol, rig, about, camera))
+    lines = tuple(_without_warnings(text, warnings) for text in rendered.lines)
+    write_summary(result_folder, [*lines, *(f"warning: {warning}" for warning in warnings)])
     report = Report(about, warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
     include_comparison(folder, result_folder)
@@ -204,7 +207,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     page = folder / "result" / "report.html"
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
-    return Processed(result, page, rendered.lines, changes)
+    return Processed(result, page, lines, changes)
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:
@@ -265,6 +268,15 @@ def _render(result: RunResult, source: Source) -> Rendered:
     )
     more = tuple(replace(section, part=part) for section in about_run)
     return replace(rendered, sections=(*rendered.sections, *more))
+
+
+def _without_warnings(text: str, warnings: Sequence[str]) -> str:
+    """Return lines of a result without those that repeat a warning."""
+    return "\n".join(
+        line
+        for line in text.splitlines()
+        if not (line.startswith("! ") and any(each.endswith(line[2:]) for each in warnings))
+    )
 
 
 def _camera_response(

@@ -212,6 +212,11 @@ from .series_table import (
     read_described_series as read_described_series,
     read_series as read_series,
 )
+from .summary import (
+    SUMMARY as SUMMARY,
+    read_summary as read_summary,
+    write_summary as write_summary,
+)
 from .table_columns import (
     TableLayout as TableLayout,
 )

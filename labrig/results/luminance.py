@@ -216,7 +216,8 @@ class LuminanceDecay:
 
     def __str__(self) -> str:
         """Return a table for people."""
-        rows = [["luminance", "after lamp off"]]
+        marking = self.marking or "none: luminances at 10 and 60 min are missing"
+        rows = [["marking", marking], ["luminance", "after lamp off"]]
         rows += [
             [f"  {duration_text(entry.t_s)}", _text(entry.luminance, "not measured")]
             for entry in self.at
@@ -226,7 +227,6 @@ class LuminanceDecay:
             rows.append(["slope, 10 to 60 min", f"L ∝ t^−{self.slope}"])
         span = f"{duration_text(float(self.t_s[0]))} to {duration_text(float(self.t_s[-1]))}"
         rows.append(["light sum", f"{self.light_sum}, {span}"])
-        rows.append(["marking", self.marking or "none: luminances at 10 and 60 min are missing"])
         rows.append(["excited by", self.excitation or "not stated: no standard's marking"])
         rows += [
             [

@@ -96,7 +96,7 @@ QUOTES = (
             _lines("patch +1 state", "paper, 11", "compare last\n"),
             _lines("Measured: ", "k_e was not", "compare last --material"),
             _lines("runs/", "  4 of 4", "runs show"),
-            _lines("    states: ", "  report: ", "runs show"),
+            _lines("    states: ", "    1 ", "runs show"),
         )
     ),
     *(

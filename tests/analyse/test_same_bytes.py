@@ -31,7 +31,7 @@ def test_a_result_is_made_again_bit_for_bit(
     assert ended.code == 0, ended.err
     result = contents(ended.run_folder / "result")
     names = {"fit.json", "material.yaml", "series.csv"}
-    ours = {"provenance.yaml", "report.html", "result.json", "run.nxs"}
+    ours = {"provenance.yaml", "report.html", "result.json", "run.nxs", "summary.txt"}
     ours |= {f"{patch}/{name}" for patch in PATCHES for name in names}
     assert ours == {name for name in result if not name.startswith("figures/")}
     shutil.rmtree(ended.run_folder / "result")

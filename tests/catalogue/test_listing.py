@@ -17,7 +17,7 @@ from labrig import resources
 from labrig.acquire import ProtocolModel, read_protocol
 from labrig.catalogue import RunFilter, RunSummary, find_run, list_runs, summarise
 from labrig.record import RunFolder, add_note
-from labrig.results import write_fitted_decay
+from labrig.results import write_fitted_decay, write_summary
 from labrig.yaml_file import yaml_text
 from tests.conftest import Ended
 from tests.results.made import decay_result
@@ -106,6 +106,25 @@ def test_a_name_from_the_list_is_the_name_of_the_run(tmp_path: Path, labrig: Lab
         assert shown.out.splitlines()[0] == str(path)
 
 
+def test_what_is_no_decay_is_listed_with_what_it_says_first(tmp_path: Path, labrig: Labrig) -> None:
+    protocol = read_protocol(resources.find("protocols", "protocol", "luminance"))
+    run = record_run(tmp_path, protocol, ["success"] * len(protocol.units()))
+    (run / "result").mkdir()
+    write_summary(
+        run / "result", ["marking   14.2/0.56-82-K-W\nluminance  after lamp off", "2 min"]
+    )
+    assert labrig("runs", "--runs", tmp_path).out.splitlines()[1].endswith("14.2/0.56-82-K-W")
+    (listed,) = json.loads(labrig("runs", "list", "--runs", tmp_path, "--json").out)
+    assert listed["headline"] == "marking   14.2/0.56-82-K-W"
+    shown = labrig("runs", "show", run).out.splitlines()
+    begin = shown.index("  result:")
+    assert [line.split()[0] for line in shown[begin + 1 : begin + 4]] == [
+        "marking",
+        "luminance",
+        "2",
+    ]
+
+
 def test_last_is_the_run_that_was_made_last_whatever_it_is_called(tmp_path: Path) -> None:
     first, second = record_run(tmp_path, decay()), record_run(tmp_path, decay())
     first = first.rename(tmp_path / "zinc-sulphide")
@@ -120,6 +139,7 @@ def test_last_is_the_run_that_was_made_last_whatever_it_is_called(tmp_path: Path
 
 def add_fit(run: Path, rate_per_s: float) -> None:
     (run / "result.part").mkdir()
+    write_summary(run / "result.part", [f"k_r {rate_per_s}"])
     write_fitted_decay(run / "result.part" / "fit.json", decay_result((rate_per_s, 1.0)))
     if (run / "result").exists():
         (run / "result").rename(run / "result-1")
@@ -148,6 +168,7 @@ def rename_sample(run: Path) -> None:
         lambda run: (run / "result" / "fit.json").write_text("{}"),
         lambda run: (run / "journal.jsonl").write_text("{]\n{}\n"),
         lambda run: (run / "journal.jsonl").unlink(),
+        lambda run: write_summary(run / "result", ["another result"]),
         lambda run: (run / "made.txt").write_text("2001-01-01T00:00:00+00:00\n"),
         rename_sample,
         lambda run: shutil.rmtree(run),
