@@ -66,6 +66,18 @@ def test_the_first_order_is_that_of_the_affine_steps() -> None:
         assert ours == pytest.approx(theirs, rel=1e-4, abs=1e-5 * np.abs(theirs).max())
 
 
+def test_a_state_that_is_not_there_may_lose_its_rate() -> None:
+    """A decay of no exponential has one more state, whose slow rate no charge tells from none."""
+    found = fit_excitation(measured(bench(1.0, seed=7)), [0.05, 1e-5], [0.5, 0.5], UNCERTAIN)
+    there, not_there = found.states
+    true = read_material("blue-paint").states[0].k_r_per_s
+    assert there.k_r_per_s == pytest.approx(true, abs=4 * there.k_r_sigma_per_s)
+    assert 0 < not_there.k_r_per_s < 1e-6
+    # Rao's test has one degree of freedom for each state.
+    assert 0 <= found.order_gain < 20
+    assert np.isfinite(found.covariance).all()
+
+
 def test_derivatives_of_levels_left_from_charges_before() -> None:
     """One charge after the other without a wait, then a fresh sample, and a full one."""
     series = Bench(two_states()).series("LVF", LVF[:2], (8.0, 64.0, 8.0, 20.0), 40.0, shots=3)

@@ -176,7 +176,8 @@ def _minimised(
     """Return the minimum from a start, each k_r within a factor of its start value."""
     lower, upper = problem.parameters.bounds()
     k_r = problem.parameters.columns.k_r
-    lower[k_r], upper[k_r] = start[k_r] - np.log(k_r_factor), start[k_r] + np.log(k_r_factor)
+    lower[k_r] = np.maximum(lower[k_r], start[k_r] - np.log(k_r_factor))
+    upper[k_r] = start[k_r] + np.log(k_r_factor)
     # Steps of general order take their time; a starting point need not be at its minimum.
     is_slow_start = np.isfinite(k_r_factor) and not problem.parameters.is_first_order
     return least_squares(

@@ -14,6 +14,8 @@ from labrig.results import ChargingSeries, FloatArray
 #: Amplitudes over the largest value: of a state which is not there, and of one so far from
 #: saturation that its amplitude is without influence.
 LEAST_AMPLITUDE, LARGEST_AMPLITUDE = 1e-9, 1e9
+#: Rate in 1/s below every one that a charge can tell from none; its logarithm is finite.
+LEAST_RATE_PER_S = 1e-30
 
 
 class Rates(NamedTuple):
@@ -230,6 +232,7 @@ class Parameters:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return bounds of θ: excitation rates, weights and veil ≥ 0, amplitudes in their range."""
         lower, upper = np.full(self.count, -np.inf), np.full(self.count, np.inf)
+        lower[self.columns.k_r] = np.log(LEAST_RATE_PER_S)
         lower[self.columns.growth.start : self.columns.weights.stop] = 0.0
         lower[self.columns.inverse_gain] = 1 / self._largest_gain
         upper[self.columns.inverse_gain] = 1 / self._least_gain
