@@ -465,7 +465,7 @@ def test_glow_that_excites_another_colour_does_not_depend_on_the_frames(tmp_path
         )  # fmt: skip
         renderer = Renderer(built)
         for t_s in frames_s:
-            renderer._advance(float(t_s))  # the pictures between are not wanted
+            renderer.advance(float(t_s))  # the pictures between are not wanted
         levels.append([float(renderer.levels[name].mean()) for name in ("walls", "ball")])
     np.testing.assert_allclose(levels[0], levels[1], rtol=0.02)
 

@@ -28,6 +28,8 @@ CLEAR_BIC = 6.0
 VEIL_SHAPE = 0.3
 #: Largest number of states that are fitted with orders.
 MAX_STATES = 2
+#: Amplitude over its σ from which a state is there.
+SEEN = 2.0
 #: Least part of the glow of a state at the start.
 LEAST_FRACTION = 1e-3
 
@@ -95,7 +97,12 @@ class OrderFits:
         if len(k_r) <= MAX_STATES:
             yield self._fit((k_r, fractions), None, first)
         else:
-            yield self._fit((k_r[[0, -1]], fractions[[0, -1]]), None)
+            # A state that may be none is no start: its rate may be anything.
+            seen = np.flatnonzero(
+                [state.amplitude > SEEN * state.amplitude_sigma for state in self.decay.states]
+            )
+            ends = seen[[0, -1]] if len(seen) > 1 else [0, -1]
+            yield self._fit((k_r[ends], fractions[ends]), None)
         if len(k_r) > 1 and not self.states_given:
             yield self._fit((np.array([fractions @ k_r]), np.ones(1)), None)
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from labrig.errors import DiskError, UsageError
 from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
-from labrig.reproduce.picture.rendering import Frame, Renderer, Report
+from labrig.reproduce.picture.rendering import Frame, Renderer
+from labrig.reproduce.picture.view import Report
 from labrig.reproduce.scene.built_scene import Scene
 
 Float32Array = NDArray[np.float32]
