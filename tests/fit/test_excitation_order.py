@@ -158,6 +158,22 @@ def test_the_order_is_chosen_by_the_data_or_told() -> None:
     assert again.chi2 == pytest.approx(fit.chi2, abs=0.01)
 
 
+def test_a_slow_state_that_may_be_none_does_not_mislead_the_orders() -> None:
+    """A third exponential of the decay, weak and of any rate, is no start for two orders."""
+    kinetics = KineticsSettings(model="general_order", order=B)
+    sample = Bench(read_material("double-medium-bright"), kinetics=kinetics, seed=5)
+    decay = decay_result((0.048, 586.0), (0.016, 396.0), (1.2e-4, 17.6))
+    sigmas = (100.0, 60.0, 600.0)
+    states = (
+        replace(state, amplitude_sigma=sigma)
+        for state, sigma in zip(decay.states, sigmas, strict=True)
+    )
+    fits = OrderFits(measured(sample), replace(decay, states=tuple(states)), UNCERTAIN, False)
+    best = fits.chosen("auto").best
+    assert [model.states for model in best.models] == [1, 2, 3]
+    assert best.models[1].reduced_chi2 < 1.1
+
+
 @pytest.mark.parametrize("text", ["second", "0.5", "5", "nan"])
 def test_what_is_no_order_is_one_line(text: str) -> None:
     with pytest.raises(UsageError, match=f"--order: expected auto, free or .* got '{text}'"):

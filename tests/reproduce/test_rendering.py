@@ -502,3 +502,30 @@ def test_a_mesh_of_two_parts_keeps_its_own_texture_coordinates(tmp_path: Path) -
     first = [[0, 0, 0, 0, 0], [1, 0, 0, 0.5, 0], [0, 1, 0, 0, 0.5]]
     second = [[0, 0, 0, 1, 1], [1, 0, 0, 0.5, 0], [0, 0, 1, 0, 0.5]]
     assert sorted(corners.tolist()) == [first, second]
+
+
+def test_rays_of_steps_that_leave_a_closed_room_are_counted(tmp_path: Path) -> None:
+    """A room that glows inside is seen from without: pictures have no rays in it, steps have."""
+    side_m = 1e-7
+    box = {"centre_m": [0, 0, 0], "size_m": [side_m] * 3, "inward": True}
+    whole = Mesh.box((0, 0, 0), [side_m] * 3, inward=True).vertices_m
+    with_slits = whole.copy()
+    with_slits[:4, 0] += 4e-10
+    shares = []
+    for name, vertices_m in (("whole", whole), ("with-slits", with_slits)):
+        np.savez(tmp_path / f"{name}.npz", t_s=[0, 1], vertices_m=[vertices_m, vertices_m])
+        moving = scene(
+            tmp_path,
+            materials={"paint": {**PAINT, "assume_scale": 0.5, "levels": 0.5}},
+            objects={"room": {"material": "paint", "box": box, "samples": [6, 4],
+                              "vertices_over_time": f"{name}.npz"}},
+            camera={"position_m": [0, 0, 9 * side_m], "look_at_m": [0, 0, 0], "up": [0, 1, 0],
+                    "width_px": 4, "height_px": 4},
+            programme=[{"at_s": -2, "lamps": {}}], frames_s=[0], step_s=1.0,
+        )  # fmt: skip
+        (frame,) = Renderer(moving).frames()
+        assert not frame.radiance.any()
+        assert bool(frame.warnings) == (frame.escaped_share > 0)
+        shares.append(frame.escaped_share)
+    assert shares[0] == 0
+    assert 0.001 < shares[1] < 0.02

@@ -250,24 +250,48 @@ def test_a_ball_far_away_that_shows_its_inside_makes_no_room() -> None:
     assert sum(each.n_escaped for each in paths) == 0
 
 
-def test_rays_that_leave_a_closed_room_are_traced_again_and_counted() -> None:
+@pytest.mark.parametrize("begin", ["walls", "camera"])
+def test_rays_that_leave_a_closed_room_are_traced_again_and_counted(begin: str) -> None:
     """A room of 0.1 µm with slits of 0.4 nm, which count as closed: no light is lost in them."""
     side_m = 1e-7
     whole = Mesh.box((0, 0, 0), (side_m, side_m, side_m), inward=True)
     moved = whole.vertices_m.copy()
     moved[:4, 0] += 4e-10
+    camera = Pinhole((0, 0, 0), (side_m, 0, 0), (0, 0, 1), 120.0, 32, 32)
     expected = np.pi * sum(0.5**n for n in range(11))
     for vertices, most in ((whole.vertices_m, 0.0), (moved, 0.02)):
         mesh = Mesh(vertices, whole.faces, whole.uv)
         geometry = Geometry.of([Surface("room", mesh, 0, samples=(6, 4))])
         assert geometry.is_room
-        tracer = Tracer(geometry, LampTable.of([], geometry), PathLength(12, 0.0), 5)
-        paths = list(tracer.from_surface(0, 256, 1))
+        length = PathLength(12 if begin == "walls" else 1, 0.0)
+        tracer = Tracer(geometry, LampTable.of([], geometry), length, 5)
         grey = SurfaceMaterial("grey", (0.5 * np.eye(BANDS)).astype(np.float32))
-        seen = folded(paths, geometry, grey, np.ones(BANDS), np.zeros(0), incident=True)
-        np.testing.assert_allclose(seen, expected, rtol=1e-5)
+        if begin == "walls":
+            paths = list(tracer.from_surface(0, 256, 1))
+            seen = folded(paths, geometry, grey, np.ones(BANDS), np.zeros(0), incident=True)
+            np.testing.assert_allclose(seen, expected, rtol=1e-5)
+        else:
+            # One vertex only: all that leaves is the ray from the camera.
+            paths = list(tracer.from_camera(camera, 16, 1))
+            seen = folded(paths, geometry, grey, np.ones(BANDS), np.zeros(0))
+            np.testing.assert_allclose(seen, 1.0, rtol=1e-5)
         share = sum(each.n_escaped for each in paths) / sum(len(each.place) for each in paths)
         assert most / 20 <= share <= most
+
+
+@pytest.mark.parametrize(
+    ("mesh", "inside"),
+    [
+        (Mesh.sphere((0, 0, 0), 1.0, 12), 4 * np.pi),
+        (Mesh.box((0, 0, 0), (2, 2, 2), 30.0, inward=True), -4 * np.pi),
+        (Mesh.rectangle((-1, -1, -1), (2, 0, 0), (0, 2, 0)), -4 * np.pi / 6),
+    ],
+)
+def test_the_solid_angle_of_a_mesh(mesh: Mesh, inside: float) -> None:
+    """A side of a cube has a sixth of the sphere from its middle; its front counts as negative."""
+    assert mesh.solid_angle_sr((0.0, 0.0, 0.0)) == pytest.approx(inside, abs=1e-9)
+    if mesh.is_closed:
+        assert mesh.solid_angle_sr((0.5, 3.0, -0.2)) == pytest.approx(0, abs=1e-9)
 
 
 def test_light_of_another_side_does_not_run_over_the_edge_of_a_chart() -> None:

@@ -304,22 +304,24 @@ def _at_off(
     levels_at_charge = []
     for charging in problem.illuminated_series(rates):
         orders = None if problem.parameters.is_first_order else b
-        level = levels_at_off(charging, k_r, rates.k_e_per_s, orders)
-        glow = level.value**b @ a
+        at_off = levels_at_off(charging, k_r, rates.k_e_per_s, orders)
+        glow = at_off.value**b @ a
         charge, site = np.unravel_index(int(np.argmax(glow)), glow.shape)
-        r0 = level.value[charge, site]
+        r0 = at_off.value[charge, site]
         by = np.zeros((3, n, len(stated)))
         for i in range(n):
-            by[0, i, i] = level.by_k_r[charge, site, i]
-            by[0, i, 2 * n + i * bands : 2 * n + (i + 1) * bands] = level.by_k_e[charge, site, i]
+            by[0, i, i] = at_off.by_k_r[charge, site, i]
+            by[0, i, 2 * n + i * bands : 2 * n + (i + 1) * bands] = at_off.by_k_e[charge, site, i]
             if len(stated) > first_order:
-                by[0, i, first_order + i] = level.by_order[charge, site, i]
+                by[0, i, first_order + i] = at_off.by_order[charge, site, i]
         log_r0 = np.log(np.maximum(r0, np.finfo(float).tiny))
         # τ = 1/((b − 1) k r(0)^(b − 1)), or 1/k where b is 1; a = A r(0)ᵇ.
         beyond = np.where(b > 1, b - 1, 1.0)
-        time_s = 1 / (beyond * k_r * r0 ** (b - 1))
+        # The time of a state that was not charged is that of the full one.
+        level = np.where(r0 > 0, r0, 1.0)
+        time_s = 1 / (beyond * k_r * level ** (b - 1))
         by[1] = (a * b * r0 ** (b - 1))[:, None] * by[0]
-        by[2] = -(time_s * (b - 1) / r0)[:, None] * by[0]
+        by[2] = -(time_s * (b - 1) / level)[:, None] * by[0]
         each = np.arange(n)
         by[1, each, n + each] += r0**b
         by[2, each, each] -= time_s / k_r

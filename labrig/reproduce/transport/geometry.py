@@ -191,20 +191,30 @@ class Geometry:
         flat = self.triangles.reshape(-1, 3)
         return float(np.linalg.norm(flat.max(axis=0) - flat.min(axis=0)))
 
-    @cached_property
+    @property
     def is_room(self) -> bool:
         """Whether a closed surface around all others has its front inside: no ray can leave it."""
+        return self._room is not None
+
+    @cached_property
+    def _room(self) -> Mesh | None:
         flat = self.triangles.reshape(-1, 3)
         low, high = flat.min(axis=0) + self.origin_m, flat.max(axis=0) + self.origin_m
         nearly = 1e-5 * self.size_m
-        return any(
-            (surface.mesh.vertices_m.min(axis=0) <= low + nearly).all()
+        rooms = (
+            surface.mesh
+            for surface in self.surfaces
+            if surface.lamp < 0
+            and (surface.mesh.vertices_m.min(axis=0) <= low + nearly).all()
             and (surface.mesh.vertices_m.max(axis=0) >= high - nearly).all()
             and surface.mesh.volume_m3 < 0
             and surface.mesh.is_closed
-            for surface in self.surfaces
-            if surface.lamp < 0
         )
+        return next(rooms, None)
+
+    def is_room_around(self, point_m: Sequence[float]) -> bool:
+        """Return whether the scene is a room, and a point in m is inside."""
+        return self._room is not None and self._room.solid_angle_sr(point_m) < -2 * np.pi
 
     def places_of(self, surface: int) -> slice:
         """Return the places of a surface."""

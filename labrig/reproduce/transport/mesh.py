@@ -242,6 +242,26 @@ class Mesh:
         a, b, c = self.vertices_m[self.faces].swapaxes(0, 1)
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
+    def solid_angle_sr(self, point_m: ArrayLike) -> float:
+        """Return the solid angle of the triangles from a point, in sr.
+
+        Triangles that turn their back to the point count as positive: a closed mesh with its front
+        outside has 4π from within, one with its front inside −4π, and 0 from without (A. van
+        Oosterom and J. Strackee, *The solid angle of a plane triangle*, 1983).
+
+        Parameters
+        ----------
+        point_m
+            The point in m, on none of the triangles.
+        """
+        corners = self.vertices_m[self.faces] - np.asarray(point_m, dtype=np.float64)
+        a, b, c = corners.swapaxes(0, 1)
+        length_a, length_b, length_c = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
+        below = length_a * length_b * length_c + ab * length_c + bc * length_a + ca * length_b
+        return float(2 * np.arctan2(volume, below).sum())
+
     @property
     def is_closed(self) -> bool:
         """Whether each edge has a triangle on both sides, vertices at one place being one."""

@@ -8,6 +8,7 @@ something moves.
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -201,6 +202,27 @@ class Pinhole:
         return np.ascontiguousarray(begin), direction.astype(np.float32)
 
 
+@dataclass(frozen=True, eq=False)
+class Met:
+    """Where rays arrive.
+
+    Attributes
+    ----------
+    position, normal
+        Points in m from the origin of the geometry, and unit normals there, shape (n, 3).
+    place
+        Places (n,); negative of a lamp, or of nothing.
+    """
+
+    position: Float32Array
+    normal: Float32Array
+    place: IntArray
+
+    def of(self, rays: NDArray[np.integer[Any]]) -> "Met":
+        """Return where some of the rays arrive."""
+        return Met(self.position[rays], self.normal[rays], self.place[rays])
+
+
 class Tracer:
     """Traces paths in one arrangement of surfaces and lamps.
 
@@ -253,17 +275,25 @@ class Tracer:
         """
         at_once = max(1, CHUNK // per_pixel)
         n_pixels = camera.width_px * camera.height_px
+        is_inside = self._geometry.is_room_around(camera.position_m)
 
         def part(number: int) -> Paths:
-            pixels = np.arange(number * at_once, min((number + 1) * at_once, n_pixels))
+            chosen = np.arange(number * at_once, min((number + 1) * at_once, n_pixels))
+            pixels = np.repeat(chosen, per_pixel).astype(np.int32)
             rng = np.random.default_rng((self._seed, 0, number))
-            even = _even(len(pixels), per_pixel, 4 + 2 * len(self._lamps), rng)
-            origin, direction = camera.rays(
-                np.repeat(pixels, per_pixel).astype(np.int32),
-                even[:, :2].astype(np.float64),
-                self._geometry.origin_m,
-            )
-            return self._trace(origin, direction, per_pixel, even[:, 2:], rng)
+            even = _even(len(chosen), per_pixel, 4 + 2 * len(self._lamps), rng)
+
+            def rays(within: Float32Array, of: IntArray) -> tuple[Float32Array, Float32Array]:
+                where = within.astype(np.float64)
+                return camera.rays(of, where, self._geometry.origin_m)
+
+            def elsewhere(lost: NDArray[np.intp]) -> Float32Array:
+                return rays(rng.random((len(lost), 2), np.float32), pixels[lost])[1]
+
+            origin, direction = rays(even[:, :2], pixels)
+            met = self._meet(origin, direction, rng)
+            n_escaped = self._again(origin, elsewhere, met, rng) if is_inside else 0
+            return self._seen(met, per_pixel, even[:, 2:], rng, n_escaped)
 
         yield from _in_threads(part, -(-n_pixels // at_once), threads)
 
@@ -305,10 +335,13 @@ class Tracer:
             if geometry.surfaces[surface].is_two_sided:
                 side = rng.integers(0, 2, (len(places), 1)) + np.arange(per_place)
                 normal[side.ravel() % 2 == 1] *= -1
+            places = places + geometry.places_of(surface).start
             return self._walk(
-                position.astype(np.float32) + np.float32(LIFT * geometry.size_m) * normal,
-                normal,
-                (places + geometry.places_of(surface).start).astype(np.int32).repeat(per_place),
+                Met(
+                    position.astype(np.float32) + np.float32(LIFT * geometry.size_m) * normal,
+                    normal,
+                    places.astype(np.int32).repeat(per_place),
+                ),
                 np.full(len(normal), -1, np.int16),
                 per_place,
                 even[:, 2:],
@@ -317,43 +350,41 @@ class Tracer:
 
         yield from _in_threads(part, -(-len(starts.places) // at_once), threads)
 
-    def _trace(
+    def _seen(
         self,
-        origin: Float32Array,
-        direction: Float32Array,
+        met: "Met",
         per_target: int,
         even: Float32Array,
         rng: np.random.Generator,
+        n_escaped: int,
     ) -> Paths:
-        """Trace paths whose first ray is given."""
-        position, normal, place = self._meet(origin, direction, rng)
-        is_lamp = place <= self._kernels.FIRST_LAMP
-        seen = np.where(is_lamp, self._kernels.FIRST_LAMP - place, -1)
+        """Follow paths from where their first rays arrived."""
+        is_lamp = met.place <= self._kernels.FIRST_LAMP
+        seen = np.where(is_lamp, self._kernels.FIRST_LAMP - met.place, -1)
         if self._sky >= 0:
-            seen = np.where(place == self._kernels.NOTHING, self._sky, seen)
-        return self._walk(position, normal, place, seen.astype(np.int16), per_target, even, rng)
+            seen = np.where(met.place == self._kernels.NOTHING, self._sky, seen)
+        return self._walk(met, seen.astype(np.int16), per_target, even, rng, n_escaped)
 
     def _walk(
         self,
-        position: Float32Array,
-        normal: Float32Array,
-        place: IntArray,
+        first: "Met",
         seen: NDArray[np.int16],
         per_target: int,
         even: Float32Array,
         rng: np.random.Generator,
+        n_escaped: int = 0,
     ) -> Paths:
         """Follow paths from their first vertices to their ends."""
-        n_paths, lamps = len(place), len(self._lamps)
-        path = np.flatnonzero(place >= 0).astype(np.int32)
-        position, normal, place, even = position[path], normal[path], place[path], even[path]
+        n_paths, lamps = len(first.place), len(self._lamps)
+        path = np.flatnonzero(first.place >= 0).astype(np.int32)
+        here, even = first.of(path), even[path]
         depths: list[tuple[IntArray, IntArray, Float32Array, Float32Array]] = []
-        n_escaped, depth = 0, 0
+        depth = 0
         while len(path):
             chance = even if depth == 0 else rng.random((len(path), 2 + 2 * lamps), np.float32)
-            light = self._light(position, normal, chance[:, 2:])
+            light = self._light(here.position, here.normal, chance[:, 2:])
             weight = np.ones(len(path), np.float32)
-            depths.append((path, place, weight, light))
+            depths.append((path, here.place, weight, light))
             depth += 1
             goes_on = np.ones(len(path), bool)
             if depth >= self._length.vertices:
@@ -361,28 +392,37 @@ class Tracer:
                 goes_on = rng.random(len(path), np.float32) < survival
                 weight[:] = 1 / survival if survival else 0.0
             on = np.flatnonzero(goes_on)
-            direction = np.empty((len(on), 3), np.float32)
-            position, normal = position[on], normal[on]
-            self._kernels.scatter(position, normal, np.ascontiguousarray(chance[on, :2]), direction)
-            met, normal_there, place = self._meet(position, direction, rng)
+            here = here.of(on)
+            met = self._meet(here.position, self._scattered(here, chance[on, :2]), rng)
             if self._geometry.is_room:
-                n_escaped += self._again(position, normal, met, normal_there, place, rng)
+                n_escaped += self._again(
+                    here.position, partial(self._scattered_anew, here, rng), met, rng
+                )
             if self._sky >= 0:
-                away = on[place == self._kernels.NOTHING]
+                away = on[met.place == self._kernels.NOTHING]
                 light[away, self._sky] += weight[away]
-            arrived = place >= 0
-            path, position = path[on[arrived]], met[arrived]
-            normal, place = normal_there[arrived], place[arrived]
+            arrived = np.flatnonzero(met.place >= 0)
+            path, here = path[on[arrived]], met.of(arrived)
         return _in_order(n_paths, per_target, seen, depths, lamps, n_escaped)
+
+    def _scattered(self, here: "Met", chance: Float32Array) -> Float32Array:
+        """Return directions into which light is scattered (n, 3)."""
+        direction = np.empty((len(here.place), 3), np.float32)
+        self._kernels.scatter(here.position, here.normal, np.ascontiguousarray(chance), direction)
+        return direction
+
+    def _scattered_anew(
+        self, here: "Met", rng: np.random.Generator, lost: NDArray[np.intp]
+    ) -> Float32Array:
+        return self._scattered(here.of(lost), rng.random((len(lost), 2), np.float32))
 
     def _meet(
         self, origin: Float32Array, direction: Float32Array, rng: np.random.Generator
-    ) -> tuple[Float32Array, Float32Array, IntArray]:
-        """Return positions, normals and places where rays arrive."""
+    ) -> "Met":
+        """Return where rays arrive."""
         geometry = self._geometry
         n = len(origin)
-        position, normal = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
-        place = np.empty(n, np.int32)
+        met = Met(np.empty((n, 3), np.float32), np.empty((n, 3), np.float32), np.empty(n, np.int32))
         if n:
             hit = self._scene.run(origin, direction, output=True)
             self._kernels.locate(
@@ -390,30 +430,30 @@ class Tracer:
                 geometry.triangles, geometry.normals, geometry.uv, geometry.corner_place,
                 geometry.surface_of_face, geometry.table, geometry.chart_of_face,
                 geometry.chart_of_place, np.float32(LIFT * geometry.size_m),
-                position, normal, place,
+                met.position, met.normal, met.place,
             )  # fmt: skip
-        return position, normal, place
+        return met
 
     def _again(
         self,
         origin: Float32Array,
-        normal_here: Float32Array,
-        position: Float32Array,
-        normal: Float32Array,
-        place: IntArray,
+        directions: Callable[[NDArray[np.intp]], Float32Array],
+        met: "Met",
         rng: np.random.Generator,
     ) -> int:
-        """Trace rays anew that left the room between its triangles; return how many."""
+        """Trace rays anew, in other directions, that left the room between its triangles.
+
+        What they meet is put into `met`; their number is returned.
+        """
         n_escaped = 0
         for _ in range(TRIALS):
-            away = np.flatnonzero(place == self._kernels.NOTHING)
-            if not len(away):
+            lost = np.flatnonzero(met.place == self._kernels.NOTHING)
+            if not len(lost):
                 break
-            n_escaped += len(away)
-            direction = np.empty((len(away), 3), np.float32)
-            chance = rng.random((len(away), 2), np.float32)
-            self._kernels.scatter(origin[away], normal_here[away], chance, direction)
-            position[away], normal[away], place[away] = self._meet(origin[away], direction, rng)
+            n_escaped += len(lost)
+            found = self._meet(origin[lost], directions(lost), rng)
+            met.position[lost], met.normal[lost] = found.position, found.normal
+            met.place[lost] = found.place
         return n_escaped
 
     def _light(
