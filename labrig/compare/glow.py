@@ -76,7 +76,9 @@ def state_signals(material: Material, series: Series) -> FloatArray:
 def glow_sigma(material: Material, series: Series, *, is_same_camera: bool) -> FloatArray:
     """Return the relative σ of a material's glow over each exposure, shape (n,).
 
-    The scale is common to all states; amplitude and rate of each state count as independent.
+    The scale is common to all states; amplitude and rate of each state count as independent. Of a
+    state of a kinetic order b above 1 it is τ that its decay tells, a (1 + t/τ)^(−b/(b − 1)): its
+    rate may be known only together with its level.
 
     Parameters
     ----------
@@ -98,9 +100,18 @@ def glow_sigma(material: Material, series: Series, *, is_same_camera: bool) -> F
     for number, state in enumerate(material.states):
         amplitude = (state.amplitude_sigma or 0.0) / (state.amplitude or np.inf)
         of_amplitude = max(amplitude**2 - whole**2, 0.0)
-        of_rate = np.square((state.k_r_per_s_sigma or 0.0) * middles_s)
+        of_rate = np.square(_slowing(state, middles_s))
         variance = variance + share[:, number] ** 2 * (of_amplitude + of_rate)
     return np.asarray(np.sqrt(variance))
+
+
+def _slowing(state: State, t_s: FloatArray) -> FloatArray:
+    """Return the relative σ of a state's light at times after lamp off by its rate, shape (n,)."""
+    time_s, sigma_s = state.decay_time_s, state.decay_time_s_sigma
+    order = state.kinetic_order
+    if order == 1 or time_s is None or sigma_s is None:
+        return np.asarray((state.k_r_per_s_sigma or 0.0) * t_s)
+    return np.asarray(order / (order - 1) * t_s / (time_s + t_s) * sigma_s / time_s)
 
 
 def _relative(factors: Sequence[ScaleFactor]) -> float:
@@ -170,8 +181,8 @@ class GlowComparison:
     delta_e
         CIEDE2000 of each prediction by name, shape (n,); NaN where there is no colour.
     noise
-        Expected mean CIEDE2000 from noise alone if the nearest prediction were true; NaN if the
-        noise is not known.
+        Expected CIEDE2000 from noise alone if the nearest prediction were true, shape (n,); NaN
+        where there is no colour or the noise is not known.
     """
 
     patch: str
@@ -181,7 +192,12 @@ class GlowComparison:
     photographed: FloatArray
     predicted: Mapping[str, FloatArray]
     delta_e: Mapping[str, FloatArray]
-    noise: float
+    noise: FloatArray
+
+    @property
+    def mean_noise(self) -> float:
+        """Mean CIEDE2000 over all photographs that noise alone makes; NaN if it is not known."""
+        return float(np.mean(self.noise[self.seen]))
 
     def mean(self, name: str) -> float:
         """Return the mean CIEDE2000 of a prediction over all photographs."""
@@ -262,7 +278,7 @@ def compare_scaled(
         photographed=scale * xyz,
         predicted=normalised,
         delta_e={name: np.where(seen, values, np.nan) for name, values in differences.items()},
-        noise=_noise(series, predicted[nearest], scale, viewing, flicker),
+        noise=np.where(seen, _noise(series, predicted[nearest], scale, viewing, flicker), np.nan),
     )
 
 
@@ -286,17 +302,17 @@ def _scale(series: Series, xyz: FloatArray, viewing: Viewing) -> FloatArray:
 
 def _noise(
     series: Series, expected: FloatArray, scale: FloatArray, viewing: Viewing, flicker: float
-) -> float:
-    """Return the mean CIEDE2000 between expected values and photographs of them with noise."""
+) -> FloatArray:
+    """Return the CIEDE2000 between expected values and photographs of them with noise, (n,)."""
     if not np.isfinite(series.sigma).all():
-        return float("nan")
+        return np.full(len(expected), np.nan)
     rng = np.random.default_rng(0)
     shape = (DRAWS, len(expected))
     draws = expected * (1 + flicker * rng.standard_normal((*shape, 1)))
     draws = draws + series.sigma * rng.standard_normal((*shape, 3))
     drawn_lab = lab(scale * (draws @ viewing.to_xyz.T), viewing.white)
     expected_lab = lab(scale * (expected @ viewing.to_xyz.T), viewing.white)
-    return float(delta_e(drawn_lab, expected_lab[np.newaxis])[:, has_colour(series)].mean())
+    return np.asarray(delta_e(drawn_lab, expected_lab[np.newaxis]).mean(axis=0))
 
 
 def glow_table(glows: Sequence[GlowComparison]) -> Table:
@@ -306,7 +322,7 @@ def glow_table(glows: Sequence[GlowComparison]) -> Table:
         (
             glow.patch,
             *(_mean_and_most([glow], name) for name in names),
-            "–" if np.isnan(glow.noise) else f"{glow.noise:.2f}",
+            "–" if np.isnan(glow.mean_noise) else f"{glow.mean_noise:.2f}",
         )
         for glow in glows
     ]

@@ -12,6 +12,7 @@ from labrig.compare.run import MeasuredPatch
 from labrig.compare.viewing import FloatArray, Viewing
 from labrig.errors import UsageError
 from labrig.material import Material
+from labrig.results import Series
 
 #: Lightness of the photographed patch.
 LIGHTNESS = 50.0
@@ -60,12 +61,17 @@ class RenderedPatch:
         Comparison in which every photograph has L* = 50, and its rendering the same factor.
     common
         Comparison in which one factor for all brings the brightest photograph to L* = 50.
+    matched
+        As `each`, but each channel of a rendering has one factor for all times that brings it
+        nearest to the photographs. What is left is noise and the course over time; what it takes
+        away is of the measured spectrum and of the curves of the camera.
     ratio
         Glow over reflected light.
     """
 
     each: GlowComparison
     common: GlowComparison
+    matched: GlowComparison
     ratio: GlowRatio
 
 
@@ -101,12 +107,29 @@ def compare_patch(
     luminance = np.maximum(series.values @ conversion.to_xyz[1], 1e-300)
     target = ((LIGHTNESS + 16) / 116) ** 3
     brightest = np.full_like(luminance, luminance.max())
-    each, common = (
-        compare_scaled(series, rendered, conversion, patch.flicker, target / factor[:, None])
-        for factor in (luminance, brightest)
+    factor_each, factor_common = (
+        target / factor[:, np.newaxis] for factor in (luminance, brightest)
+    )
+    matched = {name: _matched(values, series, patch.flicker) for name, values in rendered.items()}
+    each, common, by_colour = (
+        compare_scaled(series, values, conversion, patch.flicker, factor)
+        for values, factor in (
+            (rendered, factor_each),
+            (rendered, factor_common),
+            (matched, factor_each),
+        )
     )
     light, lit = measured.reflected[0]
-    return RenderedPatch(each, common, _ratio(patch, light, gain * lit, rendered, sigma, room))
+    ratio = _ratio(patch, light, gain * lit, rendered, sigma, room)
+    return RenderedPatch(each, common, by_colour, ratio)
+
+
+def _matched(values: FloatArray, series: Series, flicker: float) -> FloatArray:
+    """Return a rendering with a factor of each channel by weighted least squares, shape (n, C)."""
+    variance = np.square(np.nan_to_num(series.sigma)) + np.square(flicker * values)
+    weight = 1 / (variance + np.finfo(float).eps * np.max(values**2))
+    factor = np.sum(weight * values * series.values, axis=0) / np.sum(weight * values**2, axis=0)
+    return np.asarray(factor * values)
 
 
 def _albedo_sigma(material: Material) -> float:

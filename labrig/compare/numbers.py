@@ -43,7 +43,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
             "glow": {
                 glow.patch: {
                     "t_s": glow.t_s.tolist(),
-                    "noise": glow.noise,
+                    "noise": glow.mean_noise,
                     "delta_e": {name: values.tolist() for name, values in glow.delta_e.items()},
                     "mean": {name: glow.mean(name) for name in glow.delta_e},
                     "max": {name: glow.most(name) for name in glow.delta_e},
@@ -117,14 +117,20 @@ def rendered_numbers(comparison: RenderedComparison) -> dict[str, Any]:
         {
             "description": " ".join(comparison.description),
             "notes": list(comparison.notes),
+            "warnings": list(comparison.warnings),
             "left_out": list(comparison.left_out),
             "patches": {
                 patch.each.patch: {
                     "t_s": patch.each.t_s.tolist(),
-                    "noise": patch.each.noise,
+                    "noise": patch.each.mean_noise,
+                    "delta_e_noise": patch.each.noise.tolist(),
                     "delta_e": _lists(patch.each.delta_e),
+                    "delta_e_matched": _lists(patch.matched.delta_e),
                     "delta_e_one_exposure": _lists(patch.common.delta_e),
                     "mean": {name: patch.each.mean(name) for name in patch.each.delta_e},
+                    "mean_matched": {
+                        name: patch.matched.mean(name) for name in patch.matched.delta_e
+                    },
                     "mean_one_exposure": {
                         name: patch.common.mean(name) for name in patch.common.delta_e
                     },

@@ -8,7 +8,7 @@ brightness is fitted, too.
 """
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from labrig.errors import DataError, UsageError
 from labrig.material import Material
 from labrig.record import read_run
 from labrig.reproduce import Assumptions
-from labrig.results import read_result
+from labrig.results import ExcitationResult, PhosphorResult, RunResult, read_result
 
 NOTHING_ASSUMED = Assumptions()
 
@@ -45,6 +45,9 @@ class RenderedComparison:
         How it was compared, in paragraphs for people.
     notes
         What was assumed, one sentence each.
+    warnings
+        Why the measured material may not describe how the sample was charged, as its run says, one
+        sentence each.
     left_out
         Renderings that are not possible, with the reason.
     scene
@@ -56,6 +59,7 @@ class RenderedComparison:
     notes: tuple[str, ...]
     left_out: tuple[str, ...]
     scene: DarkRoomScene | None = None
+    warnings: tuple[str, ...] = ()
 
 
 def compare_rendered(
@@ -123,7 +127,8 @@ def compare_rendered(
     if curves is None:
         raise UsageError(f"the dark room cannot be rendered: {reasons[0]}")
     rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), read_run(folder).camera_identity)
-    room = PhotographedRoom.of(folder, rig, read_result(folder))
+    result = read_result(folder)
+    room = PhotographedRoom.of(folder, rig, result)
     own = _own_names(patches, room)
     with tempfile.TemporaryDirectory() as place:
         bench = RenderedBench(room, curves, Path(place), assumptions)
@@ -154,7 +159,20 @@ def compare_rendered(
         tuple(dict.fromkeys(notes)),
         tuple(left_out),
         measured.scene if compared else None,
+        tuple(_doubts(result, [name for name in patches if name not in given])),
     )
+
+
+def _doubts(result: RunResult, patches: Sequence[str]) -> Iterator[str]:
+    """Yield what a run warns of the charging of patches whose own materials are rendered."""
+    parts = result.parts.values() if isinstance(result, PhosphorResult) else (result,)
+    for part in parts:
+        if not isinstance(part, ExcitationResult):
+            continue
+        for name, patch in part.patches.items():
+            if name in patches or (not name and patches):
+                of = f"{name}, excitation" if name else "excitation"
+                yield from (f"{of}: {warning}" for warning in patch.fit.warnings)
 
 
 def _completed(material: Material) -> Material:
@@ -202,7 +220,9 @@ def _description(
         "brightness is fitted, too.",
         f"CIELAB: {conversion.source}. ΔE is CIEDE2000 with L* = {LIGHTNESS:g} of every "
         "photograph, and with one exposure for all, the brightest at that; a rendering has the "
-        "factor of its photograph.",
+        "factor of its photograph. Of noise: what the photographs' noise alone would make. Colour "
+        "matched: with one factor of each channel for all times, so that the measured spectrum and "
+        "the camera's curves are not in it, but the course over time.",
         *_unread(room),
     ]
     if left_out:

@@ -13,6 +13,9 @@ from labrig.compare.viewing import FloatArray
 from labrig.number_format import plus_minus, rounded
 from labrig.report import Picture, Section, Table
 
+#: Units in which glow is told over reflected light, the first of which it reaches.
+UNITS = ((1e-2, "%"), (1e-3, "‰"), (1e-6, "ppm"))
+
 
 def rendered_sections(comparison: RenderedComparison) -> tuple[Section, ...]:
     """Lay out a rendered dark room as sections of a page.
@@ -35,7 +38,11 @@ def rendered_sections(comparison: RenderedComparison) -> tuple[Section, ...]:
     """
     if not comparison.patches:
         return ()
-    text = (*comparison.description, *(f"Note: {note}." for note in comparison.notes))
+    text = (
+        *comparison.description,
+        *(f"Note: {note}." for note in comparison.notes),
+        *(f"Warning: {warning}." for warning in comparison.warnings),
+    )
     return (
         Section(
             "The dark room, photographed and rendered",
@@ -68,6 +75,8 @@ def _colours_table(comparison: RenderedComparison) -> Table:
             patch.each.patch,
             name,
             f"{patch.each.mean(name):.2f} ({patch.each.most(name):.2f})",
+            _delta_e(patch.each.mean_noise),
+            _delta_e(patch.matched.mean(name)),
             f"{patch.common.mean(name):.2f} ({patch.common.most(name):.2f})",
             f"{100 * float(np.mean(patch.ratio.excess(name))):+.2f}",
             f"{_furthest(100 * patch.ratio.excess(name)):+.2f}",
@@ -81,6 +90,8 @@ def _colours_table(comparison: RenderedComparison) -> Table:
             "patch",
             "rendered",
             "ΔE at L* 50",
+            "of noise",
+            "colour matched",
             "ΔE, one exposure",
             "ratio off / %",
             "furthest / %",
@@ -88,32 +99,49 @@ def _colours_table(comparison: RenderedComparison) -> Table:
         ),
         rows=tuple(rows),
         caption="CIEDE2000 between photographs and renderings, mean over all times and, in "
-        "brackets, the largest; rendered over photographed ratio of glow to reflected light − 1, "
-        "mean and furthest over all times.",
+        "brackets, the largest; of noise: the mean that the photographs' noise alone makes; "
+        "colour matched: the mean with one factor of each channel for all times, without the "
+        "errors of the measured spectrum and of the camera's curves; rendered over photographed "
+        "ratio of glow to reflected light − 1, mean and furthest over all times.",
     )
 
 
 def _ratio_table(patch: RenderedPatch) -> Table:
     """Return a table of glow over reflected light at the times that the pictures show."""
     ratio = patch.ratio
+    unit, in_words = next(
+        (each for each in UNITS if ratio.photographed.max() >= each[0]), UNITS[-1]
+    )
     rows = [
         (
             rounded(float(patch.each.t_s[row]), 3),
-            plus_minus(float(ratio.photographed[row]), float(ratio.photographed_sigma[row])),
-            plus_minus(
-                float(ratio.rendered[MEASURED][row]), float(ratio.rendered_sigma[MEASURED][row])
+            *(
+                plus_minus(float(values[row]) / unit, float(sigma[row]) / unit)
+                for values, sigma in (
+                    (ratio.photographed, ratio.photographed_sigma),
+                    (ratio.rendered[MEASURED], ratio.rendered_sigma[MEASURED]),
+                )
             ),
             f"{ratio.in_sigma(MEASURED)[row]:+.1f}",
             _delta_e(patch.each.delta_e[MEASURED][row]),
+            _delta_e(patch.each.noise[row]),
             _delta_e(patch.common.delta_e[MEASURED][row]),
         )
         for row in shown_rows(patch.each)
     ]
     return Table(
-        head=("t / s", "photographed", "rendered", "σ", "ΔE at L* 50", "ΔE, one exposure"),
+        head=(
+            "t / s",
+            f"photographed / {in_words}",
+            f"rendered / {in_words}",
+            "σ",
+            "ΔE at L* 50",
+            "of noise",
+            "ΔE, one exposure",
+        ),
         rows=tuple(rows),
-        caption=f"{patch.each.patch}: glow over the light that {ratio.reflected_by} reflects, in "
-        f"{ratio.channel}, of photographs and of the measured material.",
+        caption=f"{patch.each.patch}: glow in {in_words} of the light that {ratio.reflected_by} "
+        f"reflects, in {ratio.channel}, of photographs and of the measured material.",
     )
 
 

@@ -12,7 +12,17 @@ Row = tuple[str | float, ...]
 
 #: Columns of both tables: light over reflected light, or over that of the card.
 LIGHT = ("photographed", "photographed_sigma", "rendered", "rendered_sigma")
-OF_GLOW = ("patch", "t_s", "rendering", "channel", *LIGHT, "delta_e", "delta_e_one_exposure")
+OF_GLOW = (
+    "patch",
+    "t_s",
+    "rendering",
+    "channel",
+    *LIGHT,
+    "delta_e",
+    "delta_e_noise",
+    "delta_e_matched",
+    "delta_e_one_exposure",
+)
 OF_LAMPS = (
     "lamp",
     "sample",
@@ -79,6 +89,8 @@ def _of_glow(comparison: RenderedComparison) -> Iterator[Row]:
                 ratio.rendered[name],
                 ratio.rendered_sigma[name],
                 patch.each.delta_e[name],
+                patch.each.noise,
+                patch.matched.delta_e[name],
                 patch.common.delta_e[name],
                 strict=True,
             )
