@@ -159,12 +159,20 @@ def compare_rendered(
         tuple(dict.fromkeys(notes)),
         tuple(left_out),
         measured.scene if compared else None,
-        tuple(_doubts(result, [name for name in patches if name not in given])),
+        tuple(charging_doubts(result, [name for name in patches if name not in given])),
     )
 
 
-def _doubts(result: RunResult, patches: Sequence[str]) -> Iterator[str]:
-    """Yield what a run warns of the charging of patches whose own materials are rendered."""
+def charging_doubts(result: RunResult, patches: Sequence[str]) -> Iterator[str]:
+    """Yield what a run warns of how patches were charged, one sentence each.
+
+    Parameters
+    ----------
+    result
+        Result of the run, or of a chain.
+    patches
+        Names of the patches whose own materials are rendered.
+    """
     parts = result.parts.values() if isinstance(result, PhosphorResult) else (result,)
     for part in parts:
         if not isinstance(part, ExcitationResult):

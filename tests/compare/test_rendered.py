@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from labrig.calibration import FADE_KIND
 from labrig.cli.exit_codes import guarded
 from labrig.compare.glow import glow_sigma, state_signals
 from labrig.compare.photographed_room import PhotographedRoom
+from labrig.compare.rendered import charging_doubts
 from labrig.material import (
     SEEN_FACTOR,
     Albedo,
@@ -27,13 +29,14 @@ from labrig.material import (
     write_material,
 )
 from labrig.reproduce import Renderer, load_scene
-from labrig.results import FloatArray, Series, read_result
+from labrig.results import FloatArray, PhosphorResult, Series, read_result
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.optics import REFLECTED, emission
 from labrig.sim.phosphor import band_cells
 from tests.acceptance.trap_models import true_fade
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
+from tests.results.made_excitation import excitation_result
 
 
 def made_series(t_s: FloatArray, exposure_s: FloatArray) -> Series:
@@ -209,6 +212,25 @@ def test_the_sigma_of_a_glow_of_another_order_is_that_of_its_decay_time() -> Non
     relative = np.std(drawn, axis=0) / np.mean(drawn, axis=0)
     stated = glow_sigma(material(60.0), series, is_same_camera=True)
     np.testing.assert_allclose(stated, relative, rtol=0.1)
+
+
+def test_what_a_run_warns_of_its_charging_is_said_of_the_rendering() -> None:
+    excited = excitation_result()
+    left = excited.patches["left"]
+    law = replace(left, fit=replace(left.fit, warnings=("another law holds",)))
+    right = replace(left, fit=replace(left.fit, warnings=()))
+    both = replace(excited, patches={"left": law, "right": right})
+    chain = PhosphorResult(parts={"excitation": both}, failed={}, materials={})
+    assert list(charging_doubts(chain, ["left", "right"])) == [
+        "left, excitation: another law holds"
+    ]
+    # A material that was named takes the place of the run's own.
+    assert not list(charging_doubts(chain, ["right"]))
+    alone = PhosphorResult(
+        parts={"excitation": replace(excited, patches={"": law})}, failed={}, materials={}
+    )
+    assert list(charging_doubts(alone, ["otor"])) == ["excitation: another law holds"]
+    assert not list(charging_doubts(alone, []))
 
 
 def test_the_lamps_fade_is_the_measured_one(measured: Path) -> None:
