@@ -62,13 +62,21 @@ def render(
         ),
     ] = None,
     exposure: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--exposure",
             help="'each': so that each picture is bright; 'common': one for all; or the luminance "
-            "in cd/m² that is white.",
+            "in cd/m² that is white. Default: the scene's.",
         ),
-    ] = "each",
+    ] = None,
+    white: Annotated[
+        str | None,
+        typer.Option(
+            "--white",
+            help="Light in which a white surface looks white, such as D65, D50, A, or a file: "
+            "colours are adapted to the screen by Bradford's transform. Default: the scene's.",
+        ),
+    ] = None,
     night: Annotated[
         bool,
         typer.Option("--night", help="As the eye sees it in the dark (Thompson et al., 2002)."),
@@ -97,17 +105,17 @@ def render(
     from labrig.reproduce import (
         Assumptions,
         RenderFolder,
-        check_exposure,
         load_scene,
         require_ffmpeg,
+        white_under,
     )
 
-    check_exposure(exposure)
     if video is not None:
         require_ffmpeg(video)
     _check_places(gltf, mitsuba)
     built = load_scene(scene, _pairs(materials or []), Assumptions(assume_albedo, assume_scale))
-    built = _changed(built, times, size, paths)
+    built = _changed(built, times, size, paths).displayed(white, exposure)
+    adapted = None if built.white is None else white_under(built.white, built.bands.edges_nm)
     for note in built.notes:
         typer.echo(f"note: {note}", err=True)
     folder = RenderFolder.open(out or Path("renders") / built.file.name, built)
@@ -124,7 +132,7 @@ def render(
             bar.say(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}")
             for warning in frame.warnings:
                 bar.say(f"warning: {warning}")
-    _draw(folder, built, exposure, night, video, fps)
+    _draw(folder, built, night, adapted, video, fps)
     _export(folder, built, gltf, mitsuba)
     typer.echo(folder.path)
 
@@ -251,8 +259,8 @@ def _changed(scene: "Scene", times: str | None, size: str | None, paths: int | N
 def _draw(
     folder: "RenderFolder",
     scene: "Scene",
-    exposure: str,
     night: bool,
+    adapted_white: tuple[float, float, float] | None,
     video: Path | None,
     fps: float,
 ) -> None:
@@ -264,14 +272,20 @@ def _draw(
 
     frames = [folder.frame(number) for number in range(folder.n_done)]
     pictures, labels = [], []
-    for number, (picture, display) in enumerate(shown_frames(frames, exposure, night)):
+    look = scene.file.display
+    for number, (picture, display) in enumerate(
+        shown_frames(frames, look.exposure, night, adapted_white)
+    ):
         t_s = folder.times_s[number]
-        when = f"−{duration_text(-t_s)}" if t_s < 0 else duration_text(t_s)
+        when = f"{'−' if t_s < 0 else ''}{duration_text(abs(t_s))}" if t_s else "0 s"
         labels.append(f"{when}; white is {rounded(display.white_luminance, 2)} cd/m²")
         texts = {"Description": f"{scene.file.name} at {t_s:g} s", "Comment": display.statement}
         write_png(folder.path / f"{number:03d}.png", picture, texts)
         pictures.append(picture)
-    caption = "; ".join(scene.notes)
+    notes = list(scene.notes)
+    if adapted_white is not None and not night:
+        notes.append(f"white is {look.white}, adapted to the screen by Bradford's transform")
+    caption = "; ".join(notes)
     draw_frames(pictures, labels, folder.path / "sheet.png", scene.file.name, caption)
     if video is not None:
         write_video(video, pictures, fps)

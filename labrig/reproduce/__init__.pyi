@@ -45,8 +45,8 @@ from .picture.rendering import (
     Seen as Seen,
 )
 from .picture.shown import (
-    check_exposure as check_exposure,
     shown_frames as shown_frames,
+    white_under as white_under,
 )
 from .picture.video import (
     require_ffmpeg as require_ffmpeg,

@@ -8,10 +8,29 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
-from labrig.reproduce import Mesh, RenderFolder, exported_meshes, load_scene, read_spectral_exr
+from labrig import colour_science
+from labrig.optics import (
+    CHART_PATCHES,
+    CIE_1931,
+    XYZ_TO_SRGB,
+    delta_e,
+    lab,
+    observer,
+    white_xyz,
+)
+from labrig.reproduce import (
+    Mesh,
+    RenderFolder,
+    exported_meshes,
+    load_scene,
+    read_png_texts,
+    read_spectral_exr,
+)
+from labrig.results import FloatArray
 from tests.conftest import Ended
 
 SMALL = ("--size", "12x9", "--paths", "4")
@@ -57,6 +76,46 @@ def test_a_rendering_that_was_killed_goes_on_to_the_same_pictures(
             for name in ("whole", "part")
         )
         np.testing.assert_array_equal(whole, resumed)
+
+
+def png_lab(path: Path) -> FloatArray:
+    """CIELAB of a picture's bytes, shape (height, width, 3)."""
+    colour, white = colour_science.load(), white_xyz("D65", observer(CIE_1931))
+    picture = cv2.imread(str(path))
+    assert picture is not None
+    rgb = picture[..., ::-1] / 255
+    linear = colour.cctf_decoding(rgb, function="sRGB")
+    return lab(linear @ np.linalg.inv(XYZ_TO_SRGB).T, white)
+
+
+def test_a_chart_has_its_published_srgb(labrig: Callable[..., Ended]) -> None:
+    """The colours of the mean of 30 charts under D50, adapted to the screen by Bradford."""
+    ended = labrig("render", "colour-chart", "--size", "62x42", "--paths", "4")
+    assert ended.code == 0, ended.err
+    seen = png_lab(ended.run_folder / "000.png")[5::10, 5::10].reshape(24, 3)
+    colour, white = colour_science.load(), white_xyz("D65", observer(CIE_1931))
+    published = colour.CCS_COLOURCHECKERS["BabelColor Average"]
+    adapted = colour.chromatic_adaptation(
+        colour.xyY_to_XYZ(np.array(list(published.data.values()))),
+        colour.xy_to_XYZ(published.illuminant), white, method="Von Kries", transform="Bradford",
+    )  # fmt: skip
+    difference = delta_e(seen, lab(np.asarray(adapted), white))
+    # Cyan is beyond the screen's gamut.
+    in_gamut = difference[[name != "cyan" for name in CHART_PATCHES]]
+    assert in_gamut.max() < 0.7
+    assert in_gamut.mean() < 0.4
+    statement = read_png_texts(ended.run_folder / "000.png")["Comment"]
+    assert "Bradford" in statement
+    assert "0.3457, 0.3585" in statement  # of D50, CIE 15
+    # Another look needs no new rendering.
+    before = (ended.run_folder / "000.exr").stat().st_mtime_ns
+    again = labrig("render", "colour-chart", "--size", "62x42", "--paths", "4", "--white", "D65",
+                   "--exposure", "400")  # fmt: skip
+    assert again.code == 0, again.err
+    assert (ended.run_folder / "000.exr").stat().st_mtime_ns == before
+    yellower = png_lab(ended.run_folder / "000.png")[35, 5]
+    assert yellower[2] > seen[18, 2] + 15
+    assert "D65 of luminance 400" in read_png_texts(ended.run_folder / "000.png")["Comment"]
 
 
 def test_other_settings_do_not_mix_with_what_is_there(labrig: Callable[..., Ended]) -> None:
@@ -110,7 +169,11 @@ def test_on_a_terminal_it_says_what_is_done_and_for_how_long(
         (["cornell-box", "--times", "1,0"], "rise"),
         (["cornell-box", "--times", "soon"], "0,1,80"),
         (["cornell-box", "--times", "-900"], "programme"),
-        (["cornell-box", *SMALL, "--exposure", "bright"], "common"),
+        (["cornell-box", "--exposure", "bright"], "common"),
+        (["cornell-box", "--exposure", "-1"], "greater than 0"),
+        (["cornell-box", "--white", "450nm"], "450nm"),
+        (["cornell-box", "--white", "nonsense"], "D50"),
+        (["cornell-box", "--white", "none.csv"], "none.csv"),
     ],
 )
 def test_what_cannot_be_rendered_is_one_line(
@@ -120,6 +183,7 @@ def test_what_cannot_be_rendered_is_one_line(
     assert ended.code == 2
     assert says in ended.err.splitlines()[-1]
     assert "Traceback" not in ended.err
+    assert not Path("renders").exists()
 
 
 def test_other_programs_take_the_scene(labrig: Callable[..., Ended]) -> None:

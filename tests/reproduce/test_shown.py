@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from labrig.errors import UsageError
-from labrig.reproduce import SpectralFrame, shown_frames
+from labrig.optics import illuminant
+from labrig.reproduce import SpectralFrame, shown_frames, white_under
 
 EDGES_NM = np.linspace(300, 780, 25)
 
@@ -40,3 +41,22 @@ def test_a_given_white_is_taken_and_what_is_none_is_refused() -> None:
     for wrong in ("bright", "0", "nan"):
         with pytest.raises(UsageError):
             shown_frames(FRAMES, wrong)
+
+
+def test_a_white_surface_is_white_in_the_light_that_it_is_adapted_to() -> None:
+    """Under a halogen lamp it is orange without; eyes in the dark are adapted to no lamp."""
+    lamp = illuminant("A")
+    image = np.broadcast_to(lamp.in_bands(EDGES_NM), (8, 8, 24)).astype(np.float32)
+    white = white_under(lamp, EDGES_NM)
+    lit = SpectralFrame(image, EDGES_NM, "", {})
+    for exposure in ("each", "common"):
+        ((picture, display),) = shown_frames([lit], exposure, adapted_white=white)
+        assert picture.min() >= 254
+        assert display.adapted_white == white
+    ((picture, _),) = shown_frames([lit])
+    assert (picture[..., 0] > picture[..., 2] + 60).all()
+    faint = SpectralFrame(np.float32(1e-9) * image, EDGES_NM, "", {})
+    ((night, _),), ((other, _),) = (
+        shown_frames([faint], night=True, adapted_white=each) for each in (None, white)
+    )
+    np.testing.assert_array_equal(night, other)

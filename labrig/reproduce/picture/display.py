@@ -6,7 +6,7 @@ bytes of the observer's X, Y, Z.
 """
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,7 @@ from labrig.optics import (
 
 FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
+White: TypeAlias = tuple[float, float, float]
 
 #: Percentage of the pixels that are not black which automatic exposure shows unclipped.
 UNCLIPPED_PER_CENT = 99.5
@@ -169,12 +170,14 @@ class Display:
     """
 
     white_luminance: float
-    adapted_white: tuple[float, float, float] | None = None
+    adapted_white: White | None = None
 
     def __post_init__(self) -> None:
-        white = (1.0, 1.0, 1.0) if self.adapted_white is None else self.adapted_white
-        if not all(0 < value < np.inf for value in white):
-            raise UsageError(f"expected X, Y and Z of white above 0 and finite, got {white}")
+        if self.adapted_white is not None and not is_white(self.adapted_white):
+            raise UsageError(
+                "expected X, Y and Z, above 0 and finite, of a white to which eyes adapt, got "
+                f"{tuple(round(value, 4) for value in self.adapted_white)}"
+            )
         if not 0 < self.white_luminance < np.inf:
             raise UsageError(
                 "expected the luminance of white above 0 and finite, got "
@@ -193,7 +196,7 @@ class Display:
         cls,
         xyz: FloatArray,
         unclipped_per_cent: float = UNCLIPPED_PER_CENT,
-        adapted_white: tuple[float, float, float] | None = None,
+        adapted_white: White | None = None,
     ) -> Self:
         """Return the transform that shows most pixels of X, Y, Z (…, 3) unclipped.
 
@@ -243,7 +246,7 @@ class Display:
         lifted = _lifted(relative)
         grey = np.clip(relative[..., 1:2], 0.0, 1.0)
         above = lifted.max(axis=-1, keepdims=True) - grey
-        kept = np.minimum(1.0, (1.0 - grey) / np.maximum(above, np.finfo(float).tiny))
+        kept = _ratio_up_to_one(1.0 - grey, above)
         return np.asarray(np.clip(grey + kept * (lifted - grey), 0.0, 1.0))
 
     def shown(self, xyz: FloatArray) -> Bytes:
@@ -251,7 +254,16 @@ class Display:
         return srgb_bytes(self.linear(xyz))
 
 
-def _adapted(xyz: FloatArray, white: tuple[float, float, float] | None) -> FloatArray:
+def is_white(xyz: White) -> bool:
+    """Return whether eyes adapt to a colour X, Y, Z, of any scale, as to a white.
+
+    The responses that Bradford's transform adapts have to be above 0, which those to saturated
+    colours are not.
+    """
+    return all(0 < value < np.inf for value in (*xyz, *(BRADFORD @ xyz).tolist()))
+
+
+def _adapted(xyz: FloatArray, white: White | None) -> FloatArray:
     """Return X, Y, Z (…, 3) as they look where a white is adapted to the screen's."""
     if white is None:
         return xyz
@@ -265,5 +277,10 @@ def _lifted(xyz: FloatArray) -> FloatArray:
     linear = xyz @ XYZ_TO_SRGB.T
     grey = np.maximum(xyz[..., 1:2], 0.0)
     below = grey - linear.min(axis=-1, keepdims=True)
-    kept = np.minimum(1.0, grey / np.maximum(below, np.finfo(float).tiny))
+    kept = _ratio_up_to_one(grey, below)
     return np.asarray(grey + kept * (linear - grey))
+
+
+def _ratio_up_to_one(part: FloatArray, whole: FloatArray) -> FloatArray:
+    """Return a ratio where the part is smaller, else 1; of whatever small numbers."""
+    return np.divide(part, whole, out=np.ones_like(part), where=whole > part)

@@ -196,7 +196,8 @@ class RenderFolder:
 
 def _identity(scene: Scene) -> str:
     """Return a hash of all that the numbers depend on."""
-    digest = hashlib.sha256(scene.file.model_dump_json().encode())
+    # How pictures are shown may change.
+    digest = hashlib.sha256(scene.file.model_dump_json(exclude={"display"}).encode())
     for material in scene.materials:
         digest.update(material.matrix.tobytes())
         if (parameters := material.parameters) is not None:

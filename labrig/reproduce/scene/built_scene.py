@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from labrig.errors import UsageError
 from labrig.material import Albedo, Material, read_any_material, read_mixture
 from labrig.optics import (
+    Spectrum,
     Transmittance,
     absolute_irradiance,
     read_colour_chart,
@@ -22,6 +23,7 @@ from labrig.optics import (
 from labrig.reproduce.scene.scene_file import (
     STRENGTHS,
     AlbedoCurve,
+    DisplayEntry,
     LampEntry,
     MaterialEntry,
     MaterialMap,
@@ -52,6 +54,8 @@ IntArray = NDArray[np.int32]
 #: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
 TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
 MOST_AREA_M2 = 1e12
+#: White of a screen in sRGB.
+SCREEN_WHITE = "D65"
 #: Part of a lamp's brightest band by which noise may make another negative.
 NOISE_OF_LAMP = 0.01
 
@@ -117,6 +121,12 @@ class Scene:
         return _bench_light(self.file, self._folder)
 
     @property
+    def white(self) -> Spectrum | None:
+        """Light in which a white surface looks white on the screen; None for D65, the screen's."""
+        named = self.file.display.white
+        return None if named == SCREEN_WHITE else read_light(_beside(named, self._folder))
+
+    @property
     def path_length(self) -> PathLength:
         """How paths end."""
         return PathLength(self.file.paths.vertices, self.file.paths.survival)
@@ -142,6 +152,30 @@ class Scene:
             for name, new in (("camera", size), ("paths", fineness))
         }
         return replace(self, file=self.file.model_copy(update=changed))
+
+    def displayed(self, white: str | None = None, exposure: str | float | None = None) -> Self:
+        """Return the scene with pictures that are shown in another way.
+
+        Parameters
+        ----------
+        white, exposure
+            As the `display` of a scene has them, `white` relative to the current folder if it is a
+            file; None keeps them.
+
+        Raises
+        ------
+        UsageError
+            There is no such light or exposure.
+        """
+        content = self.file.display.model_dump()
+        if white is not None:
+            content["white"] = str(Path(white).absolute()) if Path(white).suffix else white
+        if exposure is not None:
+            content["exposure"] = exposure
+        display = validate(content, DisplayEntry, "--white" if exposure is None else "--exposure")
+        shown = replace(self, file=self.file.model_copy(update={"display": display}))
+        _ = shown.white
+        return shown
 
     def at_times(self, frames_s: Sequence[float]) -> Self:
         """Return the scene with pictures at other times in s, which rise.
@@ -301,7 +335,7 @@ def build_scene(
     )
     scene = Scene(file, bands, materials, surfaces, folder)
     # What a camera or a lamp cannot be is refused before a folder is made for the pictures.
-    _ = scene.camera, scene.lamps(file.programme[0].at_s)
+    _ = scene.camera, scene.white, scene.lamps(file.programme[0].at_s)
     return scene
 
 

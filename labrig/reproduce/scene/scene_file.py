@@ -447,6 +447,23 @@ class CameraEntry(_Part):
     height_px: Count = 256
 
 
+class DisplayEntry(_Part):
+    """How pictures are shown on a screen.
+
+    Attributes
+    ----------
+    white
+        Light in which a white surface looks white: a CIE illuminant, or a file with a spectrum.
+        Colours under another one than D65, the screen's, are adapted by Bradford's transform.
+    exposure
+        `each`, so that each picture is bright; `common`, one for all; or the luminance in cd/m²
+        that is white.
+    """
+
+    white: Name = "D65"
+    exposure: Literal["each", "common"] | Positive = "each"
+
+
 class ProgrammeEntry(_Part):
     """From when on which lamps shine how strongly.
 
@@ -512,6 +529,8 @@ class SceneFile(_Part):
         Longest step in s; needed where an object or a lamp moves.
     paths
         How finely light is traced.
+    display
+        How pictures are shown.
     """
 
     name: FileName
@@ -526,6 +545,7 @@ class SceneFile(_Part):
     frames_s: Annotated[tuple[Time, ...], Field(min_length=1)]
     step_s: Positive | None = None
     paths: PathsEntry = PathsEntry()
+    display: DisplayEntry = DisplayEntry()
 
     @model_validator(mode="after")
     def _names_are_known(self) -> Self:
