@@ -53,7 +53,6 @@ from .picture.video import (
     write_video as write_video,
 )
 from .scene.built_scene import (
-    Assumptions as Assumptions,
     Scene as Scene,
     build_scene as build_scene,
     load_scene as load_scene,
@@ -71,6 +70,9 @@ from .scene.scene_file import (
     ProgrammeEntry as ProgrammeEntry,
     SceneFile as SceneFile,
     read_scene as read_scene,
+)
+from .scene.scene_materials import (
+    Assumptions as Assumptions,
 )
 from .surface.bands import (
     Bands as Bands,

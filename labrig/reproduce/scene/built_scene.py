@@ -2,78 +2,40 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Self
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.material import Albedo, Material, read_any_material, read_mixture
-from labrig.optics import (
-    Spectrum,
-    Transmittance,
-    absolute_irradiance,
-    read_colour_chart,
-    read_light,
-    read_transmittance,
-)
+from labrig.optics import Spectrum, read_light
+from labrig.reproduce.scene.placed_objects import surface_over_time
 from labrig.reproduce.scene.scene_file import (
-    STRENGTHS,
-    AlbedoCurve,
     DisplayEntry,
-    LampEntry,
-    MaterialEntry,
-    MaterialMap,
-    ObjectEntry,
     ProgrammeEntry,
     SceneFile,
+    beside,
     read_scene,
 )
-from labrig.reproduce.surface.bands import Bands
-from labrig.reproduce.surface.parameter_texture import read_parameter_texture
-from labrig.reproduce.surface.surface_material import (
-    BenchLight,
-    SurfaceMaterial,
-    of_albedo,
-    of_matrix,
-    of_mixture,
-    of_phosphor,
+from labrig.reproduce.scene.scene_lamps import bench_light, placed_lamp
+from labrig.reproduce.scene.scene_materials import (
+    NOTHING_ASSUMED,
+    Assumptions,
+    replaced_entries,
+    scene_material,
 )
-from labrig.reproduce.transport.geometry import Geometry, Samples, Surface
+from labrig.reproduce.surface.bands import Bands
+from labrig.reproduce.surface.surface_material import BenchLight, SurfaceMaterial
+from labrig.reproduce.transport.geometry import Geometry, Surface
 from labrig.reproduce.transport.lamp import Lamp
-from labrig.reproduce.transport.mesh import Mesh, read_mesh, rotation
 from labrig.reproduce.transport.tracing import PathLength, Pinhole
 from labrig.yaml_file import did_you_mean, validate
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
-#: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
-TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
-MOST_AREA_M2 = 1e12
 #: White of a screen in sRGB.
 SCREEN_WHITE = "D65"
-#: Part of a lamp's brightest band by which noise may make another negative.
-NOISE_OF_LAMP = 0.01
-
-
-@dataclass(frozen=True)
-class Assumptions:
-    """What is taken for true where a measurement is missing.
-
-    Attributes
-    ----------
-    albedo
-        Albedo of phosphors whose file has none.
-    scale
-        Factor from Λ to s sr⁻¹ of phosphors whose file has none.
-    """
-
-    albedo: float | None = None
-    scale: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +80,13 @@ class Scene:
     @property
     def bench_light(self) -> BenchLight:
         """Light by which measured phosphors were charged."""
-        return _bench_light(self.file, self._folder)
+        return bench_light(self.file, self._folder)
 
     @property
     def white(self) -> Spectrum | None:
         """Light in which a white surface looks white on the screen; None for D65, the screen's."""
         named = self.file.display.white
-        return None if named == SCREEN_WHITE else read_light(_beside(named, self._folder))
+        return None if named == SCREEN_WHITE else read_light(beside(named, self._folder))
 
     @property
     def path_length(self) -> PathLength:
@@ -230,7 +192,7 @@ class Scene:
     def lamps(self, t_s: float) -> tuple[Lamp, ...]:
         """Return the lamps at a time in s, at their full strength."""
         return tuple(
-            _lamp(name, entry, self.bands, self._folder, t_s)
+            placed_lamp(name, entry, self.bands, self._folder, t_s)
             for name, entry in self.file.lamps.items()
         )
 
@@ -246,7 +208,7 @@ class Scene:
 def load_scene(
     name_or_path: str | Path,
     replaced: Mapping[str, str] | None = None,
-    assumptions: Assumptions = Assumptions(),
+    assumptions: Assumptions = NOTHING_ASSUMED,
 ) -> Scene:
     """Read a scene and all that it names.
 
@@ -285,7 +247,7 @@ def build_scene(
     file: SceneFile,
     folder: Path,
     replaced: Mapping[str, str] | None = None,
-    assumptions: Assumptions = Assumptions(),
+    assumptions: Assumptions = NOTHING_ASSUMED,
     made: Mapping[str, SurfaceMaterial] | None = None,
 ) -> Scene:
     """Return the scene of a file's content; see `load_scene`.
@@ -320,337 +282,22 @@ def build_scene(
     (0.0, 1.0, 2.0)
     """
     bands = Bands.even(file.bands.first_nm, file.bands.last_nm, file.bands.count)
-    bench = _bench_light(file, folder)
-    entries = _replaced(file.materials, replaced or {}, folder)
+    bench = bench_light(file, folder)
+    entries = replaced_entries(file.materials, replaced or {}, folder)
     given = made or {}
     materials = tuple(
-        given[name] if name in given else _material(name, entry, place, bands, bench, assumptions)
+        given[name]
+        if name in given
+        else scene_material(name, entry, place, bands, bench, assumptions)
         for name, (entry, place) in entries.items()
     )
     numbers = {name: number for number, name in enumerate(entries)}
     lamps = {name: number for number, name in enumerate(file.lamps)}
     surfaces = tuple(
-        _surface(name, entry, folder, numbers, lamps, materials)
+        surface_over_time(name, entry, folder, numbers, lamps, materials)
         for name, entry in file.objects.items()
     )
     scene = Scene(file, bands, materials, surfaces, folder)
     # What a camera or a lamp cannot be is refused before a folder is made for the pictures.
     _ = scene.camera, scene.white, scene.lamps(file.programme[0].at_s)
     return scene
-
-
-def _bench_light(file: SceneFile, folder: Path) -> BenchLight:
-    light = file.bench_light
-    spectrum = read_light(_beside(light.spectrum, folder))
-    return BenchLight(absolute_irradiance(light.illuminance_lux, spectrum))
-
-
-def _replaced(
-    entries: Mapping[str, MaterialEntry], replaced: Mapping[str, str], folder: Path
-) -> dict[str, tuple[MaterialEntry, Path]]:
-    """Return entries with the folders of their files, those replaced by the user's."""
-    if unknown := set(replaced) - set(entries):
-        raise UsageError(
-            f"expected a material of the scene ({', '.join(entries)}), got '{min(unknown)}'"
-        )
-    return {
-        name: (
-            (
-                entry.model_copy(
-                    update={
-                        "file": replaced[name],
-                        "albedo": None,
-                        "chart_patch": None,
-                        "mixture": None,
-                        "texture": None,
-                    }
-                ),
-                Path(),
-            )
-            if name in replaced
-            else (entry, folder)
-        )
-        for name, entry in entries.items()
-    }
-
-
-def _beside(named: str, folder: Path) -> str:
-    """Return a file's path beside the scene's, or the name of something shipped as it is."""
-    return str(folder / named) if Path(named).suffix else named
-
-
-def _material(
-    name: str,
-    entry: MaterialEntry,
-    folder: Path,
-    bands: Bands,
-    bench: BenchLight,
-    assumptions: Assumptions,
-) -> SurfaceMaterial:
-    stored = None if entry.mixture is None else read_mixture(folder / entry.mixture)
-    albedo = _reflectance(entry, folder)
-    if albedo is not None:
-        if stored is None or not entry.is_fluorescent:
-            return of_albedo(name, albedo, bands)
-        return of_mixture(name, stored, albedo, bands)
-    assert entry.file is not None
-    material = read_any_material(_beside(entry.file, folder))
-    if stored is not None:
-        if isinstance(material, Material):
-            raise UsageError(
-                f"{name}: expected 'file' to be a measured matrix, whose reflectance the 'mixture' "
-                f"needs, got the phosphor {material.name}"
-            )
-        if entry.is_fluorescent:
-            return _named(name, of_mixture(material.name, stored, material, bands))
-    if not isinstance(material, Material):
-        if entry.texture is not None:
-            raise UsageError(
-                f"{name}: expected a phosphor for 'texture', got the matrix {material.name}"
-            )
-        if not entry.is_fluorescent:
-            material = replace(material, reradiation=np.zeros_like(material.reradiation))
-        return _named(name, of_matrix(material, bands))
-    assumed, scale = entry.assume_albedo, entry.assume_scale
-    phosphor = of_phosphor(
-        material,
-        bands,
-        bench,
-        assumed if assumptions.albedo is None else assumptions.albedo,
-        scale if assumptions.scale is None else assumptions.scale,
-        entry.prompt,
-        None if entry.texture is None else read_parameter_texture(folder / entry.texture),
-    )
-    return _named(name, phosphor)
-
-
-def _reflectance(entry: MaterialEntry, folder: Path) -> Albedo | Transmittance | float | None:
-    """Return the reflectance that a scene gives a material, None of one that its file has."""
-    if entry.chart_patch is not None:
-        return read_colour_chart("colorchecker")[entry.chart_patch - 1]
-    if isinstance(entry.albedo, str):
-        return read_transmittance(_beside(entry.albedo, folder))
-    if isinstance(entry.albedo, AlbedoCurve):
-        return Albedo(**entry.albedo.model_dump())
-    return entry.albedo
-
-
-def _named(name: str, material: SurfaceMaterial) -> SurfaceMaterial:
-    """Return a material with its name in the scene before its own."""
-    if name == material.name:
-        return material
-    return replace(material, name=f"{name} ({material.name})")
-
-
-def _lamp(name: str, entry: LampEntry, bands: Bands, folder: Path, t_s: float) -> Lamp:
-    of_eye, of_watt = STRENGTHS[entry.kind]
-    strength = getattr(entry, of_eye)
-    is_to_eye = strength is not None
-    unit = _unit_light(_beside(entry.spectrum, folder), bands, is_to_eye)
-    if unit.min() < -NOISE_OF_LAMP * unit.max():
-        worst = bands.centre_nm[int(np.argmin(unit))]
-        raise UsageError(
-            f"lamp {name}: expected a spectrum ≥ 0, got a negative one at {worst:g} nm in "
-            f"'{entry.spectrum}'"
-        )
-    unit = np.maximum(unit, 0.0)
-    light = unit * (strength if is_to_eye else getattr(entry, of_watt))
-    if not light.any() and strength != 0:
-        raise UsageError(
-            f"lamp {name}: expected light between {bands.edges_nm[0]:g} and "
-            f"{bands.edges_nm[-1]:g} nm, got none in '{entry.spectrum}'"
-        )
-    vector = entry.position_m or (0.0, 0.0, 1.0)
-    if entry.path is not None:
-        times = [point.at_s for point in entry.path]
-        places = np.array([point.position_m for point in entry.path])
-        x, y, z = (float(np.interp(t_s, times, column)) for column in places.T)
-        vector = x, y, z
-    if entry.towards is not None:
-        x, y, z = (np.array(entry.towards) / np.linalg.norm(entry.towards)).tolist()
-        vector = x, y, z
-    return Lamp(name, entry.kind, light, vector)
-
-
-@lru_cache(maxsize=64)
-def _unit_light(named: str, bands: Bands, is_to_eye: bool) -> FloatArray:
-    """Return a spectrum in the bands of one scene, of 1 lm or of 1 W; read once for all times."""
-    spectrum = read_light(named)
-    if is_to_eye:
-        return absolute_irradiance(1.0, spectrum).in_bands(bands.edges_nm)
-    whole = float(np.trapezoid(spectrum.value, spectrum.wavelength_nm))
-    if not whole > 0:
-        raise UsageError(f"{named}: expected the spectrum of a lamp, got one without light")
-    return np.asarray(bands.means(spectrum) / whole)
-
-
-def _surface(
-    name: str,
-    entry: ObjectEntry,
-    folder: Path,
-    numbers: Mapping[str, int],
-    lamps: Mapping[str, int],
-    materials: tuple[SurfaceMaterial, ...],
-) -> Callable[[float], Surface]:
-    """Return a function that gives an object at a time in s."""
-    mesh = _mesh(name, entry, folder)
-    if not 0 < mesh.area_m2 < MOST_AREA_M2:
-        raise UsageError(f"{name}: expected a surface with an area, got {mesh.area_m2:g} m²")
-    lamp = -1 if entry.lamp is None else lamps[entry.lamp]
-    used = [numbers[entry.material]] if entry.material is not None else []
-    if entry.material_map is not None:
-        used = [numbers[each] for each in entry.material_map.materials.values()]
-    glows = any(materials[number].parameters is not None for number in used)
-    samples = _samples(name, entry, mesh, glows)
-    of_texel = None
-    if entry.material_map is not None:
-        if not isinstance(samples, tuple):
-            raise UsageError(f"{name}: expected texels with 'material_map', got {samples}")
-        of_texel = _mapped(name, entry.material_map, folder, samples, numbers)
-    place = _motion(name, entry, mesh, folder)
-
-    def at(t_s: float) -> Surface:
-        return Surface(
-            name, place(t_s), used[0] if used else -1, samples, lamp, entry.two_sided, of_texel
-        )
-
-    return at
-
-
-def _samples(name: str, entry: ObjectEntry, mesh: Mesh, glows: bool) -> Samples:
-    if entry.material_map is not None:
-        return entry.samples or TEXELS
-    if not glows:
-        return None
-    if entry.particles is not None:
-        return "particles"
-    of_shape = TEXELS if entry.box is None else TEXELS_OF_BOX
-    return entry.samples or ("vertices" if mesh.uv is None else of_shape)
-
-
-def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
-    if (flat := entry.rectangle) is not None:
-        return Mesh.grid(flat.corner_m, flat.edge_u_m, flat.edge_v_m, flat.parts)
-    if entry.disk is not None:
-        return Mesh.disk(**entry.disk.model_dump())
-    if entry.box is not None:
-        return Mesh.box(**entry.box.model_dump())
-    if entry.sphere is not None:
-        return Mesh.sphere(**entry.sphere.model_dump())
-    if entry.particles is not None:
-        _, position_m = _trajectory(folder / entry.particles.file)
-        return Mesh.octahedra(position_m[0], entry.particles.radius_m)
-    assert entry.mesh is not None
-    mesh = read_mesh(folder / entry.mesh.file)
-    turn = np.eye(3)
-    for axis, angle_deg in zip(np.eye(3), entry.mesh.turned_deg, strict=True):
-        turn = rotation(axis, angle_deg) @ turn
-    placed = mesh.vertices_m @ turn.T * entry.mesh.size_m + np.array(entry.mesh.position_m)
-    mesh = Mesh(placed, mesh.faces, mesh.uv)
-    if entry.mesh.inward:
-        mesh = mesh.turned_over()
-    if not entry.two_sided and not mesh.is_turned_alike:
-        raise UsageError(
-            f"{name}: expected triangles that all have their front on the same side, got some "
-            f"inverted ones in {entry.mesh.file}; turn their normals over, or give "
-            "'two_sided: true'"
-        )
-    if not entry.two_sided and not mesh.is_closed and entry.lamp is None:
-        raise UsageError(
-            f"{name}: expected a closed mesh, got one with holes in {entry.mesh.file}; its back "
-            "would be black: close it, or give 'two_sided: true'"
-        )
-    if not entry.two_sided and mesh.is_closed and (mesh.volume_m3 < 0) != entry.mesh.inward:
-        raise UsageError(
-            f"{name}: expected triangles whose front is {'in' if entry.mesh.inward else 'out'}"
-            f"side, got inverted ones in {entry.mesh.file}; turn its normals over, or give "
-            f"'inward: {str(not entry.mesh.inward).lower()}'"
-        )
-    return mesh
-
-
-def _motion(name: str, entry: ObjectEntry, mesh: Mesh, folder: Path) -> Callable[[float], Mesh]:
-    """Return a function that gives the mesh at a time in s."""
-    if (wave := entry.wave) is not None:
-        assert mesh.uv is not None
-        front, along = mesh.normals[0], mesh.uv[:, 0] / wave.wavelength
-
-        def waved(t_s: float) -> Mesh:
-            height = wave.amplitude_m * np.sin(2 * np.pi * (along - t_s / wave.period_s))
-            return Mesh(mesh.vertices_m + height[:, None] * front, mesh.faces, mesh.uv)
-
-        return waved
-    if entry.particles is not None:
-        radius_m = entry.particles.radius_m
-        times_s, position_m = _trajectory(folder / entry.particles.file)
-        return lambda t_s: Mesh.octahedra(_between(t_s, times_s, position_m), radius_m)
-    if entry.vertices_over_time is None:
-        return lambda _: mesh
-    path = folder / entry.vertices_over_time
-    moments_s, vertices_m = _over_time(path, "vertices_m")
-    if vertices_m.shape[1:] != mesh.vertices_m.shape:
-        raise UsageError(
-            f"{path}: expected 'vertices_m' of {len(mesh.vertices_m)} vertices for {name}, got "
-            f"those of {vertices_m.shape[1]}"
-        )
-    return lambda t_s: Mesh(_between(t_s, moments_s, vertices_m), mesh.faces, mesh.uv)
-
-
-def _trajectory(path: Path) -> tuple[FloatArray, FloatArray]:
-    """Return times (n,) in s and places of particles (n, particles, 3) in m."""
-    return _over_time(path, "position_m")
-
-
-def _between(t_s: float, times_s: FloatArray, places_m: FloatArray) -> FloatArray:
-    """Return places at a time, straight between neighbouring times, (points, 3)."""
-    at = float(np.interp(t_s, times_s, np.arange(len(times_s))))
-    before = max(min(int(at), len(times_s) - 2), 0)
-    after = min(before + 1, len(times_s) - 1)
-    return np.asarray(places_m[before] + (at - before) * (places_m[after] - places_m[before]))
-
-
-def _over_time(path: Path, name: str) -> tuple[FloatArray, FloatArray]:
-    """Return times (n,) and places (n, points, 3) from a file."""
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-            times_s = np.asarray(content["t_s"], dtype=np.float64)
-            places_m = np.asarray(content[name], dtype=np.float64)
-    except (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
-        raise UsageError(
-            f"{path}: expected a .npz file with 't_s' and '{name}' ({error})"
-        ) from None
-    is_series = places_m.ndim == 3 and places_m.shape[0] == times_s.size and places_m.size > 0
-    if not is_series or places_m.shape[2] != 3 or not np.isfinite(places_m).all():
-        raise UsageError(
-            f"{path}: expected finite '{name}' of shape ({times_s.size}, points, 3), got "
-            f"{places_m.shape}"
-        )
-    if times_s.ndim != 1 or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0).any():
-        raise UsageError(f"{path}: expected times 't_s' that rise")
-    return times_s, places_m
-
-
-def _mapped(
-    name: str,
-    entry: MaterialMap,
-    folder: Path,
-    samples: tuple[int, int],
-    numbers: Mapping[str, int],
-) -> IntArray:
-    """Return the number of the material of each texel, by the nearest colour (rows, columns)."""
-    import cv2
-
-    path = folder / entry.file
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None
-    if picture is None:
-        raise UsageError(f"{path}: expected a picture for the material_map of {name}, got none")
-    resized = cv2.resize(picture, samples, interpolation=cv2.INTER_NEAREST)[::-1, :, ::-1]
-    colours = []
-    for text in entry.materials:
-        digits = text.removeprefix("#")
-        if len(digits) != 6 or not all(digit in "0123456789abcdefABCDEF" for digit in digits):
-            raise UsageError(f"{name}: expected colours such as '#ff8000', got '{text}'")
-        colours.append([int(digits[k : k + 2], 16) for k in (0, 2, 4)])
-    distance = np.abs(resized[:, :, None, :].astype(float) - np.array(colours)).sum(axis=3)
-    chosen = np.array([numbers[material] for material in entry.materials.values()])
-    return np.asarray(chosen[np.argmin(distance, axis=2)], dtype=np.int32)

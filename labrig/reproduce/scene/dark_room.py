@@ -10,16 +10,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from labrig.region import Region
+from labrig.reproduce.scene.lamp_entry import LampEntry
+from labrig.reproduce.scene.object_entry import ObjectEntry, RectangleEntry
 from labrig.reproduce.scene.scene_file import (
     BandsEntry,
     BenchLightEntry,
     CameraEntry,
-    LampEntry,
     MaterialEntry,
-    ObjectEntry,
     PathsEntry,
     ProgrammeEntry,
-    RectangleEntry,
     SceneFile,
 )
 

@@ -1,0 +1,193 @@
+"""Objects of a scene at any time: their meshes, where these are, and of which materials."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import UsageError
+from labrig.reproduce.scene.object_entry import MaterialMap, ObjectEntry
+from labrig.reproduce.surface.surface_material import SurfaceMaterial
+from labrig.reproduce.transport.geometry import Samples, Surface
+from labrig.reproduce.transport.mesh import Mesh, read_mesh, rotation
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+#: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
+TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
+MOST_AREA_M2 = 1e12
+
+
+def surface_over_time(
+    name: str,
+    entry: ObjectEntry,
+    folder: Path,
+    numbers: Mapping[str, int],
+    lamps: Mapping[str, int],
+    materials: tuple[SurfaceMaterial, ...],
+) -> Callable[[float], Surface]:
+    """Return a function that gives an object at a time in s."""
+    mesh = _mesh(name, entry, folder)
+    if not 0 < mesh.area_m2 < MOST_AREA_M2:
+        raise UsageError(f"{name}: expected a surface with an area, got {mesh.area_m2:g} m²")
+    lamp = -1 if entry.lamp is None else lamps[entry.lamp]
+    used = [numbers[entry.material]] if entry.material is not None else []
+    if entry.material_map is not None:
+        used = [numbers[each] for each in entry.material_map.materials.values()]
+    glows = any(materials[number].parameters is not None for number in used)
+    samples = _samples(name, entry, mesh, glows)
+    of_texel = None
+    if entry.material_map is not None:
+        if not isinstance(samples, tuple):
+            raise UsageError(f"{name}: expected texels with 'material_map', got {samples}")
+        of_texel = _mapped(name, entry.material_map, folder, samples, numbers)
+    place = _motion(name, entry, mesh, folder)
+
+    def at(t_s: float) -> Surface:
+        return Surface(
+            name, place(t_s), used[0] if used else -1, samples, lamp, entry.two_sided, of_texel
+        )
+
+    return at
+
+
+def _samples(name: str, entry: ObjectEntry, mesh: Mesh, glows: bool) -> Samples:
+    if entry.material_map is not None:
+        return entry.samples or TEXELS
+    if not glows:
+        return None
+    if entry.particles is not None:
+        return "particles"
+    of_shape = TEXELS if entry.box is None else TEXELS_OF_BOX
+    return entry.samples or ("vertices" if mesh.uv is None else of_shape)
+
+
+def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
+    if (flat := entry.rectangle) is not None:
+        return Mesh.grid(flat.corner_m, flat.edge_u_m, flat.edge_v_m, flat.parts)
+    if entry.disk is not None:
+        return Mesh.disk(**entry.disk.model_dump())
+    if entry.box is not None:
+        return Mesh.box(**entry.box.model_dump())
+    if entry.sphere is not None:
+        return Mesh.sphere(**entry.sphere.model_dump())
+    if entry.particles is not None:
+        _, position_m = _trajectory(folder / entry.particles.file)
+        return Mesh.octahedra(position_m[0], entry.particles.radius_m)
+    assert entry.mesh is not None
+    mesh = read_mesh(folder / entry.mesh.file)
+    turn = np.eye(3)
+    for axis, angle_deg in zip(np.eye(3), entry.mesh.turned_deg, strict=True):
+        turn = rotation(axis, angle_deg) @ turn
+    placed = mesh.vertices_m @ turn.T * entry.mesh.size_m + np.array(entry.mesh.position_m)
+    mesh = Mesh(placed, mesh.faces, mesh.uv)
+    if entry.mesh.inward:
+        mesh = mesh.turned_over()
+    if not entry.two_sided and not mesh.is_turned_alike:
+        raise UsageError(
+            f"{name}: expected triangles that all have their front on the same side, got some "
+            f"inverted ones in {entry.mesh.file}; turn their normals over, or give "
+            "'two_sided: true'"
+        )
+    if not entry.two_sided and not mesh.is_closed and entry.lamp is None:
+        raise UsageError(
+            f"{name}: expected a closed mesh, got one with holes in {entry.mesh.file}; its back "
+            "would be black: close it, or give 'two_sided: true'"
+        )
+    if not entry.two_sided and mesh.is_closed and (mesh.volume_m3 < 0) != entry.mesh.inward:
+        raise UsageError(
+            f"{name}: expected triangles whose front is {'in' if entry.mesh.inward else 'out'}"
+            f"side, got inverted ones in {entry.mesh.file}; turn its normals over, or give "
+            f"'inward: {str(not entry.mesh.inward).lower()}'"
+        )
+    return mesh
+
+
+def _motion(name: str, entry: ObjectEntry, mesh: Mesh, folder: Path) -> Callable[[float], Mesh]:
+    """Return a function that gives the mesh at a time in s."""
+    if (wave := entry.wave) is not None:
+        assert mesh.uv is not None
+        front, along = mesh.normals[0], mesh.uv[:, 0] / wave.wavelength
+
+        def waved(t_s: float) -> Mesh:
+            height = wave.amplitude_m * np.sin(2 * np.pi * (along - t_s / wave.period_s))
+            return Mesh(mesh.vertices_m + height[:, None] * front, mesh.faces, mesh.uv)
+
+        return waved
+    if entry.particles is not None:
+        radius_m = entry.particles.radius_m
+        times_s, position_m = _trajectory(folder / entry.particles.file)
+        return lambda t_s: Mesh.octahedra(_between(t_s, times_s, position_m), radius_m)
+    if entry.vertices_over_time is None:
+        return lambda _: mesh
+    path = folder / entry.vertices_over_time
+    moments_s, vertices_m = _over_time(path, "vertices_m")
+    if vertices_m.shape[1:] != mesh.vertices_m.shape:
+        raise UsageError(
+            f"{path}: expected 'vertices_m' of {len(mesh.vertices_m)} vertices for {name}, got "
+            f"those of {vertices_m.shape[1]}"
+        )
+    return lambda t_s: Mesh(_between(t_s, moments_s, vertices_m), mesh.faces, mesh.uv)
+
+
+def _trajectory(path: Path) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) in s and places of particles (n, particles, 3) in m."""
+    return _over_time(path, "position_m")
+
+
+def _between(t_s: float, times_s: FloatArray, places_m: FloatArray) -> FloatArray:
+    """Return places at a time, straight between neighbouring times, (points, 3)."""
+    at = float(np.interp(t_s, times_s, np.arange(len(times_s))))
+    before = max(min(int(at), len(times_s) - 2), 0)
+    after = min(before + 1, len(times_s) - 1)
+    return np.asarray(places_m[before] + (at - before) * (places_m[after] - places_m[before]))
+
+
+def _over_time(path: Path, name: str) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) and places (n, points, 3) from a file."""
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
+            times_s = np.asarray(content["t_s"], dtype=np.float64)
+            places_m = np.asarray(content[name], dtype=np.float64)
+    except (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
+        raise UsageError(
+            f"{path}: expected a .npz file with 't_s' and '{name}' ({error})"
+        ) from None
+    is_series = places_m.ndim == 3 and places_m.shape[0] == times_s.size and places_m.size > 0
+    if not is_series or places_m.shape[2] != 3 or not np.isfinite(places_m).all():
+        raise UsageError(
+            f"{path}: expected finite '{name}' of shape ({times_s.size}, points, 3), got "
+            f"{places_m.shape}"
+        )
+    if times_s.ndim != 1 or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0).any():
+        raise UsageError(f"{path}: expected times 't_s' that rise")
+    return times_s, places_m
+
+
+def _mapped(
+    name: str,
+    entry: MaterialMap,
+    folder: Path,
+    samples: tuple[int, int],
+    numbers: Mapping[str, int],
+) -> IntArray:
+    """Return the number of the material of each texel, by the nearest colour (rows, columns)."""
+    import cv2
+
+    path = folder / entry.file
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None
+    if picture is None:
+        raise UsageError(f"{path}: expected a picture for the material_map of {name}, got none")
+    resized = cv2.resize(picture, samples, interpolation=cv2.INTER_NEAREST)[::-1, :, ::-1]
+    colours = []
+    for text in entry.materials:
+        digits = text.removeprefix("#")
+        if len(digits) != 6 or not all(digit in "0123456789abcdefABCDEF" for digit in digits):
+            raise UsageError(f"{name}: expected colours such as '#ff8000', got '{text}'")
+        colours.append([int(digits[k : k + 2], 16) for k in (0, 2, 4)])
+    distance = np.abs(resized[:, :, None, :].astype(float) - np.array(colours)).sum(axis=3)
+    chosen = np.array([numbers[material] for material in entry.materials.values()])
+    return np.asarray(chosen[np.argmin(distance, axis=2)], dtype=np.int32)

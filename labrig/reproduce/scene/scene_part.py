@@ -1,0 +1,19 @@
+"""What all parts of a scene file have in common: strict keys, and numbers within reason."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+#: Lengths in m and times in s that single precision and a person can still tell apart.
+Length = Annotated[float, Field(gt=0, le=1e6)]
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Time = Annotated[float, Field(ge=-1e9, le=1e9)]
+Vector = tuple[Coordinate, Coordinate, Coordinate]
+Name = Annotated[str, Field(min_length=1)]
+Count = Annotated[int, Field(ge=1, le=8192)]
+
+
+class ScenePart(BaseModel):
+    """A part of a scene file, which has no other keys than those it names."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
