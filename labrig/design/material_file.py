@@ -11,7 +11,14 @@ from labrig.design.nearest import material_radiance
 from labrig.design.result import Design
 from labrig.design.scene_spectra import SceneSpectra
 from labrig.errors import DataError
-from labrig.material import Albedo, IrradianceNorm, Material, Provenance, State
+from labrig.material import (
+    Albedo,
+    IrradianceNorm,
+    Material,
+    Provenance,
+    State,
+    self_excitation,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -148,8 +155,7 @@ def _in_scene(design: Design, name: str, light: SceneSpectra) -> Material:
 def _fading(material: Material) -> tuple[Material, float]:
     """Return a material whose glow fades in a closed room of its own, and the factor of its Λ.
 
-    The bands of a design may keep the energy where the spectra in them do not: in weak light a
-    state emits Λ κ in the end, and what comes back is reflected 1/(1 − albedo) times.
+    The bands of a design may keep the energy where the spectra in them do not.
     """
     assert material.bands_nm is not None
     assert material.albedo is not None
@@ -158,9 +164,8 @@ def _fading(material: Material) -> tuple[Material, float]:
     if material.scale == "absolute":
         # Rates belong to the irradiance of a whole band, else to its mean.
         k_e = k_e * np.diff(material.bands_nm)
-    lasting = 1 / np.maximum(1 - np.array(material.albedo.value), TINY)
-    among = np.pi * np.einsum("ib,jb->ij", k_e * lasting, emitted)
-    factor = FADING / max(float(np.abs(np.linalg.eigvals(among)).max()), TINY)
+    albedo = np.minimum(material.albedo.value, 1 - TINY)
+    factor = FADING / max(self_excitation(k_e, emitted, albedo), TINY)
     if factor >= 1:
         return material, 1.0
     states = tuple(

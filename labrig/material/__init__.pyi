@@ -81,3 +81,6 @@ from .reradiation import (
     without_spill as without_spill,
     write_reradiation as write_reradiation,
 )
+from .self_excitation import (
+    self_excitation as self_excitation,
+)

@@ -13,6 +13,7 @@ from labrig.material import (
     ReradiationMatrix,
     StoredMixture,
     physical_warnings,
+    self_excitation,
 )
 from labrig.optics import Spectrum, Transmittance, edges_from_centres
 from labrig.reproduce.surface.bands import Bands
@@ -392,28 +393,17 @@ def _require_overlap(name: str, edges_nm: ArrayLike, bands: Bands) -> None:
 def _require_fading(
     name: str, albedo: Float32Array, factor: Float32Array | None, rates: FieldParameters
 ) -> None:
-    """Refuse a phosphor that in a closed room of its own would glow ever more.
-
-    In weak light a state emits in the end Λ κ. All of it comes back to the walls of such a room,
-    again and again as they reflect it: 1/(1 − albedo) times in all.
-    """
+    """Refuse a phosphor that in a closed room of its own would glow ever more."""
     factors = np.ones(1) if factor is None else factor.astype(np.float64)
     if not float(factors.max()) * float(albedo.max()) < 1:
         raise UsageError(
             f"{name}: expected an albedo below 1 everywhere, got {albedo.max():.3g} with a factor "
             f"of {factors.max():.3g} in the texture"
         )
-    k_e, reradiation = (
-        each[..., np.newaxis] if each.ndim == 2 else each
-        for each in (rates.k_e_per_s.astype(np.float64), rates.reradiation.astype(np.float64))
-    )
-    lasting = 1 / (1 - factors * albedo[:, np.newaxis])
-    # Excitation of state i by the glow of state j, for each sample.
-    among = np.pi * np.einsum("ibs,jbs->sij", k_e * lasting, reradiation)
-    largest = float(np.abs(np.linalg.eigvals(among)).max())
-    if not largest < 1:
+    gain = self_excitation(rates.k_e_per_s, rates.reradiation, factors * albedo[:, np.newaxis])
+    if not gain < 1:
         raise UsageError(
-            f"{name}: expected a glow of less light than it takes, got {largest:.3g} "
+            f"{name}: expected a glow of less light than it takes, got {gain:.3g} "
             "times as much; the scale of Λ or the bench's light (bench_light) is wrong"
         )
 
