@@ -107,6 +107,7 @@ def render(
         RenderFolder,
         load_scene,
         require_ffmpeg,
+        require_traceable,
         white_under,
     )
 
@@ -116,6 +117,7 @@ def render(
     built = load_scene(scene, _pairs(materials or []), Assumptions(assume_albedo, assume_scale))
     built = _changed(built, times, size, paths).displayed(white, exposure)
     adapted = None if built.white is None else white_under(built.white, built.bands.edges_nm)
+    require_traceable(built)
     for note in built.notes:
         typer.echo(f"note: {note}", err=True)
     folder = RenderFolder.open(out or Path("renders") / built.file.name, built)

@@ -52,6 +52,9 @@ from .picture.video import (
     require_ffmpeg as require_ffmpeg,
     write_video as write_video,
 )
+from .picture.view import (
+    require_traceable as require_traceable,
+)
 from .scene.built_scene import (
     Scene as Scene,
     build_scene as build_scene,

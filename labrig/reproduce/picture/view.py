@@ -167,6 +167,29 @@ def _nearest_lit(lit: IntArray, surface: Surface) -> IntArray:
     return np.asarray((row * columns + column).ravel(), dtype=np.int32)
 
 
+def require_traceable(scene: Scene) -> None:
+    """Refuse a scene through which no paths can be traced, before a picture is begun.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Raises
+    ------
+    UsageError
+        Its paths take more memory than there is, or a mesh does not have the texture coordinates
+        that its texels need.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import load_scene, require_traceable
+    >>> require_traceable(load_scene("cornell-box"))
+    """
+    require_memory(scene)
+    scene.geometry(scene.file.programme[0].at_s)
+
+
 def require_memory(scene: Scene) -> None:
     """Refuse a scene whose paths take more memory than there is."""
     try:
