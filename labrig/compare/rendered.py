@@ -225,12 +225,10 @@ def _description(
         "The dark room is rendered at the exposures of the photographs, in bands of 10 nm; its "
         f"light is that of the lamp as {by} reflects it in the photographs. '{MEASURED}': the "
         "measured material, charged as the journal says; the others: fits to the decay, whose "
-        "brightness is fitted, too.",
+        "brightness is fitted, too. Laws that have no states are shown by their course over time.",
         f"CIELAB: {conversion.source}. ΔE is CIEDE2000 with L* = {LIGHTNESS:g} of every "
         "photograph, and with one exposure for all, the brightest at that; a rendering has the "
-        "factor of its photograph. Of noise: what the photographs' noise alone would make. Colour "
-        "matched: with one factor of each channel for all times, so that the measured spectrum and "
-        "the camera's curves are not in it, but the course over time.",
+        "factor of its photograph.",
         *_unread(room),
     ]
     if left_out:

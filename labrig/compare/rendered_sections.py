@@ -69,40 +69,41 @@ def _pictures(comparison: RenderedComparison) -> Iterator[Picture]:
 
 
 def _colours_table(comparison: RenderedComparison) -> Table:
-    """Return a table with a row for each patch and rendering."""
-    rows = [
-        (
-            patch.each.patch,
-            name,
-            f"{patch.each.mean(name):.2f} ({patch.each.most(name):.2f})",
-            _delta_e(patch.each.mean_noise),
-            _delta_e(patch.matched.mean(name)),
-            f"{patch.common.mean(name):.2f} ({patch.common.most(name):.2f})",
-            f"{100 * float(np.mean(patch.ratio.excess(name))):+.2f}",
-            f"{_furthest(100 * patch.ratio.excess(name)):+.2f}",
-            f"{_furthest(patch.ratio.in_sigma(name)):+.1f}",
-        )
-        for patch in comparison.patches
-        for name in patch.each.delta_e
-    ]
+    """Return a table with a row for each patch and rendering, and one for noise."""
+    rows: list[tuple[str, ...]] = []
+    for patch in comparison.patches:
+        of_patch = [patch.each.patch] if len(comparison.patches) > 1 else []
+        rows += [
+            (
+                *of_patch,
+                name,
+                f"{patch.each.mean(name):.2f} ({patch.each.most(name):.2f})",
+                _delta_e(patch.matched.mean(name)),
+                f"{patch.common.mean(name):.2f} ({patch.common.most(name):.2f})",
+                f"{100 * float(np.mean(patch.ratio.excess(name))):+.2f} "
+                f"({_furthest(100 * patch.ratio.excess(name)):+.2f})",
+                f"{_furthest(patch.ratio.in_sigma(name)):+.1f}",
+            )
+            for name in patch.each.delta_e
+        ]
+        of_noise = [_delta_e(each.mean_noise) for each in (patch.each, patch.matched, patch.common)]
+        rows.append((*of_patch, "noise alone", *of_noise, "", ""))
     return Table(
         head=(
-            "patch",
+            *(["patch"] if len(comparison.patches) > 1 else []),
             "rendered",
             "ΔE at L* 50",
-            "of noise",
-            "colour matched",
-            "ΔE, one exposure",
+            "matched",
+            "one exposure",
             "ratio off / %",
-            "furthest / %",
             "furthest / σ",
         ),
         rows=tuple(rows),
         caption="CIEDE2000 between photographs and renderings, mean over all times and, in "
-        "brackets, the largest; of noise: the mean that the photographs' noise alone makes; "
-        "colour matched: the mean with one factor of each channel for all times, without the "
-        "errors of the measured spectrum and of the camera's curves; rendered over photographed "
-        "ratio of glow to reflected light − 1, mean and furthest over all times.",
+        "brackets, the largest; matched: with one factor of each channel for all times, without "
+        "the errors of the measured spectrum and of the camera's curves; noise alone: what the "
+        "photographs' noise would make. Rendered over photographed ratio of glow to reflected "
+        "light − 1, mean and, in brackets, furthest over all times.",
     )
 
 
@@ -135,13 +136,14 @@ def _ratio_table(patch: RenderedPatch) -> Table:
             f"photographed / {in_words}",
             f"rendered / {in_words}",
             "σ",
-            "ΔE at L* 50",
+            "ΔE",
             "of noise",
-            "ΔE, one exposure",
+            "one exposure",
         ),
         rows=tuple(rows),
         caption=f"{patch.each.patch}: glow in {in_words} of the light that {ratio.reflected_by} "
-        f"reflects, in {ratio.channel}, of photographs and of the measured material.",
+        f"reflects, in {ratio.channel}, of photographs and of the measured material; ΔE of this at "
+        "L* = 50, what noise alone would make of it, and ΔE with one exposure.",
     )
 
 

@@ -25,13 +25,15 @@ from labrig.reproduce import (
     camera_values,
     dark_room,
 )
-from labrig.results import Series
+from labrig.results import RATE_SPECTRUM, Series
 
 #: Gauss–Legendre nodes of an exposure, and their weights.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 NODES, WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 #: Name of the rendering of the run's own material, and of that of Becquerel's law.
 MEASURED, BECQUEREL = "measured", "Becquerel"
+#: Names of laws that have no states: only their courses over time are shown.
+STATELESS = {"otor": "one trap", "stretched": "stretched", RATE_SPECTRUM: "spectrum"}
 #: Number of the scene's pictures of the glow, and paths that make smooth edges.
 PICTURES, SMOOTH = 8, 16
 
@@ -114,7 +116,10 @@ class RenderedBench:
         return SeenRoom(found, scene.notes, DarkRoomScene(file, _files(materials)))
 
     def fitted(self, patch: MeasuredPatch, fits: Mapping[int, DecayFit]) -> FittedGlow:
-        """Render what was fitted to the decay of a patch, its states full at lamp off."""
+        """Render what was fitted to the decay of a patch, its states full at lamp off.
+
+        Laws without states have the colour of the rendered ones, and their own course over time.
+        """
         series, left_out = patch.series, []
         each: dict[str, tuple[tuple[State, ...], tuple[FloatArray, FloatArray]]] = {}
         for number, fit in fits.items():
@@ -151,11 +156,20 @@ class RenderedBench:
         scene = self._scene(materials, regions, [(0.0, 0.0)], levels=1.0)
         times = series.t_s[:, None] + series.exposure_s[:, None] * NODES
         seen = self._seen(scene, regions, np.unique(times))
+        glow = {prediction: _exposed(seen, prediction, times) for prediction in each}
+        signals = {prediction: signal for prediction, (_, signal) in each.items()}
+        colour = glow[predicted_by(1)].sum(axis=0)
+        spectrum = fits[1].rate_spectrum
+        for law in (*fits[1].laws, *(() if spectrum is None else (spectrum,))):
+            if law.name in STATELESS:
+                name = STATELESS[law.name]
+                signals[name] = law.signal(series.t_s, series.exposure_s)
+                glow[name] = np.multiply.outer(signals[name][0], colour)
         return FittedGlow(
-            {prediction: _exposed(seen, prediction, times) for prediction in each},
+            glow,
             {
                 prediction: np.sqrt(variance) / np.maximum(np.abs(signal), 1e-300)
-                for prediction, (_, (signal, variance)) in each.items()
+                for prediction, (signal, variance) in signals.items()
             },
             tuple(left_out),
         )

@@ -146,6 +146,9 @@ def test_the_glow_over_reflected_light_is_the_photographs(labrig: Labrig, measur
     assert patch["noise"] == pytest.approx(np.mean(patch["delta_e_noise"]))
     assert patch["mean_matched"]["measured"] < 2 * patch["noise"]
     assert patch["mean_matched"]["1 state"] > 4 * patch["noise"]
+    # Laws without states are shown, too: one spectrum of rates has both of these, one trap has not.
+    assert patch["mean_matched"]["spectrum"] < 2 * patch["noise"]
+    assert patch["mean_matched"]["one trap"] > 2 * patch["noise"]
     assert said["notes"] == said["warnings"] == []
 
 
