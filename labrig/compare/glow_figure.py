@@ -28,10 +28,8 @@ from labrig.report import (
 COLUMNS = 9
 SPREAD = 1.6
 WRITING_PT = 8.5
-LABELS_PT, CELL_HEIGHT_PT = 74.0, 24.0
+LABELS_PT, MEANS_PT, CELL_HEIGHT_PT = 74.0, 34.0, 24.0
 TITLE_PT, TIMES_PT, GAP_PT = 20.0, 16.0, 8.0
-#: Number of predictions whose means have a line of their own below the name, and its height.
-MANY, MEANS_PT = 4, 14.0
 #: Luminance from which black text has more contrast than white text.
 BRIGHT = 0.18
 
@@ -39,6 +37,7 @@ BRIGHT = 0.18
 def glow_figure(glows: Sequence[GlowComparison], notes: Sequence[str] = ()) -> Figure:
     """Draw a block for each patch: photographs above, predictions with their ΔE below.
 
+    The mean ΔE over all photographs stands at the end of each row.
     Notes stand under the times, a line each.
     """
     times = [tuple(glow.t_s[shown_rows(glow)]) for glow in glows]
@@ -54,7 +53,7 @@ def glow_figure(glows: Sequence[GlowComparison], notes: Sequence[str] = ()) -> F
     axes.axis("off")
     for glow, top, with_times in zip(glows, tops, timed, strict=False):
         _block(axes, glow, float(top), with_times)
-    centre = LABELS_PT + (WIDTH_PT - LABELS_PT) / 2
+    centre = (LABELS_PT + WIDTH_PT - MEANS_PT) / 2
     times_pt = float(tops[-1]) + TIMES_PT - EDGE_PT
     axes.text(centre, times_pt, "Time after lamp off / s", ha="center", color=INK)
     for number, note in enumerate(notes, start=1):
@@ -90,25 +89,21 @@ def screen_colours(glow: GlowComparison) -> dict[str, FloatArray]:
 
 def _height(glow: GlowComparison, with_times: bool) -> float:
     below = TIMES_PT if with_times else GAP_PT
-    return _title_pt(glow) + (1 + len(glow.predicted)) * CELL_HEIGHT_PT + below
-
-
-def _title_pt(glow: GlowComparison) -> float:
-    """Return the height of name and means: many means have a line of their own."""
-    return TITLE_PT if len(glow.predicted) < MANY else TITLE_PT + MEANS_PT
+    return TITLE_PT + (1 + len(glow.predicted)) * CELL_HEIGHT_PT + below
 
 
 def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> None:
     rows = shown_rows(glow)
-    width = (WIDTH_PT - LABELS_PT - EDGE_PT) / max(len(rows), 1)
-    means = ", ".join(f"{name} {glow.mean(name):.2f}" for name in glow.predicted)
+    width = (WIDTH_PT - LABELS_PT - MEANS_PT - EDGE_PT) / max(len(rows), 1)
     axes.text(EDGE_PT, top + 14, glow.patch, color=INK, fontsize=FONT_PT, weight="bold")
-    y = top + _title_pt(glow)
-    axes.text(WIDTH_PT - EDGE_PT, y - (TITLE_PT - 14), f"mean ΔE: {means}", ha="right",
-              color=MUTED, fontsize=SMALL_PT)  # fmt: skip
+    y, right = top + TITLE_PT, WIDTH_PT - EDGE_PT
+    axes.text(right, top + 14, "mean ΔE", ha="right", color=MUTED, fontsize=SMALL_PT)
     for name, strip in screen_colours(glow).items():
         axes.text(LABELS_PT - 6, y + CELL_HEIGHT_PT / 2, name, ha="right", va="center", color=INK,
                   fontsize=SMALL_PT)  # fmt: skip
+        if name in glow.predicted:
+            axes.text(right, y + CELL_HEIGHT_PT / 2, f"{glow.mean(name):.2f}", ha="right",
+                      va="center", color=INK, fontsize=SMALL_PT)  # fmt: skip
         for column, row in enumerate(rows):
             x = LABELS_PT + column * width
             delta_e = glow.delta_e.get(name)
