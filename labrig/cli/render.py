@@ -81,6 +81,12 @@ def render(
         bool,
         typer.Option("--night", help="As the eye sees it in the dark (Thompson et al., 2002)."),
     ] = False,
+    linear: Annotated[
+        bool,
+        typer.Option(
+            "--linear", help="Each picture as linear sRGB in cd/m² (EXR), for other programs, too."
+        ),
+    ] = False,
     video: Annotated[
         Path | None, typer.Option("--video", help="File for a film of all pictures (.mp4).")
     ] = None,
@@ -135,6 +141,8 @@ def render(
             for warning in frame.warnings:
                 bar.say(f"warning: {warning}")
     _draw(folder, built, night, adapted, video, fps)
+    if linear:
+        _write_linear(folder)
     _export(folder, built, gltf, mitsuba)
     typer.echo(folder.path)
 
@@ -212,6 +220,16 @@ def _export(
     if mitsuba is not None:
         written = write_mitsuba_scene(mitsuba, meshes, scene.camera)
         typer.echo(f"wrote {written}: lamps and glow in sRGB, not re-radiation", err=True)
+
+
+def _write_linear(folder: "RenderFolder") -> None:
+    """Write all frames in linear sRGB."""
+    from labrig.reproduce import tristimulus, write_linear_exr
+
+    for number in range(folder.n_done):
+        frame = folder.frame(number)
+        xyz = tristimulus(frame.radiance, frame.edges_nm)
+        write_linear_exr(folder.path / f"{number:03d}-linear.exr", xyz)
 
 
 def _check_places(gltf: Path | None, mitsuba: Path | None) -> None:

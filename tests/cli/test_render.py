@@ -27,8 +27,10 @@ from labrig.reproduce import (
     RenderFolder,
     exported_meshes,
     load_scene,
+    read_linear_exr,
     read_png_texts,
     read_spectral_exr,
+    tristimulus,
 )
 from labrig.results import FloatArray
 from tests.conftest import Ended
@@ -43,9 +45,13 @@ def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_pictures_of_all_times_with_what_was_assumed(labrig: Callable[..., Ended]) -> None:
     ended = labrig("render", "cornell-box", *SMALL, "--times", "-1,0,5", "--material",
-                   "phosphorescent=pink-paint")  # fmt: skip
+                   "phosphorescent=pink-paint", "--linear")  # fmt: skip
     assert ended.code == 0, ended.err
     folder = ended.run_folder
+    spectral = read_spectral_exr(folder / "000.exr")
+    luminance = tristimulus(spectral.radiance, spectral.edges_nm)[..., 1]
+    linear = read_linear_exr(folder / "000-linear.exr")[..., 1]
+    np.testing.assert_allclose(linear, luminance, rtol=1e-3, atol=1e-3 * luminance.max())
     assert {"000.png", "001.png", "002.png"} <= {path.name for path in folder.iterdir()}
     content = json.loads((folder / "render.json").read_text(encoding="utf-8"))
     assert any("pink-paint" in note for note in content["notes"])
