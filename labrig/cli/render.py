@@ -293,19 +293,22 @@ def _draw(
     frames = [folder.frame(number) for number in range(folder.n_done)]
     pictures, labels = [], []
     look = scene.file.display
+    notes = list(scene.notes)
+    if adapted_white is not None and not night:
+        notes.append(f"white is {look.white}, adapted to the screen by Bradford's transform")
+    caption = "; ".join(notes)
     for number, (picture, display) in enumerate(
         shown_frames(frames, look.exposure, night, adapted_white)
     ):
         t_s = folder.times_s[number]
         when = f"{'−' if t_s < 0 else ''}{duration_text(abs(t_s))}" if t_s else "0 s"
         labels.append(f"{when}; white is {rounded(display.white_luminance, 2)} cd/m²")
-        texts = {"Description": f"{scene.file.name} at {t_s:g} s", "Comment": display.statement}
+        texts = {
+            "Description": f"{scene.file.name} at {t_s:g} s",
+            "Comment": "; ".join([display.statement, *scene.notes]),
+        }
         write_png(folder.path / f"{number:03d}.png", picture, texts)
         pictures.append(picture)
-    notes = list(scene.notes)
-    if adapted_white is not None and not night:
-        notes.append(f"white is {look.white}, adapted to the screen by Bradford's transform")
-    caption = "; ".join(notes)
     draw_frames(pictures, labels, folder.path / "sheet.png", scene.file.name, caption)
     if video is not None:
         write_video(video, pictures, fps)

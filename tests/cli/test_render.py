@@ -55,6 +55,8 @@ def test_pictures_of_all_times_with_what_was_assumed(labrig: Callable[..., Ended
     assert {"000.png", "001.png", "002.png"} <= {path.name for path in folder.iterdir()}
     content = json.loads((folder / "render.json").read_text(encoding="utf-8"))
     assert any("pink-paint" in note for note in content["notes"])
+    # An assumption is in every picture, too, not only below the sheet.
+    assert all(note in read_png_texts(folder / "001.png")["Comment"] for note in content["notes"])
     dark = read_spectral_exr(folder / "001.exr").radiance
     later = read_spectral_exr(folder / "002.exr").radiance
     # One exponential of 0.027 per second, which the glow itself slows by a part in a thousand.
