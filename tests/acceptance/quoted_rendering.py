@@ -124,7 +124,12 @@ def _rooms(printed: str) -> str:
             for pattern in (r"ΔE +([\d.]+)", r".*ratio +(\S+) %")
         )
         single = match(r"^ +1 state +ΔE +([\d.]+)", case)
-        cells = (said, light, f"{float(delta_e):.1f}", _signed(ratio), f"{float(single):.1f}")
+        noise, matched = (
+            match(pattern, case)
+            for pattern in (r"noise alone ΔE ([\d.]+)", r"^ +measured .*matched +([\d.]+)")
+        )
+        numbers = (f"{float(each):.1f}" for each in (delta_e, noise, matched))
+        cells = (said, light, *numbers, _signed(ratio), f"{float(single):.1f}")
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

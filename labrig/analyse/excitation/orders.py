@@ -97,11 +97,13 @@ class OrderFits:
         if len(k_r) <= MAX_STATES:
             yield self._fit((k_r, fractions), None, first)
         else:
-            # A state that may be none is no start: its rate may be anything.
-            seen = np.flatnonzero(
-                [state.amplitude > SEEN * state.amplitude_sigma for state in self.decay.states]
-            )
-            ends = seen[[0, -1]] if len(seen) > 1 else [0, -1]
+            # A slow state that may be none is no start: its rate may be anything.
+            slow = [
+                number
+                for number, state in enumerate(self.decay.states)
+                if number == 1 or state.amplitude > SEEN * state.amplitude_sigma
+            ]
+            ends = [0, slow[-1]]
             yield self._fit((k_r[ends], fractions[ends]), None)
         if len(k_r) > 1 and not self.states_given:
             yield self._fit((np.array([fractions @ k_r]), np.ones(1)), None)
