@@ -12,7 +12,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# Modules and tests are no garbage: the collector looks for it once all of them are there.
 import gc
+
+gc.disable()
+
 import logging
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -73,6 +77,12 @@ def labrig(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
         return Ended(code, said.out, said.err)
 
     return run
+
+
+def pytest_collection_finish() -> None:
+    """Begin to collect garbage, and never look at modules and thousands of tests."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_xdist_auto_num_workers() -> int:
