@@ -26,8 +26,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 from matplotlib.figure import Figure
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
 
 from labrig import resources
 from labrig.cli.exit_codes import guarded
@@ -85,6 +88,11 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests with a browser come first, so that one worker starts it and not each."""
+    items.sort(key=lambda item: "chromium" not in getattr(item, "fixturenames", ()))
+
+
 def pytest_xdist_auto_num_workers() -> int:
     """Half as many again as there are processors: a third of the time tests wait for processes."""
     return max(1, 3 * (os.cpu_count() or 1) // 2)
@@ -105,6 +113,23 @@ def shared_recordings(tmp_path_factory: pytest.TempPathFactory) -> None:
     is_worker = "PYTEST_XDIST_WORKER" in os.environ
     recorded.SHARED = (of_worker.parent if is_worker else of_worker) / "recorded"
     recorded.SHARED.mkdir(exist_ok=True)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once(shared_recordings: None) -> Iterator[None]:
+    """What one worker compiles, the others wait for and load, instead of compiling it, too."""
+    assert recorded.SHARED is not None
+    alone = FileLock(recorded.SHARED / "compiled.lock")
+    compile_kernel = Dispatcher.compile
+
+    def compile_alone(kernel: Dispatcher, signature: object) -> object:
+        # Threads take the locks in the order in which a kernel that calls another one does.
+        with global_compiler_lock, alone:
+            return compile_kernel(kernel, signature)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Dispatcher, "compile", compile_alone)
+        yield
 
 
 @pytest.fixture(autouse=True)
