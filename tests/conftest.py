@@ -58,7 +58,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended and what it said."""
+    """How a command ended, and what it printed."""
 
     code: int
     out: str
@@ -77,8 +77,8 @@ def labrig(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
     def run(*arguments: object) -> Ended:
         capfd.readouterr()
         code = guarded([str(argument) for argument in arguments])
-        said = capfd.readouterr()
-        return Ended(code, said.out, said.err)
+        printed = capfd.readouterr()
+        return Ended(code, printed.out, printed.err)
 
     return run
 

@@ -82,8 +82,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
              "--runs", str(folder / "runs")]
         )  # fmt: skip
     assert code == 0, quiet.getvalue()
-    (found,) = (folder / "runs").iterdir()
-    return found
+    (recorded,) = (folder / "runs").iterdir()
+    return recorded
 
 
 def of_the_room() -> Material:
@@ -119,13 +119,13 @@ def measured(run: Path) -> Path:
 def rendered(labrig: Labrig, run: Path, *more: object) -> dict[str, Any]:
     ended = labrig("compare", run, "--rendered", "--json", *more)
     assert (ended.code, ended.err) == (0, "")
-    said: dict[str, Any] = json.loads(ended.out)["rendered"]
-    return said
+    comparison: dict[str, Any] = json.loads(ended.out)["rendered"]
+    return comparison
 
 
 def test_the_glow_over_reflected_light_is_the_photographs(labrig: Labrig, measured: Path) -> None:
-    said = rendered(labrig, measured)
-    patch = said["patches"][SAMPLE]
+    comparison = rendered(labrig, measured)
+    patch = comparison["patches"][SAMPLE]
     ratio = patch["glow_over_reflected"]
     assert ratio["reflected_by"] == "the sample"
     photographed, own = np.array(ratio["photographed"]), np.array(ratio["rendered"]["measured"])
@@ -139,7 +139,7 @@ def test_the_glow_over_reflected_light_is_the_photographs(labrig: Labrig, measur
     assert patch["mean"]["1 state"] > 2 * patch["mean"]["measured"]
     assert patch["mean_one_exposure"]["measured"] < 2
     assert patch["mean"]["2 states"] < 2 * patch["noise"] + 1
-    assert said["notes"] == []
+    assert comparison["notes"] == []
 
 
 @pytest.mark.parametrize("is_same_camera", [False, True])
