@@ -40,10 +40,11 @@ _FLOAT = re.compile(
 
 
 if TYPE_CHECKING:
-    from yaml import SafeLoader
+    from yaml import SafeDumper, SafeLoader
 else:
-    # libyaml is several times faster; a PyYAML built without it lacks its loader.
+    # libyaml is several times faster; a PyYAML built without it lacks its loader and dumper.
     SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    SafeDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 class _Loader(SafeLoader, Composer):
@@ -146,7 +147,7 @@ _Loader.add_constructor("tag:yaml.org,2002:float", _construct_float)
 _Loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(str(node.value)))
 
 
-class _Dumper(yaml.SafeDumper):
+class _Dumper(SafeDumper):
     """Dumper that quotes every text that PyYAML's own reader or this one would not read as text."""
 
     yaml_implicit_resolvers = {  # noqa: RUF012

@@ -101,26 +101,35 @@ class View:
     ) -> FloatArray:
         """Return the radiance of uncovered cells, shape (cells, wavelengths); cell 0 is cloth."""
         from_lamp, stray, door = self._on_samples(arrangement, reflected)
+        is_blank = arrangement.card == "blank"
+        radiance: FloatArray = glow_s * (
+            0.0 if is_blank else self._turned_away(arrangement.tilt_deg)
+        )
+        # Most photographs of a decay are taken in the dark.
+        if from_lamp.any() or stray.any() or door.any():
+            thrown_back = self._thrown_back(arrangement, from_lamp, stray)
+            radiance += self._reflected * (thrown_back + CLOTH_REFLECTANCE * door)
+        radiance[0] = self._reflected * CLOTH_REFLECTANCE * reflected.cloth
+        return radiance
+
+    def _thrown_back(
+        self, arrangement: Arrangement, from_lamp: FloatArray, stray: FloatArray
+    ) -> FloatArray:
+        """Return the light that comes back from uncovered cells, as from a white."""
         light = from_lamp + stray
         if arrangement.lvf == "on sample":
             passed = self._below_lvf(arrangement.turned)[self._layout.piece]
             light = passed * from_lamp + stray
         if arrangement.card == "blank":
-            glow_s = np.zeros_like(glow_s)
-            thrown_back = reflectances("blank", self._simulation.grey_card)[1] * light
-        else:
-            by_reflection = self._surfaces.reflected(light, self._layout.patch)
-            by_reradiation = self._surfaces.reradiated(light, self._layout.patch)
-            thrown_back = self._angles.reflected(arrangement) * by_reflection
-            thrown_back += self._angles.reradiated(arrangement) * by_reradiation
-            by_gloss = self._surfaces.mirrored(light, self._layout.patch)
-            thrown_back += self._angles.mirrored(arrangement) * by_gloss
-            thrown_back = np.maximum(thrown_back, 0.0)
-            glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
-        thrown_back = thrown_back + CLOTH_REFLECTANCE * door
-        radiance: FloatArray = glow_s + self._reflected * thrown_back
-        radiance[0] = self._reflected * CLOTH_REFLECTANCE * reflected.cloth
-        return radiance
+            blank: FloatArray = reflectances("blank", self._simulation.grey_card)[1] * light
+            return blank
+        by_reflection = self._surfaces.reflected(light, self._layout.patch)
+        by_reradiation = self._surfaces.reradiated(light, self._layout.patch)
+        thrown_back = self._angles.reflected(arrangement) * by_reflection
+        thrown_back += self._angles.reradiated(arrangement) * by_reradiation
+        by_gloss = self._surfaces.mirrored(light, self._layout.patch)
+        thrown_back += self._angles.mirrored(arrangement) * by_gloss
+        return np.maximum(thrown_back, 0.0)
 
     def _on_samples(
         self, arrangement: Arrangement, reflected: VisibleLight

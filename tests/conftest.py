@@ -12,30 +12,37 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# Modules and tests are no garbage: the collector looks for it once all of them are there.
 import gc
+
+gc.disable()
+
 import logging
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from filelock import FileLock
 from hypothesis import settings
-from matplotlib.figure import Figure
 
-from labrig import resources
-from labrig.cli.exit_codes import guarded
-from labrig.report.figure_files import FigureFiles
-from labrig.report.page import RenderedSection, draw
-from labrig.report.sections import Picture, Section
 from labrig.signals import STOP_SIGNALS
-from tests.analyse import recorded
 from tests.quick_yaml import read_quickly, write_quickly
 
+# What takes long to import is imported where it is used: the process that hands out the tests,
+# and begins before the others, needs none of it.
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
+
+    from labrig.report.figure_files import FigureFiles
+    from labrig.report.page import RenderedSection
+    from labrig.report.sections import Picture, Section
+
+    Draw = Callable[[Sequence[Section], FigureFiles], list[RenderedSection]]
 
 # As Python sets it, the collector takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 10, 10)
@@ -51,7 +58,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended and what it said."""
+    """How a command ended, and what it printed."""
 
     code: int
     out: str
@@ -65,14 +72,26 @@ class Ended:
 @pytest.fixture
 def labrig(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
     """Runs `labrig ARGUMENTS…` in this process."""
+    from labrig.cli.exit_codes import guarded
 
     def run(*arguments: object) -> Ended:
         capfd.readouterr()
         code = guarded([str(argument) for argument in arguments])
-        said = capfd.readouterr()
-        return Ended(code, said.out, said.err)
+        printed = capfd.readouterr()
+        return Ended(code, printed.out, printed.err)
 
     return run
+
+
+def pytest_collection_finish() -> None:
+    """Begin to collect garbage, and never look at modules and thousands of tests."""
+    gc.freeze()
+    gc.enable()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests with a browser come first, so that one worker starts it and not each."""
+    items.sort(key=lambda item: "chromium" not in getattr(item, "fixturenames", ()))
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -91,10 +110,34 @@ def shared_data() -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def shared_recordings(tmp_path_factory: pytest.TempPathFactory) -> None:
     """One folder of recorded runs for all workers."""
+    from tests.analyse import recorded
+
     of_worker = tmp_path_factory.getbasetemp()
     is_worker = "PYTEST_XDIST_WORKER" in os.environ
     recorded.SHARED = (of_worker.parent if is_worker else of_worker) / "recorded"
     recorded.SHARED.mkdir(exist_ok=True)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once(shared_recordings: None) -> Iterator[None]:
+    """What one worker compiles, the others wait for and load, instead of compiling it, too."""
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.dispatcher import Dispatcher
+
+    from tests.analyse import recorded
+
+    assert recorded.SHARED is not None
+    alone = FileLock(recorded.SHARED / "compiled.lock")
+    compile_kernel = Dispatcher.compile
+
+    def compile_alone(kernel: Dispatcher, signature: object) -> object:
+        # Threads take the locks in the order in which a kernel that calls another one does.
+        with global_compiler_lock, alone:
+            return compile_kernel(kernel, signature)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Dispatcher, "compile", compile_alone)
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -117,7 +160,9 @@ def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
         return
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", _leave_blank)
     if not {"analyse", "recordings"} & set(request.node.path.parts):
-        monkeypatch.setattr("labrig.report.page.draw", _draw_blank)
+        from labrig.report.page import draw
+
+        monkeypatch.setattr("labrig.report.page.draw", partial(_draw_blank, draw))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -153,12 +198,16 @@ def _leave_blank(figure: object, file: object, format: str = "", **_: object) ->
         file.write(b'<svg viewBox="0 0 1 1"></svg>')
 
 
-def _draw_blank(sections: Sequence[Section], figure_files: FigureFiles) -> list[RenderedSection]:
+def _draw_blank(
+    draw: "Draw", sections: "Sequence[Section]", figure_files: "FigureFiles"
+) -> "list[RenderedSection]":
     blank = [replace(one, figures=tuple(map(_blank, one.figures))) for one in sections]
     return draw(blank, figure_files)
 
 
-def _blank(picture: Picture) -> Picture:
+def _blank(picture: "Picture") -> "Picture":
+    from matplotlib.figure import Figure
+
     return replace(picture, drawing=Figure) if callable(picture.drawing) else picture
 
 
@@ -174,6 +223,8 @@ def make_rig(tmp_path: Path) -> Callable[..., Path]:
 
 def write_small_rig(path: Path, base: str = "sim", **simulation: object) -> Path:
     """Write the shipped simulated rig with a small sensor, changed as told."""
+    from labrig import resources
+
     content = read_quickly((resources.folder("config") / f"{base}.yaml").read_text())
     content["simulation"] |= {"sensor": {"width": 96, "height": 64}}
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.

@@ -3,6 +3,7 @@ from .channels import (
     FrameMeasurement as FrameMeasurement,
     PixelMask as PixelMask,
     measure as measure,
+    measure_regions as measure_regions,
 )
 from .colour_chart import (
     find_colour_chart as find_colour_chart,

@@ -56,6 +56,9 @@ def isolated_outliers(
         level, y + corner[0], x + corner[1], side, noises
     )
     y, x = y[is_isolated], x[is_isolated]
+    # So it is in most regions of most frames.
+    if not len(y):
+        return y, x
     level = _median_of_neighbours(window, y, x, side)
     is_outlier = window[y, x] > level + OUTLIER_SIGMAS * _deviation(
         level, y + corner[0], x + corner[1], side, noises
@@ -505,6 +508,19 @@ def measure_regions(
         A region leaves the frame.
     DataError
         The mask `hot` is of another sensor, or leaves no pixel of a channel.
+
+    See Also
+    --------
+    measure : Statistics of one region, outliers included.
+
+    Examples
+    --------
+    >>> from labrig.reduce import measure_regions, read_raw
+    >>> left, right = (0.0, 0.0, 0.5, 1.0), (0.5, 0.0, 0.5, 1.0)
+    >>> for measured in measure_regions(read_raw("frame.dng"), [left, right]):
+    ...     print(f"{measured.channels['G'].mean:.0f} DN")
+    371 DN
+    370 DN
     """
     if hot is not None and hot.shape != raw.mosaic.shape:
         raise DataError(

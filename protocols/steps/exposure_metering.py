@@ -13,7 +13,7 @@ import numpy.typing as npt
 from labrig.acquire import CameraOffers
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
-from labrig.reduce import ChannelStats, FrameMeasurement, measure, read_raw
+from labrig.reduce import ChannelStats, FrameMeasurement, measure, measure_regions, read_raw
 from labrig.region import Region
 
 FloatArray = npt.NDArray[np.float64]
@@ -70,10 +70,9 @@ def measure_frame(frame: FrameRecord, regions: Sequence[Region]) -> MeteringFram
 
 @lru_cache(maxsize=1000)
 def _measure_frame(frame: FrameRecord, regions: tuple[Region, ...]) -> MeteringFrame:
-    raw = read_raw(frame.path)
-    return MeteringFrame(
-        frame.start_time, frame.exposure_s, [measure(raw, region) for region in regions]
-    )
+    # Places of a strip are many, which take hardly longer together than one.
+    patches = measure_regions(read_raw(frame.path), regions, outliers=True)
+    return MeteringFrame(frame.start_time, frame.exposure_s, patches)
 
 
 @dataclass(frozen=True)

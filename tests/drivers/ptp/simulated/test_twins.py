@@ -61,7 +61,7 @@ def plug_in(monkeypatch: pytest.MonkeyPatch) -> Callable[[BodySettings], Twins]:
         twins = Twins(body)
         monkeypatch.setattr(usb.core, "find", twins.find)
         # The bench has the cameras' clock: nobody waits for exposures.
-        monkeypatch.setattr("labrig.bench.SystemClock", lambda: twins.clock)
+        monkeypatch.setattr("labrig.bench.opening.SystemClock", lambda: twins.clock)
         return twins
 
     return plug
