@@ -249,12 +249,16 @@ class Scene:
         Reason for the arrangement, for the person.
     is_dark
         Whether it takes dark frames only, for which any arrangement without a glow will do.
+    rests
+        Whether the sample rests in the dark before it is charged, so that others may be measured
+        meanwhile.
     """
 
     unit: Unit
     arrangement: Arrangement
     why: str
     is_dark: bool = False
+    rests: bool = False
 
     def of_part(self, part: str) -> "Scene":
         """Return the scene as one of a part of a chain."""

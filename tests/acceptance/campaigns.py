@@ -115,6 +115,9 @@ CAMPAIGNS = {
         _module("spectrum_through_lvf", "40"),
         _module("spectrum_lines", "8"),
         _module("emission_spectra", "3"),
+        _module("camera_filters"),
+        _module("selected_lights"),
+        _module("leds_by_camera", "--seeds", "24"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
         _module("rate_information"),
         *(_module("manual_examples", page, called=f"manual_{page}") for page in EXAMPLES),
@@ -123,6 +126,7 @@ CAMPAIGNS = {
         _module("luminance_pulls", "--seeds", "50"),
         _module("camera_curves"),
         _module("law_confusion", "--seeds", "100"),
+        _module("unequal_filling", "--seeds", "40"),
         *(
             _module(
                 "coverage_table_sigma", "--broken", "--seeds", "60", "--only", only, called=name
