@@ -403,7 +403,7 @@ class Simulation(Part):
     @model_validator(mode="after")
     def _samples_on_a_table_or_a_changer(self) -> Self:
         if bool(self.sample) == (self.sample_changer is not None):
-            raise ValueError("expected at least 1 value in 'sample', or 'sample_changer' in its place")
+            raise ValueError("expected at least 1 value in 'sample', or a 'sample_changer'")
         return self
 
     @field_validator("faults")

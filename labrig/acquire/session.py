@@ -171,7 +171,7 @@ class Session:
         if left_s > 0:
             self.wait(left_s, f"warming up the {key}")
 
-    def bring(self, sample: str) -> None:
+    def bring(self, sample: str | None) -> None:
         """Bring a sample of the changer into place, with the lamp off; all others lie in the dark.
 
         Where a changer keeps samples in the dark, `rest` counts the time since it took this one
@@ -180,19 +180,21 @@ class Session:
         Parameters
         ----------
         sample
-            Name of the sample on the changer.
+            Name of the sample on the changer; None for all of them in the dark. A lamp burns on if
+            they are there already.
 
         Raises
         ------
         ProtocolError
             The rig has no sample changer, or the changer has no such sample.
         """
-        changer = self.rig[SAMPLE_CHANGER]
-        if LAMP in self.rig and self.rig[LAMP].is_on():
-            self.perform(LAMP_OFF)
-        action = BringSample(sample)
+        changer, action = self.rig[SAMPLE_CHANGER], BringSample(sample)
         turns = self._recorder.all_actions(action.device)
         self._dark_since_s = None
+        if sample is None and not self._is_any_in_place(turns):
+            return
+        if LAMP in self.rig and self.rig[LAMP].is_on():
+            self.perform(LAMP_OFF)
         if changer.keeps_dark():
             in_place = [n for n, turn in enumerate(turns) if turn.action == str(action)]
             # A sample that nothing was put in place of was in place up to now, or up to the crash.
@@ -200,6 +202,12 @@ class Session:
                 taken_away = turns[in_place[-1] + 1].start_time
                 self._dark_since_s = taken_away - self.clock.wall(0.0)
         self.perform(action)
+
+    def _is_any_in_place(self, turns: Sequence[ActionRecord]) -> bool:
+        """Return whether a sample may be in place: when devices are connected, none is."""
+        since = self.clock.wall(self.rig.connected_s)
+        here = [turn.action for turn in turns if turn.start_time >= since]
+        return bool(here) and here[-1] != str(BringSample(None))
 
     def rest(self, duration_s: float) -> None:
         """Wait until the sample has rested in the dark for `duration_s` seconds.

@@ -131,7 +131,7 @@ def _rounds(units: Iterator[_PlannedUnit]) -> Iterator[_PlannedUnit]:
             yield first
             continue
         samples = [unit.part.rpartition("/")[0] for unit in (first, *others)]
-        part = f"{', '.join(samples)} in turn/{first.kind_of_part}"
+        part = f"{first.kind_of_part} of {', '.join(samples)} in turn"
         steps = [step for unit in (first, *others) for step in unit.steps]
         yield _PlannedUnit(f"{part}/{first.own_name}", first.begins_s, others[-1].ends_s, steps)
 

@@ -11,18 +11,18 @@ from .scenes import Arrangement, Scene
 
 @dataclass(frozen=True)
 class UnitOfSample:
-    """A unit before which the changer brings its sample.
+    """A unit before which the changer brings its sample, or takes all away.
 
     Attributes
     ----------
     unit
         Unit of one sample.
     sample
-        Name of the sample on the changer.
+        Name of the sample on the changer; None if all of them are to lie in the dark.
     """
 
     unit: Unit
-    sample: str
+    sample: str | None
 
     @property
     def name(self) -> str:
@@ -93,6 +93,7 @@ def in_sample_turns(scenes: Mapping[str, Sequence[SampleScene]], *, shared: bool
 
 
 def _on_changer(sample: str, each: SampleScene) -> SampleScene:
-    """Return the scene with its sample brought before it."""
+    """Return the scene with its sample brought before it, or all taken away from a card."""
     scene = each.scene
-    return replace(each, scene=replace(scene, unit=UnitOfSample(scene.unit, sample)))
+    in_place = sample if scene.arrangement.stage in ("sample", "lit sample") else None
+    return replace(each, scene=replace(scene, unit=UnitOfSample(scene.unit, in_place)))
