@@ -101,10 +101,6 @@ class UnitKind(StrEnum):
         return light if kind == cls.BAND and light else None
 
 
-#: Roles of frames of a glow.
-GLOWS = (*ExcitationFrames, FrameRole.METER, FrameRole.REST)
-#: Growth of the glow during a rest from which it is no noise: a glow falls in the dark.
-BRIGHTER = 1.2
 #: Factor by which each pause between two frames is longer than the one before.
 PAUSES_GROW = 1.25
 #: Places along each patch, for metering and for choosing charge times.
@@ -348,27 +344,6 @@ class ExcitationUnit:
         face_camera(session)
         session.perform(Shoot(FrameRole.REST, self.protocol.settings(exposure_s)))
         face_lamp(session)
-        if session.has_rested and session.choose(
-            "brighter after its rest", lambda: self._is_brighter(session), worst=False
-        ):
-            session.warn(
-                "the sample glows brighter than before its rest: light reached it on the sample "
-                "changer; make that light-tight, or take 'keeps_dark' out of the rig file"
-            )
-
-    def _is_brighter(self, session: Session) -> bool:
-        """Return whether a patch glows brighter than in the last photograph before the rest."""
-        *earlier, rested = sorted(
-            (frame for role in GLOWS for frame in session.frames(role)),
-            key=lambda frame: frame.start_time,
-        )
-        # Without a trap door a filter that lies on the sample comes off between these two kinds.
-        kinds = {UnitKind.DIRECT.has(frame.unit) for frame in (*earlier[-1:], rested)}
-        if not earlier or len(kinds) > 1 or not self._is_seen(rested):
-            return False
-        darks = self.darks(session)
-        before, after = (self.rates(frame, darks).max(axis=1) for frame in (earlier[-1], rested))
-        return bool((after > BRIGHTER * np.maximum(before, 0.0)).any())
 
     def _rest_s(self, session: Session) -> float:
         """Return the time until the glow of every patch is low against that after the last charge.

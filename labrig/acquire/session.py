@@ -224,11 +224,6 @@ class Session:
             text = f"in the dark for {now_s - since_s:.1f} s"
             self._recorder.acted("protocol", text, now_s, now_s, 0.0)
 
-    @property
-    def has_rested(self) -> bool:
-        """Whether the sample comes from the dark of the sample changer."""
-        return self._dark_since_s is not None
-
     def perform(self, action: Action) -> None:
         """Perform one action now."""
         self._heartbeat_if_due()

@@ -14,6 +14,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.found_calibrations import find_calibrations
 from labrig.material import read_material
 from labrig.quantity import duration_text
+from labrig.record import read_run
 from tests.acceptance.reused_calibration import labrig
 from tests.acceptance.whole_phosphor import PAINTS, Errors, errors, summary
 
@@ -74,6 +76,21 @@ def planned(folder: Path, rig: Path, materials: Sequence[str], rest: dict[str, s
     return f"in turn at most {times[0]}, one after the other {times[1]}"
 
 
+def brightness(run: Path, sample: str) -> float:
+    """Return the brightness of the room's lamp in a sample's last charge of the excitation.
+
+    It loses 0.2 % an hour of the room's clock.
+    """
+    part = read_run(run).part(f"{sample}/excitation")
+    off_s = max(
+        action.start_time
+        for attempt in part.attempts
+        for action in attempt.actions
+        if action.device == "lamp" and action.action == "off"
+    )
+    return 1 - 0.002 * (off_s - datetime(2026, 1, 1, tzinfo=UTC).timestamp()) / 3600
+
+
 def main(arguments: Sequence[str]) -> None:
     """Print the plans, then a line for each material."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -97,14 +114,15 @@ def main(arguments: Sequence[str]) -> None:
     ended = labrig("run", protocol, "--rig", rig, "--runs", runs, "--yes")
     if ended.returncode:
         raise SystemExit(ended.stderr.strip().splitlines()[-1])
-    result = Path(ended.stdout.strip().splitlines()[-1]) / "result"
+    run = Path(ended.stdout.strip().splitlines()[-1])
     every: list[Errors] = []
     for material in asked.materials:
-        found, true = read_material(result / material / "material.yaml"), read_material(material)
+        found = read_material(run / "result" / material / "material.yaml")
+        true = read_material(material)
         if len(found.states) != len(true.states):
             print(f"{material:13}  {len(found.states)} states instead of {len(true.states)}")
             continue
-        own = errors(found, true, brightness=1.0)
+        own = errors(found, true, brightness(run, material))
         print(f"{material:13}  {'; '.join(one.line() for one in own)}")
         every += own
     if every:

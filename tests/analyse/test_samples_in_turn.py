@@ -16,7 +16,7 @@ from labrig.compare.run import read_patches
 from labrig.material import read_material
 from labrig.process import process_and_report
 from labrig.record import RunRecord, read_run
-from labrig.results import read_fitted_decays
+from labrig.results import ExcitationResult, read_fitted_decays
 from labrig.sim.simulation import Simulation
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.analyse.selected_lights import LED_NAMES, QUICK, bench, true_light
@@ -175,17 +175,17 @@ def test_cut_off_in_one_turn_it_goes_on_and_the_other_sample_has_rested(tmp_path
     assert rested(after)[following.unit] == pytest.approx(rest.start_time - taken_away, abs=2.0)
 
 
-def test_a_changer_that_is_not_light_tight_is_noticed(tmp_path: Path, run: Path) -> None:
-    brief = CHAIN["parts"][0] | {"select": {"leds": [TWO[0]]}, "direct": ["10 s"]}
-    leaking = run_on(tmp_path, CHAIN | {"parts": [brief]}, leak="20 %")
-    told = [
-        {
-            action.action
-            for attempt in read_run(path).completed().values()
-            for action in attempt.actions
-            if action.action.startswith("brighter after its rest")
-        }
-        for path in (run, leaking)
-    ]
-    assert told[0] == {"brighter after its rest: False"}
-    assert "brighter after its rest: True" in told[1]
+@pytest.mark.campaign
+def test_a_changer_that_is_not_light_tight_does_not_fit(tmp_path: Path, run: Path) -> None:
+    tight, leaking = (analyse(part_of(path)) for path in (run, run_on(tmp_path, leak="5 %")))
+    for sample in SAMPLES:
+        chi2 = []
+        for result in (tight, leaking):
+            part = result.parts[f"{sample}/excitation"]
+            assert isinstance(part, ExcitationResult)
+            chi2 += [patch.fit.reduced_chi2 for patch in part.patches.values()]
+        assert chi2[0] < 1.5
+        assert chi2[1] > 2.0 * chi2[0]
+        assert any(
+            line.startswith(f"{sample}/excitation: reduced χ² is") for line in leaking.warnings
+        )
