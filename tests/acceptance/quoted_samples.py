@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from functools import partial
 
 from tests.acceptance.printed import Extract, columns, furthest, match, span
 from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
@@ -70,15 +71,15 @@ def _selected_lights(way: str) -> Extract:
 
 def _unequal_filling(printed: str) -> str:
     def counted(samples: str, said: str, what: str) -> int:
-        lines = re.findall(rf"^{samples}.*{said}: ([^;]*)", printed, re.M)
+        lines = re.findall(rf"^{samples}.*{said}: ([^;\n]*)", printed, re.M)
         return sum(int(n) for line in lines for n in re.findall(rf"\b{what} (\d+)", line))
 
     seeds = sum(columns(r"^two rates .* (\d+) seeds", printed)[0])
     of_order = sum(columns(r"^general order .* (\d+) seeds", printed)[0])
     order = "(?<!no )order"
-    told, alone = (counted("two rates", said, order) for said in ("said", "test"))
+    told, alone = counted("two rates", "said", order), counted("two rates", "test", "general order")
     right = counted("general order", "said", order)
-    alike = counted("general order", "test", "undecided")
+    alike = counted("general order", "test", "not decided")
     return (
         f"Of {seeds:.0f} samples of two such states, charged for 10 s, 1 min and 10 min, "
         f"{told or 'none'} is told as an order, where the exponents alone would tell {alone}; of "
@@ -115,12 +116,31 @@ def _in_turn(printed: str) -> str:
     )
 
 
+def _budget(printed: str) -> str:
+    def of(way: str, column: int) -> str:
+        cells = re.split(r" {2,}", match(rf"^{way} +(.*)$", printed))
+        return cells[column]
+
+    names = re.split(r" {2,}", match(r"^emission +(.*)$", printed))
+    colour, light, two = (names.index(name) for name in ("colour", "L10", "with a second meter"))
+    shutter, reading = (of("three channels", names.index(name)) for name in ("shutter", "reading"))
+    three, filters = (partial(of, way) for way in ("three channels", "camera filters"))
+    return (
+        f"σ of a green glow at 10 min is {three(light)} %: {three(colour)} % by its colour, "
+        f"{reading} % by the reading, {shutter} % by shutter times. A run of `emission_spectrum` "
+        f"through ten filters before the camera lowers that of the colour to {filters(colour)} %, "
+        f"and σ to {filters(light)} %; the mean of two meters as the reading by itself lowers it "
+        f"to {three(two)} %, and both together to {filters(two)} %"
+    )
+
+
 LIGHTS, WHOLE = f"{HOW_TO}/select_wavelengths.md", f"{HOW_TO}/whole_phosphor.md"
 QUOTES = (
     Quote(LIGHTS, "leds_by_camera", _leds_by_camera),
     Quote(LIGHTS, "camera_filters", _camera_filters),
     *(Quote(LIGHTS, "selected_lights", _selected_lights(way)) for way in WAYS),
     Quote(f"{EXPLANATION}/identifiability.md", "unequal_filling", _unequal_filling),
+    Quote(f"{HOW_TO}/luminance.md", "luminance_budget", _budget),
     Quote(WHOLE, "samples_in_turn", _lab_times),
     Quote(WHOLE, "samples_in_turn", _in_turn),
 )
