@@ -22,7 +22,7 @@ import yaml
 
 from labrig import resources
 from labrig.acquire import plan, read_protocol, read_rig_file
-from labrig.found_calibrations import find_calibrations
+from labrig.bench.found_calibrations import find_calibrations
 from labrig.material import read_material
 from labrig.quantity import duration_text
 from labrig.record import read_run
