@@ -99,8 +99,10 @@ def test_no_light_is_on_while_the_changer_turns(tmp_path: Path) -> None:
         turns += step.device == "sample_changer"
         assert not (is_on and step.device == "sample_changer"), step
     assert turns > 20
-    # Nor does a sample lie in the light while the card is photographed for both of them.
+    # Nor does a sample lie in the light while the card is photographed for both of them, under one
+    # burning lamp.
     white = [step for step in laid_out.steps if step.unit.endswith("/white")]
+    assert [step.action for step in white if step.device == "lamp"] == ["on"]
     assert [step.action for step in white if step.device == "sample_changer"] == [
         "all samples into the dark"
     ]
