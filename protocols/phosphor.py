@@ -16,6 +16,7 @@ from labrig.acquire import (
     RigFile,
     Sample,
     Unit,
+    driver_and_settings,
     plan,
     planned_rig,
 )
@@ -45,7 +46,7 @@ OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation", "reflect
 #: Why samples do not rest while another one is measured.
 NOT_DARK = (
     "the rig file does not say that the sample changer keeps samples in the dark, light-tight, "
-    "while another one is lit ('keeps_dark: true' under 'sample_changer:')"
+    "while another one is lit, 'keeps_dark: true' under 'sample_changer:'"
 )
 
 
@@ -215,7 +216,12 @@ class Phosphor(Chain):
             not.
         """
         source = f"rig '{rig.name}'"
-        changer = planned_rig(rig, source, {SAMPLE_CHANGER.key} & set(rig.devices))[SAMPLE_CHANGER]
+        if SAMPLE_CHANGER.key not in rig.devices:
+            raise ProtocolError(
+                f"samples: expected a sample changer, the {source} has none; add 'sample_changer:' "
+                "under 'devices:', or measure one sample after the other (labrig queue)"
+            )
+        changer = planned_rig(rig, source, (SAMPLE_CHANGER.key,))[SAMPLE_CHANGER]
         for sample in self.samples:
             if sample.name not in changer.samples():
                 raise ProtocolError(
@@ -232,19 +238,22 @@ class Phosphor(Chain):
         """Return why rests are shared or not, and the time in the lab with the other way."""
         if not self.samples:
             return super().notes(rig)
-        rests, source = self._rests_on(rig), f"rig '{rig.name}'"
-        changer = planned_rig(rig, source, (SAMPLE_CHANGER.key,))[SAMPLE_CHANGER]
-        if not changer.keeps_dark():
-            return (f"no sample rests while another is measured: {NOT_DARK}",)
-        apart, shared = self._lab_time("apart", rig), self._lab_time("shared", rig)
-        if rests == "shared":
-            return (
-                f"one sample rests in the dark while another is measured: at most {shared} in the "
-                f"lab, one sample after the other {apart}",
-            )
+        driver, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
+        apart = self._lab_time("apart", rig)
+        if driver.declared_keeps_dark(settings):
+            shared = self._lab_time("shared", rig)
+            if self._rests_on(rig) == "shared":
+                return (
+                    f"one sample rests in the dark while another is measured: at most {shared} in "
+                    f"the lab, one sample after the other {apart}",
+                )
+            why = "'rests: apart'"
+        else:
+            shared = self._lab_time("shared", _with_dark_places(rig))
+            why = NOT_DARK
         return (
-            f"no sample rests while another is measured ('rests: apart'): at most {apart} in the "
-            f"lab, with shared rests {shared}",
+            f"no sample rests while another is measured ({why}): at most {apart} in the lab, with "
+            f"shared rests {shared}",
         )
 
     def _lab_time(self, rests: Literal["shared", "apart"], rig: RigFile) -> str:
@@ -286,6 +295,12 @@ class Phosphor(Chain):
             return [*units, *in_turn(of_samples)]
         check = sorted(((part, scene) for part in of_all for scene in part.scenes()), key=_turn)
         return in_turn(_darks_as_next([*(scene for _, scene in check), *of_samples]))
+
+
+def _with_dark_places(rig: RigFile) -> RigFile:
+    """Return the rig as if its sample changer kept samples in the dark."""
+    changer = rig.devices[SAMPLE_CHANGER.key].model_copy(update={"keeps_dark": True})
+    return rig.model_copy(update={"devices": {**rig.devices, SAMPLE_CHANGER.key: changer}})
 
 
 def _darks_as_next(scenes: Sequence[Scene]) -> list[Scene]:
