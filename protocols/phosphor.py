@@ -56,7 +56,9 @@ def _with_keys(sample: Any) -> Any:
 
 
 #: Samples of a changer, by their names there or with all keys of a sample.
-ChangerSamples = tuple[Annotated[Sample, BeforeValidator(_with_keys)], ...]
+ChangerSamples = tuple[
+    Annotated[Sample, BeforeValidator(_with_keys, json_schema_input_type=str | Sample)], ...
+]
 
 
 class Phosphor(Chain):

@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from labrig import resources
 from labrig.acquire import Plan, RigFile, plan, read_protocol, read_rig_file
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
+from labrig.schema import schema
 from tests.protocols.protocol_files import assert_one_clear_line, written
 from tests.quick_yaml import read_quickly, write_quickly
 
@@ -157,6 +159,13 @@ def test_what_was_decided_is_written_and_reads_back(tmp_path: Path) -> None:
 )
 def test_what_cannot_be_is_one_clear_line(tmp_path: Path, keys: dict[str, Any], said: str) -> None:
     assert_one_clear_line(written(tmp_path, **(CHAIN | keys)), said)
+
+
+def test_an_editor_takes_names_and_keys_of_samples() -> None:
+    validator = Draft202012Validator(schema("protocol"))
+    assert validator.is_valid(CHAIN)
+    assert not validator.is_valid(CHAIN | {"samples": [{"nam": BLUE}, GREEN]})
+    assert not validator.is_valid(CHAIN | {"rests": "sometimes"})
 
 
 def test_a_rig_without_these_samples_is_refused(tmp_path: Path) -> None:
