@@ -118,6 +118,12 @@ class Phosphor(Chain):
                 "expected either 'samples' or 'patches', got both: of several materials in one "
                 "frame none can rest while another is lit"
             )
+        for part in self._links():
+            if any(scene.arrangement.stage == "lit sample" for scene in part.scenes()):
+                raise ValueError(
+                    f"expected parts that leave the samples on their changer, got '{part.name}', "
+                    "which has them laid elsewhere by hand; run it with one sample"
+                )
         folders = {part.name.casefold() for part in self._links()}
         if clashes := [name for name in names if name.casefold() in folders]:
             raise ValueError(

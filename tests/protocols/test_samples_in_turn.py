@@ -155,6 +155,7 @@ def test_what_was_decided_is_written_and_reads_back(tmp_path: Path) -> None:
         ({"sample": {"name": "c"}}, "expected either 'sample' or 'samples'"),
         ({"patches": {"c": [0.1, 0.1, 0.8, 0.3]}}, "expected either 'samples' or 'patches'"),
         ({"rests": "sometimes"}, "rests"),
+        ({"parts": [{"protocol": "reflectance"}]}, "that leave the samples on their changer"),
     ],
 )
 def test_what_cannot_be_is_one_clear_line(tmp_path: Path, keys: dict[str, Any], said: str) -> None:
