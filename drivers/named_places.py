@@ -59,9 +59,23 @@ class _NamesSamples(Protocol):
     @property
     def samples(self) -> Mapping[str, object]: ...
 
+    @property
+    def keeps_dark(self) -> bool: ...
+
 
 class SamplePlaces(NamedPlaces[Position]):
     """Samples of a changer, as the rig file names them."""
+
+    _keeps_dark: bool
+
+    @classmethod
+    def declared_keeps_dark(cls, settings: _NamesSamples) -> bool:
+        """Whether the rig file says that samples that are not in place lie in the dark."""
+        return settings.keeps_dark
+
+    def keeps_dark(self) -> bool:
+        """Whether samples that are not in place lie in the dark while another one is lit."""
+        return self._keeps_dark
 
     @classmethod
     def declared_samples(cls, settings: _NamesSamples) -> Sequence[str]:

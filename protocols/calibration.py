@@ -23,6 +23,11 @@ class Calibration(Chain):
 
     protocol: Literal["calibration"] = "calibration"
 
+    @property
+    def sample_in_place(self) -> None:
+        """No sample of a changer is in place: only the bench is measured."""
+        return None
+
     def units(self) -> Sequence[Unit]:
         """Return the units of all parts, those with the same arrangement together."""
         scenes = [scene for part in self.chain() for scene in part.scenes()]

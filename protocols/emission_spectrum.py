@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.acquire import CAMERA, LAMP_OFF, RigFile, Session, Shoot, at
+from labrig.acquire import CAMERA, RigFile, Session, Shoot, at
 from labrig.calibration import LVF_KIND
 from labrig.quantity import DurationS, duration_text
 from labrig.region import Region
@@ -180,7 +180,8 @@ class EmissionSpectrum(GlowSettings, ScenesProtocol):
                 Scene(SpectrumUnit(self, lamp), arrangement, OTHER_LAMP),
             ]
         if self.white:
-            scenes.append(Scene(WhiteUnit(self), Arrangement("grey card", "before camera"), WHITE))
+            card = Arrangement("grey card", "before camera")
+            scenes.append(Scene(WhiteUnit(self), card, WHITE, leaves_lamp_on=True))
         return scenes
 
     def _through_filters(self, select: CameraFilters) -> Sequence[Scene]:
@@ -210,6 +211,7 @@ class EmissionSpectrum(GlowSettings, ScenesProtocol):
                     WhiteUnit(self, white_unit(scene)),
                     Arrangement("grey card", camera_filter=name),
                     WHITE,
+                    leaves_lamp_on=True,
                 )
                 for scene, name in filters.items()
                 if scene != AFTERWARDS
@@ -261,7 +263,7 @@ class WhiteUnit:
     name: str = "white"
 
     def run(self, session: Session) -> None:
-        """Switch the lamp on, take a ladder of exposures, switch the lamp off."""
+        """Switch the lamp on, unless it burns, and take a ladder of exposures; it burns on."""
         session.wait_until_warm("camera")
         light_card(session)
         offers = session.rig[CAMERA].offers()
@@ -271,4 +273,3 @@ class WhiteUnit:
             )
             for _ in range(WHITES_PER_EXPOSURE):
                 session.perform(shoot)
-        session.perform(LAMP_OFF)

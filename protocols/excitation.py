@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
+    DARK,
     LAMP,
     LAMP_OFF,
     LAMP_ON,
@@ -336,7 +337,7 @@ class ExcitationUnit:
             session.ask(FRESH)
             return
         rest_s = session.choose("rest", lambda: self._rest_s(session), worst=rule.at_most)
-        session.wait(rest_s, "resting in the dark")
+        session.rest(rest_s)
         exposure_s = max(
             self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
         )
@@ -565,8 +566,10 @@ class _ChargeUnit(ExcitationUnit):
 def _light_on_s(session: Session, unit: str) -> float:
     """Return the time for which the lamp, or an LED, shone in a unit, in seconds."""
     actions = [*session.actions(LAMP.key), *session.actions(LEDS.key)]
-    times_s = [action.start_time for action in actions if action.unit == unit]
-    return times_s[1] - times_s[0]
+    switched = [action for action in actions if action.unit == unit]
+    on_s = next(action.start_time for action in switched if action.action != DARK)
+    off_s = (action.start_time for action in switched if action.action == DARK)
+    return next(time_s for time_s in off_s if time_s > on_s) - on_s
 
 
 def _selected(protocol: ExcitationSettings) -> ExcitingLights:
@@ -696,7 +699,8 @@ class Excitation(ExcitationSettings, ScenesProtocol):
             DirectMeter(self),
             *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
         ]
-        by_itself = [Scene(unit, LVF_AWAY, BY_ITSELF) for unit in direct]
+        rests = self.samples == 1
+        by_itself = [Scene(unit, LVF_AWAY, BY_ITSELF, rests=rests) for unit in direct]
         if self.select is not None:
             return [
                 Scene(DarkUnit(self), LVF_AWAY, BY_ITSELF, is_dark=True),
@@ -710,14 +714,16 @@ class Excitation(ExcitationSettings, ScenesProtocol):
         ]
         return [
             Scene(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
-            *(Scene(unit, LVF_ON, THROUGH_IT) for unit in through),
+            *(Scene(unit, LVF_ON, THROUGH_IT, rests=rests) for unit in through),
             *by_itself,
         ]
 
     def _by_lights(self, lights: ExcitingLights) -> Iterator[Scene]:
         """Yield metering and charges by one light after another."""
+        rests = self.samples == 1
         for place, light in enumerate(lights.names()):
             arrangement = lights.arrangement(light)
-            yield Scene(BandMeter(self, light, place == 0), arrangement, BY_ONE)
+            yield Scene(BandMeter(self, light, place == 0), arrangement, BY_ONE, rests=rests)
             for number in range(1, len(self.charges) + 1):
-                yield Scene(BandUnit(self, light, number), arrangement, BY_ONE)
+                unit = BandUnit(self, light, number)
+                yield Scene(unit, arrangement, BY_ONE, rests=rests)

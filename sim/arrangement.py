@@ -56,6 +56,8 @@ class Arrangement:
     chart_patch
         Patch of the ColorChecker, from 1 on, that lies so near that it alone fills the frame; 0 is
         the whole chart in its place.
+    in_place
+        Sample of the sample changer that is in the light, from 1 on; 0 is none.
     """
 
     card: Card = "sample"
@@ -74,6 +76,11 @@ class Arrangement:
     placing: int = 0
     faced: int = 0
     chart_patch: int = 0
+    in_place: int = 0
+
+    def with_sample(self, number: int) -> "Arrangement":
+        """Return the arrangement with another sample of the sample changer in place."""
+        return self if number == self.in_place else replace(self, in_place=number)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from labrig.material import read_any_material
 from labrig.yaml_file import validate
 
 from .dng import Shot, encode_dng
-from .simulation import Simulation
+from .simulation import EMPTY, Simulation
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,10 @@ def describe_room(content: Mapping[str, Any], source: str) -> RoomDescription:
     RoomDescription(frame_pixels=(384, 64), frame_bytes=..., epoch_s=...)
     """
     simulation = validate(content, Simulation, f"{source}, simulation")
-    for patch in simulation.patches:
-        read_any_material(patch.material)
+    for table in simulation.tables():
+        for patch in table.patches:
+            if patch.material != EMPTY:
+                read_any_material(patch.material)
     width, height = simulation.sensor.width, simulation.sensor.height
     lens = None if simulation.lens is None else simulation.lens.notes
     file = encode_dng(np.zeros((height, width), np.uint16), Shot(0.0, 1.0, 100, 4.0, lens))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.clock import VirtualClock
+from labrig.errors import UsageError
 
 from .aiming import (
     LIVE_EXPOSURE_S,
@@ -14,7 +15,6 @@ from .aiming import (
     developed,
     live_stride,
 )
-from .angles import Spheres
 from .arrangement import Arrangement, Arrangements
 from .bench_settings import FilterWheelSettings
 from .cards import reflectances
@@ -29,7 +29,6 @@ from .illuminants import Illuminants
 from .imaging import Imaging
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
-from .layout import Layout
 from .led_circuit import LedCircuit
 from .leds import Leds
 from .lights import Lights, VisibleLight, leak, room_light_spectrum
@@ -43,12 +42,11 @@ from .optics import (
     measured_curves,
     vignetting,
 )
-from .samples import Samples
+from .sample_changer import SampleHolder
 from .sensor import BAYER_RGGB, Course, Sensor, SensorTemperature, gain_electrons_per_dn
 from .simulation import Simulation
-from .surfaces import Surfaces
+from .table import Table
 from .truth import Truth, true_lvf, true_patches
-from .view import View
 from .wander import Wander
 
 FloatArray = NDArray[np.float64]
@@ -84,13 +82,12 @@ class Room:
     ) -> None:
         self._simulation = simulation
         self._clock = clock
-        self._layout = Layout(simulation)
-        self._samples = Samples(simulation, self._layout)
-        prompt = [patch.prompt for patch in simulation.patches]
-        self._surfaces = Surfaces(self._samples.materials, simulation.gloss, prompt)
-        self._view = View(simulation, self._layout, self._surfaces)
-        has_sphere = any(patch.shape == "sphere" for patch in simulation.patches)
-        self._spheres = Spheres(simulation) if has_sphere else None
+        changer = simulation.sample_changer
+        self._holder = SampleHolder(changer, pulses)
+        self._tables = [
+            Table.of(table, None if changer is None else place, changer.leak if changer else 0.0)
+            for place, table in enumerate(simulation.tables())
+        ]
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
         leds = Leds(simulation.leds, passed=film(simulation.polarisers))
@@ -160,12 +157,25 @@ class Room:
     @property
     def tasks(self) -> Mapping[str, Callable[..., None]]:
         """Tasks of the changer in the room, by their command line."""
-        return self._changer.tasks
+        return {**self._changer.tasks, "holder NUMBER": self._turn_holder}
 
     @property
     def arrangements(self) -> Arrangements:
         """Arrangements of the bench up to now."""
-        return self._changer.arrangements
+        return self._holder.with_places(self._changer.arrangements)
+
+    def _table(self, arrangement: Arrangement) -> Table:
+        """Return what lies before lamp and camera."""
+        return self._tables[arrangement.in_place]
+
+    def _turn_holder(self, number: str) -> None:
+        """Turn the sample changer that has no servo to a place, 0 for none."""
+        changer = self._simulation.sample_changer
+        if changer is None or changer.channel is not None:
+            raise UsageError("there is none that obeys, see 'simulation.sample_changer'")
+        if not number.isdecimal() or int(number) > len(changer.places):
+            raise UsageError(f"expected a place from 0 to {len(changer.places)}, got '{number}'")
+        self._holder.turn(int(number), self._clock.now())
 
     def switch_lamp(self, on: bool) -> None:
         """Ask the lamp's relay to switch now."""
@@ -218,13 +228,14 @@ class Room:
             )
         lights = self._lights()
         light: NDArray[np.float32] | None = None
-        for begin_s, stop_s, arrangement in self._changer.arrangements.spans(start_s, end_s):
+        for begin_s, stop_s, arrangement in self.arrangements.spans(start_s, end_s):
             reflected = lights.seen(begin_s, stop_s)
             rgb = self._electrons(begin_s, stop_s, arrangement, lights, reflected, f_number)
-            painted = self._layout.places(arrangement).painted
+            table = self._table(arrangement)
+            painted = table.layout.places(arrangement).painted
             part = rgb[:, BAYER_RGGB].reshape(-1)[painted]
-            if self._spheres is not None and arrangement.card in ("sample", "lit sample"):
-                part = self._shaded(part, self._spheres, arrangement, reflected, f_number)
+            if table.spheres is not None and arrangement.card in ("sample", "lit sample"):
+                part = self._shaded(part, table, arrangement, reflected, f_number)
             part = self._imaging.textured(part, arrangement)
             light = part if light is None else light + part
         assert light is not None
@@ -255,12 +266,13 @@ class Room:
         reference beside the samples.
         """
         total = np.zeros_like(WAVELENGTH_NM)
-        for begin_s, stop_s, arrangement in self._changer.arrangements.spans(start_s, end_s):
+        for begin_s, stop_s, arrangement in self.arrangements.spans(start_s, end_s):
             light = self.white_exposure(begin_s, stop_s)
             if arrangement.card == "grey card":
                 light = reflectances("grey card", self._simulation.grey_card)[1] * light
             elif arrangement.faced:
-                (light,) = self._surfaces.thrown_back(light, np.array([arrangement.faced]))
+                surfaces = self._table(arrangement).surfaces
+                (light,) = surfaces.thrown_back(light, np.array([arrangement.faced]))
             total += light
         return total
 
@@ -269,7 +281,7 @@ class Room:
 
         That light is for display only: it does not charge the samples.
         """
-        arrangement = self._changer.arrangements.at(at_s)
+        arrangement = self.arrangements.at(at_s)
         start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
         lights = self._lights()
         reflected = lights.seen(start_s, at_s)
@@ -282,7 +294,7 @@ class Room:
                 reflected.cloth + light,
             )
         rgb = self._electrons(start_s, at_s, arrangement, lights, reflected, LIVE_F_NUMBER)
-        painted = self._layout.places(arrangement).painted
+        painted = self._table(arrangement).layout.places(arrangement).painted
         step = 2 * live_stride(*painted.shape)
         place = painted[::step, ::step] // len(BAYER_RGGB)
         return developed(
@@ -296,24 +308,25 @@ class Room:
         off_s = lamps.last_switch_off(self._clock.now())
         level = effective = None
         off_or_now_s = self._clock.now() if off_s is None else off_s
-        faster = self._samples.cells.rate_factor(off_or_now_s)
+        arrangements = self.arrangements
+        table = self._table(arrangements.at(off_or_now_s))
+        faster = table.samples.cells.rate_factor(off_or_now_s)
         if off_s is not None:
-            arrangements = self._changer.arrangements
-            level_at_off = self._samples.level_at(off_s, self._lights(), arrangements)
-            level_later, _ = self._samples.evolve(
+            level_at_off = table.samples.level_at(off_s, self._lights(), arrangements)
+            level_later, _ = table.samples.evolve(
                 level_at_off, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
             )
-            level = self._samples.of_cells(level_at_off)
-            effective = self._samples.extrapolated(level_at_off, level_later, off_s)
-        electrons_per_s = self._curves.glow_electrons_per_s(self._samples.radiance_at_one, f_number)
+            level = table.samples.of_cells(level_at_off)
+            effective = table.samples.extrapolated(level_at_off, level_later, off_s)
+        electrons_per_s = self._curves.glow_electrons_per_s(table.samples.radiance_at_one, f_number)
         return Truth(
             lamp_off_s=off_s,
             iso=iso,
             f_number=f_number,
             patches=true_patches(
-                self._simulation,
-                self._samples,
-                self._layout,
+                table.simulation,
+                table.samples,
+                table.layout,
                 level,
                 effective,
                 faster * electrons_per_s / gain_electrons_per_dn(iso),
@@ -342,14 +355,15 @@ class Room:
         ndarray, shape (patches, 3)
             Mean signal in R, G, B in DN per second of exposure, in the middle of the lens.
         """
-        arrangement, lights = self._changer.arrangements.at(start_s), self._lights()
-        level = self._samples.level_at(start_s, lights, self._changer.arrangements)
-        glow_s = self._samples.glow(level, start_s, start_s + exposure_s, arrangement, lights)
+        arrangement, lights = self.arrangements.at(start_s), self._lights()
+        samples, layout = self._table(arrangement).samples, self._table(arrangement).layout
+        level = samples.level_at(start_s, lights, self.arrangements)
+        glow_s = samples.glow(level, start_s, start_s + exposure_s, arrangement, lights)
         electrons = self._curves.glow_electrons_per_s(glow_s / exposure_s, f_number)
         means = []
-        for number in range(1, len(self._simulation.patches) + 1):
-            cells = self._layout.patch == number
-            pixels = self._layout.pixels[cells]
+        for number in range(1, layout.patch.max() + 1):
+            cells = layout.patch == number
+            pixels = layout.pixels[cells]
             means.append(np.average(electrons[cells], axis=0, weights=pixels))
         return np.array(means) / gain_electrons_per_dn(iso)
 
@@ -361,14 +375,13 @@ class Room:
         start_s, exposure_s
             Begin and duration on the room's clock, in seconds; with the lamp off.
         """
-        arrangement, lights = self._changer.arrangements.at(start_s), self._lights()
-        level = self._samples.level_at(start_s, lights, self._changer.arrangements)
-        glow_s = self._samples.glow(level, start_s, start_s + exposure_s, arrangement, lights)
+        arrangement, lights = self.arrangements.at(start_s), self._lights()
+        samples, layout = self._table(arrangement).samples, self._table(arrangement).layout
+        level = samples.level_at(start_s, lights, self.arrangements)
+        glow_s = samples.glow(level, start_s, start_s + exposure_s, arrangement, lights)
         light = luminance_mcd_per_m2(glow_s / exposure_s, self._simulation.lamp)
-        cells = [self._layout.patch == n for n in range(1, len(self._simulation.patches) + 1)]
-        return np.array(
-            [np.average(light[cell], weights=self._layout.pixels[cell]) for cell in cells]
-        )
+        cells = [layout.patch == n for n in range(1, layout.patch.max() + 1)]
+        return np.array([np.average(light[cell], weights=layout.pixels[cell]) for cell in cells])
 
     def write_truth(self, path: Path) -> None:
         """Write `truth()` as a JSON file, next to a run, for tests."""
@@ -378,7 +391,7 @@ class Room:
         return FilteredLamps(
             self._circuit.lamp,
             self._circuit.mercury,
-            self._filters.history(self._changer.arrangements),
+            self._filters.history(self.arrangements),
             self._led_circuit.leds,
             self._illuminants,
         )
@@ -408,7 +421,8 @@ class Room:
         return np.random.default_rng([self._simulation.seed, *stream])
 
     def _freshen(self) -> None:
-        self._samples.freshen(self._clock.now(), self._lights(), self._changer.arrangements)
+        samples = self._table(self.arrangements.last).samples
+        samples.freshen(self._clock.now(), self._lights(), self.arrangements)
 
     def _electrons(
         self,
@@ -420,29 +434,31 @@ class Room:
         f_number: float,
     ) -> NDArray[np.float32]:
         """Return the expected electrons in the middle of the lens, shape (places, 3)."""
-        level = self._samples.level_at(start_s, lights, self._changer.arrangements)
-        glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
+        table = self._table(arrangement)
+        level = table.samples.level_at(start_s, lights, self.arrangements)
+        glow_s = table.samples.glow(level, start_s, end_s, arrangement, lights)
         opened = lights.openness((start_s + end_s) / 2)
-        radiance_s = self._view.radiance_s(arrangement, glow_s, reflected, opened)
+        radiance_s = table.view.radiance_s(arrangement, glow_s, reflected, opened)
         radiance_s *= self._filters.before_camera(arrangement)
         return self._curves.glow_electrons_per_s(radiance_s, f_number).astype(np.float32)
 
     def _shaded(
         self,
         light: NDArray[np.float32],
-        spheres: Spheres,
+        table: Table,
         arrangement: Arrangement,
         reflected: VisibleLight,
         f_number: float,
     ) -> NDArray[np.float32]:
         """Return the expected electrons of all pixels with the shading of the spheres."""
-        radiance_s = self._view.reradiated_s(arrangement, reflected)
+        assert table.spheres is not None
+        radiance_s = table.view.reradiated_s(arrangement, reflected)
         rgb = self._curves.glow_electrons_per_s(radiance_s, f_number)
-        painted = self._layout.places(arrangement).painted
+        painted = table.layout.places(arrangement).painted
         reradiated = rgb[:, BAYER_RGGB].reshape(-1)[painted]
         shaded: FloatArray = (
             light - reradiated
-        ) * spheres.reflected + reradiated * spheres.reradiated
+        ) * table.spheres.reflected + reradiated * table.spheres.reradiated
         return np.maximum(shaded, 0.0).astype(np.float32)
 
 

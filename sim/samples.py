@@ -8,22 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.material import Material, State, read_any_material
+from labrig.material import Albedo, Material, State, read_any_material
 
 from .arrangement import Arrangement, Arrangements
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .layout import Layout
 from .lights import Lights
 from .lvf import Lvf
-from .optics import REFLECTED, emission
+from .optics import CLOTH_REFLECTANCE, REFLECTED, emission
 from .phosphor import Light, Phosphor, phosphor
-from .simulation import Simulation
+from .simulation import EMPTY, Simulation
 from .temperature import rate_factor
 
 FloatArray = NDArray[np.float64]
 
 #: Unit of the lamp's mean spectral irradiance among the factors of an absolute scale.
 IRRADIANCE_UNIT = "W/m²/nm"
+#: What an empty holder is: black.
+NOTHING = Material(
+    name="nothing",
+    kind="phosphor",
+    bands_nm=(400.0, 700.0),
+    states=(State(k_r_per_s=1.0, reradiation=(0.0,)),),
+    albedo=Albedo(wavelength_nm=(400.0, 700.0), value=(CLOTH_REFLECTANCE,) * 2),
+)
 #: What a sample that does not glow is among those that do.
 DARK = Material(
     name="dark",
@@ -31,6 +39,22 @@ DARK = Material(
     bands_nm=(400.0, 700.0),
     states=(State(k_r_per_s=1.0, reradiation=(0.0,)),),
 )
+
+
+class NoLight:
+    """The light in a dark place; as `Light`."""
+
+    def corners(self, start_s: float, end_s: float) -> list[float]:
+        """Return no times: nothing changes."""
+        return []
+
+    def dark(self, start_s: float, end_s: float) -> bool:
+        """Return True: it never shines."""
+        return True
+
+    def irradiance(self, time_s: FloatArray) -> FloatArray:
+        """Return the relative spectral irradiance at every time, shape (times, wavelengths)."""
+        return np.zeros((len(time_s), len(WAVELENGTH_NM)))
 
 
 class Samples:
@@ -45,6 +69,10 @@ class Samples:
         Settings of the room.
     layout
         Layout of the picture into cells.
+    place
+        Place of the sample changer on which they lie, from 1 on; None without a changer.
+    leak
+        Light that reaches them while they are not in place, as a fraction.
 
     Attributes
     ----------
@@ -59,8 +87,18 @@ class Samples:
         Λ k_r of every state of the cells: its radiance at r = 1 (eq. 3).
     """
 
-    def __init__(self, simulation: Simulation, layout: Layout) -> None:
-        self.materials = [read_any_material(patch.material) for patch in simulation.patches]
+    def __init__(
+        self,
+        simulation: Simulation,
+        layout: Layout,
+        place: int | None = None,
+        leak: float = 0.0,
+    ) -> None:
+        self._place, self._leak = place, leak
+        self.materials = [
+            NOTHING if patch.material == EMPTY else read_any_material(patch.material)
+            for patch in simulation.patches
+        ]
         phosphors = [
             material if isinstance(material, Material) else DARK for material in self.materials
         ]
@@ -139,12 +177,16 @@ class Samples:
     ) -> tuple[FloatArray, FloatArray]:
         """Integrate over time on a bench that does not change; see `Phosphor.evolve`."""
         on_top = arrangement.card in ("grey card", "colorchecker") and not self._has_door
-        if arrangement.lvf == "on sample":
+        is_away = self._place is not None and arrangement.in_place != self._place
+        if arrangement.lvf == "on sample" and not is_away:
             level, states = self.of_cells(level), self._below(turned=arrangement.turned)
         else:
             are_patches = len(level) == len(self._patches.k_r_per_s)
             states = self._patches if are_patches else self.cells
-        if arrangement.card == "blank" or on_top:
+        if is_away:
+            states = replace(states, excitation=self._leak * states.excitation)
+            light = light if self._leak else NoLight()
+        elif arrangement.card == "blank" or on_top:
             states = replace(states, excitation=np.zeros_like(states.excitation))
         return states.evolve(level, start_s, end_s, light, visible)
 

@@ -38,6 +38,9 @@ RELAYS = 7
 #: Place of a single sample without a region.
 MIDDLE: Region = (0.1, 0.1, 0.8, 0.8)
 
+#: Material of a place without a sample: dark, and without a glow.
+EMPTY = "(no sample)"
+
 #: A level below 1: only infinite light would reach 1 itself.
 Charge = Annotated[float, Field(ge=0, lt=1)]
 
@@ -87,6 +90,55 @@ class Patch(Part):
     initial_charge: Charge | None = None
     kinetics: KineticsSettings | None = None
     prompt: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
+
+
+def _alone(sample: Any) -> Any:
+    return [{"material": sample}] if isinstance(sample, str) else sample
+
+
+#: Samples that lie side by side, or the name of a single material.
+Patches = Annotated[
+    tuple[Patch, ...],
+    BeforeValidator(_alone, json_schema_input_type=str | tuple[Patch, ...]),
+]
+
+
+class ChangerPlace(Part):
+    """A place of the sample changer.
+
+    Attributes
+    ----------
+    pulse
+        Length of the servo's pulse with this place in the light, for example `1300 us`.
+    sample
+        Samples on it: a list of patches, or the name of a single material.
+    """
+
+    pulse: Annotated[DurationS, Field(ge=64e-6, le=4080e-6)] = 1500e-6
+    sample: Annotated[Patches, Field(min_length=1)]
+
+
+class SampleChangerSettings(Part):
+    """A disk or slide with samples, one of which is in the light; all others lie in the dark.
+
+    Attributes
+    ----------
+    channel
+        Channel of the Maestro at `sim://room/servo` that moves it, counted from 0; null: the lines
+        `holder 1`, `holder 2`, … and `holder 0` at `sim://room/changer`, which answers `done`.
+    travel
+        Time that a turn takes, for example `1 s`; no sample is in the light meanwhile.
+    places
+        Places with samples. At any other pulse, and at `holder 0`, none is in the light.
+    leak
+        Light that reaches the samples that are not in place, as a fraction of that on the one that
+        is, for example `1 %`.
+    """
+
+    channel: Annotated[int, Field(ge=0, le=23)] | None = None
+    travel: Annotated[DurationS, Field(ge=0)] = 1.0
+    places: Annotated[tuple[ChangerPlace, ...], Field(min_length=1)]
+    leak: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
 
 
 class SensorSettings(Part):
@@ -200,10 +252,6 @@ class InitialState(Part):
     manual_steps: tuple[str, ...] = ()
 
 
-def _alone(sample: Any) -> Any:
-    return [{"material": sample}] if isinstance(sample, str) else sample
-
-
 class Simulation(Part):
     """A simulated dark room.
 
@@ -212,6 +260,8 @@ class Simulation(Part):
     sample
         Samples on the table: a list of patches, or the name of a single material, which then lies
         in the middle of the frame.
+    sample_changer
+        Sample changer, whose samples take the place of `sample`; null: none.
     initial_charge
         Concentration r that a long charge under this room's lamp reaches, 0 to 1, for patches that
         give none of their own.
@@ -308,11 +358,8 @@ class Simulation(Part):
         are always taken without it.
     """
 
-    sample: Annotated[
-        tuple[Patch, ...],
-        BeforeValidator(_alone, json_schema_input_type=str | tuple[Patch, ...]),
-        Field(min_length=1),
-    ]
+    sample: Patches = ()
+    sample_changer: SampleChangerSettings | None = None
     initial_charge: Charge | None = None
     sensor: SensorSettings = SensorSettings()
     camera: BodySettings = BodySettings()
@@ -352,6 +399,12 @@ class Simulation(Part):
     imaging: ImagingSettings = ImagingSettings()
     inter_reflection: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.0
     room_light: bool = True
+
+    @model_validator(mode="after")
+    def _samples_on_a_table_or_a_changer(self) -> Self:
+        if bool(self.sample) == (self.sample_changer is not None):
+            raise ValueError("expected at least 1 value in 'sample', or a 'sample_changer'")
+        return self
 
     @field_validator("faults")
     @classmethod
@@ -405,6 +458,22 @@ class Simulation(Part):
             self.epoch.timestamp()
             + sum(step.by for step in ahead if step.is_on(0.0))
             - sum(step.by for step in back if step.is_on(0.0))
+        )
+
+    def tables(self) -> tuple["Simulation", ...]:
+        """Return the room with the samples of each place of the changer; only itself without one.
+
+        The first has none of them in the light: an empty holder in the place of the first ones.
+        """
+        if self.sample_changer is None:
+            return (self,)
+        places = self.sample_changer.places
+        empty = tuple(
+            Patch(material=EMPTY, region=patch.region, brightness=1.0) for patch in places[0].sample
+        )
+        return tuple(
+            self.model_copy(update={"sample": sample, "sample_changer": None})
+            for sample in (empty, *(place.sample for place in places))
         )
 
     @property

@@ -26,7 +26,9 @@ SHIPPED = [
 ]
 #: Mappings whose keys are names that a person chooses, and a chain's parts: those are checked by
 #: their own protocols when the file is read.
-FREE = ("patches", "parts", "channels", "lamps", "fluorescence", "materials", "objects")
+FREE = (
+    "patches", "parts", "channels", "lamps", "fluorescence", "materials", "objects", "samples"
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -34,10 +34,14 @@ class MaestroSampleChanger(ServoSamples):
             `{blue-paint: 1100 us, green-paint: 1300 us}`.
         away
             Length of the servo's pulse with all samples in the dark, for example `1000 us`.
+        keeps_dark
+            Whether samples that are not in place lie in the dark, light-tight, while another one is
+            lit and photographed. Only then may one rest while another is measured.
         """
 
         samples: Mapping[str, PulseS] = Field(min_length=1)
         away: PulseS
+        keeps_dark: bool = False
 
         @model_validator(mode="after")
         def _different_pulses(self) -> Self:
@@ -46,3 +50,4 @@ class MaestroSampleChanger(ServoSamples):
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         super().__init__(address, settings, connections, settings.samples, settings.away)
+        self._keeps_dark = settings.keeps_dark

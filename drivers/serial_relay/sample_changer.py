@@ -33,10 +33,14 @@ class SerialSampleChanger(BoardSamples):
             the sample's name: `{blue-paint: {send: turn 2, answer: done}}`.
         away
             The same for the place where all samples are in the dark.
+        keeps_dark
+            Whether samples that are not in place lie in the dark, light-tight, while another one is
+            lit and photographed. Only then may one rest while another is measured.
         """
 
         samples: Mapping[str, Command] = Field(min_length=1)
         away: Command
+        keeps_dark: bool = False
 
         @field_validator("samples")
         @classmethod
@@ -45,3 +49,4 @@ class SerialSampleChanger(BoardSamples):
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         super().__init__(address, settings, connections, settings.samples, settings.away)
+        self._keeps_dark = settings.keeps_dark

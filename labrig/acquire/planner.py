@@ -145,6 +145,7 @@ class _PlanRecorder:
     overhead_s: float
     unit: str = ""
     steps: list[Step] = field(default_factory=list)
+    done: list[ActionRecord] = field(default_factory=list)
 
     def acted(
         self,
@@ -156,6 +157,8 @@ class _PlanRecorder:
         task: str = "",
     ) -> None:
         self._add(Step(start_s, self.unit, device, action), late_s)
+        begin, end = self.clock.wall(start_s), self.clock.wall(end_s)
+        self.done.append(ActionRecord(self.unit, device, action, begin, end, late_s, task))
 
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         action, exposure_s = f"{role} frame, {frame.settings}", frame.settings.exposure_s
@@ -184,6 +187,9 @@ class _PlanRecorder:
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         return ()
+
+    def all_actions(self, device: str) -> Sequence[ActionRecord]:
+        return [action for action in self.done if action.device == device]
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return worst

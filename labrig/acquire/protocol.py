@@ -89,6 +89,11 @@ class ProtocolModel(BaseModel):
             raise ValueError(f"expected keys, such as 'sample: {{name: blue-paint}}'{received}")
         return sample
 
+    @property
+    def sample_in_place(self) -> str | None:
+        """Name of the sample that is in place during the run; None if units bring their own."""
+        return self.sample.name
+
     @abstractmethod
     def units(self) -> Sequence[Unit]:
         """Return all units in order; they are determined before any device moves."""

@@ -132,13 +132,15 @@ def _run_remaining_units(
     frames = [frame for attempt in completed.values() for frame in attempt.frames]
     spectra = [spectrum for attempt in completed.values() for spectrum in attempt.spectra]
     actions = [action for attempt in completed.values() for action in attempt.actions]
+    # Of failed attempts, too: what moved or shone then did so all the same.
+    all_actions = [action for attempt in record.attempts for action in attempt.actions]
     lights = LightReadback(rig)
     for number, unit in enumerate(units, start=1):
         if unit.name in completed:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        recorder = _Recorder(rig.clock, writer, frames, spectra, actions, observer)
+        recorder = _Recorder(rig.clock, writer, frames, spectra, actions, all_actions, observer)
         session = Session(rig, recorder, observer, temperature, lights)
         try:
             with rig.clock.noticing_sleep():
@@ -163,6 +165,7 @@ class _Recorder:
         frames: Sequence[FrameRecord],
         spectra: Sequence[SpectrumRecord],
         actions: Sequence[ActionRecord],
+        all_actions: list[ActionRecord],
         observer: RunObserver,
     ) -> None:
         self._clock = clock
@@ -171,6 +174,7 @@ class _Recorder:
         self.kept_frames = list(frames)
         self.kept_spectra = list(spectra)
         self.kept_actions = list(actions)
+        self._all_actions = all_actions
 
     def acted(
         self,
@@ -186,6 +190,7 @@ class _Recorder:
         self._writer.action(record)
         _logger.info("%s: %s", device, action)
         self.kept_actions.append(record)
+        self._all_actions.append(record)
 
     def temperature(self, celsius: float, at_s: float) -> None:
         self._writer.temperature(
@@ -240,6 +245,9 @@ class _Recorder:
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self.kept_actions if action.device == device]
+
+    def all_actions(self, device: str) -> Sequence[ActionRecord]:
+        return [action for action in self._all_actions if action.device == device]
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return decide()

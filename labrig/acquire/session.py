@@ -14,7 +14,11 @@ from labrig.acquire.rig import Rig, device_errors
 from labrig.acquire.roles import (
     CAMERA,
     CHANGER,
+    LAMP,
+    LAMP_OFF,
+    SAMPLE_CHANGER,
     SPECTROMETER,
+    BringSample,
     Guarded,
     KeptAwake,
     ReadSpectrum,
@@ -77,6 +81,9 @@ class Recorder(Protocol):
     def actions(self, device: str) -> Sequence[ActionRecord]:
         """Return the actions of a device, those of completed units before those of this one."""
 
+    def all_actions(self, device: str) -> Sequence[ActionRecord]:
+        """Return the actions of a device in order of time, those of failed attempts included."""
+
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """Return `decide()` on a bench; `worst` in a plan, which has no data to decide on."""
 
@@ -124,6 +131,9 @@ class Session:
         Log of the thermometer, shared by all units of a run; None for one of this unit's own.
     lights
         Read-back of the lights, shared by all units of a run; None for one of this unit's own.
+    dark_since_s
+        Time on the rig's clock in seconds since when the sample has been in the dark on the sample
+        changer; None if it was not taken away.
     """
 
     def __init__(
@@ -133,12 +143,14 @@ class Session:
         observer: Observer,
         temperature: TemperatureLog | None = None,
         lights: LightReadback | None = None,
+        dark_since_s: float | None = None,
     ) -> None:
         self.rig = rig
         self._recorder = recorder
         self._observer = observer
         self._temperature = temperature or TemperatureLog(rig, observer.warn)
         self._lights = lights or LightReadback(rig)
+        self._dark_since_s = dark_since_s
         self._settings_in_force: ExposureSettings | None = None
         self._heartbeat_s = rig.clock.now()
 
@@ -158,6 +170,59 @@ class Session:
         left_s = self.rig.connected_s + self.rig.warm_up_s(key) - self.clock.now()
         if left_s > 0:
             self.wait(left_s, f"warming up the {key}")
+
+    def bring(self, sample: str | None) -> None:
+        """Bring a sample of the changer into place, with the lamp off; all others lie in the dark.
+
+        Where a changer keeps samples in the dark, `rest` counts the time since it took this one
+        away.
+
+        Parameters
+        ----------
+        sample
+            Name of the sample on the changer; None for all of them in the dark. A lamp burns on if
+            they are there already.
+
+        Raises
+        ------
+        ProtocolError
+            The rig has no sample changer, or the changer has no such sample.
+        """
+        changer, action = self.rig[SAMPLE_CHANGER], BringSample(sample)
+        turns = self._recorder.all_actions(action.device)
+        self._dark_since_s = None
+        if sample is None and not self._is_any_in_place(turns):
+            return
+        if LAMP in self.rig and self.rig[LAMP].is_on():
+            self.perform(LAMP_OFF)
+        if changer.keeps_dark():
+            in_place = [n for n, turn in enumerate(turns) if turn.action == str(action)]
+            # A sample that nothing was put in place of was in place up to now, or up to the crash.
+            if in_place and in_place[-1] + 1 < len(turns):
+                taken_away = turns[in_place[-1] + 1].start_time
+                self._dark_since_s = taken_away - self.clock.wall(0.0)
+        self.perform(action)
+
+    def _is_any_in_place(self, turns: Sequence[ActionRecord]) -> bool:
+        """Return whether a sample may be in place: when devices are connected, none is."""
+        since = self.clock.wall(self.rig.connected_s)
+        here = [turn.action for turn in turns if turn.start_time >= since]
+        return bool(here) and here[-1] != str(BringSample(None))
+
+    def rest(self, duration_s: float) -> None:
+        """Wait until the sample has rested in the dark for `duration_s` seconds.
+
+        Time on the sample changer counts, and is recorded; else the rest begins now.
+        """
+        now_s = self.clock.now()
+        since_s = now_s if self._dark_since_s is None else min(self._dark_since_s, now_s)
+        left_s = since_s + duration_s - now_s
+        if left_s > 0:
+            self.wait(left_s, "resting in the dark")
+        if self._dark_since_s is not None:
+            now_s = self.clock.now()
+            text = f"in the dark for {now_s - since_s:.1f} s"
+            self._recorder.acted("protocol", text, now_s, now_s, 0.0)
 
     def perform(self, action: Action) -> None:
         """Perform one action now."""
@@ -249,7 +314,14 @@ class Session:
     def within(self, part: str) -> "Session":
         """Return a session for a unit of one part of a chain, which shows that part's frames."""
         recorder = _PartRecorder(self._recorder, part)
-        return Session(self.rig, recorder, self._observer, self._temperature, self._lights)
+        return Session(
+            self.rig,
+            recorder,
+            self._observer,
+            self._temperature,
+            self._lights,
+            self._dark_since_s,
+        )
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """Make and record a choice that depends on frames already taken; the plan assumes `worst`.
@@ -368,6 +440,7 @@ class _PartRecorder:
         self.spectrum = recorder.spectrum
         self.temperature = recorder.temperature
         self.last_manual_step = recorder.last_manual_step
+        self.all_actions = recorder.all_actions
         self.choose = recorder.choose
         self._recorder = recorder
         self._part = part

@@ -27,7 +27,7 @@ def analyse(part: Part) -> CalibrationResult:
     return CalibrationResult(
         parts=analysed.results,
         failed=analysed.failed,
-        reference=_reference(part, analysed.inputs.lvf, set(analysed.results)),
+        reference=_reference(part, analysed.inputs[""].lvf, set(analysed.results)),
         warnings=analysed.warnings,
     )
 

@@ -20,19 +20,22 @@ class AnalysedParts:
     failed
         Reason why a part could not be analysed, by its name.
     inputs
-        Calibrations and results after the last part.
+        Calibrations and results after the last part, by the sample; those of the bench, and of the
+        only sample, under "".
     warnings
         Warnings of all parts, with their names.
     """
 
     results: Mapping[str, RunResult]
     failed: Mapping[str, str]
-    inputs: Inputs
+    inputs: Mapping[str, Inputs]
     warnings: tuple[str, ...]
 
 
 def analyse_parts(part: Part) -> AnalysedParts:
     """Analyse every part of a chain; each may use the results of earlier ones.
+
+    Those of one sample do not use the results of another.
 
     A part that cannot be analysed is a warning, as long as another one can.
 
@@ -44,11 +47,19 @@ def analyse_parts(part: Part) -> AnalysedParts:
     results: dict[str, RunResult] = {}
     failures: dict[str, DataError | FitError] = {}
     warnings: list[str] = []
-    inputs = part.inputs
+    inputs = {"": part.inputs}
     for link in part.protocol.chain():
         kind = link.protocol.protocol
         analyse_link = plugins.load(plugins.ANALYSES, kind, str(part.run.folder))
-        link_part = Part(part.run.part(link.name), link.protocol, part.rig, part.overrides, inputs)
+        known = inputs.get(link.sample, inputs[""])
+        link_part = Part(
+            part.run.part(link.name),
+            link.protocol,
+            part.rig,
+            part.overrides,
+            known,
+            part.run.beside(link.name) if link.sample else None,
+        )
         try:
             result: RunResult = analyse_link(link_part)
             if result.failures():
@@ -59,7 +70,7 @@ def analyse_parts(part: Part) -> AnalysedParts:
             continue
         results[link.name] = result
         warnings += [f"{link.name}: {warning}" for warning in result.warnings]
-        inputs = inputs.updated_by(result)
+        inputs[link.sample] = known.updated_by(result)
     if not results:
         raise next(iter(failures.values()))
     failed = {name: str(error) for name, error in failures.items()}

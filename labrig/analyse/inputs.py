@@ -113,6 +113,8 @@ class Part:
         The user's settings.
     inputs
         Calibrations that the rig file names, and results of earlier parts of a chain.
+    beside
+        Record of the other parts' units, where samples took turns: the lamp burned for them, too.
     """
 
     run: RunRecord
@@ -120,3 +122,4 @@ class Part:
     rig: RigFile
     overrides: Overrides
     inputs: Inputs
+    beside: RunRecord | None = None

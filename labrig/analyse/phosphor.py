@@ -1,8 +1,11 @@
 """Analysis of a chain of protocols, to the results of its parts and the materials from them."""
 
+from collections.abc import Mapping
+
 from labrig.analyse.chain import analyse_parts
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.surface import with_reflectances
+from labrig.material import Material
 from labrig.results import PhosphorResult
 
 
@@ -18,6 +21,15 @@ def analyse(part: Part) -> PhosphorResult:
     return PhosphorResult(
         parts=analysed.results,
         failed=analysed.failed,
-        materials=with_reflectances(analysed.inputs.materials, analysed.inputs.reflectance),
+        materials=_materials(analysed.inputs),
         warnings=analysed.warnings,
     )
+
+
+def _materials(inputs: Mapping[str, Inputs]) -> dict[str, Material]:
+    """Return the materials by patch, or by sample."""
+    return {
+        sample or patch: material
+        for sample, known in inputs.items()
+        for patch, material in with_reflectances(known.materials, known.reflectance).items()
+    }

@@ -110,7 +110,7 @@ def execute(
             _refuse_what_spoils(rig)
             if CAMERA in rig:
                 _refuse_what_the_camera_cannot(rig[CAMERA], protocol, folder, bench)
-            _place_sample(protocol.sample.name, rig, observer)
+            _place_sample(protocol.sample_in_place, rig, observer)
             devices = rig.identities()
             require_calibrated_camera(bench.file, devices)
             _arrange_again(manual_actions, rig, observer)
@@ -245,9 +245,9 @@ def _not_used(protocol: ProtocolModel, bench: Bench, laid_out: Plan) -> frozense
     return frozenset({key}) if without.steps == laid_out.steps else frozenset()
 
 
-def _place_sample(name: str, rig: Rig, observer: RunObserver) -> None:
+def _place_sample(name: str | None, rig: Rig, observer: RunObserver) -> None:
     """Have the sample changer bring the run's sample, or all of its samples into the dark."""
-    if SAMPLE_CHANGER not in rig:
+    if SAMPLE_CHANGER not in rig or name is None:  # the safe state is that all are in the dark
         return
     changer = rig[SAMPLE_CHANGER]
     samples = changer.samples()

@@ -41,6 +41,11 @@ class _PlannedUnit:
         return self.name.rpartition("/")[0]
 
     @property
+    def kind_of_part(self) -> str:
+        """Name of the part without that of its sample."""
+        return self.part.rpartition("/")[2]
+
+    @property
     def own_name(self) -> str:
         """Name of the unit within its part."""
         return self.name.rpartition("/")[2]
@@ -93,7 +98,7 @@ def folded_units(plan: Plan) -> Iterator[str]:
 def _unit_lines(plan: Plan) -> Iterator[str]:
     yield f"  {'begins':>9}  {'lasts':>11}  unit"
     part = ""
-    for _, alike in groupby(_units(plan), key=lambda unit: unit.kind):
+    for _, alike in groupby(_rounds(_units(plan)), key=lambda unit: unit.kind):
         units = list(alike)
         if units[0].part != part:
             part = units[0].part
@@ -116,6 +121,19 @@ def _units(plan: Plan) -> Iterator[_PlannedUnit]:
     for name, ends_s in zip(plan.units, plan.unit_ends_s, strict=True):
         yield _PlannedUnit(name, begins_s, ends_s, steps.get(name, ()))
         begins_s = ends_s
+
+
+def _rounds(units: Iterator[_PlannedUnit]) -> Iterator[_PlannedUnit]:
+    """Yield units with those as one that samples have in turn: one unit of each sample."""
+    for _, in_turn in groupby(units, key=lambda unit: (unit.kind_of_part, unit.own_name)):
+        first, *others = in_turn
+        if not others:
+            yield first
+            continue
+        samples = [unit.part.rpartition("/")[0] for unit in (first, *others)]
+        part = f"{first.kind_of_part} of {', '.join(samples)} in turn"
+        steps = [step for unit in (first, *others) for step in unit.steps]
+        yield _PlannedUnit(f"{part}/{first.own_name}", first.begins_s, others[-1].ends_s, steps)
 
 
 def _names(units: Sequence[_PlannedUnit]) -> str:

@@ -281,9 +281,17 @@ def _decay(folder: Path, result: RunResult) -> tuple[RunRecord, DecayResult]:
     if isinstance(result, DecayResult):
         return run, result
     if isinstance(result, PhosphorResult):
-        for name, part in result.parts.items():
-            if isinstance(part, DecayResult):
-                return run.part(name), part
+        decays = {
+            name: part for name, part in result.parts.items() if isinstance(part, DecayResult)
+        }
+        samples = sorted({name.rpartition("/")[0] for name in decays})
+        if len(samples) > 1:
+            raise DataError(
+                f"{folder}: expected a run of one sample, got {', '.join(samples)}; the glow of "
+                "several samples in turn is not rendered"
+            )
+        for name, part in decays.items():
+            return run.part(name), part
     raise DataError(
         f"{folder}: expected a run with a decay, got none; the glow of other runs is not rendered"
     )

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -80,14 +81,26 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
             f"{run}: expected a result with the fit of a decay, got none; make one: "
             f"labrig process {run}"
         )
-    sample = read_yaml(run / "protocol.yaml").get("sample")
+    protocol, result = read_yaml(run / "protocol.yaml"), run / "result"
+    sample, samples = protocol.get("sample"), _sample_names(protocol)
     only = sample.get("name") if isinstance(sample, dict) and len(folders) == 1 else None
-    several = len(folders) > 1
-    patches = [
-        _read_patch(folder, only, run / "result" / (folder.name if several else ""))
-        for folder in folders
-    ]
+    patches = []
+    for folder in folders:
+        of_sample = folder.relative_to(result).parts[:1]
+        if set(of_sample) & samples:
+            patches.append(_read_patch(folder, of_sample[0], result / of_sample[0]))
+        else:
+            chain_folder = result / (folder.name if len(folders) > 1 else "")
+            patches.append(_read_patch(folder, only, chain_folder))
     return {patch.name: patch for patch in patches}
+
+
+def _sample_names(protocol: Mapping[str, Any]) -> set[str]:
+    """Return the names of samples that a changer brought in turn; empty of all other runs."""
+    samples = protocol.get("samples")
+    if not isinstance(samples, list):
+        return set()
+    return {str(sample["name"]) for sample in samples if isinstance(sample, dict)}
 
 
 def _read_patch(folder: Path, name: str | None, chain_folder: Path) -> MeasuredPatch:

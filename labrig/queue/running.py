@@ -106,8 +106,9 @@ def _recorded(path: Path, runs: Path, entry: QueueEntry, before: str, attendant:
     """Record a measurement, or what is missing of it, and return the run folder."""
     if entry.summary is None:
         recording = _prepared(path, entry, attendant)
-        sample = recording.protocol.sample.name
-        if before and sample != before and sample not in _on_changer(recording):
+        sample = recording.protocol.sample_in_place
+        is_brought = sample is None or sample in _on_changer(recording)
+        if before and sample is not None and sample != before and not is_brought:
             attendant.change_sample(before, sample)
         return recording.record(
             attendant.watch(recording.rig), lambda folder: _note(path, entry, folder.name)

@@ -127,6 +127,15 @@ class RunRecord:
         attempts = [_attempt_within(name, attempt) for attempt in self.completed().values()]
         return replace(self, attempts=[attempt for attempt in attempts if attempt is not None])
 
+    def beside(self, name: str) -> "RunRecord":
+        """Return the completed units of all other parts of a chain, by their whole names."""
+        attempts = [
+            attempt
+            for attempt in self.completed().values()
+            if unit_within(name, attempt.unit) is None
+        ]
+        return replace(self, attempts=attempts)
+
     def frames(self, role: str) -> list[FrameRecord]:
         """Return the frames with a given role in completed units."""
         return [

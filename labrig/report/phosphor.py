@@ -120,10 +120,18 @@ def _first_glow(
 
 
 def _decays(result: PhosphorResult) -> dict[str, DecayPatch]:
-    """Return the patches of the last decay in the chain that have a fit, by name."""
-    decays = [part for part in result.parts.values() if isinstance(part, DecayResult)]
-    patches = decays[-1].patches if decays else {}
-    return {name: patch for name, patch in patches.items() if patch.fit is not None}
+    """Return the patches of each sample's last decay that have a fit, by name."""
+    decays = {
+        name.rpartition("/")[0]: part
+        for name, part in result.parts.items()
+        if isinstance(part, DecayResult)
+    }
+    return {
+        sample or name: patch
+        for sample, decay in decays.items()
+        for name, patch in decay.patches.items()
+        if patch.fit is not None
+    }
 
 
 def _patch_suffix(patch: str, result: PhosphorResult) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -599,7 +600,8 @@ def find_fitted_decays(folder: Path) -> dict[str, Path]:
     -------
     dict of str to Path
         Path of each `fit.json` by the name of the patch's folder. A run with one patch has its fit
-        in the result folder itself, under the name "".
+        in the result folder itself, under the name "". Folders of one name, as of several samples,
+        have their whole path in the result folder instead, such as `blue-paint/decay`.
 
     Examples
     --------
@@ -609,10 +611,13 @@ def find_fitted_decays(folder: Path) -> dict[str, Path]:
     ...     print(repr(name), path.as_posix())
     '' runs/decay/result/fit.json
     """
-    return {
-        path.parent.name if path.parent != folder else "": path
-        for path in sorted(folder.rglob(FILE))
-    }
+    paths = sorted(folder.rglob(FILE))
+    names = Counter(path.parent.name for path in paths)
+    found = {}
+    for path in paths:
+        place = path.parent.relative_to(folder).as_posix().removeprefix(".")
+        found[place if names[path.parent.name] > 1 else place.rpartition("/")[2]] = path
+    return found
 
 
 def read_fitted_decays(folder: Path) -> dict[str, FittedDecay]:

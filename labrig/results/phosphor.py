@@ -21,7 +21,7 @@ class PhosphorResult(RunResult):
     failed
         Reason why a part could not be analysed, by its name.
     materials
-        Material of each patch by its name; that of the only one under "".
+        Material of each patch, or of each sample, by its name; that of the only one under "".
 
     Examples
     --------
@@ -48,7 +48,7 @@ class PhosphorResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write the files of every part into a folder of its name, and the material files."""
         for name, part in self.parts.items():
-            (folder / name).mkdir(exist_ok=True)
+            (folder / name).mkdir(parents=True, exist_ok=True)
             part.write_files(folder / name)
         for patch, material in self.materials.items():
             (folder / patch).mkdir(exist_ok=True)

@@ -6,8 +6,8 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from labrig import plugins
-from labrig.acquire import PartUnit, ProtocolModel, RigFile
-from labrig.record import unit_within
+from labrig.acquire import PartUnit, ProtocolModel, RigFile, Sample
+from labrig.record import unit_in, unit_within
 from labrig.region import Region
 from labrig.yaml_file import validate
 
@@ -28,7 +28,7 @@ class Chain(ProtocolModel):
 
     @model_validator(mode="after")
     def _parts_that_can_be_told_apart(self) -> Self:
-        names = [part.name for part in self.chain()]
+        names = [part.name for part in self._links()]
         if len(set(names)) < len(names):
             raise ValueError(
                 f"expected every protocol once in 'parts', got {', '.join(names)}; give one of "
@@ -38,6 +38,10 @@ class Chain(ProtocolModel):
 
     def chain(self) -> tuple["Part", ...]:
         """Return the protocols in order, each with the sample of the chain."""
+        return self._links()
+
+    def _links(self) -> tuple["Part", ...]:
+        """Return a protocol for each entry of `parts`, in order."""
         return tuple(Part.read(self._part_keys(content), self.protocol) for content in self.parts)
 
     def _part_keys(self, content: Mapping[str, Any]) -> dict[str, Any]:
@@ -69,7 +73,7 @@ class Chain(ProtocolModel):
         """Return the chain with the keys filled in that its parts leave to the rig file."""
         parts = [
             content | _changed(part.protocol, part.protocol.suited_to(rig))
-            for content, part in zip(self.parts, self.chain(), strict=True)
+            for content, part in zip(self.parts, self._links(), strict=True)
         ]
         return self.model_copy(update={"parts": tuple(parts)})
 
@@ -84,11 +88,27 @@ class Chain(ProtocolModel):
 
 
 class Part:
-    """One protocol of a chain."""
+    """One protocol of a chain.
 
-    def __init__(self, name: str, protocol: ProtocolModel) -> None:
+    Attributes
+    ----------
+    name
+        Name of the part in the chain, which its units begin with.
+    protocol
+        Model of the protocol.
+    sample
+        Name of the sample that alone it measures; empty for the only one, and for the bench.
+    """
+
+    def __init__(self, name: str, protocol: ProtocolModel, sample: str = "") -> None:
         self.name = name
         self.protocol = protocol
+        self.sample = sample
+
+    def of_sample(self, sample: Sample) -> "Part":
+        """Return the part for one of several samples, which its name begins with."""
+        protocol = self.protocol.model_copy(update={"sample": sample})
+        return Part(unit_in(sample.name, self.name), protocol, sample.name)
 
     @classmethod
     def read(cls, content: Mapping[str, Any], chain: str) -> Self:

@@ -52,7 +52,14 @@ def _folders(patches: dict[str, Region]) -> dict[str, Region]:
     return patches
 
 
-def _sample_folders(names: tuple[str, ...]) -> tuple[str, ...]:
+def sample_folders(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Refuse names of samples that are no folders, or are given twice.
+
+    Raises
+    ------
+    ValueError
+        A name is no folder on every disk, or two names are of the same folder.
+    """
     if len(set(names)) < len(names):
         raise ValueError(f"expected every sample once, got {', '.join(names)}")
     _folders(dict.fromkeys(names, (0.0, 0.0, 1.0, 1.0)))
@@ -90,4 +97,4 @@ FilterPatches = Annotated[
 ]
 
 #: Names of samples that are measured one after another.
-SampleNames = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_sample_folders)]
+SampleNames = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(sample_folders)]

@@ -217,12 +217,25 @@ def _thing_of(task: str) -> str | None:
 
 @dataclass(frozen=True)
 class Arranged:
-    """A unit that needs another arrangement of the bench than the unit before it."""
+    """A unit that needs another arrangement of the bench than the unit before it.
+
+    Attributes
+    ----------
+    unit
+        Unit that is run in the arrangement.
+    now, before
+        Its arrangement, and that of the unit before it.
+    why
+        Reason for the arrangement, for the person.
+    goes_dark
+        Whether the lamp that the unit before has left burning is switched off first.
+    """
 
     unit: Unit
     now: Arrangement
     before: Arrangement
     why: str
+    goes_dark: bool = False
 
     @property
     def name(self) -> str:
@@ -231,6 +244,8 @@ class Arranged:
 
     def run(self, session: Session) -> None:
         """Ask for the arrangement, then run the unit."""
+        if self.goes_dark and session.rig[LAMP].is_on():
+            session.perform(LAMP_OFF)
         self.now.set_up(session, self.before, self.why)
         self.unit.run(session)
 
@@ -249,12 +264,19 @@ class Scene:
         Reason for the arrangement, for the person.
     is_dark
         Whether it takes dark frames only, for which any arrangement without a glow will do.
+    rests
+        Whether the sample rests in the dark before it is charged, so that others may be measured
+        meanwhile.
+    leaves_lamp_on
+        Whether the unit leaves the lamp burning, warm for another one that does so.
     """
 
     unit: Unit
     arrangement: Arrangement
     why: str
     is_dark: bool = False
+    rests: bool = False
+    leaves_lamp_on: bool = False
 
     def of_part(self, part: str) -> "Scene":
         """Return the scene as one of a part of a chain."""
@@ -264,10 +286,11 @@ class Scene:
 def in_turn(scenes: Sequence[Scene]) -> list[Unit]:
     """Return the units of scenes, each asking for what changes, and at last the bench put back."""
     units: list[Unit] = []
-    before = Arrangement()
+    before, burns = Arrangement(), False
     for scene in scenes:
-        units.append(Arranged(scene.unit, scene.arrangement, before, scene.why))
-        before = scene.arrangement
+        goes_dark = burns and not scene.leaves_lamp_on
+        units.append(Arranged(scene.unit, scene.arrangement, before, scene.why, goes_dark))
+        before, burns = scene.arrangement, scene.leaves_lamp_on
     return units if before == Arrangement() else [*units, PutBackUnit(before)]
 
 

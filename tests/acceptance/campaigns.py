@@ -111,10 +111,14 @@ CAMPAIGNS = {
         _module("excitation_rates", "--seeds", "40"),
         _module("whole_phosphor"),
         _module("reused_calibration"),
+        _module("samples_in_turn"),
         _module("lvf_in_the_room", "--width", "402", "--seeds", "3"),
         _module("spectrum_through_lvf", "40"),
         _module("spectrum_lines", "8"),
         _module("emission_spectra", "3"),
+        _module("camera_filters"),
+        _module("selected_lights"),
+        _module("leds_by_camera", "--seeds", "24"),
         _module("decays_of_all_materials", "--sensor", "384x256"),
         _module("rate_information"),
         *(_module("manual_examples", page, called=f"manual_{page}") for page in EXAMPLES),
@@ -122,7 +126,9 @@ CAMPAIGNS = {
         _module("veiling_glare"),
         _module("luminance_pulls", "--seeds", "50"),
         _module("camera_curves"),
+        _module("luminance_budget"),
         _module("law_confusion", "--seeds", "100"),
+        _module("unequal_filling", "--seeds", "40"),
         *(
             _module(
                 "coverage_table_sigma", "--broken", "--seeds", "60", "--only", only, called=name

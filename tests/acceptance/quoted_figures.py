@@ -2,7 +2,12 @@
 
 import re
 
-from tests.acceptance import quoted_decay_fit, quoted_examples, quoted_rendering
+from tests.acceptance import (
+    quoted_decay_fit,
+    quoted_examples,
+    quoted_rendering,
+    quoted_samples,
+)
 from tests.acceptance.printed import Extract, columns, match, part, span
 from tests.acceptance.quote import DECISIONS, EXPLANATION, HOW_TO, Quote
 
@@ -259,6 +264,7 @@ QUOTES = (
     *quoted_examples.QUOTES,
     *quoted_decay_fit.QUOTES,
     *quoted_rendering.QUOTES,
+    *quoted_samples.QUOTES,
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _charging),
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _two_rates),
     Quote(f"{EXPLANATION}/identifiability.md", "coverage_pipeline", _of_bound),

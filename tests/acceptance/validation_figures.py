@@ -501,6 +501,16 @@ FIGURES = (
         _phosphor_sigma,
     ),
     Figure(
+        "Eight phosphors of a sample changer measured in turn in one run, with one calibration",
+        "samples_in_turn",
+        _phosphor,
+    ),
+    Figure(
+        "Same run: rms of error over σ (1 if σ is right)",
+        "samples_in_turn",
+        _phosphor_sigma,
+    ),
+    Figure(
         "Same bench, frames of a 21-megapixel camera: what each further sample takes",
         "reused_calibration",
         _each_sample,

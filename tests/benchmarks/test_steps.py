@@ -120,6 +120,9 @@ class NothingRecorded:
     def actions(self, device: str) -> Sequence[ActionRecord]:
         return ()
 
+    def all_actions(self, device: str) -> Sequence[ActionRecord]:
+        return ()
+
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return worst
 

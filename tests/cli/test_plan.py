@@ -115,6 +115,20 @@ def test_planned_devices_take_the_time_of_their_driver() -> None:
     assert list(planned_rig(rig, "rig", ("lamp",)).devices) == ["lamp"]
 
 
+def test_units_that_samples_have_in_turn_are_one_line(labrig: Labrig, tmp_path: Path) -> None:
+    path = tmp_path / "turns.yaml"
+    parts = [{"protocol": "excitation", "at_most": 3, "refine": 0, "direct": ["3 s", "1 min"]}]
+    samples = {"samples": ["blue-paint", "green-paint"]}
+    path.write_text(write_quickly({"protocol": "phosphor", **samples, "parts": parts}))
+    folded = labrig("plan", path, "--rig", "sim-samples").out
+    assert folded.count("excitation of blue-paint, green-paint in turn") == 1
+    assert "3 × strip-1 … strip-3: " in folded
+    laid_out = json.loads(labrig("plan", path, "--rig", "sim-samples", "--json").out)
+    counted = sum(int(n) for n in re.findall(r"(\d+)\s+(?:[\w-]+)\s+frames?\s+of", folded))
+    assert counted == laid_out["frames"]
+    assert len([unit for unit in laid_out["units"] if "/strip-" in unit]) == 2 * (1 + 3)
+
+
 def test_repeats_are_folded_and_nothing_is_lost(
     labrig: Labrig, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -102,6 +102,24 @@ def test_hands_move_as_little_as_they_can_and_put_all_back(tmp_path: Path) -> No
     assert [unit for unit, _ in steps] == ["meter-weaker", "meter-full"]
 
 
+def test_the_lamp_warms_up_once_for_the_card_in_all_filters_and_is_off_for_the_sample(
+    tmp_path: Path,
+) -> None:
+    filters = {"filters": ["bandpass-450", "bandpass-500", "bandpass-550", "longpass-660"]}
+    laid_out = planned(
+        written(tmp_path, protocol="emission_spectrum", select=filters), "sim-phosphor"
+    )
+    white = [step for step in laid_out.steps if step.unit.startswith("white-")]
+    assert len({step.unit for step in white}) == 5
+    assert [step.action for step in white if step.device == "lamp"] == ["on"]
+    assert sum(step.lasts_s for step in white if step.lasts_s) == pytest.approx(900.0, abs=5.0)
+    is_on = False
+    for step in laid_out.steps:
+        if step.device == "lamp":
+            is_on = step.action == "on"
+        assert not (is_on and step.action.startswith(("dark frame", "take the card away")))
+
+
 def test_a_run_that_had_no_disk_left_goes_on_where_it_was(tmp_path: Path) -> None:
     """The bench is as it was left: the filter is still before the camera."""
     keys = {"protocol": "emission_spectrum", "charge": "1 min", "times": ["2 s", "10 s"],

@@ -61,7 +61,7 @@ from labrig.acquire.roles.role import (
     Role,
     Suggestion,
 )
-from labrig.acquire.roles.sample_changer import SAMPLE_CHANGER, SampleChanger
+from labrig.acquire.roles.sample_changer import SAMPLE_CHANGER, BringSample, SampleChanger
 from labrig.acquire.roles.spectrometer import (
     SPECTROMETER,
     ReadSpectrum,
@@ -122,6 +122,7 @@ __all__ = [
     "SPECTROMETER",
     "THERMOMETER",
     "VIEWFINDER",
+    "BringSample",
     "Camera",
     "Changer",
     "Checkable",

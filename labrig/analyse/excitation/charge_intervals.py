@@ -78,7 +78,11 @@ class ChargeFrames:
 
 
 def charge_frames(
-    run: RunRecord, overrides: Overrides, time_constant_s: float, blank: BlankFile | None = None
+    run: RunRecord,
+    overrides: Overrides,
+    time_constant_s: float,
+    blank: BlankFile | None = None,
+    beside: RunRecord | None = None,
 ) -> ChargeFrames:
     """Return a run's charges and photographs, without those before its blank is clean.
 
@@ -92,6 +96,8 @@ def charge_frames(
         Time constant in seconds with which the lamp's housing warms and cools.
     blank
         Stray light of the bench; None if it was not measured.
+    beside
+        Record of other units, for which the lamp burned meanwhile; None if there are none.
 
     Raises
     ------
@@ -99,15 +105,17 @@ def charge_frames(
         There are no charges through the filter, or none without it, or no photographs; or the blank
         never became dark.
     """
-    units = (_interval(attempt) for attempt in run.completed().values())
-    charges = sorted(
-        (interval for interval in units if interval is not None), key=lambda interval: interval.on_s
+    charges = _intervals(run)
+    own_units = {interval.unit for interval in charges}
+    burned = [] if beside is None else _intervals(beside)
+    by_lamp = sorted(
+        (interval for interval in (*charges, *burned) if not interval.is_led), key=_begin
     )
-    by_lamp = [interval for interval in charges if not interval.is_led]
+    warmed = [
+        interval for interval in with_warmth(by_lamp, time_constant_s) if interval.unit in own_units
+    ]
     by_leds = [interval for interval in charges if interval.is_led]
-    intervals = sorted(
-        [*with_warmth(by_lamp, time_constant_s), *by_leds], key=lambda interval: interval.on_s
-    )
+    intervals = sorted([*warmed, *by_leds], key=_begin)
     frames = [
         frame for role in GLOWING for frame in run.frames(role) if not overrides.excludes(frame)
     ]
@@ -123,6 +131,15 @@ def charge_frames(
             f"with: labrig resume {run.folder}"
         )
     return ChargeFrames(intervals, charge_of, left_out)
+
+
+def _intervals(run: RunRecord) -> list[ChargeInterval]:
+    units = (_interval(attempt) for attempt in run.completed().values())
+    return sorted((interval for interval in units if interval is not None), key=_begin)
+
+
+def _begin(interval: ChargeInterval) -> float:
+    return interval.on_s
 
 
 def _without_stray_light(

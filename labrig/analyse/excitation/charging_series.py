@@ -73,7 +73,7 @@ def patch_chargings(
         The irradiance is that of selected lights and the run's charges went through the filter.
     """
     inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
-    frames = charge_frames(part.run, overrides, warming.time_constant_s, inputs.blank)
+    frames = charge_frames(part.run, overrides, warming.time_constant_s, inputs.blank, part.beside)
     require_calibrated_camera(inputs.camera, part.run, list(frames.charge_of))
     layout = sensor_layout(next(iter(frames.charge_of)))
     if protocol.select is None:
