@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.analyse.fade.change import FittedChange
-from labrig.analyse.fade.fit import ANY_LAG, fit_change
+from labrig.analyse.fade.fit import fit_change
 from labrig.analyse.fade.frames import (
     brightest_channels,
     frames_after_switch,
@@ -36,8 +36,6 @@ STEP_NM = 10.0
 TIMES, DENSER = 81, 1.5
 GONE = 1e-4
 LONGEST_S = 5.0
-#: Standard deviation in seconds between the delays of a relay's closing and opening.
-RELAY_S = 1e-3
 #: Error of the camera's curves: those of another camera of its model.
 CURVES = CurveError(added=0.02)
 #: χ² per degree of freedom beyond which the lamp is no black-body emitter, and by how many of its
@@ -68,7 +66,7 @@ def analyse(part: Part) -> FadeResult:
     bands = _band_weights(edges, lamp, nm)
     changes: dict[str, LampChange] = {}
     tables: dict[str, Change] = {}
-    lag = ANY_LAG
+    fade: FittedChange | None = None
     for role in SWITCHED if protocol.rise else SWITCHED[:1]:
         switched = frames_after_switch(part.run, frames, darks, places, camera, role)
         channel_weights, weight_errors = weights, errors
@@ -84,9 +82,9 @@ def analyse(part: Part) -> FadeResult:
             nm,
             flicker,
             rises=role == LampFrames.RISE,
-            lag=lag,
+            fade=fade,
         )
-        lag = replace(change.lag, sigma=float(np.hypot(change.lag.sigma, RELAY_S)))
+        fade = change
         changes[role] = change.result(switched)
         tables[role] = _table(change, bands, nm)
     warm, warming_light = _fit_warming(part, darks, flicker)
