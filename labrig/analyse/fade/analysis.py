@@ -1,7 +1,6 @@
 """Analysis of a fade run, from its frames to its result."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
