@@ -53,8 +53,8 @@ ALONG_THE_STRIP = {
     strip_problem.LOG_PEAK: (2, 0.04),
     strip_problem.LEAKAGE: (1, 0.0005),
 }
-#: σ of the bend with one turn more than the map has, in nm.
-THIRD_ORDER_NM = 5.0
+#: σ of the bend with one turn more than the map has, and least σ of its coefficients, in nm.
+THIRD_ORDER_NM, EXACT_NM = 5.0, 0.01
 #: Lower limit of the map's σ: strips are not smooth to a tenth of a nanometre.
 CENTRE_FLOOR_NM = 0.5
 #: Correlation length of errors of a gel's transmittance, which closer positions share.
@@ -238,8 +238,7 @@ def _runs_along_strip(positions: FloatArray, wavelengths: WavelengthMap) -> list
     covariance = THIRD_ORDER_NM**2 * np.eye(order + 1)
     if wavelengths.covariance is not None:
         known = len(wavelengths.covariance)
-        covariance[:known, :known] = wavelengths.covariance
-    covariance[0, 0] += CENTRE_FLOOR_NM**2
+        covariance[:known, :known] = wavelengths.covariance + EXACT_NM**2 * np.eye(known)
     root = np.linalg.inv(np.linalg.cholesky(covariance))
     return [*runs, AlongStrip(strip_problem.CENTRE, powers, root, scatter)]
 
