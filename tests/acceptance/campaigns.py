@@ -111,6 +111,7 @@ CAMPAIGNS = {
         _module("excitation_rates", "--seeds", "40"),
         _module("whole_phosphor"),
         _module("reused_calibration"),
+        _module("fade_pulls", "--seeds", "100"),
         _module("lvf_in_the_room", "--width", "402", "--seeds", "3"),
         _module("spectrum_through_lvf", "40"),
         _module("spectrum_lines", "8"),
