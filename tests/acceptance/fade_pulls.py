@@ -2,11 +2,12 @@
 
     python -m tests.acceptance.fade_pulls [--seeds 100]
 
-Each seed is a run of the shipped protocol `fade`, of two passes, in a simulated room of 96 x 64 pixels
-with a lamp of its own, held against that lamp. The seed draws the camera's curves and all noise; the
-filament's mass, how much of its heat is conducted, its heat capacity when cold, the powers of the
-temperature with which it radiates and its resistance grows; by how much the shutter's lag differs from
-that in the rig file (6 ms); and how much light a cold housing lacks, and for how long.
+Each seed is a run of the shipped protocol `fade`, of two passes, in a simulated room of 96 x 64
+pixels with a lamp of its own, held against that lamp. The seed draws the camera's curves and all
+noise; the filament's mass, how much of its heat is conducted, its heat capacity when cold, the
+powers of the temperature with which it radiates and its resistance grows; by how much the
+shutter's lag differs from that in the rig file (6 ms); and how much light a cold housing lacks,
+and for how long.
 
 Per time after the switch, in three bands: rms of error over σ (1 if σ is right), and median σ in
 per cent of the steady light. Then the same of the wavelength's exponent (which is 1) and of what a
