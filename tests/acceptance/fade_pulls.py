@@ -10,8 +10,8 @@ shutter's lag differs from that in the rig file (6 ms); and how much light a col
 and for how long.
 
 Per time after the switch, in three bands: rms of error over σ (1 if σ is right), and median σ in
-per cent of the steady light. Then the same of the wavelength's exponent (which is 1) and of what a
-cold housing lacks.
+per cent of the steady light. Then the same of the light in each frame (σ in per cent of it), of the
+wavelength's exponent (which is 1), and of what a cold housing lacks.
 """
 
 import argparse
@@ -26,7 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.process import process_run
+from labrig.results import SwitchedFrames
 from labrig.sim import lamp as room_lamp
+from labrig.sim.optics import bent_curves
+from labrig.sim.room import CURVES_STREAM
 from labrig.sim.simulation import LampSettings
 from tests.analyse.recorded import record
 
@@ -37,6 +40,8 @@ PROTOCOL = {"protocol": "fade", "sample": {"name": "lamp"}, "passes": 2}
 TIMES_MS = {"fade": (5, 20, 60, 120, 200), "rise": (20, 60, 120, 250, 400)}
 BANDS = {410: 1, 550: 8, 690: 15}
 LAG_S = 0.06
+#: How late the room's shutter opens by its own clock, the relay's switching being early by its.
+LATE_S = 5.3e-3
 
 
 def drawn_lamp(rng: np.random.Generator) -> dict[str, Any]:
@@ -60,6 +65,18 @@ def true_fractions(edges_nm: FloatArray, t_s: FloatArray, *, rises: bool) -> Flo
     return fractions
 
 
+def true_light_s(
+    frames: SwitchedFrames, begin_s: FloatArray, curves: FloatArray, *, rises: bool
+) -> FloatArray:
+    """Return what exposures of that length from then on see of the lamp, over the steady lamp's."""
+    found = room_lamp.Lamp.found(LampSettings(warm_up_deficit=0, drift_per_hour=0), not rises)
+    switched = found.switched(rises, 10.0)
+    spans = zip(10 + begin_s, 10 + begin_s + frames.exposure_s, strict=True)
+    exposures = np.array([switched.exposure(begin, end) for begin, end in spans])
+    light_s: FloatArray = exposures @ curves.T / (curves @ room_lamp.BURNING_SPECTRUM)
+    return light_s
+
+
 def errors(seed: int, folder: Path) -> Iterator[tuple[str, float, float]]:
     """Run one seed; yield names, errors over σ and σ."""
     rng = np.random.default_rng([seed, 2611])
@@ -73,6 +90,7 @@ def errors(seed: int, folder: Path) -> Iterator[tuple[str, float, float]]:
             "warm_up": f"{150 * np.exp(0.4 * rng.standard_normal()):.1f} s",
         }
 
+    curves = bent_curves(np.random.default_rng([seed, CURVES_STREAM])).sensitivity
     room_lamp._settling.cache_clear()
     with patch.multiple(room_lamp, **drawn_lamp(rng)):
         result: Any = process_run(record(folder, PROTOCOL, of_seed))
@@ -93,6 +111,14 @@ def errors(seed: int, folder: Path) -> Iterator[tuple[str, float, float]]:
                     if np.isfinite(sigma[k]):
                         off = (fraction[k] - truth[k, band]) / sigma[k]
                         yield f"{role} {t_ms} ms, {nm} nm", float(off), float(100 * sigma[k])
+            begin_s = change.frames.start_s + LATE_S + LAG_S - lag_s
+            light_s = true_light_s(change.frames, begin_s, curves, rises=rises)
+            for off, sigma in zip(
+                ((change.frames.light_s - light_s) / change.frames.light_sigma_s).ravel().tolist(),
+                (change.frames.light_sigma_s / change.frames.light_s).ravel().tolist(),
+                strict=True,
+            ):
+                yield f"{role}, single frames", off, 100 * sigma
             p = change.exponent
             yield f"{role} exponent", (p.value - 1) / p.sigma, p.sigma
         warming = file.warming
@@ -118,7 +144,7 @@ def main() -> None:
             f"  {np.median(sigmas[name]):8.3f}  {len(all_off):4}"
         )
     for role in TIMES_MS:
-        tables = [pulls[name] for name in pulls if name.startswith(role) and "ms" in name]
+        tables = [pulls[name] for name in pulls if name.startswith(role) and " ms" in name]
         everything = [one for table in tables for one in table]
         print(f"{role}, all of the above: {_rms(everything):.2f}")
 
