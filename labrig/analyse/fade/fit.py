@@ -124,7 +124,8 @@ def _prior(shape: Shape, fade: FittedChange | None) -> _Prior:
         return _Prior(expected, np.diag(1 / sigma))
     expected[LAG], sigma[LAG] = fade.lag.value, np.hypot(fade.lag.sigma, RELAY_S)
     cooling = fade.fits[0]
-    if isinstance(shape, Heating) and isinstance(cooling.shape, Cooling):
+    is_filament = len(fade.fits) == 1 and isinstance(cooling.shape, Cooling)
+    if isinstance(shape, Heating) and is_filament:
         # Not by the fade's p, which the errors of the same curves have shifted.
         filament = [*range(cooling.shape.free), LAG]
         expected[filament] = cooling.parameters[filament]
