@@ -20,9 +20,9 @@ def peak_shape(
 ) -> FloatArray:
     """Return a skewed Gaussian, or a peak with steeper or flatter sides, of height 1.
 
-    The shape is exp(−ln 2 · |ln(1 + 2 a x / w) / a|ⁿ) with a = `skew` and w such that the full
-    width at half maximum is `fwhm_nm`. a > 0 extends the tail to long wavelengths, a = 0 is a
-    Gaussian.
+    The shape is exp(−ln 2 · yⁿ), y the absolute value of ln(1 + 2 a x / w) / a, with a = `skew`,
+    n = `order` and w such that the full width at half maximum is `fwhm_nm`. a > 0 extends the tail
+    to long wavelengths, a = 0 with n = 2 is a Gaussian.
 
     Parameters
     ----------
