@@ -504,10 +504,7 @@ def _parameter_changes(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatA
         return np.zeros((1, len(lvf.position), len(nodes)))
     changes = []
     for name in ("centre_nm", "fwhm_nm", "skew", "leakage"):
-        changed = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
-        bands = replace(lvf.bands, **{name: changed})
-        bands = replace(bands, peak=bands.peak * lvf.bands.fwhm_nm / bands.fwhm_nm)
-        change = bands.transmission(nodes) - lvf.bands.transmission(nodes)
+        change = lvf.changed_bands(name, _STEP).transmission(nodes) - lvf.bands.transmission(nodes)
         changes.append(change * light / _STEP)
     return np.array(changes)
 
@@ -534,15 +531,14 @@ def _smooth(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale:
 def in_bands(lvf: Lvf, lamp: Spectrum, edges_nm: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return ∫ L T_p dλ over bands and its σ by the parameters of the filter, (p, bands) each.
 
-    The height of a band is left out: `strip_scale` measures it.
+    The area of a band is left out: `strip_scale` measures it.
     """
     value = _in_bands(lvf, lamp, edges_nm)
     if lvf.sigma is None:
         return value, np.zeros_like(value)
     variance = np.zeros_like(value)
     for name in ("centre_nm", "fwhm_nm", "skew", "leakage"):
-        changed = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
-        changed_lvf = replace(lvf, bands=replace(lvf.bands, **{name: changed}))
+        changed_lvf = replace(lvf, bands=lvf.changed_bands(name, _STEP))
         variance += ((_in_bands(changed_lvf, lamp, edges_nm) - value) / _STEP) ** 2
     return value, np.sqrt(variance)
 

@@ -102,7 +102,8 @@ class LvfFile(_Part):
     position
         Position of each band along the strip: 0 at its blue end, 1 at its red end.
     bands, sigma
-        Parameters of T_p(λ) and one standard deviation; all relative to one unknown factor.
+        Parameters of T_p(λ) and one standard deviation, that of a width at the same ∫ T_p dλ, of a
+        peak at the same width; all relative to one unknown factor.
     remainder_nm, remainder
         Deviation of T_p(λ) from the bands' shape at wavelengths in nm, a row for each position.
     wavelengths

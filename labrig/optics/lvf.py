@@ -1,6 +1,6 @@
 """A linear variable filter (LVF): its pass band depends on the position along a strip."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Self
 
 import numpy as np
@@ -15,12 +15,14 @@ _GAUSSIAN = 1e-9
 _LN2 = float(np.log(2.0))
 
 
-def peak_shape(distance_nm: FloatArray, fwhm_nm: ArrayLike, skew: ArrayLike) -> FloatArray:
-    """Return a skewed Gaussian of height 1.
+def peak_shape(
+    distance_nm: FloatArray, fwhm_nm: ArrayLike, skew: ArrayLike, order: ArrayLike = 2.0
+) -> FloatArray:
+    """Return a skewed Gaussian, or a peak with steeper or flatter sides, of height 1.
 
-    The shape is exp(−ln 2 · [ln(1 + 2 a x / w) / a]²) with a = `skew` and w such that the full
-    width at half maximum is `fwhm_nm`. a > 0 extends the tail to long wavelengths, a = 0 is a
-    Gaussian.
+    The shape is exp(−ln 2 · yⁿ), y the absolute value of ln(1 + 2 a x / w) / a, with a = `skew`,
+    n = `order` and w such that the full width at half maximum is `fwhm_nm`. a > 0 extends the tail
+    to long wavelengths, a = 0 with n = 2 is a Gaussian.
 
     Parameters
     ----------
@@ -30,6 +32,9 @@ def peak_shape(distance_nm: FloatArray, fwhm_nm: ArrayLike, skew: ArrayLike) -> 
         Full width at half maximum in nm, broadcast against `distance_nm`.
     skew
         Dimensionless asymmetry a, broadcast against `distance_nm`.
+    order
+        Exponent n, broadcast against `distance_nm`; above 2 it is flatter on top, with steeper
+        sides.
 
     Returns
     -------
@@ -58,7 +63,7 @@ def peak_shape(distance_nm: FloatArray, fwhm_nm: ArrayLike, skew: ArrayLike) -> 
     x = 2 * distance_nm / width
     inside = 1 + a * x > 0
     stretched = np.where(skewed, np.log1p(np.where(inside, a * x, 0.0)) / a, x)
-    shape: FloatArray = np.where(~skewed | inside, np.exp(-_LN2 * stretched**2), 0.0)
+    shape: FloatArray = np.where(~skewed | inside, np.exp(-_LN2 * np.abs(stretched) ** order), 0.0)
     return shape
 
 
@@ -211,7 +216,8 @@ class Lvf:
     bands
         Pass bands at these positions.
     sigma
-        One standard deviation of each of the bands' parameters, where it is known.
+        One standard deviation of each of the bands' parameters, where it is known: of the width
+        at the same ∫ T dλ, of the peak at the same width.
     remainder_nm
         Wavelengths of `remainder` in nm, shape (n,); n may be 0.
     remainder
@@ -245,6 +251,29 @@ class Lvf:
                 transmission + self.remainder @ hat_functions(self.remainder_nm, wavelength_nm).T
             )
         return np.maximum(transmission, 0.0)
+
+    def changed_bands(self, parameter: str, sigmas: float) -> Bands:
+        """Return the bands with one of their parameters changed by some of its σ.
+
+        What passes in all is known better than its distribution: a wider band is less high.
+
+        Parameters
+        ----------
+        parameter
+            Name of the parameter, a field of `Bands`.
+        sigmas
+            Number of its standard deviations.
+
+        Raises
+        ------
+        ValueError
+            The filter has no σ.
+        """
+        if self.sigma is None:
+            raise ValueError("expected a filter with its σ, got one without")
+        value = getattr(self.bands, parameter) + sigmas * getattr(self.sigma, parameter)
+        changed = replace(self.bands, **{parameter: value})
+        return replace(changed, peak=changed.peak * self.bands.fwhm_nm / changed.fwhm_nm)
 
     def twice(self) -> "Lvf":
         """Return the filter that light passes twice in the same place, of transmission T².

@@ -161,7 +161,10 @@ def _table(file: LvfFile) -> Table:
             f"p{k:02d}",
             plus_minus(bands.centre_nm[k], sigma.centre_nm[k]),
             plus_minus(bands.fwhm_nm[k], sigma.fwhm_nm[k]),
-            plus_minus(100 * bands.peak[k], 100 * sigma.peak[k]),
+            plus_minus(
+                100 * bands.peak[k],
+                100 * np.hypot(sigma.peak[k], bands.peak[k] * sigma.fwhm_nm[k] / bands.fwhm_nm[k]),
+            ),
             plus_minus(100 * bands.leakage[k], 100 * sigma.leakage[k]),
         )
         for k in chosen

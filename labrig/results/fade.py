@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import FADE_KIND, FadeFile
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import FloatArray, IntArray, Measured
 from labrig.results.run_result import RunResult
 
 
@@ -20,11 +20,18 @@ class SwitchedFrames:
         Recorded begins in seconds after the switch, and exposure times in seconds, shape (n,).
     light_s, light_sigma_s
         Integral over the exposure of the light relative to the steady lamp, and its standard
-        uncertainty, in seconds, shape (n, S); NaN where it clips.
+        uncertainty, in seconds, shape (n, S); NaN where it clips. Of frames that were fitted, σ
+        has flicker, the shutter's jitter, dark level and steady light besides photon and read
+        noise.
     steady_dn_per_s
         Signal of the steady lamp in DN/s, shape (S,).
     dark_sigma_dn_per_s
         σ of the dark level, which all frames share, in DN/s, shape (S,).
+    pass_number
+        Pass of each frame, counted from 0, shape (n,).
+    steady_frames
+        Number of frames of the steady lamp in each pass, to whose mean its frames are relative,
+        shape (passes,).
     clipped
         Number of frames that clip somewhere; those that clip everywhere are not among the n.
     """
@@ -35,6 +42,8 @@ class SwitchedFrames:
     light_sigma_s: FloatArray
     steady_dn_per_s: FloatArray
     dark_sigma_dn_per_s: FloatArray
+    pass_number: IntArray
+    steady_frames: IntArray
     clipped: int
 
 

@@ -112,6 +112,7 @@ CAMPAIGNS = {
         _module("whole_phosphor"),
         _module("reused_calibration"),
         _module("samples_in_turn"),
+        _module("fade_pulls", "--seeds", "100"),
         _module("lvf_in_the_room", "--width", "402", "--seeds", "3"),
         _module("spectrum_through_lvf", "40"),
         _module("spectrum_lines", "8"),

@@ -11,8 +11,9 @@ from labrig.yaml_file import read_yaml
 
 Figures = dict[str, tuple[float, float]]
 
-#: Tables of single frames, and what a run is called by: no figures.
+#: Tables of single frames, and what a run is called by: no figures. Two runs have others.
 NO_FIGURES = ("series.csv", "provenance.yaml")
+SINGLE_FRAMES = "frames"
 #: Whose σ a key is that does not say so itself.
 OF_SIGMA = {"sigma_dn_per_s": ("rate_dn_per_s",), "sigma": ("value", "bands", "fraction", "factor")}
 
@@ -66,7 +67,7 @@ def _pairs(content: Any, place: str = "") -> Iterator[tuple[str, tuple[float, fl
         for key, inner in content.items():
             if (of := _whose(key, content)) is not None:
                 yield from _side_by_side(content[of], inner, f"{place}{of} ")
-            else:
+            elif key != SINGLE_FRAMES:
                 yield from _pairs(inner, f"{place}{key} ")
 
 

@@ -50,7 +50,10 @@ SHORTER: dict[str, dict[str, Any]] = {
         "at_most": 3, "refine": 1, "direct": ["10 s", "4 min"], "for": "40 s", "last_decay": "60 s",
         "rest": {"at_least": "1 min", "at_most": "4 min"},
     },
-    "isotropy": {"charge": "2 min", "angles": [20, 60], "frames": 2},
+    "isotropy": {
+        "charge": "2 min", "angles": [20, 60], "frames": 2,
+        "patches": {"sample": [0.47, 0.35, 0.06, 0.3]},
+    },
     "luminance": {"until": "3 min", "longest": "10 s"},
     "reflectance": {"charge": "2 min", "longest": "4 s", "repeats": 1},
     "saturation": {"charges": ["2 min", "10 min"], "for": "60 s"},

@@ -127,6 +127,15 @@ def _variable_filter_sigma(printed: str) -> str:
     return ", ".join(said)
 
 
+def _lamps(printed: str) -> str:
+    said = []
+    for role in ("fade", "rise"):
+        ((rms,),) = columns(rf"^{role}, all of the above: ([\d.]+)$", printed)
+        said.append(f"{role} {rms:.2f}")
+    ((housing,),) = columns(r"^cold housing +([\d.]+)", printed)
+    return f"{', '.join(said)}, light that a cold housing lacks {housing:.2f}"
+
+
 def _irradiance(printed: str) -> str:
     (off,) = columns(r"^ +irradiance / 1 +[\d.]+ +([\d.]+)", printed)
     return f"{100 * max(off):.1f} %"
@@ -531,6 +540,12 @@ FIGURES = (
         "680 nm: largest error",
         "lvf_in_the_room",
         _irradiance,
+    ),
+    Figure(
+        "Fade and rise of 100 halogen lamps, no two alike, by two passes of the protocol `fade`: "
+        "rms of error over σ at five times after the switch in three bands (1 if σ is right)",
+        "fade_pulls",
+        _lamps,
     ),
     Figure(
         "ColorChecker under a halogen lamp through a variable filter, another laboratory's curves "

@@ -9,6 +9,7 @@ import pytest
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import LvfCalibration, calibrate_lvf
+from labrig.fit.lvf.calibration import LOG_ORDER_SIGMA
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
 from labrig.optics import (
@@ -49,13 +50,17 @@ def bent(camera: CameraResponse, seed: int) -> CameraResponse:
 
 
 def calibrated(
-    positions: int, filters: list[Transmittance], lamp: Spectrum, camera: CameraResponse
+    positions: int,
+    filters: list[Transmittance],
+    lamp: Spectrum,
+    camera: CameraResponse,
+    shape: Callable[[FloatArray], Callable[[FloatArray], FloatArray]] = truth,
 ) -> tuple[FloatArray, LvfCalibration]:
     """Seen by a camera, calibrated with the shipped curves of it."""
     position = TRUE_MAP.position(np.linspace(402.0, 698.0, positions))
     knots = [camera.wavelength_nm, lamp.wavelength_nm, *(f.wavelength_nm for f in filters)]
     nodes, weights = quadrature(380.0, 780.0, *knots)
-    lit = truth(position)(nodes) * (weights * lamp.at(nodes) * GREY_CARD.at(nodes))
+    lit = shape(position)(nodes) * (weights * lamp.at(nodes) * GREY_CARD.at(nodes))
     value = np.stack([(lit * f.at(nodes)) @ camera.at(nodes) for f in filters], axis=1)
     card = weights * lamp.at(nodes) * GREY_CARD.at(nodes)
     value *= card @ made.of_the_house().at(nodes) / (card @ camera.at(nodes))
@@ -119,6 +124,31 @@ def test_a_filter_of_another_shape_with_perturbed_curves() -> None:
     lamp = Spectrum("lamp", nm, np.exp((nm - 780) / 200))
     camera = bent(made.of_the_house(), 1)
     assert_calibrated(*calibrated(11, step_filters(), lamp, camera))
+
+
+def peaks_of_order(order: float) -> Callable[[FloatArray], Callable[[FloatArray], FloatArray]]:
+    """25 nm wide everywhere; above an order of 2 flatter on top than a Gaussian."""
+
+    def peaks(position: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        x = np.abs(FINE_NM - TRUE_MAP.wavelength_nm(position)[:, np.newaxis]) / 12.5
+        curves = 0.003 + 0.8 * np.exp(-np.log(2) * x**order)
+        return lambda nm: np.array([np.interp(nm, FINE_NM, curve) for curve in curves])
+
+    return peaks
+
+
+def test_with_bands_of_another_shape_widths_err_as_stated() -> None:
+    """Shapes one σ from a Gaussian, to either side: so far are the widths apart."""
+    nm = np.arange(380.0, 781.0, 5.0)
+    lamp = Spectrum("lamp", nm, np.exp((nm - 780) / 200))
+    camera = bent(made.of_the_house(), 3)
+    found = [
+        calibrated(11, step_filters(), lamp, camera, peaks_of_order(2 * np.exp(sigma)))[1].lvf
+        for sigma in (-LOG_ORDER_SIGMA, LOG_ORDER_SIGMA)
+    ]
+    stated = np.mean([lvf.sigma.fwhm_nm for lvf in found if lvf.sigma is not None], axis=0)
+    by_shape = (found[0].bands.fwhm_nm - found[1].bands.fwhm_nm) / 2
+    assert 0.83 < (by_shape / stated)[2:9].mean() < 1.2
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,11 @@
 """Analysis of a fade run, from its frames to its result."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from labrig.analyse.fade.change import FittedChange
-from labrig.analyse.fade.fit import ANY_LAG, fit_change
+from labrig.analyse.fade.fit import fit_change
 from labrig.analyse.fade.frames import (
     brightest_channels,
     frames_after_switch,
@@ -31,13 +30,10 @@ from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
 TYPICAL_FLICKER = 0.007
 #: Step in nm of the wavelengths on which curves are integrated.
 STEP_NM = 10.0
-#: Number of times of the table, exponent by which they are denser at first, fraction of the light
-#: at which the slowest band has reached its end, and longest time in seconds.
-TIMES, DENSER = 81, 1.5
+#: Times of the table in seconds, denser at first and the same in all runs, and the fraction of the
+#: light at which the slowest band has reached its end.
+TIMES_S: FloatArray = 7e-4 * np.arange(372.0) ** 1.5
 GONE = 1e-4
-LONGEST_S = 5.0
-#: Standard deviation in seconds between the delays of a relay's closing and opening.
-RELAY_S = 1e-3
 #: Error of the camera's curves: those of another camera of its model.
 CURVES = CurveError(added=0.02)
 #: χ² per degree of freedom beyond which the lamp is no black-body emitter, and by how many of its
@@ -68,7 +64,7 @@ def analyse(part: Part) -> FadeResult:
     bands = _band_weights(edges, lamp, nm)
     changes: dict[str, LampChange] = {}
     tables: dict[str, Change] = {}
-    lag = ANY_LAG
+    fade: FittedChange | None = None
     for role in SWITCHED if protocol.rise else SWITCHED[:1]:
         switched = frames_after_switch(part.run, frames, darks, places, camera, role)
         channel_weights, weight_errors = weights, errors
@@ -84,9 +80,9 @@ def analyse(part: Part) -> FadeResult:
             nm,
             flicker,
             rises=role == LampFrames.RISE,
-            lag=lag,
+            fade=fade,
         )
-        lag = replace(change.lag, sigma=float(np.hypot(change.lag.sigma, RELAY_S)))
+        fade = change
         changes[role] = change.result(switched)
         tables[role] = _table(change, bands, nm)
     warm, warming_light = _fit_warming(part, darks, flicker)
@@ -176,9 +172,11 @@ def _band_weights(edges_nm: FloatArray, lamp: Spectrum, nm: FloatArray) -> Float
 
 
 def _table(change: FittedChange, bands: FloatArray, nm: FloatArray) -> Change:
-    last_s = _end_s(change, bands, nm)
-    t_s = last_s * np.linspace(0, 1, TIMES) ** DENSER
-    fraction, sigma = change.in_bands(bands, nm, t_s)
+    fraction, sigma = change.in_bands(bands, nm, TIMES_S)
+    remaining = 1 - fraction if change.rises else fraction
+    ended = np.flatnonzero((remaining < GONE).all(axis=1))
+    rows = slice(None if not len(ended) else int(ended[0]) + 1)
+    t_s, fraction, sigma = TIMES_S[rows], fraction[rows], sigma[rows]
     first = 0.0 if change.rises else 1.0
     fraction[0], sigma[0] = first, 0.0
     return Change(
@@ -186,15 +184,6 @@ def _table(change: FittedChange, bands: FloatArray, nm: FloatArray) -> Change:
         fraction=tuple(tuple(_rounded(value) for value in row) for row in fraction),
         sigma=tuple(tuple(_rounded(value) for value in row) for row in sigma),
     )
-
-
-def _end_s(change: FittedChange, bands: FloatArray, nm: FloatArray) -> float:
-    """Return the time in seconds at which all bands have reached their end."""
-    t_s = np.linspace(0, LONGEST_S, 2001)
-    fraction, _ = change.in_bands(bands, nm, t_s)
-    remaining = 1 - fraction if change.rises else fraction
-    ended = np.flatnonzero((remaining < GONE).all(axis=1))
-    return float(t_s[ended[0]]) if len(ended) else LONGEST_S
 
 
 def _rounded(value: float) -> float:

@@ -7,7 +7,7 @@ By Wien's law a body at the temperature T(t) has, of its light at T₀, the frac
 Parameters θ of all shapes end with p and with the lag of the shutter in s.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -29,10 +29,20 @@ LOGIT_SIGMA = 1.5
 COLD_LOSS, COLD_LOSS_SIGMA = 0.42, 0.1
 #: Temperature of the room over the filament's, and least difference to it.
 ROOM, LEAST_ABOVE_ROOM = 295 / 3000, 5e-3
+#: Exponent of the temperature that tungsten's resistance is proportional to, and its σ: 1.20 from
+#: 300 K to 3000 K (P. D. Desai et al., J. Phys. Chem. Ref. Data 13, 1984, 1069); leads and gas do
+#: the rest.
+RESISTANCE, RESISTANCE_SIGMA = 1.2, 0.1
 #: Values of u between which the filament's cooling is integrated.
 U_GRID: FloatArray = DARK * np.linspace(0.0, 1.0, 1001) ** 2
+#: Values of −ln(1 − T) between which its heating is, from the room's temperature to where u < 1e-5,
+#: and the least gain of heat by what is missing of T.
+HEATING_GRID: FloatArray = np.linspace(-np.log(1 - ROOM), 14.0, 1001)
+LEAST_GAIN = 1e-3
 #: Step of the derivatives as a fraction of σ.
 STEP = 0.01
+#: Places of p and of the lag among the parameters of all shapes.
+EXPONENT, LAG = -2, -1
 
 
 class Shape(Protocol):
@@ -89,12 +99,9 @@ class Cooling:
     def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
         """Return u at times in seconds after the switch, shape (m,)."""
         kappa, rate = np.exp(parameters[:2])
-        radiated = 1 / (1 + np.exp(-parameters[2]))
         temperature = 1 / (1 + U_GRID / kappa)
-        above_room = np.maximum(temperature - ROOM, LEAST_ABOVE_ROOM) / (1 - ROOM)
-        lost = radiated * temperature**5 + (1 - radiated) * above_room
-        capacity = 1 - parameters[3] * (1 - temperature**2)
-        seconds_per_u = capacity * temperature**2 / (kappa * lost * rate / 4)
+        heat_capacity, lost = _capacity_and_loss(temperature, parameters)
+        seconds_per_u = heat_capacity * temperature**2 / (kappa * lost * rate / 4)
         steps_s = np.diff(U_GRID) * (seconds_per_u[1:] + seconds_per_u[:-1]) / 2
         return np.interp(t_s, np.append(0.0, np.cumsum(steps_s)), U_GRID)
 
@@ -104,6 +111,52 @@ class Cooling:
             np.array([LN_KAPPA, 0.0, 0.0, COLD_LOSS]),
             np.array([LN_KAPPA_SIGMA, np.inf, LOGIT_SIGMA, COLD_LOSS_SIGMA]),
         )
+
+
+@dataclass(frozen=True)
+class Heating:
+    """The same filament at constant voltage, which a cold one draws more current at.
+
+    c(T) dT/dt = q/4 (T^(−s) − r T⁵ − (1 − r) (T − Tₐ)/(1 − Tₐ)) from Tₐ, tungsten's resistance
+    being proportional to T^s. Parameters: those of `Cooling`, then s.
+    """
+
+    rises: bool = True
+    free: int = 5
+    name: str = "filament"
+
+    def start(self, level: float, slope: float) -> FloatArray:
+        """Return initial parameters by which u falls to 1/e in the same time near its end."""
+        # There dT/dt = −q/4 (s + 4 r + 1 + …) (T − 1), about 4 of them at equal losses.
+        return np.array([LN_KAPPA, np.log(max(-slope / SCALE_S, 0.1)), 0.0, COLD_LOSS, RESISTANCE])
+
+    def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
+        """Return u at times in seconds after the switch, shape (m,)."""
+        kappa, rate = np.exp(parameters[:2])
+        missing = np.exp(-HEATING_GRID)
+        temperature = 1 - missing
+        heat_capacity, lost = _capacity_and_loss(temperature, parameters)
+        gained = np.maximum(temperature ** -parameters[4] - lost, LEAST_GAIN * missing)
+        seconds_per_step = heat_capacity * missing / (gained * rate / 4)
+        steps_s = np.diff(HEATING_GRID) * (seconds_per_step[1:] + seconds_per_step[:-1]) / 2
+        left = np.exp(-np.interp(t_s, np.append(0.0, np.cumsum(steps_s)), HEATING_GRID))
+        u: FloatArray = np.minimum(kappa * left / (1 - left), DARK)
+        return u
+
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Return prior values of the parameters of halogen lamps, and their σ."""
+        mean, sigma = Cooling().expected()
+        return np.append(mean, RESISTANCE), np.append(sigma, RESISTANCE_SIGMA)
+
+
+def _capacity_and_loss(
+    temperature: FloatArray, parameters: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the filament's heat capacity and loss of heat over those of the steady lamp."""
+    radiated = 1 / (1 + np.exp(-parameters[2]))
+    above_room = np.maximum(temperature - ROOM, LEAST_ABOVE_ROOM) / (1 - ROOM)
+    lost = radiated * temperature**5 + (1 - radiated) * above_room
+    return 1 - parameters[3] * (1 - temperature**2), lost
 
 
 @dataclass(frozen=True)
@@ -165,7 +218,7 @@ def fraction_of(shape: Shape, theta: FloatArray, nm: FloatArray, t_s: FloatArray
     The shape is (m, wavelengths).
     """
     u = shape.u(theta[:-2], np.maximum(t_s, 0.0))
-    fraction: FloatArray = np.exp(-np.outer(u, (REFERENCE_NM / nm) ** theta[-2]))
+    fraction: FloatArray = np.exp(-np.outer(u, (REFERENCE_NM / nm) ** theta[EXPONENT]))
     return fraction
 
 
@@ -183,6 +236,8 @@ class Fit:
         χ² of the photographs and its degrees of freedom.
     log_determinant
         Logarithm of the determinant of the photographs' covariance.
+    light_sigma_s
+        σ of the photographs' light with all that scatters from one to the next, shape (n, S).
     """
 
     shape: Shape
@@ -192,6 +247,7 @@ class Fit:
     chi2: float
     dof: int
     log_determinant: float
+    light_sigma_s: FloatArray
 
     @property
     def reduced_chi2(self) -> float:
@@ -237,7 +293,7 @@ class FittedChange:
     @property
     def lag(self) -> Measured:
         """Delay of the actual against the recorded opening of the shutter in seconds."""
-        return self._mean(-1, "s")
+        return self._mean(LAG, "s")
 
     def result(self, frames: SwitchedFrames) -> LampChange:
         """Return the transient as part of a result, with the frames that it was fitted to."""
@@ -248,7 +304,9 @@ class FittedChange:
             )
             for fit, weight in zip(self.fits, self.likely.tolist(), strict=True)
         )  # fmt: skip
-        return LampChange(frames, shapes, exponent=self._mean(-2), lag=self.lag)
+        best = self.fits[int(np.argmax(self.likely))]
+        frames = replace(frames, light_sigma_s=best.light_sigma_s)
+        return LampChange(frames, shapes, exponent=self._mean(EXPONENT), lag=self.lag)
 
     def in_bands(
         self, weights: FloatArray, nm: FloatArray, t_s: FloatArray

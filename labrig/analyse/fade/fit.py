@@ -2,8 +2,9 @@
 
 The begin of a photograph after the switch is known up to a constant lag and some jitter, which all
 its places and colours share, as they share its flicker. The camera's curves and its dark level have
-errors that all photographs share: without these in the noise, every colour's fade would be a little
-off that of a glowing body.
+errors that all photographs share, and so has the steady light to which those of a pass are
+relative: without these in the noise, every colour's fade would be a little off that of a glowing
+body.
 """
 
 from dataclasses import dataclass
@@ -11,25 +12,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.analyse.fade.change import (
+    LAG,
     REFERENCE_NM,
     SCALE_S,
     Cooling,
     Fit,
     FittedChange,
+    Heating,
     Shape,
     Smooth,
     fraction_of,
 )
 from labrig.errors import FitError
 from labrig.fit import least_squares
-from labrig.results import FloatArray, Measured, SwitchedFrames
+from labrig.results import FloatArray, SwitchedFrames
 
 #: Step in seconds of the grid on which fractions are integrated.
 STEP_S = 2e-3
 DEGREES = (2, 3, 4)
-#: Prior standard deviation of p, and prior of the lag without any measurement.
-EXPONENT_SIGMA = 0.2
-ANY_LAG = Measured(0.0, 6e-3, "s")
+#: Prior standard deviations of p, and of the lag in seconds: relays take up to 15 ms.
+EXPONENT_SIGMA, LAG_SIGMA_S = 0.2, 15e-3
+#: Standard deviation in seconds between the delays of a relay's closing and opening.
+RELAY_S = 1e-3
 #: Jitters in seconds that are compared, and the initial one.
 JITTERS_S = np.geomspace(3e-4, 2e-2, 31)
 FIRST_JITTER_S = 3e-3
@@ -47,7 +51,7 @@ def fit_change(
     flicker: float,
     *,
     rises: bool,
-    lag: Measured = ANY_LAG,
+    fade: FittedChange | None = None,
 ) -> FittedChange:
     """Fit the transient of the lamp to photographs.
 
@@ -66,8 +70,8 @@ def fit_change(
         Relative scatter common to the values of a photograph.
     rises
         Whether the lamp is turned on.
-    lag
-        Prior of the delay of the shutter in seconds.
+    fade
+        Fade of the same lamp on the same bench, with whose filament and lag it rises, too.
 
     Raises
     ------
@@ -76,9 +80,11 @@ def fit_change(
     """
     last_s = float(frames.start_s.max())
     smooth = [Smooth(rises, degree, last_s) for degree in DEGREES]
-    shapes: list[Shape] = [*smooth] if rises else [Cooling(), *smooth]
+    shapes: list[Shape] = [Heating() if rises else Cooling(), *smooth]
     fits = [
-        _fit(_Problem(frames, weights, weight_errors, nm, flicker, shape, lag), shape)
+        _fit(
+            _Problem(frames, weights, weight_errors, nm, flicker, shape, _prior(shape, fade)), shape
+        )
         for shape in shapes
         if len(frames.start_s) > shape.free + 3
     ]
@@ -95,10 +101,39 @@ def fit_change(
     aic = np.array(
         [fit.log_determinant + fit.chi2 / scatter + 2 * len(fit.parameters) for fit in fits]
     )
-    if isinstance(fits[0].shape, Cooling) and aic[0] < aic.min() + CLEARLY:
+    if isinstance(fits[0].shape, Cooling | Heating) and aic[0] < aic.min() + CLEARLY:
         return FittedChange((fits[0],), np.ones(1))
     likely = np.exp((aic.min() - aic) / 2)
     return FittedChange(tuple(fits), likely / likely.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Prior:
+    """Prior of the parameters: their expected values, and a root of their inverse covariance."""
+
+    expected: FloatArray
+    root: FloatArray
+
+
+def _prior(shape: Shape, fade: FittedChange | None) -> _Prior:
+    """Return the prior of a shape's parameters, p and the lag; of a rise, by the lamp's fade."""
+    expected, sigma = shape.expected()
+    expected = np.array([*expected, 1.0, 0.0])
+    sigma = np.array([*sigma, EXPONENT_SIGMA, LAG_SIGMA_S])
+    if fade is None:
+        return _Prior(expected, np.diag(1 / sigma))
+    expected[LAG], sigma[LAG] = fade.lag.value, np.hypot(fade.lag.sigma, RELAY_S)
+    cooling = fade.fits[0]
+    is_filament = len(fade.fits) == 1 and isinstance(cooling.shape, Cooling)
+    if isinstance(shape, Heating) and is_filament:
+        # Not by the fade's p, which the errors of the same curves have shifted.
+        filament = [*range(cooling.shape.free), LAG]
+        expected[filament] = cooling.parameters[filament]
+        covariance = np.diag(np.square(sigma))
+        covariance[np.ix_(filament, filament)] = cooling.covariance[np.ix_(filament, filament)]
+        covariance[LAG, LAG] += RELAY_S**2
+        return _Prior(expected, np.linalg.inv(np.linalg.cholesky(covariance)))
+    return _Prior(expected, np.diag(1 / sigma))
 
 
 def _fit(problem: "_Problem", shape: Shape) -> Fit:
@@ -113,7 +148,16 @@ def _fit(problem: "_Problem", shape: Shape) -> Fit:
     problem.whiten(theta, jitter_s)
     chi2, dof = problem.chi2(theta), max(problem.values - len(theta), 1)
     covariance = result.covariance * max(chi2 / dof, 1.0)
-    return Fit(shape, theta, covariance, jitter_s, chi2, dof, problem.log_determinant())
+    return Fit(
+        shape,
+        theta,
+        covariance,
+        jitter_s,
+        chi2,
+        dof,
+        problem.log_determinant(),
+        problem.light_sigma_s(theta, jitter_s),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +203,8 @@ class _Noise:
     photographs
         Flicker and jitter, `along` of shape (n, S, 2).
     all_share
-        Errors of curves and dark level, whitened by the former, `along` of shape (n S, q + S).
+        Errors of curves, dark level and steady light, whitened by the former, `along` of shape
+        (n S, q + S + passes).
     """
 
     photographs: _CommonModes
@@ -186,14 +231,12 @@ class _Problem:
         nm: FloatArray,
         flicker: float,
         shape: Shape,
-        lag: Measured,
+        prior: _Prior,
     ) -> None:
         self._frames, self._weights, self._nm = frames, weights, nm
         self._weight_errors = weight_errors
         self._flicker, self._shape = flicker, shape
-        expected, sigma = shape.expected()
-        self._expected = np.array([*expected, 1.0, lag.value])
-        self._sigma = np.array([*sigma, EXPONENT_SIGMA, lag.sigma])
+        self._prior = prior
         last_s = float((frames.start_s + frames.exposure_s).max()) + 0.05
         self._grid_s = np.arange(0.0, last_s + STEP_S, STEP_S)
         self._used = np.isfinite(frames.light_s) & np.isfinite(frames.light_sigma_s)
@@ -225,7 +268,7 @@ class _Problem:
         if not self._shape.rises:
             slope *= middle_nm / REFERENCE_NM
         first = self._shape.start(float(level), float(slope))
-        return np.array([*first, 1.0, self._expected[-1]])
+        return np.array([*first, 1.0, self._prior.expected[LAG]])
 
     def model(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ∫ fraction dt of every photograph, and its slope by the begin; (n, S) each."""
@@ -244,6 +287,16 @@ class _Problem:
     def whiten(self, theta: FloatArray, jitter_s: float) -> None:
         """Set the covariance to that of the model at these parameters."""
         self._noise = self._noise_at(*self.model(theta), self._shared_errors(theta), jitter_s)
+
+    def light_sigma_s(self, theta: FloatArray, jitter_s: float) -> FloatArray:
+        """Return the σ of every photograph's light by all but the curves, NaN where it clips."""
+        value, slope = self.model(theta)
+        by_dark, by_steady = self._dark_errors(), self._steady_errors(value)
+        variance = np.square(self._frames.light_sigma_s) + np.square(self._flicker * value)
+        variance += np.square(jitter_s * slope)
+        variance += np.square(by_dark).sum(axis=2) + np.square(by_steady).sum(axis=2)
+        sigma_s: FloatArray = np.sqrt(variance)
+        return sigma_s
 
     def log_determinant(self) -> float:
         """Return the logarithm of the determinant of the photographs' covariance."""
@@ -268,15 +321,29 @@ class _Problem:
         return np.where(self._used, (self._frames.light_s - value) * self._inverse_sigma, 0.0)
 
     def _shared_errors(self, theta: FloatArray) -> FloatArray:
-        """Return the values' errors in σ by those of curves and dark level, shape (n, S, q + S)."""
-        frames = self._frames
+        """Return the values' errors in σ that photographs share, shape (n, S, q + S + passes)."""
         by_wavelength, _ = self._integrals(theta, np.eye(len(self._nm)))
         by_curves = np.tensordot(by_wavelength, self._weight_errors, axes=(1, 2))
-        dark = np.diag(frames.dark_sigma_dn_per_s / frames.steady_dn_per_s)
-        by_dark = frames.exposure_s[:, np.newaxis, np.newaxis] * dark
-        errors = np.concatenate([np.moveaxis(by_curves, 1, 2), by_dark], axis=2)
+        by_steady = self._steady_errors(by_wavelength @ self._weights.T)
+        errors = np.concatenate(
+            [np.moveaxis(by_curves, 1, 2), self._dark_errors(), by_steady], axis=2
+        )
         scaled: FloatArray = errors * self._inverse_sigma[..., np.newaxis]
         return scaled
+
+    def _dark_errors(self) -> FloatArray:
+        """Return the values' errors by that of the dark level, shape (n, S, S)."""
+        frames = self._frames
+        dark = np.diag(frames.dark_sigma_dn_per_s / frames.steady_dn_per_s)
+        errors: FloatArray = frames.exposure_s[:, np.newaxis, np.newaxis] * dark
+        return errors
+
+    def _steady_errors(self, value: FloatArray) -> FloatArray:
+        """Return the values' errors by the flicker of their pass's steady light, (n, S, passes)."""
+        frames = self._frames
+        by_pass = self._flicker / np.sqrt(frames.steady_frames) * np.eye(len(frames.steady_frames))
+        errors: FloatArray = value[..., np.newaxis] * by_pass[frames.pass_number, np.newaxis]
+        return errors
 
     def _noise_at(
         self, value: FloatArray, slope: FloatArray, shared: FloatArray, jitter_s: float
@@ -298,7 +365,8 @@ class _Problem:
 
         def whitened_residuals(parameters: FloatArray) -> FloatArray:
             return np.append(
-                self._whitened_residuals(parameters), (parameters - self._expected) / self._sigma
+                self._whitened_residuals(parameters),
+                self._prior.root @ (parameters - self._prior.expected),
             )
 
         residual = whitened_residuals(theta)

@@ -78,6 +78,9 @@ def frames_after_switch(
             f"expected {FEWEST} photographs of the {role} that do not clip, got "
             f"{np.count_nonzero(unclipped)}; lower camera.iso"
         )
+    unit = np.array(first.unit)
+    passes, pass_number = np.unique(unit[: len(switched)][unclipped], return_inverse=True)
+    references = unit[len(switched) :][first.usable[len(switched) :]]
     clips = ~np.all(
         [place_series.usable[: len(switched)] for place_series in series.values()], axis=0
     )
@@ -88,6 +91,8 @@ def frames_after_switch(
         sigma_s[unclipped],
         steady_dn_per_s,
         dark_sigma_dn_per_s,
+        pass_number=pass_number,
+        steady_frames=np.array([np.count_nonzero(references == name) for name in passes]),
         clipped=int(np.count_nonzero(clips)),
     )
 

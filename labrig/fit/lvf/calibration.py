@@ -15,7 +15,13 @@ from numpy.typing import ArrayLike
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import strip_problem
-from labrig.fit.lvf.strip_problem import Expected, StripProblem, StripSolution
+from labrig.fit.lvf.strip_problem import (
+    AlongStrip,
+    Expected,
+    StripProblem,
+    StripSigmas,
+    StripSolution,
+)
 from labrig.fit.spectrum.system import CurveError
 from labrig.optics import (
     NOMINAL_FWHM_NM,
@@ -32,6 +38,9 @@ from labrig.optics import (
 LOG_FWHM = (float(np.log(NOMINAL_FWHM_NM)), 0.3)
 SKEW = (0.0, 0.2)
 LEAKAGE = (0.002, 0.01)
+#: σ of the logarithm of the order of a band's shape, 2 for the skewed Gaussian that is fitted: tops
+#: of interference filters are flatter, and the mean over a piece of strip makes them rounder again.
+LOG_ORDER_SIGMA = 0.1
 #: Prior σ of the remainder near a band and, beyond a distance in nm, of the uneven blocking.
 REMAINDER, BLOCKING, SHAPE_NM = 0.01, 0.001, 60.0
 #: Prior σ of the logarithm of the peak: all positions have the same order of magnitude.
@@ -44,6 +53,8 @@ ALONG_THE_STRIP = {
     strip_problem.LOG_PEAK: (2, 0.04),
     strip_problem.LEAKAGE: (1, 0.0005),
 }
+#: σ of the bend with one turn more than the map has, and least σ of its coefficients, in nm.
+THIRD_ORDER_NM, EXACT_NM = 5.0, 0.01
 #: Lower limit of the map's σ: strips are not smooth to a tenth of a nanometre.
 CENTRE_FLOOR_NM = 0.5
 #: Correlation length of errors of a gel's transmittance, which closer positions share.
@@ -132,9 +143,10 @@ def calibrate_lvf(
             )
         solution = problem.solve(solution, expected, STEPS)
     misfit = np.maximum(1.0, repetition * problem.misfit(solution))
-    sigma_figures = problem.sigmas(solution, expected) * misfit[:, np.newaxis]
+    runs = _runs_along_strip(positions, wavelengths)
+    joint = problem.joint_sigmas(solution, prior, runs, LOG_ORDER_SIGMA)
     try:
-        lvf = _lvf(positions, solution.figures, sigma_figures, problem.knots_nm)
+        lvf = _lvf(positions, solution.figures, joint, misfit, problem.knots_nm)
     except ValueError as error:
         raise FitError(f"{error}; check the order of the pictures") from None
     return LvfCalibration(lvf, misfit, problem.camera(solution.curves))
@@ -207,12 +219,40 @@ def _prior_from_others(
     return Expected(mean, sigma)
 
 
+def _runs_along_strip(positions: FloatArray, wavelengths: WavelengthMap) -> list[AlongStrip]:
+    """Return the run of each parameter along the strip, before the colour filters are looked at."""
+    scaled = (positions - positions.mean()) / (np.ptp(positions) / 2)
+    runs = []
+    for figure, sigma in (
+        (strip_problem.LOG_WIDTH, LOG_FWHM[1]),
+        (strip_problem.SKEW, SKEW[1]),
+        (strip_problem.LOG_PEAK, ANY_PEAK),
+        (strip_problem.LEAKAGE, LEAKAGE[1]),
+    ):
+        order, scatter = ALONG_THE_STRIP[figure]
+        powers = np.vander(scaled, order + 1, increasing=True)
+        runs.append(AlongStrip(figure, powers, np.eye(order + 1) / sigma, scatter))
+    order, scatter = ALONG_THE_STRIP[strip_problem.CENTRE]
+    low, high = wavelengths.span
+    powers = np.vander((2 * positions - low - high) / (high - low), order + 1, increasing=True)
+    covariance = THIRD_ORDER_NM**2 * np.eye(order + 1)
+    if wavelengths.covariance is not None:
+        known = len(wavelengths.covariance)
+        covariance[:known, :known] = wavelengths.covariance + EXACT_NM**2 * np.eye(known)
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    return [*runs, AlongStrip(strip_problem.CENTRE, powers, root, scatter)]
+
+
 def _lvf(
-    positions: FloatArray, figures: FloatArray, sigmas: FloatArray, knots_nm: FloatArray
+    positions: FloatArray,
+    figures: FloatArray,
+    sigmas: StripSigmas,
+    misfit: FloatArray,
+    knots_nm: FloatArray,
 ) -> Lvf:
     centre, log_width, skew, log_peak, leakage = figures[:, : strip_problem.FIGURES].T
     width, peak = np.exp(log_width), np.exp(log_peak)
-    sigma_columns = sigmas.T
+    sigma_columns = sigmas.figures.T * misfit
     return Lvf(
         positions,
         Bands(centre, width, skew, peak, leakage * peak),
@@ -220,7 +260,7 @@ def _lvf(
             sigma_columns[strip_problem.CENTRE],
             width * sigma_columns[strip_problem.LOG_WIDTH],
             sigma_columns[strip_problem.SKEW],
-            peak * sigma_columns[strip_problem.LOG_PEAK],
+            peak * sigmas.log_area * misfit,
             peak * sigma_columns[strip_problem.LEAKAGE],
         ),
         knots_nm,

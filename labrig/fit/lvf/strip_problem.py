@@ -53,6 +53,36 @@ class StripSolution:
 
 
 @dataclass(frozen=True, eq=False)
+class AlongStrip:
+    """Run of one parameter along the strip: a polynomial, and scatter about it.
+
+    Attributes
+    ----------
+    figure
+        Number of the parameter.
+    powers
+        Design of the polynomial, shape (p, c).
+    root
+        Root of the inverse covariance of its coefficients before any measurement, shape (c, c).
+    scatter
+        σ of the parameter about the polynomial.
+    """
+
+    figure: int
+    powers: FloatArray
+    root: FloatArray
+    scatter: float
+
+
+@dataclass(frozen=True, eq=False)
+class StripSigmas:
+    """Standard uncertainties of all parameters (p, figures), and of the logarithm of ∫ T_p dλ."""
+
+    figures: FloatArray
+    log_area: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class _Step:
     """Damped Gauss–Newton step."""
 
@@ -174,6 +204,76 @@ class StripProblem:
             rows.append(np.sqrt(np.diag(inverse @ inverse.T + coupled @ curves @ coupled.T)))
         return np.array(rows)
 
+    def joint_sigmas(
+        self,
+        solution: StripSolution,
+        prior: Expected,
+        runs: Sequence[AlongStrip],
+        log_order_sigma: float,
+    ) -> StripSigmas:
+        """Return the uncertainties with the errors that all positions share.
+
+        These are those of the curves, of the polynomials along the strip, which a position's prior
+        from all others takes for exact, and of the order of the peaks' shape, which is not fitted:
+        what the light through filters says of it is what it says of the width.
+
+        Parameters
+        ----------
+        solution
+            Parameters at the minimum.
+        prior
+            Prior of the parameters without a run.
+        runs
+            Runs of the others.
+        log_order_sigma
+            σ of the logarithm of the order.
+        """
+        _, design = self._residuals(solution)
+        slopes = self._derivatives(solution.figures) @ design.T
+        by_order = log_order_sigma * self._by_log_order(solution.figures)
+        by_curves = np.tensordot(
+            self._transmission(solution.figures), self._mode_designs, axes=(1, 2)
+        )
+        count = solution.figures.shape[1]
+        coefficients = np.cumsum([self.modes + 1, *(run.powers.shape[1] for run in runs)])
+        information = np.eye(coefficients[-1])
+        for first, last, run in zip(coefficients[:-1], coefficients[1:], runs, strict=True):
+            information[first:last, first:last] = run.root.T @ run.root
+        positions = []
+        for k, inverse in enumerate(self._inverse):
+            precision = 1 / prior.sigma[k]
+            shared = np.zeros((len(inverse) + count, coefficients[-1]))
+            shared[: len(inverse), : self.modes] = by_curves[k].T * inverse[:, np.newaxis]
+            shared[: len(inverse), self.modes] = design @ by_order[k] * inverse
+            for first, last, run in zip(coefficients[:-1], coefficients[1:], runs, strict=True):
+                precision[run.figure] = 1 / run.scatter
+                shared[len(inverse) + run.figure, first:last] = -run.powers[k] / run.scatter
+            own = np.vstack([slopes[k].T * inverse[:, np.newaxis], np.diag(precision)])
+            q, triangle = np.linalg.qr(own)
+            coupling = q.T @ shared
+            information += shared.T @ shared - coupling.T @ coupling
+            positions.append((np.linalg.inv(triangle), coupling))
+        covariance = _with_unfitted(information, self.modes)
+        areas = self._derivatives(solution.figures).sum(axis=2)
+        total = self._transmission(solution.figures).sum(axis=1)
+        figures, log_area = [], []
+        for k, (root, coupling) in enumerate(positions):
+            by_shared = -root @ coupling
+            figures.append(np.sqrt(np.square(root).sum(axis=1) + _variances(by_shared, covariance)))
+            area_by_shared = areas[k] @ by_shared
+            area_by_shared[self.modes] += by_order[k].sum()
+            variance = np.square(areas[k] @ root).sum() + _variances(area_by_shared, covariance)
+            log_area.append(np.sqrt(variance) / total[k])
+        return StripSigmas(np.array(figures), np.array(log_area))
+
+    def _by_log_order(self, figures: FloatArray) -> FloatArray:
+        """Return the derivatives of T_p by the logarithm of the peaks' order, shape (p, grid)."""
+        difference = _shapes(self.grid_nm, figures, 2 * np.exp(_STEP)) - _shapes(
+            self.grid_nm, figures, 2 * np.exp(-_STEP)
+        )
+        slope: FloatArray = np.exp(figures[:, [LOG_PEAK]]) * difference / (2 * _STEP)
+        return slope
+
     def _trial(
         self, solution: StripSolution, chi2: float, expected: Expected, damping: float
     ) -> tuple[StripSolution, float]:
@@ -257,7 +357,24 @@ def _on_grid(light: FloatArray, sensitivity: FloatArray, onto_grid: FloatArray) 
     return np.stack(rows, axis=1).reshape(-1, onto_grid.shape[1])
 
 
-def _shapes(nm: FloatArray, figures: FloatArray) -> FloatArray:
+def _with_unfitted(information: FloatArray, number: int) -> FloatArray:
+    """Return the covariance of parameters of which one, of unit variance, is not fitted."""
+    others = np.arange(len(information)) != number
+    covariance = np.zeros_like(information)
+    covariance[np.ix_(others, others)] = np.linalg.inv(information[np.ix_(others, others)])
+    by_unfitted = -covariance @ information[number]
+    by_unfitted[number] = 1.0
+    total: FloatArray = covariance + np.outer(by_unfitted, by_unfitted)
+    return total
+
+
+def _variances(by_shared: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the variances of what depends linearly on errors of some covariance."""
+    variances: FloatArray = ((by_shared @ covariance) * by_shared).sum(axis=-1)
+    return variances
+
+
+def _shapes(nm: FloatArray, figures: FloatArray, order: float = 2.0) -> FloatArray:
     """Return peaks of height 1, shape (p, grid)."""
     centre, log_width, skew = (figures[:, [number]] for number in (CENTRE, LOG_WIDTH, SKEW))
-    return peak_shape(nm - centre, np.exp(log_width), skew)
+    return peak_shape(nm - centre, np.exp(log_width), skew, order)

@@ -1,7 +1,7 @@
 """The linear system from a spectrum to the measured values, and its errors."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,7 +177,8 @@ def _filter_changes(lvf: Lvf, nodes: FloatArray) -> Iterator[tuple[int, FloatArr
         return
     for name in (f.name for f in fields(Bands)):
         step = _STEP * getattr(lvf.sigma, name)
-        shifted = replace(lvf.bands, **{name: getattr(lvf.bands, name) + step})
-        change = (shifted.transmission(nodes) - lvf.bands.transmission(nodes)) / _STEP
+        change = (
+            lvf.changed_bands(name, _STEP).transmission(nodes) - lvf.bands.transmission(nodes)
+        ) / _STEP
         for position in np.flatnonzero(step > 0).tolist():
             yield position, change[position]
