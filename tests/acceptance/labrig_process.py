@@ -21,6 +21,8 @@ from labrig.bench import Bench, open_bench, recording
 from labrig.cli.exit_codes import guarded
 
 LOOK_S = 0.002
+#: Begins of lines of progress, and of those that tell of no failure.
+REMARKS = "[", "warning:", "note:", "nothing to resume: all units are complete"
 
 
 class Labrig:
@@ -52,9 +54,9 @@ class Labrig:
 
     @property
     def complaints(self) -> list[str]:
-        """Return its messages beside its progress."""
+        """Return its messages beside its progress, and what it only remarks on."""
         lines = self._err.read_text().splitlines()
-        return [line for line in lines if not line.startswith(("[", "warning:"))]
+        return [line for line in lines if not line.startswith(REMARKS)]
 
     @property
     def bench(self) -> dict[str, Any]:
