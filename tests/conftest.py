@@ -33,6 +33,14 @@ from hypothesis import settings
 from labrig.signals import STOP_SIGNALS
 from tests.quick_yaml import read_quickly, write_quickly
 
+# Tests write ten thousands of files, which some disks take longer to delete than they are worth:
+# where the memory is a file system that runs programs, too, they are there.
+MEMORY = Path("/dev/shm")
+if MEMORY.is_dir() and sys.platform == "linux":
+    _memory = os.statvfs(MEMORY)
+    if _memory.f_bavail * _memory.f_frsize > 4e9 and not _memory.f_flag & os.ST_NOEXEC:
+        os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
+
 # What takes long to import is imported where it is used: the process that hands out the tests,
 # and begins before the others, needs none of it.
 if TYPE_CHECKING:
