@@ -33,7 +33,7 @@ from hypothesis import settings
 from labrig.signals import STOP_SIGNALS
 from tests.quick_yaml import read_quickly, write_quickly
 
-# Tests write ten thousands of files, which some disks take longer to delete than they are worth:
+# Tests write thousands of files, which some disks take longer to delete than to write:
 # where the memory is a file system that runs programs, too, they are there.
 MEMORY = Path("/dev/shm")
 if MEMORY.is_dir() and sys.platform == "linux":
