@@ -110,7 +110,7 @@ def test_densities_are_the_conditional_ones_within_the_range(seed: int, given_nm
             continue
         expected = conditional.pdf(others, given_nm) / inside
         assert surface.density(given_nm, others, start) == pytest.approx(
-            expected, rel=1e-6, abs=1e-8
+            expected, rel=1e-6, abs=1e-7
         )
 
 
