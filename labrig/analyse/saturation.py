@@ -48,6 +48,8 @@ from labrig.results import (
 FAINTEST, STRONGEST = 1e-4, 1e4
 #: Relative step of the derivatives.
 STEP = 1e-3
+#: σ of the logarithm of a rate from which a decay does not determine it: a factor of 20.
+UNDETERMINED = 3.0
 
 
 def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
@@ -158,12 +160,11 @@ def compare_rates(
     # A smaller scatter than σ does not lower it: σ may be a little too large, never too small.
     scatter = max(own_chi2 / dof, 1.0)
     falling = np.argsort(-shared)
+    own = [(log_rates, sigma) for log_rates, _, sigma in own_fits]
     return RatesTest(
         shared_per_s=np.exp(shared)[falling],
-        own_per_s=np.array([np.exp(log_rates)[falling] for log_rates, _, _ in own_fits]),
-        own_sigma_per_s=np.array(
-            [(np.exp(log_rates) * sigma)[falling] for log_rates, _, sigma in own_fits]
-        ),
+        own_per_s=np.array([_rates(*each)[0][falling] for each in own]),
+        own_sigma_per_s=np.array([_rates(*each)[1][falling] for each in own]),
         amplitude=np.array([value[falling] for value, _ in amplitudes]),
         amplitude_sigma=np.array([sigma[falling] for _, sigma in amplitudes]),
         residuals=tuple(-_misfit(decay, np.exp(shared)[falling])[0][:-1] for decay in curves),
@@ -173,6 +174,17 @@ def compare_rates(
         noise_dof=noise_dof,
         p_value=float(fdtrc(added, dof, gain / scatter)),
     )
+
+
+def _rates(log_rates: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return rates (s,) and their σ from their logarithms, NaN and infinity if not known.
+
+    Where a decay lacks a state, the logarithm of its rate runs off.
+    """
+    is_determined = sigma < UNDETERMINED
+    rates = np.exp(np.where(is_determined, log_rates, 0.0))
+    spread = rates * np.where(is_determined, sigma, 0.0)
+    return np.where(is_determined, rates, np.nan), np.where(is_determined, spread, np.inf)
 
 
 def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float, FloatArray]:

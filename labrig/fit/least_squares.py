@@ -545,11 +545,6 @@ def _rank_tolerance(jacobian: FloatArray) -> float:
     return float(max(jacobian.shape)) * EPSILON
 
 
-#: Diagonal of a triangular factor of unit columns above which it is inverted without a look at its
-#: rank.
-WELL_CONDITIONED = 1e-8
-
-
 def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (JᵀJ)⁻¹ of J (m, p), defined as `LeastSquaresFit.covariance`, and singular values.
 
@@ -567,21 +562,6 @@ def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
         covariance[:, unresolved] = 0.0
         covariance[unresolved, unresolved] = np.inf
     return covariance, s
-
-
-def parameter_covariances(jacobians: FloatArray) -> list[FloatArray]:
-    """Return the covariance of every one of k Jacobians (k, m, p), as `parameter_covariance` does.
-
-    All at once, by triangular factors; one after the other where one of them is near-singular.
-    """
-    scale = np.sqrt(np.einsum("kij,kij->kj", jacobians, jacobians))
-    if (scale > 0).all() and jacobians.shape[1] >= jacobians.shape[2]:
-        triangles = np.linalg.qr(jacobians / scale[:, None, :], mode="r")
-        diagonal = np.abs(np.diagonal(triangles, axis1=1, axis2=2))
-        if diagonal.min() > WELL_CONDITIONED:
-            inverse = np.linalg.inv(triangles) / scale[:, :, None]
-            return list(inverse @ np.swapaxes(inverse, 1, 2))
-    return [parameter_covariance(jacobian)[0] for jacobian in jacobians]
 
 
 def _result(problem: _Problem, end: _End) -> LeastSquaresFit:

@@ -259,7 +259,7 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
     >>> listed = entries(Queue(runs=(QueuedRun(protocol="decay", run="decay"),)), Path("runs"))
     >>> report = queue_report("queue", listed)
     >>> report.sections[0].tables[0].rows[0][-1]
-    '0.2048(29), 0.01009(11)'
+    '0.2048(31), 0.01009(12)'
     """
     keys = _keys(listed)
     rows = [

@@ -169,8 +169,8 @@ def comparison_table(comparison: MaterialComparison) -> Table:
     >>> reference = labrig.read_material("white-paint")
     >>> for row in comparison_table(compare_materials(measured, reference)).rows:
     ...     print("; ".join(row))
-    k_r 1 / s⁻¹; 0.2048 ± 0.0029; 0.047; +335.7; +55.2
-    k_r 2 / s⁻¹; 0.01009 ± 0.00011; –; –; –
+    k_r 1 / s⁻¹; 0.2048 ± 0.0031; 0.047; +335.7; +51.7
+    k_r 2 / s⁻¹; 0.01009 ± 0.00012; –; –; –
     """
     return Table(
         head=("", _measured_head(comparison), "reference", "apart / %", "apart / σ"),

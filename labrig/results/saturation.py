@@ -85,7 +85,8 @@ class RatesTest:
     shared_per_s
         Shared rates in 1/s, falling, shape (s,).
     own_per_s, own_sigma_per_s
-        Rates of every decay alone and their standard uncertainties in 1/s, shape (d, s).
+        Rates of every decay alone and their standard uncertainties in 1/s, shape (d, s); NaN and
+        infinite of a state that the decay lacks.
     amplitude, amplitude_sigma
         Amplitudes of every decay at lamp off with shared rates in DN/s, shape (d, s).
     residuals

@@ -155,6 +155,17 @@ def test_rates_that_differ_by_a_few_per_cent_are_distinguished() -> None:
     assert test.own_per_s[:, 0] == pytest.approx([0.05, 0.053], rel=0.02)
 
 
+def test_a_state_that_a_decay_lacks_has_no_rate_there() -> None:
+    curves = [decay([0.1, 0.01], [1.0, 0.2], 3), decay([0.1, 0.01], [0.001, 0.0], 53)]
+    test = compare_rates(curves, [0.1, 0.01])
+    assert test.own_per_s[0] == pytest.approx([0.1, 0.01], rel=0.1)
+    lacking = np.isnan(test.own_per_s)
+    assert lacking[1].any()
+    assert not lacking[0].any()
+    assert (np.isinf(test.own_sigma_per_s) == lacking).all()
+    assert (test.own_sigma_per_s > 0).all()
+
+
 def judged(curves: list[Curve], rates: list[float]) -> PatchSaturation:
     """Compare decays as an analysis does, the last one fitted with as many states as rates."""
     t_s, one, text = curves[-1].t_s, np.ones(len(T_S)), ("",) * len(T_S)

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from labrig.fit import DecayFit, fit_decay
-from labrig.fit.decay.joint import JointProblem
+from labrig.fit.decay.joint import JointProblem, covariance_under_flicker, fit_jointly
 from labrig.fit.decay.series import decay_series
 from labrig.fit.decay.states import exponentials
 from labrig.fit.decay.whitening import whitened
 from tests.fit import truths
+from tests.pulls import assert_sigma_is_right
 
 States = tuple[tuple[float, float], ...]
 
@@ -248,3 +249,23 @@ def test_whitening_is_the_inverse_root_of_the_covariance() -> None:
         np.broadcast_to(np.eye(3), (37, 3, 3)),
         atol=1e-9,
     )
+
+
+def test_covariance_is_that_of_the_weights_used_whatever_the_flicker() -> None:
+    """Frames that flicker by 2 % and are weighed as if by 0.1 %."""
+    assumed, true, errors = 0.001, 0.02, []
+    decay, weights, free = truths.exponentials((0.05, 1.0)), truths.RGB_WEIGHTS, np.full(2, np.inf)
+    for seed in range(200):
+        seen = truths.observe(decay, 40_000 + seed, flicker=true)
+        series = decay_series(seen.t_s, seen.values, seen.sigma, seen.exposure_s, "RGB", 0.0)
+        course = truths.exposed(decay, seen.t_s, seen.exposure_s) / series.peak
+        signal = np.multiply.outer(course, weights)
+        start = np.array([np.log(0.05 * series.span_s), 1.0])
+        data, shape = whitened(series, signal, assumed), exponentials(series, 1, np.empty(0))
+        fit = fit_jointly(data, shape, start, weights, np.zeros(3), -free, free, 50, 1e-8)
+        errors.append(fit.shape[0] - start[0])
+    sigma2 = covariance_under_flicker(fit, data, signal, true**2 - assumed**2)[0, 0]
+    assert_sigma_is_right(np.array(errors) / np.sqrt(sigma2))
+    data = whitened(series, signal, true)
+    best = fit_jointly(data, shape, start, weights, np.zeros(3), -free, free, 50, 1e-8)
+    assert sigma2 > 2 * best.least_squares.covariance[0, 0]

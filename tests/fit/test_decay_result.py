@@ -14,6 +14,8 @@ from tests.fit import truths
 
 DOUBLE = truths.exponentials((0.08, 1.0), (0.015, 0.4))
 T = truths.TIMES_S
+#: Frames of what fades within seconds.
+FAST_S: truths.FloatArray = 0.3 + 2.0 * np.arange(31, dtype=np.float64)
 SEEN = truths.observe(DOUBLE, seed=11)
 
 
@@ -166,11 +168,27 @@ def test_offset_far_from_its_prior_is_named() -> None:
 
 def test_flicker_from_too_few_bright_frames_is_reported() -> None:
     for seed in range(10):
-        seen = truths.observe(truths.exponentials((0.25, 1.0)), seed, weights=np.ones(1))
+        seen = truths.observe(truths.exponentials((0.5, 1.0)), seed, weights=np.ones(1))
         fit = fit_decay(seen.t_s, seen.values, seen.sigma, exposure_s=1.5, flicker=None)
         assert any("give a flicker measured elsewhere" in line for line in fit.warnings)
         (state,) = fit.states
-        assert abs(state.k_r_per_s - 0.25) < 4.5 * state.k_r_sigma_per_s
+        assert abs(state.k_r_per_s - 0.5) < 4.5 * state.k_r_sigma_per_s
+
+
+def test_flicker_from_few_bright_frames_is_in_sigma() -> None:
+    """Five frames tell it to a third, which its σ allows for: nothing is to be said."""
+    pulls = []
+    for seed in range(20):
+        seen = truths.observe(
+            truths.exponentials((0.35, 1.0)), seed, snr=1000, t_s=FAST_S, exposure_s=1.0
+        )
+        fit = fit_decay(
+            seen.t_s, seen.values, seen.sigma, exposure_s=1.0, channels="RGB", flicker=None
+        )
+        (state,) = fit.states
+        pulls.append((state.k_r_per_s - 0.35) / state.k_r_sigma_per_s)
+        assert not any("give a flicker" in line for line in fit.warnings)
+    assert 0.5 < np.sqrt(np.mean(np.square(pulls))) < 1.3
 
 
 GOOD = np.exp(-0.05 * T)

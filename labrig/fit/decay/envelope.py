@@ -94,6 +94,10 @@ class Envelope:
         """Median of the likely values of ρ; unlike the likeliest one it is not zero by chance."""
         return float(np.median(self.likely_flickers))
 
+    def added_square(self, assumed: float) -> float:
+        """Return by how much the mean of ρ² exceeds the square of a flicker that was assumed."""
+        return float((self.likely_flickers**2).mean()) - assumed**2
+
 
 def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     """Alternate fits of the curve, the channel weights, the repeats' levels and the flicker.

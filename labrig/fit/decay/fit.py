@@ -13,7 +13,7 @@ from labrig.fit.decay.law_ties import tie_warnings
 from labrig.fit.decay.laws import LawFit, fit_laws
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
-from labrig.fit.decay.result import DecayFit, assemble, noise_matrices, student_factor
+from labrig.fit.decay.result import DecayFit, assemble, student_factor
 from labrig.fit.decay.scatter import with_scatter_sigma
 from labrig.fit.decay.selection import CLEAR_BIC, choose_states, is_needed, law_margin
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
@@ -126,7 +126,7 @@ def fit_decay(
     >>> fit = labrig.fit_decay(decay.t_s, y, sigma, exposure_s=decay.exposure_s, flicker=0.007)
     >>> for state in fit.states:
     ...     print(f"k = {state.k_r_per_s:.4f} ± {state.k_r_sigma_per_s:.4f} 1/s")
-    k = 0.2046 ± 0.0029 1/s
+    k = 0.2046 ± 0.0030 1/s
     k = 0.0101 ± 0.0001 1/s
     """
     if law not in LAW_CHOICES:
@@ -162,8 +162,8 @@ def fit_decay(
     chosen, tried = _supported_states(likelihood, numbers, fixed, smooth)
     weights, offsets = chosen.joint.weights, chosen.joint.offsets
     student = student_factor(estimated.dof if estimated else np.inf)
-    noises = noise_matrices(data, smooth.signal, smooth)
-    laws = fit_laws(likelihood, weights, offsets, noises, student)
+    added_square = smooth.added_square(smooth.typical_flicker)
+    laws = fit_laws(likelihood, weights, offsets, added_square, student)
     spectrum = fit_rate_spectrum(likelihood, weights, student)
     if law == AUTO and n_states is not None:
         law = EXPONENTIALS

@@ -38,6 +38,9 @@ from labrig.results import (
 )
 
 RISING_SIGMAS = 5.0
+#: Degrees of freedom of an estimated flicker below which its prior makes σ: Student's t then has no
+#: variance. Above, the flicker's own uncertainty is in σ.
+FEWEST_FLICKER_DOF = 2.0
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
 AT_BOUND = 1e-3
 
@@ -187,7 +190,7 @@ def warnings_about(
             f"the values scatter {factor} times as much as their σ says, and it was multiplied by "
             "that: check its column and its unit"
         )
-    elif evidence.noise_dof < FEWEST_NOISE_DOF:
+    elif evidence.noise_dof < FEWEST_FLICKER_DOF:
         warnings.append(
             f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
             "signal: give a flicker measured elsewhere, or record more frames while it is bright"

@@ -5,18 +5,16 @@ The model is w_c h(t; θ) + b_c: a shape h shared by all channels, times one wei
 channel's weight is held at 1, which fixes the scale of h.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import (
     FloatArray,
     LeastSquaresFit,
     least_squares,
-    parameter_covariances,
 )
 
 #: Shape parameters (q,) → h (n,) and its Jacobian (n, q).
@@ -167,36 +165,33 @@ class JointProblem:
         return residuals, jacobian
 
 
-def covariances_under(
-    series: DecaySeries, shape: Shape, fit: JointFit, matrices: Sequence[FloatArray]
-) -> list[FloatArray]:
-    """Return the covariance of the parameters of `fit` for each of several noises.
+def covariance_under_flicker(
+    fit: JointFit, data: WhitenedSeries, signal: FloatArray, added_square: float
+) -> FloatArray:
+    """Return the covariance A V Aᵀ (p, p) of a fit if its frames flicker otherwise than weighed.
+
+    The parameters follow the whitened values with A = (JᵀJ)⁻¹Jᵀ, whose weights are those of the
+    flicker assumed. Values of another one have V = 1 + (ρ² − ρ₀²) s sᵀ, and no smaller covariance
+    than if they were weighed by ρ: that is more than the (JᵀJ)⁻¹ of ρ's own weights.
 
     Parameters
     ----------
-    series
-        The series, whose offsets have priors.
-    shape
-        Function that returns h and its Jacobian.
     fit
         The fit.
-    matrices
-        Whitening matrices of each noise, shape (n, C, C).
+    data
+        The series in units of its noise.
+    signal
+        What the fit says without offsets, shape (n, C).
+    added_square
+        Mean of ρ² − ρ₀², ρ₀ the flicker in the units of `data`.
     """
-    h, slopes = shape(fit.shape)
-    others = [c for c in range(len(fit.weights)) if c != fit.brightest]
-    q, first_offset = len(fit.shape), len(fit.shape) + len(others)
-    n_parameters = first_offset + len(series.fitted_offsets)
-    model = np.zeros((series.n_frames, len(fit.weights), n_parameters))
-    model[:, :, :q] = fit.weights[:, None] * slopes[:, None, :]
-    model[:, others, range(q, first_offset)] = h[:, None]
-    model[:, series.fitted_offsets, range(first_offset, n_parameters)] = 1.0
-    priors = np.zeros((len(series.offset_prior), n_parameters))
-    priors[:, first_offset:] = series.offset_prior
-    designs = [
-        np.vstack([(whitening @ model).reshape(-1, n_parameters), priors]) for whitening in matrices
-    ]
-    return parameter_covariances(np.stack(designs))
+    covariance = fit.least_squares.covariance
+    along = np.einsum("fcd,fd->fc", data.matrices, signal)
+    jacobian = fit.least_squares.jacobian[: along.size].reshape(*along.shape, -1)
+    # What is not determined at all has an infinite variance, whatever the flicker.
+    determined = np.where(np.isfinite(covariance), covariance, 0.0)
+    effect = determined @ np.einsum("fc,fcp->pf", along, jacobian)
+    return np.asarray(covariance + added_square * effect @ effect.T)
 
 
 def weight_sigma(fit: JointFit, covariance: FloatArray) -> FloatArray:

@@ -5,13 +5,12 @@ that their χ² compare. Traps of many depths and the recombination of electrons
 this (Nalbach et al., section 4.4).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from labrig.errors import FitError
-from labrig.fit.decay.joint import JointFit, Shape, covariances_under, fit_jointly
+from labrig.fit.decay.joint import JointFit, Shape, covariance_under_flicker, fit_jointly
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import DecaySeries
@@ -71,7 +70,7 @@ def fit_law(
     law: DecayLaw,
     weights: FloatArray,
     offsets: FloatArray,
-    noises: Sequence[FloatArray],
+    added_square: float,
     student: float,
 ) -> LawFit | None:
     """Fit a law from the best place of a grid of rates and shapes.
@@ -84,8 +83,8 @@ def fit_law(
         The law.
     weights, offsets
         Start values of the channels, shape (C,).
-    noises
-        Whitening matrices of equally probable noises, over which the covariance is averaged.
+    added_square
+        Mean square of the flicker less that of the series' noise.
     student
         Factor of the covariance where the noise was estimated.
 
@@ -119,15 +118,11 @@ def fit_law(
         return None
     if fit.shape[0] == 0:
         return None
-    covariances = covariances_under(series, shape, fit, noises)
     # Near an exponential, retrapping changes the signal as the rate does: its σ has no limit there.
     if not np.sqrt(fit.least_squares.covariance[LAW_SHAPE, LAW_SHAPE]) <= largest - least:
         fit = _with_shape_held(fit)
-        held = _shape_held(shape)
-        covariances = [
-            _without_shape(each) for each in covariances_under(series, held, fit, noises)
-        ]
-    covariance = np.mean(covariances, axis=0)
+    signal = np.multiply.outer(shape(fit.shape)[0], fit.weights)
+    covariance = covariance_under_flicker(fit, data, signal, added_square)
     with np.errstate(invalid="ignore"):
         covariance = np.where(covariance == 0, 0.0, student * covariance)
     return LawFit(fit, covariance, _in_units(law, fit, series, covariance, likelihood.bic(fit)))
@@ -137,12 +132,13 @@ def fit_laws(
     likelihood: NoiseLikelihood,
     weights: FloatArray,
     offsets: FloatArray,
-    noises: Sequence[FloatArray],
+    added_square: float,
     student: float,
 ) -> tuple[LawFit, ...]:
     """Fit every law; the arguments are those of `fit_law`."""
     fits = (
-        fit_law(likelihood, law, weights, offsets, noises, student) for law in DECAY_LAWS.values()
+        fit_law(likelihood, law, weights, offsets, added_square, student)
+        for law in DECAY_LAWS.values()
     )
     return tuple(fit for fit in fits if fit is not None)
 
@@ -162,17 +158,6 @@ def _shape(series: DecaySeries, law: DecayLaw) -> Shape:
         return theta[0] * means, np.column_stack([means, theta[0] * slopes])
 
     return shape
-
-
-def _shape_held(shape: Shape) -> Shape:
-    """Return a law that does not depend on its shape."""
-
-    def held(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        values, slopes = shape(theta)
-        slopes[:, LAW_SHAPE] = 0.0
-        return values, slopes
-
-    return held
 
 
 def _with_shape_held(fit: JointFit) -> JointFit:

@@ -4,19 +4,23 @@ Neighbouring values then err together, and what a sum of exponentials averages o
 seems. In units of their σ, the values deviate from the fit with the covariance
 V = D + c² S φ^|f − g| S: S is the part of σ that is flicker, or all of it, and D the independent
 rest. The restricted likelihood (D. Harville, J. Am. Stat. Assoc. 72, 1977) allows for what the fit
-took of the deviations, and weighs all φ and c. That there is no correlation is six times as
+took of the deviations, and weighs all φ and c. That there is no correlation is four times as
 probable before the data as all φ > 0 together, since the flicker of shutter and aperture has none;
 these have the reference prior (1 − φ²)^(−1/2) (J. O. Berger, R.-Y. Yang, Econometric Theory 10,
 1994). The fit, whose weights are those of independent values, has the covariance A V Aᵀ with
-A = (JᵀJ)⁻¹Jᵀ, and V is the mean over all φ and c, none included (model averaging; J. Hoeting et
-al., Statistical Science 14, 1999). A threshold would do worse: some dozens of values hardly tell a
-memory of one or two frames, which makes σ too small by a third, and σ would jump at it.
+A = (JᵀJ)⁻¹Jᵀ, and V is the mean over all φ and c (model averaging; J. Hoeting et al., Statistical
+Science 14, 1999). That there may be none or one, an error then having either of two widths, makes
+longer tails than those of a normal distribution: σ is not less than what makes 3 σ exceeded as
+seldom as by one, if a noise that correlates has the geometric mean of c. A threshold would do
+worse: some dozens of values hardly tell a memory of one or two frames, which makes σ too small by a
+third, and σ would jump at it.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solveh_banded
+from scipy.special import ndtr
 
 from labrig.fit.decay.diagnostics import BELOW_ZERO_SIGMAS
 from labrig.fit.decay.envelope import USUAL_FLICKER, Envelope
@@ -27,7 +31,7 @@ from labrig.fit.least_squares import FloatArray
 #: Correlations of neighbouring values that are weighed, and the prior probability of none: who
 #: gives the flicker has measured it, and would have seen how a steady light drifts.
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92, 0.97])
-PRIOR_OF_NONE, PRIOR_OF_NONE_IF_GIVEN = 0.85, 0.95
+PRIOR_OF_NONE, PRIOR_OF_NONE_IF_GIVEN = 0.8, 0.95
 #: Factor by which the data raise the odds of a correlation from which a warning says so:
 #: substantial evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of 1200 series
 #: with independent noise five have it.
@@ -42,6 +46,11 @@ FEWEST_VALUES, MOST_VALUES = 12, 100
 TINY, INDEPENDENT = 1e-300, 1e-6
 #: Least estimate: a flicker that drifts with the decay leaves hardly any scatter about a curve.
 LEAST_FLICKER = 0.002
+#: Number of σ, the probability beyond which is that of a normal distribution, and steps of a search
+#: by halves.
+TAIL_SIGMAS, BISECTIONS = 3.0, 20
+#: Part of a variance, below which what is added to it does not matter.
+LEAST_ADDED = 1e-3
 #: Mean part of the variance from which it matters whether it correlates.
 LEAST_FRACTION = 0.1
 
@@ -68,11 +77,14 @@ class _Part:
         scaled = self.factors[None, :, None, None] ** 2 * powers[:, None]
         return np.asarray(scaled + np.diag(self.rest[:n_values] + INDEPENDENT))
 
-    def effect_of(self, effect: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return A V Aᵀ (p, p) of A (p, n), summed with weights of all φ > 0 and c (k − 1, m)."""
+    def effect_of(self, effect: FloatArray, weights: FloatArray, squares: FloatArray) -> FloatArray:
+        """Return A V Aᵀ (p, p) of A (p, n), summed with weights of all φ > 0 and c (k − 1, m).
+
+        The squares are those of c, broadcast to the weights.
+        """
         total = float(weights.sum()) * (effect * self.rest) @ effect.T
         sized = effect * self.size
-        for phi, weight in zip(CORRELATIONS[1:], weights @ self.factors**2, strict=True):
+        for phi, weight in zip(CORRELATIONS[1:], (weights * squares).sum(axis=1), strict=True):
             total += weight * sized @ _correlated(phi, sized.T)
         return np.asarray(total)
 
@@ -165,11 +177,19 @@ class NoiseCorrelation:
         left = _Deviations.of(data, joint, signal)
         effect = solution.covariance @ left.jacobian.T
         parts = left.parts(data, self.noise, len(_kept(data, joint)))
-        total = sum(float(each.sum()) for each in self.probabilities.values())
-        added = -total * (effect @ effect.T)
+        probability = sum(float(each.sum()) for each in self.probabilities.values())
+        added = -probability * (effect @ effect.T)
+        typical = np.diag(added).copy()
         for name, probabilities in self.probabilities.items():
-            added += parts[name].effect_of(effect, probabilities)
-        return _positive(added, solution.covariance)
+            part, total = parts[name], probabilities.sum(axis=1)
+            added += part.effect_of(effect, probabilities, part.factors**2)
+            log_square = probabilities @ np.log(part.factors**2) / np.maximum(total, TINY)
+            square = np.exp(log_square)[:, None]
+            typical += np.diag(part.effect_of(effect, total[:, None], square))
+        added = _positive(added, solution.covariance)
+        own = np.diag(solution.covariance)
+        factors = _tail_factors(own, np.diag(added), typical, probability)
+        return np.asarray(factors.max(initial=1.0) * added)
 
 
 def noise_correlation(
@@ -294,6 +314,33 @@ def _log_restricted_likelihoods(
     volumes = np.log(np.diagonal(choleskys, axis1=-2, axis2=-1)).sum(axis=-1)
     volumes += np.log(np.maximum(diagonal[..., :-1], TINY)).sum(axis=-1)
     return np.asarray(-volumes - diagonal[..., -1] ** 2 / 2)
+
+
+def _tail_factors(
+    own: FloatArray, added: FloatArray, typical: FloatArray, probability: float
+) -> FloatArray:
+    """Return factors of an added variance with which 3 σ have their probability, (q,).
+
+    Parameters
+    ----------
+    own, added
+        Variance of the parameters by independent noise, and what is added to it in the mean, (p,).
+    typical
+        What a correlated noise of the usual size adds, times its probability, (p,).
+    probability
+        Probability that the noise correlates.
+    """
+    changed = (own > 0) & (added > LEAST_ADDED * own) & (typical > LEAST_ADDED * own)
+    if not changed.any():
+        return np.ones(0)
+    own, added, typical = own[changed], added[changed], typical[changed]
+    low, high = np.sqrt(own), np.sqrt(own + typical / probability)
+    sigma, weights = np.stack([low, high]), np.array([1 - probability, probability])
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        is_short = weights @ ndtr(-TAIL_SIGMAS * middle / sigma) > ndtr(-TAIL_SIGMAS)
+        low, high = np.where(is_short, middle, low), np.where(is_short, high, middle)
+    return np.asarray((low**2 - own) / added)
 
 
 def _positive(added: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -6,15 +6,14 @@ import numpy as np
 
 from labrig.fit.decay.bend import bend
 from labrig.fit.decay.drift import drift_effect
-from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.further_state import hidden_state
-from labrig.fit.decay.joint import weight_sigma
+from labrig.fit.decay.joint import covariance_under_flicker, weight_sigma
 from labrig.fit.decay.laws import LAW_RATE, LawFit
 from labrig.fit.decay.misfit_covariance import with_misfit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation, noise_correlation
 from labrig.fit.decay.states import StatesFit
-from labrig.fit.decay.whitening import WhitenedSeries, whitening_matrices
+from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
 from labrig.results import DecayState, FittedDecay
@@ -165,8 +164,8 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
         return covariance * student_factor(evidence.sigma_scale.dof)
     if noise.is_given:
         return covariance
-    matrices = noise_matrices(data, fit.signal(data.series), noise)
-    return np.asarray(np.mean(fit.covariances_under(data.series, matrices), axis=0))
+    added_square = noise.added_square(noise.flicker)
+    return covariance_under_flicker(fit.joint, data, fit.signal(data.series), added_square)
 
 
 def student_factor(dof: float) -> float:
@@ -174,13 +173,6 @@ def student_factor(dof: float) -> float:
     if np.isinf(dof):
         return 1.0
     return dof / (dof - 2) if dof > 2 else float("inf")
-
-
-def noise_matrices(data: WhitenedSeries, signal: FloatArray, noise: Envelope) -> list[FloatArray]:
-    """Return the whitening matrices (n, C, C) of every likely flicker of a signal (n, C)."""
-    if noise.is_given:
-        return [data.matrices]
-    return [whitening_matrices(data.series, signal, rho) for rho in noise.likely_flickers]
 
 
 def _covariances(

@@ -1,13 +1,12 @@
 """Fit of n exponentials to a whitened series."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import FitError
-from labrig.fit.decay.joint import JointFit, Shape, covariances_under, fit_jointly
+from labrig.fit.decay.joint import JointFit, Shape, fit_jointly
 from labrig.fit.decay.search import projection, search_rates
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
@@ -74,13 +73,6 @@ class StatesFit:
         n_priors = len(data.target) - data.values.size
         n_levels = len(data.series.repeats) - 1
         return data.series.n_values + n_priors - self.joint.n_parameters - n_levels
-
-    def covariances_under(
-        self, series: DecaySeries, matrices: Sequence[FloatArray]
-    ) -> list[FloatArray]:
-        """Return the covariance of the parameters for each noise's whitening matrices (n, C, C)."""
-        shape = exponentials(series, self.n_free, self.fixed)
-        return covariances_under(series, shape, self.joint, matrices)
 
     @property
     def rates_are_determined(self) -> bool:
