@@ -5,7 +5,7 @@
     python -m tests.recordings --keep          keep the numbers as they are now
     python -m tests.recordings --record        record the runs anew, too
 
-Ends with 1 if a number differs by more than 1e-6 σ, or 1e-9 of it where it has no σ. A commit that
+Ends with 1 if a number differs by more than 1e-6 σ, or 1e-6 of it where it has no σ. A commit that
 changes numbers on purpose says so, prints the differences in its message and keeps them anew.
 """
 
