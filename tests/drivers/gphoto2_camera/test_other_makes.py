@@ -142,7 +142,7 @@ def test_a_setting_that_is_not_taken(toy: ToyBench) -> None:
     ],
 )
 def test_a_frame_that_is_none(toy: ToyBench, files: list[Any], why: str) -> None:
-    with toy.connected({}, {"files": files}, transfer_timeout="100 ms") as camera:
+    with toy.connected({}, {"files": files}, transfer_timeout="1 s") as camera:
         camera.configure(SETTINGS)
         with pytest.raises(DeviceError, match=why):
             camera.shoot()
