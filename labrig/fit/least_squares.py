@@ -62,6 +62,8 @@ POLISH_STEPS = 60
 #: Fall of χ² that matters: it moves no parameter by more than a tenth of its σ.
 GAIN_THAT_MATTERS = 0.01
 POLISH_PATIENCE = 3
+#: Part of a step by which χ² has to begin to fall.
+BEGUN = 1 / 64
 
 
 class Ending(Enum):
@@ -100,6 +102,10 @@ class LeastSquaresFit:
         Number of evaluations of the residuals.
     ending
         How the fit ended.
+    creeps
+        Whether it ended early and a step more would gain what matters, residuals being in σ. Where
+        residuals are large, or slopes do not follow how weights depend on the parameters, steps
+        alternate about a minimum that is near enough for any use: χ² does not fall along them.
     """
 
     parameters: FloatArray
@@ -113,24 +119,12 @@ class LeastSquaresFit:
     at_bound: NDArray[np.bool_]
     iterations: int
     ending: Ending
+    creeps: bool
 
     @property
     def converged(self) -> bool:
         """Whether the fit ended at a minimum that determines its parameters."""
         return self.ending is Ending.MINIMUM
-
-    @property
-    def creeps(self) -> bool:
-        """Whether it ended early, and a step more would gain what matters: residuals being in σ.
-
-        Where residuals are large, steps alternate about a minimum that is near enough for any use.
-        """
-        if self.ending is not Ending.CREEPING:
-            return False
-        free = self.jacobian[:, ~self.at_bound]
-        norms = _or_1(_column_lengths(free))
-        step = np.linalg.lstsq(free / norms, self.residuals, rcond=None)[0] / norms
-        return bool(np.linalg.norm(free @ step) ** 2 > GAIN_THAT_MATTERS)
 
     @property
     def reduced_chi2(self) -> float:
@@ -580,4 +574,19 @@ def _result(problem: _Problem, end: _End) -> LeastSquaresFit:
         at_bound=~problem.free(point),
         iterations=end.evaluations,
         ending=end.ending,
+        creeps=end.ending is Ending.CREEPING and _gains_by_a_step(problem, point),
     )
+
+
+def _gains_by_a_step(problem: _Problem, point: _Point) -> bool:
+    """Return whether χ² would fall by what matters, and begins to fall as its slopes say."""
+    free = problem.free(point)
+    slopes = point.jacobian[:, free]
+    norms = _or_1(_column_lengths(slopes))
+    step = np.zeros_like(point.x)
+    step[free] = -np.linalg.lstsq(slopes / norms, point.residuals, rcond=None)[0] / norms
+    gain = float(np.linalg.norm(slopes @ step[free])) ** 2
+    if not gain > GAIN_THAT_MATTERS:
+        return False
+    begun = problem.at(problem.nearest(point.x + BEGUN * step))
+    return point.chi2 - begun.chi2 > BEGUN * (2 - BEGUN) * gain / 2

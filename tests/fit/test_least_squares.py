@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray, least_squares
+from labrig.fit.least_squares import Ending, FloatArray, least_squares
 from tests.fit import strd
 
 STRD = Path(__file__).parents[3] / "shared" / "data" / "decay" / "nist_strd"
@@ -105,6 +105,25 @@ def test_steps_that_alternate_about_a_minimum_do_not_creep(curvature: float) -> 
     fit = least_squares(residuals, [3.0], tolerance=1e-6)
     assert abs(fit.parameters[0]) < 0.01
     assert not fit.creeps
+
+
+@pytest.mark.parametrize("seed", [2, 3, 5])
+def test_a_step_that_gains_nothing_is_no_creeping(seed: int) -> None:
+    """Slopes that leave out how weights depend on the parameters lead past the minimum."""
+    t = np.linspace(0, 5, 60)
+    y = np.random.default_rng(seed).poisson(100 * np.exp(-t) + 2)
+
+    def residuals(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        model = x[0] * np.exp(-x[1] * t) + 2
+        weight = 1 / np.sqrt(model)
+        slopes = np.column_stack([np.exp(-x[1] * t), -t * (model - 2)])
+        return weight * (model - y), weight[:, np.newaxis] * slopes
+
+    stopped = least_squares(residuals, [101.0, 1.01], max_iterations=20, tolerance=1e-6)
+    assert stopped.ending is Ending.CREEPING
+    step = np.linalg.lstsq(stopped.jacobian, stopped.residuals)[0]
+    assert np.linalg.norm(stopped.jacobian @ step) ** 2 > 0.02
+    assert not stopped.creeps
 
 
 def test_a_search_that_is_cut_off_in_a_valley_creeps() -> None:
