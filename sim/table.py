@@ -1,4 +1,4 @@
-"""What lies before lamp and camera: samples, their surfaces, and how the camera sees them."""
+"""The table before lamp and camera: samples, their surfaces, and how the camera sees them."""
 
 from dataclasses import dataclass
 from typing import Self

@@ -66,7 +66,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended, and what it printed."""
+    """Ending of a command, and what it printed."""
 
     code: int
     out: str
@@ -128,7 +128,7 @@ def shared_recordings(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def compiled_once(shared_recordings: None) -> Iterator[None]:
-    """What one worker compiles, the others wait for and load, instead of compiling it, too."""
+    """Kernels that one worker compiles are awaited and loaded by the others."""
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.dispatcher import Dispatcher
 

@@ -49,10 +49,12 @@ class _Entry:
 
     @classmethod
     def made_from(cls, run: Path) -> Self:
-        from labrig.catalogue.summarising import fit_files, summarise
+        from labrig.catalogue.summarising import summarise
+        from labrig.results import fits_by_folder
 
-        fits = [path.relative_to(run).as_posix() for path in fit_files(run)]
-        stamps = {file: _stamp(f"{run}/{file}") for file in (*FILES, *fits)}
+        fits = fits_by_folder(run / "result").values()
+        stamps = {file: _stamp(f"{run}/{file}") for file in FILES}
+        stamps |= {path.relative_to(run).as_posix(): _stamp(str(path)) for path in fits}
         summary = summarise(run)
         return cls(
             stamps,

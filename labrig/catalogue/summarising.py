@@ -6,7 +6,7 @@ from labrig.acquire import read_protocol
 from labrig.catalogue.run_summary import RunStatus, RunSummary, status_of, utc
 from labrig.errors import DataError, DiskError, LabrigError
 from labrig.record import read_run, time_made
-from labrig.results import read_fitted_decay, read_summary
+from labrig.results import fits_by_folder, read_fitted_decay, read_summary
 from labrig.yaml_file import read_yaml
 
 
@@ -44,7 +44,8 @@ def summarise(folder: Path) -> RunSummary:
     status = status_of(record, is_complete=units is not None and set(units) <= set(completed))
     try:
         parameters = {
-            _place(path, folder): read_fitted_decay(path).parameters for path in fit_files(folder)
+            place: read_fitted_decay(path).parameters
+            for place, path in fits_by_folder(folder / "result").items()
         }
     except DataError:
         status, parameters = "damaged", {}
@@ -61,16 +62,6 @@ def summarise(folder: Path) -> RunSummary:
         parameters=parameters,
         headline=next(iter(read_summary(folder / "result")), ""),
     )
-
-
-def fit_files(folder: Path) -> list[Path]:
-    """Return the files of the fitted decays in a run's result."""
-    return sorted((folder / "result").rglob("fit.json"))
-
-
-def _place(fit: Path, folder: Path) -> str:
-    """Return the folder of a fit within the result, whose parts may have patches of one name."""
-    return fit.parent.relative_to(folder / "result").as_posix().removeprefix(".")
 
 
 def _protocol_summary(folder: Path) -> tuple[str, str, tuple[str, ...] | None]:

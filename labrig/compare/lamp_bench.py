@@ -56,7 +56,7 @@ SMOOTH = 16
 
 @dataclass(frozen=True, eq=False)
 class LitSamples:
-    """What the camera is rendered to see under a lamp, in DN/s.
+    """Values that the camera is rendered to see under a lamp, in DN/s.
 
     Attributes
     ----------

@@ -237,7 +237,7 @@ def compare_lamps(
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """How values of the camera become colours and pictures.
+    """Conversion of values of the camera to colours and pictures.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What was photographed and rendered, as a table for other programs."""
+"""Photographed and rendered values as a table for other programs."""
 
 import csv
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What a temperature that nobody recorded may have changed, in a sentence for each patch."""
+"""Effect of a temperature that nobody recorded, in a sentence for each patch."""
 
 import numpy as np
 

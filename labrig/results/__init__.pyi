@@ -79,6 +79,7 @@ from .fitted_decay import (
     FittedDecay as FittedDecay,
     ScatterSigma as ScatterSigma,
     find_fitted_decays as find_fitted_decays,
+    fits_by_folder as fits_by_folder,
     read_fitted_decay as read_fitted_decay,
     read_fitted_decays as read_fitted_decays,
     write_fitted_decay as write_fitted_decay,

@@ -611,13 +611,37 @@ def find_fitted_decays(folder: Path) -> dict[str, Path]:
     ...     print(repr(name), path.as_posix())
     '' runs/decay/result/fit.json
     """
-    paths = sorted(folder.rglob(FILE))
-    names = Counter(path.parent.name for path in paths)
-    found = {}
-    for path in paths:
-        place = path.parent.relative_to(folder).as_posix().removeprefix(".")
-        found[place if names[path.parent.name] > 1 else place.rpartition("/")[2]] = path
-    return found
+    paths = fits_by_folder(folder)
+    last = {place: place.rpartition("/")[2] for place in paths}
+    names = Counter(last.values())
+    return {place if names[last[place]] > 1 else last[place]: path for place, path in paths.items()}
+
+
+def fits_by_folder(folder: Path) -> dict[str, Path]:
+    """Find the fitted decays in a result folder by the whole paths of their folders.
+
+    Parameters
+    ----------
+    folder
+        Folder of the results.
+
+    Returns
+    -------
+    dict of str to Path
+        Path of each `fit.json` by its folder in the result, such as `decay/left-paint`, which is
+        "" if the fit lies in the result itself.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import fits_by_folder
+    >>> list(fits_by_folder(Path("runs/decay/result")))
+    ['']
+    """
+    return {
+        path.parent.relative_to(folder).as_posix().removeprefix("."): path
+        for path in sorted(folder.rglob(FILE))
+    }
 
 
 def read_fitted_decays(folder: Path) -> dict[str, FittedDecay]:

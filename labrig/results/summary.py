@@ -1,4 +1,4 @@
-"""What a result says to people in a few lines, as they stood in the terminal."""
+"""Summary of a result for people: its most important numbers, as they stood in the terminal."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -81,7 +81,7 @@ class LampPatch:
 
 @dataclass(frozen=True, eq=False)
 class ValidatedSample:
-    """What is said of a sample before it is photographed.
+    """Statements about a sample before it is photographed.
 
     Attributes
     ----------

@@ -111,7 +111,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Size:
-    """How finely a scene is traced, and the luminance of its white in cd/m², None by the scene."""
+    """Fineness with which a scene is traced, and its white in cd/m², None by the scene."""
 
     width_px: int
     paths: int

@@ -1,4 +1,4 @@
-"""What makes σ of a luminance at 10 min, and what lowers it: camera filters, a second meter.
+"""Budget of σ of a luminance at 10 min, and what lowers it: camera filters, a second meter.
 
     python -m tests.acceptance.luminance_budget [--seeds 6]
 

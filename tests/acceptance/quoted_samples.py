@@ -1,4 +1,4 @@
-"""What pages of the manual say of selected lights, camera filters, and samples in turn."""
+"""Quotes in the manual of selected lights, camera filters, and samples in turn."""
 
 import re
 from collections.abc import Iterator

@@ -68,7 +68,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was said of one sample; a line of the file of results.
+    """Result of one sample; a line of the file of results.
 
     Attributes
     ----------

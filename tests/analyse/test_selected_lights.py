@@ -81,7 +81,7 @@ def test_a_light_whose_irradiance_is_not_known(tmp_path: Path) -> None:
     ("kind", "seed"), [("filters", 11), ("wheel", 12), ("monochromator", 13), ("leds", 14)]
 )
 def test_rates_are_the_rooms(kind: str, seed: int, excitation: str, tmp_path: Path) -> None:
-    """With the light known; `tests.acceptance.selected_lights` measures it, too.
+    """The light is known; `tests.acceptance.selected_lights` measures it, too.
 
     Excitation is the same all over each band, which the fit does not assume, or falls smoothly.
     """

@@ -1,4 +1,4 @@
-"""What a rate that drifts does to a fit with constant rates, against decays integrated with it."""
+"""Effect of a rate that drifts on a fit with constant rates, against decays integrated with it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a temperature that drifts while a sample glows does to the fitted rates and amplitudes.
+"""Effect of a temperature that drifts while a sample glows on the fitted rates and amplitudes.
 
 If all rates grow as k (1 + γ t), a state's signal is a (1 + γ t) e^(−k (t + γ t²/2)). A fit with
 constant rates takes what it can of the derivative c by γ, and its parameters move by J⁺c a unit of

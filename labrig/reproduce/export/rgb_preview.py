@@ -43,7 +43,7 @@ SCREEN, MIDDLE = "D65", 0.5
 
 @dataclass(frozen=True, eq=False)
 class RgbPreview:
-    """What a fluorescent surface does to light in linear sRGB, approximately.
+    """Matrix of what a fluorescent surface does to light in linear sRGB, approximately.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class RgbPreview:
 
     @property
     def statement(self) -> str:
-        """What it is and how far off, in one line for people."""
+        """Return its kind and how far it is off, in one line for people."""
         told = ", ".join(
             f"{'–' if value is None else f'{value:.1f}'} under {lamp}"
             for lamp, value in self.delta_e.items()

@@ -10,7 +10,7 @@ from labrig.reproduce.scene.scene_part import Name, ScenePart, Time, Vector
 
 
 class Waypoint(ScenePart):
-    """Where something is at some time; in between it moves straight and evenly.
+    """Position of something at some time; in between it moves straight and evenly.
 
     Attributes
     ----------

@@ -154,7 +154,7 @@ class CameraEntry(ScenePart):
 
 
 class DisplayEntry(ScenePart):
-    """How pictures are shown on a screen.
+    """Display of pictures on a screen.
 
     Attributes
     ----------

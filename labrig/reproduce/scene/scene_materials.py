@@ -24,7 +24,7 @@ from labrig.reproduce.surface.surface_material import (
 
 @dataclass(frozen=True)
 class Assumptions:
-    """What is taken for true where a measurement is missing.
+    """Assumptions that replace a measurement that is missing.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What all parts of a scene file have in common: strict keys, and numbers within reason."""
+"""Base of all parts of a scene file: strict keys, and numbers within reason."""
 
 from typing import Annotated
 

@@ -204,7 +204,7 @@ class Pinhole:
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """Where rays arrive.
+    """Points at which rays arrive.
 
     Attributes
     ----------
