@@ -6,8 +6,10 @@
 The bench is calibrated once (`labrig run calibration`); every material is then measured by `labrig
 run phosphor`, which finds that calibration by itself. First what `labrig plan` says of both at the
 size of a 21-megapixel camera's frames. Then a line for each material, as of
-`tests.acceptance.whole_phosphor`, and the root mean squares over all of them. `--keys` changes keys
-of one part of the chain, to see what they cost.
+`tests.acceptance.whole_phosphor`, and the ΔE2000 of its photographs from the glow in the colour of
+its measured spectrum (`labrig compare`), mean and largest, with the mean that noise alone makes;
+then the root mean squares over all of them. `--keys` changes keys of one part of the chain, to see
+what they cost.
 """
 
 import argparse
@@ -69,12 +71,20 @@ def measured(
     took = f"{material:13} {time.monotonic() - began:4.0f} s"
     if ended.returncode:
         return [], f"{took}  {ended.stderr.strip().splitlines()[-1]}"
-    found = read_material(Path(ended.stdout.strip().splitlines()[-1]) / "result" / "material.yaml")
+    run = Path(ended.stdout.strip().splitlines()[-1])
+    found = read_material(run / "result" / "material.yaml")
     true = read_material(material)
     if len(found.states) != len(true.states):
         return [], f"{took}  {len(found.states)} states instead of {len(true.states)}"
     every = errors(found, true, brightness=1.0)
-    return every, f"{took}  {'; '.join(one.line() for one in every)}"
+    return every, f"{took}  {'; '.join(one.line() for one in every)}  {colours(run)}"
+
+
+def colours(run: Path) -> str:
+    """Return the colour differences of a run with one patch, as `labrig compare` tells them."""
+    (glow,) = json.loads(labrig("compare", run, "--json").stdout)["glow"].values()
+    own = "1 state"
+    return f"ΔE {glow['mean'][own]:.2f} ({glow['max'][own]:.2f}), noise {glow['noise']:.2f}"
 
 
 def main(arguments: Sequence[str]) -> None:

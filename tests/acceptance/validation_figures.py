@@ -109,6 +109,11 @@ def _phosphor_sigma(printed: str) -> str:
     return ", ".join(f"{names[name]} {value}" for name, value in rms.items())
 
 
+def _glow_colours(printed: str) -> str:
+    means, largest = columns(r"ΔE ([\d.]+) \(([\d.]+)\)", printed)
+    return f"mean {span(means, 2)}, largest {max(largest):.2f}"
+
+
 def _each_sample(printed: str) -> str:
     return match(r"^each sample +(.*)$", printed)
 
@@ -508,6 +513,11 @@ FIGURES = (
         "Same runs: rms of error over σ (1 if σ is right)",
         "reused_calibration",
         _phosphor_sigma,
+    ),
+    Figure(
+        "Same runs: ΔE2000 of photographs of the glow from its measured spectrum and decay",
+        "reused_calibration",
+        _glow_colours,
     ),
     Figure(
         "Eight phosphors of a sample changer measured in turn in one run, with one calibration",

@@ -179,7 +179,7 @@ def fit_bands(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) ->
         * reference
         for transmittance, scene in zip(scenes.filters, scenes.values, strict=True)
     ]
-    return calibrate_lvf(
+    calibration = calibrate_lvf(
         scenes.position,
         value,
         np.stack(sigma, axis=1),
@@ -190,6 +190,23 @@ def fit_bands(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) ->
         wavelengths=wavelengths,
         curve_error=CURVES,
     )
+    return replace(calibration, camera=_balanced(calibration.camera, bench, scenes.card))
+
+
+def _balanced(camera: CameraResponse, bench: Bench, card: SliceValues) -> CameraResponse:
+    """Return the curves in the ratios in which this camera's channels see the card.
+
+    The fit is in units of the card, channel by channel, so that its curves keep the ratios of those
+    it began with: another camera's, by which a glow would be up to a tenth too blue or too red.
+    """
+    is_known = np.isfinite(card.value).all(axis=1)
+    if not is_known.any():
+        return camera
+    seen = replace(bench, camera=camera).card_values()
+    # A place is as bright in all channels as lens and lamp make it.
+    places = card.value[is_known] / card.value[is_known].mean(axis=1, keepdims=True)
+    sensitivity = camera.sensitivity * (places.mean(axis=0) / seen)
+    return replace(camera, sensitivity=sensitivity / sensitivity.max())
 
 
 def residuals(scenes: FilterScenes, bench: Bench, lvf: Lvf) -> FloatArray:

@@ -15,7 +15,7 @@ from labrig.analyse.lvf_calibration.filters import (
     residuals,
 )
 from labrig.fit.least_squares import FloatArray
-from labrig.optics import Lvf, Transmittance, nominal_lvf, read_camera
+from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
 from labrig.results.lvf_calibration import SliceValues
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
@@ -42,9 +42,11 @@ def strip() -> Lvf:
     return nominal_lvf(TRUE_MAP, np.linspace(402.0, 700.0, 11), fwhm_nm=24.0, leakage=0.002)
 
 
-def values(lvf: Lvf | None, one: Transmittance, seed: int) -> SliceValues:
+def values(
+    lvf: Lvf | None, one: Transmittance, seed: int, camera: CameraResponse = BENCH.camera
+) -> SliceValues:
     """Of 11 places, with noise; without a strip the card by itself."""
-    camera, lamp = BENCH.camera, BENCH.lamp
+    lamp = BENCH.lamp
     curves = (camera.wavelength_nm, lamp.wavelength_nm, one.wavelength_nm)
     nodes, weights = quadrature(380.0, 780.0, *curves)
     light = weights * lamp.at(nodes) * CARD.at(nodes) * one.at(nodes)
@@ -55,11 +57,11 @@ def values(lvf: Lvf | None, one: Transmittance, seed: int) -> SliceValues:
     return SliceValues(value + sigma * rng.standard_normal(value.shape), sigma)
 
 
-def scenes(**in_their_place: Transmittance) -> FilterScenes:
+def scenes(camera: CameraResponse = BENCH.camera, **in_their_place: Transmittance) -> FilterScenes:
     """All filters; named ones, `-` as `_`, replaced by others."""
     really = [in_their_place.get(one.name.replace("-", "_"), one) for one in FILTERS]
-    seen = [values(strip(), one, seed) for seed, one in enumerate(really)]
-    return FilterScenes(strip().position, FILTERS, seen, values(None, NO_FILTER, 99))
+    seen = [values(strip(), one, seed, camera) for seed, one in enumerate(really)]
+    return FilterScenes(strip().position, FILTERS, seen, values(None, NO_FILTER, 99, camera))
 
 
 def test_filters_in_their_place_calibrate_the_strip() -> None:
@@ -73,6 +75,17 @@ def test_filters_in_their_place_calibrate_the_strip() -> None:
     np.testing.assert_allclose(found.lvf.bands.peak[1:], 0.5 * truth.peak[1:], rtol=0.06)
     left = residuals(all_of_them, BENCH, found.lvf)
     assert np.nanmax(np.abs(left)) < 0.02
+
+
+def test_channels_have_the_ratios_of_this_camera_not_of_the_curves_it_began_with() -> None:
+    of_this_body = np.array([0.93, 1.0, 1.12])
+    published = BENCH.camera
+    camera = replace(published, sensitivity=published.sensitivity * of_this_body)
+    fitted = fit_bands(scenes(camera), BENCH, TRUE_MAP).camera
+    for peak_nm in (460.0, 530.0, 600.0):
+        glow = np.exp(-(((camera.wavelength_nm - peak_nm) / 40) ** 2))
+        ratios, true_ratios = fitted.response(glow), camera.response(glow)
+        np.testing.assert_allclose(ratios / ratios[1], true_ratios / true_ratios[1], rtol=0.02)
 
 
 @pytest.mark.parametrize("really", [FILTERS[0], FILTERS[4]], ids=["none", "the one before"])
