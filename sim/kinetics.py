@@ -135,6 +135,35 @@ class OneTrap:
 
 
 @dataclass(frozen=True)
+class SelfExcited:
+    """Traps of another law whose own glow generates carriers, too: f + s e, e the emission.
+
+    Attributes
+    ----------
+    law
+        Law of the traps; emission and growth are linear in f.
+    share
+        s, below 1: carriers that are generated for each one that recombines.
+    """
+
+    law: Law
+    share: float
+
+    def rates(self, n: FloatArray, f: FloatArray, p: FloatArray) -> Rates:
+        """Return the rates; see `Law`. The slope is that of a glow which does not change with n."""
+        without = self.law.rates(n, f, p).emission
+        by_light = self.law.rates(n, f + 1, p).emission - without
+        emission = without / (1 - self.share * by_light)
+        return self.law.rates(n, f + self.share * emission, p)
+
+    def generation(self, n: float, p: float) -> float:
+        """Return the generation rate that keeps n of the traps filled, without the glow's part."""
+        whole = self.law.generation(n, p)
+        emission = self.law.rates(np.array(n), np.array(whole), np.array(p)).emission
+        return whole - self.share * float(emission)
+
+
+@dataclass(frozen=True)
 class Traps:
     """The traps of which the states of samples consist, arrays of shape (traps,).
 
@@ -195,6 +224,14 @@ def law_of(settings: KineticsSettings | None, order: float = 1.0) -> Law | None:
         Kinetic order of the state in the material's file, which settings of a law of their own
         leave at 1.
     """
+    if settings is not None and settings.self_excitation:
+        law = _law_in_the_dark(settings, order) or GeneralOrder(1.0)
+        return SelfExcited(law, settings.self_excitation)
+    return _law_in_the_dark(settings, order)
+
+
+def _law_in_the_dark(settings: KineticsSettings | None, order: float) -> Law | None:
+    """Return the law of a state that does not take up its own glow."""
     if settings is None:
         return None if order == 1 else GeneralOrder(order)
     if settings.retrapping is not None:

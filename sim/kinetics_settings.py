@@ -64,6 +64,9 @@ class KineticsSettings(Part):
         Optical density of the whole sample, decadic, where it absorbs exciting light most; at other
         wavelengths it is as much less as the excitation rates are. The light gets weaker on its way
         down, and all depths glow alike.
+    self_excitation
+        Carriers that the sample's own glow generates for each one that recombines, as if so much of
+        the light were absorbed again on its way out; Λ is of the light that leaves.
     excitation
         Shape of the excitation spectrum within the material's bands: `steps`, the same in all of a
         band, or `smooth`, with the bands' means.
@@ -82,6 +85,7 @@ class KineticsSettings(Part):
     width_ev: Annotated[float, Field(gt=0, le=0.3)] = 0.05
     frequency_per_s: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     optical_density: Annotated[float, Field(ge=0, le=6)] = 0.0
+    self_excitation: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.0
     excitation: Literal["steps", "smooth"] = "steps"
     excitation_beyond: Annotated[Fraction, Field(ge=0, le=10)] = 0.0
 

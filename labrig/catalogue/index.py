@@ -30,6 +30,7 @@ _MODULES = (
     "catalogue/run_summary.py",
     "catalogue/summarising.py",
     "results/fitted_decay.py",
+    "results/fitted_decay_file.py",
     "results/measured.py",
     "results/summary.py",
 )

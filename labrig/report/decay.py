@@ -19,6 +19,7 @@ from labrig.report.decay_figures import (
 )
 from labrig.report.law_figure import law_figure
 from labrig.report.methods import REFERENCES, UNKNOWN, UNKNOWN_OF_A_TABLE, methods
+from labrig.report.outside_sigma import unrecorded_temperature, unseen_states
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.report_model import (
     DECAY_ASSUMPTIONS,
@@ -35,7 +36,6 @@ from labrig.report.timing import (
     frame_lateness,
     frame_timings,
 )
-from labrig.report.unrecorded_temperature import unrecorded_temperature
 from labrig.results import DecayPatch, DecayResult, FittedDecay, Series
 
 #: Signal-to-noise ratio of the mean signal below which a patch without a fit counts as dark.
@@ -247,10 +247,17 @@ def render(result: DecayResult, source: Source) -> Rendered:
     lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
     results, method_sections = decay_sections(report, source.anchor)
     unrecorded = unrecorded_temperature(result)
-    if unrecorded:
-        text = tuple(f"{line[0].upper()}{line[1:]}." for line in unrecorded)
-        results = (*results, Section("Temperature", text))
-    return Rendered(results, (*lines, *unrecorded), method_sections)
+    outside = outside_sigma(result)
+    return Rendered((*results, *outside), (*lines, *unrecorded), method_sections)
+
+
+def outside_sigma(result: DecayResult) -> tuple[Section, ...]:
+    """Return the section on what may change rates without a trace in the data, if anything may."""
+    statements = (*unrecorded_temperature(result), *unseen_states(result))
+    if not statements:
+        return ()
+    text = tuple(f"{line[0].upper()}{line[1:]}." for line in statements)
+    return (Section("Not in σ", text),)
 
 
 def decay_sections(
@@ -338,7 +345,10 @@ def table_sections(
     ['Results', 'Patch sample']
     """
     patches = tuple(_patch_report(name, patch) for name, patch in result.patches.items())
-    return decay_sections(DecayReport(about, patches, states=result.states_requested))
+    results, method_sections = decay_sections(
+        DecayReport(about, patches, states=result.states_requested)
+    )
+    return (*results, *outside_sigma(result)), method_sections
 
 
 def _patch_report(name: str, patch: DecayPatch) -> PatchReport:

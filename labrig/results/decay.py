@@ -9,7 +9,8 @@ import numpy as np
 
 from labrig.material import Material, write_material
 from labrig.region import Region
-from labrig.results.fitted_decay import FittedDecay, write_fitted_decay
+from labrig.results.fitted_decay import FittedDecay
+from labrig.results.fitted_decay_file import write_fitted_decay
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series, write_series

@@ -1,11 +1,8 @@
-"""Fit of a decay: rates and amplitudes with their uncertainties; the file `fit.json`."""
+"""Fit of a decay: rates and amplitudes with their uncertainties."""
 
-import json
 import math
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
@@ -14,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from labrig.errors import DataError, FitError
 from labrig.material import exponential_means_and_slopes
-from labrig.number_format import aligned
+from labrig.number_format import aligned, rounded
 from labrig.results.fitted_law import (
     EXPONENTIALS,
     LAW_LABELS,
@@ -22,13 +19,10 @@ from labrig.results.fitted_law import (
     FittedLaw,
     FittedRateSpectrum,
     curve_variance,
-    fitted_law,
-    fitted_rate_spectrum,
 )
 from labrig.results.measured import FloatArray, Measured, with_uncertainty
-from labrig.results.text_files import finite, json_text, write_json
+from labrig.results.text_files import finite, json_text
 
-FILE = "fit.json"
 #: Times of the measurement beyond which a signal is not predicted with σ.
 FORECAST_SPANS = 3.0
 #: Reduced χ² of a law, in that of the best one, up to which it is in the bracket of a forecast.
@@ -37,8 +31,10 @@ BRACKET_CHI2 = 4.0
 LINE_WIDTH = 100
 #: Relative difference below which the σ of all values is given as one.
 _SAME_SIGMA = 0.05
-#: Version of that file: another number means renamed keys or other meanings.
-SCHEMA_VERSION = 2
+#: Change of a rate in σ from which what it would be due to is worth a word.
+WORTH_A_WORD = 0.3
+#: Version of `fit.json`: another number means renamed keys or other meanings.
+SCHEMA_VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -143,6 +139,57 @@ class ScatterSigma:
 
 
 @dataclass(frozen=True)
+class UnseenState:
+    """A further state, gone between the first frames, that the data would not show.
+
+    Of all lifetimes that are too short for the frames it has the one that would matter most to the
+    fitted rates. Its effect is not in their σ.
+
+    Attributes
+    ----------
+    lifetime_s
+        Its lifetime in seconds.
+    share
+        Its share of all light at lamp off, which is not larger with a probability of 95 %.
+    rate_changes, amplitude_changes
+        Relative changes of rate and amplitude of every fitted state, by falling rate, if it had
+        that share.
+    """
+
+    lifetime_s: float
+    share: float
+    rate_changes: tuple[float, ...]
+    amplitude_changes: tuple[float, ...]
+
+    @property
+    def remedy(self) -> str:
+        """Timing of the frames that would show it."""
+        return frames_for(self.lifetime_s)
+
+
+def frames_for(lifetime_s: float) -> str:
+    """Return the timing of frames that shows a state of a lifetime in seconds, in words."""
+    return f"frames closer together than {lifetime_s / 2:.2g} s in the first {3 * lifetime_s:.2g} s"
+
+
+def largest_in_sigma(
+    changes: Sequence[float], values: Sequence[tuple[float, float]]
+) -> tuple[float, float]:
+    """Return the size of the relative change that is the largest in σ, and that; of (value, σ)."""
+    sizes = [
+        (abs(change), abs(change * value) / sigma if 0 < sigma < math.inf else 0.0)
+        for change, (value, sigma) in zip(changes, values, strict=True)
+    ]
+    return max(sizes, key=lambda size: size[1])
+
+
+def change_text(changes: Sequence[float], values: Sequence[tuple[float, float]]) -> str:
+    """Return the relative change that is the largest in σ, in words; of values with their σ."""
+    relative, in_sigma = largest_in_sigma(changes, values)
+    return f"{rounded(100 * relative, 2)} % ({rounded(in_sigma, 2)} σ)"
+
+
+@dataclass(frozen=True)
 class FittedDecay:
     """Decay model Σ_i a_i e^(−k_i t), times a weight and plus an offset for each channel.
 
@@ -187,6 +234,9 @@ class FittedDecay:
     sigma_factor
         Factor by which the given uncertainties were multiplied, since the values scatter so much
         more; 1 if they do not.
+    unseen_state
+        Fast state that the data would not show; None if frames leave no room for one, or a warning
+        tells one.
     """
 
     states: tuple[DecayState, ...]
@@ -212,6 +262,7 @@ class FittedDecay:
     scatter: ScatterSigma | None = field(default=None, kw_only=True)
     sigma_origin: str = field(default="", kw_only=True)
     sigma_factor: float = field(default=1.0, kw_only=True)
+    unseen_state: UnseenState | None = field(default=None, kw_only=True)
 
     @property
     def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
@@ -428,6 +479,23 @@ class FittedDecay:
             high=values[describes].max(axis=0),
         )
 
+    @property
+    def outside_sigma(self) -> str:
+        """What a state that goes unseen would change, in words; empty if it is next to nothing."""
+        unseen = self.unseen_state
+        if unseen is None or self.law != EXPONENTIALS:
+            return ""
+        rates = [(s.k_r_per_s, s.k_r_sigma_per_s) for s in self.states]
+        amplitudes = [(s.amplitude, s.amplitude_sigma) for s in self.states]
+        if largest_in_sigma(unseen.rate_changes, rates)[1] < WORTH_A_WORD:
+            return ""
+        return (
+            f"a state that lives {rounded(unseen.lifetime_s, 2)} s would go unseen up to "
+            f"{rounded(100 * unseen.share, 2)} % of the light at lamp off; it would change rates "
+            f"by up to {change_text(unseen.rate_changes, rates)} and amplitudes by up to "
+            f"{change_text(unseen.amplitude_changes, amplitudes)}; {unseen.remedy} would show it"
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `fit.json`; values that are not finite are None."""
         fields: dict[str, Any] = {
@@ -459,6 +527,7 @@ class FittedDecay:
             "sigma_from_scatter": asdict(self.scatter) if self.scatter else None,
             "sigma_origin": self.sigma_origin,
             "sigma_factor": self.sigma_factor,
+            "unseen_state": asdict(self.unseen_state) if self.unseen_state else None,
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -500,6 +569,8 @@ class FittedDecay:
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         if self.other_laws:
             lines += aligned([["law", "", "reduced χ²", "BIC"], *self._law_rows()])
+        if self.outside_sigma:
+            lines += wrap(f"not in σ {self.outside_sigma}", LINE_WIDTH, subsequent_indent=" " * 9)
         lines += [f"! {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
@@ -523,210 +594,3 @@ class FittedDecay:
             f"{name} {with_uncertainty(value, sigma)}"
             for name, value, sigma in zip(self.channels, values, sigmas, strict=True)
         )
-
-
-def write_fitted_decay(path: Path, result: FittedDecay) -> None:
-    """Write the fit of a decay to a JSON file.
-
-    Parameters
-    ----------
-    path
-        Path of the file, `fit.json` in a result folder.
-    result
-        The fitted decay.
-
-    Raises
-    ------
-    DiskError
-        The file cannot be written.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import labrig
-    >>> from labrig.results import read_fitted_decay, write_fitted_decay
-    >>> result = labrig.read_result("runs/decay")
-    >>> write_fitted_decay(Path("fit.json"), result.patches["sample"].fit)
-    >>> read_fitted_decay(Path("fit.json")).n_states
-    2
-    """
-    write_json(path, result.to_dict())
-
-
-def read_fitted_decay(path: Path) -> FittedDecay:
-    """Read the fit of a decay from a JSON file.
-
-    Parameters
-    ----------
-    path
-        Path of a `fit.json`, as `write_fitted_decay` writes it.
-
-    Returns
-    -------
-    FittedDecay
-        Rates, amplitudes and offsets with their standard uncertainties and covariance.
-
-    Raises
-    ------
-    DataError
-        The file is missing, damaged, or of another version.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.results import read_fitted_decay
-    >>> fit = read_fitted_decay(Path("runs/decay/result/fit.json"))
-    >>> [f"{rate.value:.2g} {rate.unit}" for rate in fit.rates]
-    ['0.2 1/s', '0.01 1/s']
-    """
-    try:
-        return _from_dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DataError(
-            f"{path}: expected the fit of a decay as this labrig writes it, got something else "
-            f"({error!r}); make it again: labrig process RUN"
-        ) from None
-
-
-def find_fitted_decays(folder: Path) -> dict[str, Path]:
-    """Find the fit of every patch in a result folder.
-
-    Parameters
-    ----------
-    folder
-        A result folder.
-
-    Returns
-    -------
-    dict of str to Path
-        Path of each `fit.json` by the name of the patch's folder. A run with one patch has its fit
-        in the result folder itself, under the name "". Folders of one name, as of several samples,
-        have their whole path in the result folder instead, such as `blue-paint/decay`.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.results import find_fitted_decays
-    >>> for name, path in find_fitted_decays(Path("runs/decay/result")).items():
-    ...     print(repr(name), path.as_posix())
-    '' runs/decay/result/fit.json
-    """
-    paths = fits_by_folder(folder)
-    last = {place: place.rpartition("/")[2] for place in paths}
-    names = Counter(last.values())
-    return {place if names[last[place]] > 1 else last[place]: path for place, path in paths.items()}
-
-
-def fits_by_folder(folder: Path) -> dict[str, Path]:
-    """Find the fitted decays in a result folder by the whole paths of their folders.
-
-    Parameters
-    ----------
-    folder
-        Folder of the results.
-
-    Returns
-    -------
-    dict of str to Path
-        Path of each `fit.json` by its folder in the result, such as `decay/left-paint`, which is
-        "" if the fit lies in the result itself.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.results import fits_by_folder
-    >>> list(fits_by_folder(Path("runs/decay/result")))
-    ['']
-    """
-    return {
-        path.parent.relative_to(folder).as_posix().removeprefix("."): path
-        for path in sorted(folder.rglob(FILE))
-    }
-
-
-def read_fitted_decays(folder: Path) -> dict[str, FittedDecay]:
-    """Read the fit of every patch in a result folder.
-
-    Parameters
-    ----------
-    folder
-        A result folder.
-
-    Returns
-    -------
-    dict of str to FittedDecay
-        The fits by name of the patch, as in `find_fitted_decays`; empty if nothing was fitted.
-
-    Raises
-    ------
-    DataError
-        A file is damaged.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.results import read_fitted_decays
-    >>> for name, fit in read_fitted_decays(Path("runs/decay/result")).items():
-    ...     print(repr(name), fit.n_states, fit.brightest_channel)
-    '' 2 G
-    """
-    return {name: read_fitted_decay(path) for name, path in find_fitted_decays(folder).items()}
-
-
-def _from_dict(content: Any) -> FittedDecay:
-    if content["schema_version"] != SCHEMA_VERSION:
-        raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
-    weights: Mapping[str, float] = content["channel_weights"]
-    scatter, spectrum = content["sigma_from_scatter"], content["rate_spectrum"]
-    return FittedDecay(
-        states=tuple(
-            DecayState(
-                k_r_per_s=float(state["k_r_per_s"]),
-                k_r_sigma_per_s=_number_or(state["k_r_sigma_per_s"]),
-                amplitude=float(state["amplitude"]),
-                amplitude_sigma=_number_or(state["amplitude_sigma"]),
-            )
-            for state in content["states"]
-        ),
-        channels=tuple(weights),
-        channel_weights=tuple(map(float, weights.values())),
-        channel_weights_sigma=_by_channel_order(weights, content["channel_weights_sigma"]),
-        offsets=tuple(float(content["offsets"][name]) for name in weights),
-        offsets_sigma=_by_channel_order(weights, content["offsets_sigma"]),
-        repeats=tuple(content["levels"]),
-        levels=tuple(map(float, content["levels"].values())),
-        flicker=float(content["flicker"]),
-        flicker_sigma=_number_or(content["flicker_sigma"]),
-        chi2=float(content["chi2"]),
-        dof=int(content["dof"]),
-        bic=float(content["bic"]),
-        covariance=np.array(
-            [[_number_or(value) for value in row] for row in content["covariance"]],
-            dtype=np.float64,
-        ),
-        warnings=tuple(content["warnings"]),
-        candidates=tuple(
-            Candidate(
-                **candidate | {"reduced_chi2": _number_or(candidate["reduced_chi2"], math.nan)}
-            )
-            for candidate in content["candidates"]
-        ),
-        law=content["law"],
-        laws=tuple(fitted_law(law) for law in content["laws"]),
-        rate_spectrum=None if spectrum is None else fitted_rate_spectrum(spectrum),
-        measured_until_s=float(content["measured_until_s"]),
-        scatter=None if scatter is None else ScatterSigma(**scatter),
-        sigma_origin=content["sigma_origin"],
-        sigma_factor=float(content["sigma_factor"]),
-    )
-
-
-def _by_channel_order(
-    channels: Mapping[str, Any], sigma: Mapping[str, float | None]
-) -> tuple[float, ...]:
-    return tuple(_number_or(sigma[name]) for name in channels)
-
-
-def _number_or(value: float | None, unknown: float = math.inf) -> float:
-    """Return the number of a JSON value, whose null stands for infinity or another `unknown`."""
-    return unknown if value is None else float(value)

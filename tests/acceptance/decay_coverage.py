@@ -167,23 +167,29 @@ def hidden_truth(states: tuple[tuple[float, float], ...], share: float) -> Truth
 
 def hidden_line(truth: Truth, share: float, fits: list[DecayFit]) -> str:
     """Return one line of the table of hidden states: the slow rates' pulls, and what is said."""
-    worst = np.array(
-        [
-            max(
-                abs(state.k_r_per_s - k) / state.k_r_sigma_per_s
-                for state, k in zip(each.states, truth.parameters[-each.n_states :], strict=True)
-            )
-            for each in fits
-        ]
-    )
+    off = [_off_and_stated(truth, each) for each in fits]
+    worst = np.array([z.max() for z, _ in off])
+    beyond_stated = np.array([(z - stated).max() for z, stated in off])
+    stated_limit = np.array([stated.max() for _, stated in off])
     warned = np.array([bool(each.warnings) for each in fits])
     numbers = Counter(each.n_states for each in fits)
     return (
         f"{truth.name:26s} share {100 * share:3.0f} %  > 3 σ {100 * np.mean(worst > 3):5.1f} %  "
-        f"> 3 σ without a word {100 * np.mean((worst > 3) & ~warned):5.1f} %  furthest "
+        f"without a warning {100 * np.mean((worst > 3) & ~warned):5.1f} %  nor within what is "
+        f"stated {100 * np.mean((beyond_stated > 3) & ~warned):4.1f} % (median "
+        f"{np.median(stated_limit):.1f} σ)  furthest "
         f"{worst.max():4.1f}  warned {100 * warned.mean():5.1f} %  states "
         + ", ".join(f"{n}: {numbers[n]}" for n in sorted(numbers))
     )
+
+
+def _off_and_stated(truth: Truth, each: DecayFit) -> tuple[truths.FloatArray, truths.FloatArray]:
+    """Return errors of the slow rates, and what an unseen state is said to change, both in σ."""
+    rates = np.array([(state.k_r_per_s, state.k_r_sigma_per_s) for state in each.states])
+    unseen = each.unseen_state
+    changes = np.zeros(each.n_states) if unseen is None else np.abs(unseen.rate_changes)
+    off = np.abs(rates[:, 0] - truth.parameters[-each.n_states :])
+    return off / rates[:, 1], changes * rates[:, 0] / rates[:, 1]
 
 
 #: All truths: they hold functions, which other processes find here by their place.

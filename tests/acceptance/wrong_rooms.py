@@ -227,6 +227,7 @@ DECAYS = [
         shape="exponential",
         width_ev=0.05,
     ),
+    _law("glow excites glow, 20 %", "a sample does not take up its own glow", self_excitation=0.2),
     Case("power law", ALWAYS_FIRST, materials=("power-law",), has_rates=False),
     Case(
         "temperature drift 3 K/h",

@@ -118,7 +118,7 @@ def test_an_unknown_law_is_refused() -> None:
 
 
 def test_what_is_written_is_read_again() -> None:
-    from labrig.results.fitted_decay import _from_dict
+    from labrig.results.fitted_decay_file import _from_dict
 
     fit = fitted("otor", 0.3, 5)
     again = _from_dict(fit.to_dict())

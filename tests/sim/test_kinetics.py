@@ -96,7 +96,22 @@ TEXTBOOK: dict[str, tuple[dict[str, object], Callable[..., tuple[float, float]]]
         {"charging_offset": 0.3},
         lambda n, f, p: ((1 - n) * f * (0.3 + n) / 0.8 - p * n, p * n),
     ),
+    "glow excites glow": (
+        {"self_excitation": 0.3},
+        lambda n, f, p: ((1 - n) * (f + 0.3 * p * n) - p * n, p * n),
+    ),
+    "glow excites glow, otor": (
+        {"model": "otor", "retrapping": 0.1, "self_excitation": 0.2},
+        lambda n, f, p: _glow_of_one_trap(n, f, p, 0.1, 0.2),
+    ),
 }
+
+
+def _glow_of_one_trap(n: float, f: float, p: float, r: float, s: float) -> tuple[float, float]:
+    """Solve e = (f + s e + p n) g, g the probability to recombine."""
+    recombines = n / (r * (1 - n) + n)
+    emission = (f + p * n) * recombines / (1 - s * recombines)
+    return (f + s * emission + p * n) * (1 - recombines) - p * n, emission
 
 
 @settings(max_examples=12, deadline=None)
@@ -246,8 +261,9 @@ def test_depths_of_a_layer_add_up_to_the_integral(density: float) -> None:
         {"model": "otor", "retrapping": 0.2},
         {"model": "general_order", "order": 2},
         {"charging_offset": 0.3},
+        {"self_excitation": 0.2},
     ],
-    ids=["otor", "general order", "convex"],
+    ids=["otor", "general order", "convex", "glow excites glow"],
 )
 def test_a_room_has_samples_of_such_kinetics_and_knows_the_truth(keys: dict[str, object]) -> None:
     patch = {**SMALL["sample"][0], "kinetics": keys, "initial_charge": 0.4}

@@ -35,6 +35,7 @@ from labrig.results import (
     FittedLaw,
     FittedRateSpectrum,
     ScatterSigma,
+    frames_for,
 )
 
 RISING_SIGMAS = 5.0
@@ -269,8 +270,7 @@ def _hidden_warning(hidden: HiddenState, n_states: int, span_s: float) -> str:
     return (
         f"a state {n_states + 1} of about {100 * hidden.share:.0f} % with a lifetime around "
         f"{lifetime_s:.2g} s may hide in the first frames, which do not tell it; σ allows for it: "
-        f"take frames closer together than {lifetime_s / 2:.2g} s in the first "
-        f"{3 * lifetime_s:.2g} s"
+        f"take {frames_for(lifetime_s)}"
     )
 
 

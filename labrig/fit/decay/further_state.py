@@ -12,7 +12,7 @@ others, times its chance, is a part of their covariance.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, ndtri_exp
 
 from labrig.fit.decay.series import FASTEST_DECAYS
 from labrig.fit.decay.states import StatesFit
@@ -31,6 +31,8 @@ FASTER = 2.0
 #: Chance from which a hidden state counts: below, the data do not support it, and a σ that covered
 #: what they say nothing of would have no limit. And the chance from which a warning tells it.
 POSSIBLE, LIKELY = 0.1, 0.5
+#: Probability that the amplitude of a state that goes unseen is below its limit.
+LIMIT = 0.95
 #: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
 SHOWN_GAIN = 40.0
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
@@ -99,32 +101,55 @@ def promising_rate(data: WhitenedSeries, fit: StatesFit) -> tuple[float, float, 
 
 
 @dataclass(frozen=True)
-class HiddenState:
-    """A fast state that the data neither show nor exclude.
+class FastStates:
+    """States that are gone after a step between frames, one of each of m rates.
 
     Attributes
     ----------
-    lifetime
-        Lifetime at which the data support it most, in spans.
-    share
-        Its share of all amplitudes at lamp off.
-    covariance
-        Its part in the covariance of the fitted parameters, shape (p, p).
-    is_likely
-        Whether it is likely enough to be told.
+    further
+        Their effect.
+    amplitude, sigma
+        Mode and σ of the normal distribution, cut off below 0, of the amplitude at the first frame,
+        by the data and by what is usual, shape (m,).
+    kept
+        Weight of the data against what is usual, 0 to 1, shape (m,).
     """
 
-    lifetime: float
-    share: float
-    covariance: FloatArray
-    is_likely: bool
+    further: FurtherState
+    amplitude: FloatArray
+    sigma: FloatArray
+    kept: FloatArray
+
+    @property
+    def z(self) -> FloatArray:
+        """Amplitudes in σ, shape (m,)."""
+        return np.asarray(self.amplitude / self.sigma)
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean amplitudes, shape (m,)."""
+        density = np.exp(-(self.z**2) / 2 - log_ndtr(self.z)) / np.sqrt(2 * np.pi)
+        return np.asarray(self.sigma * (self.z + density))
+
+    @property
+    def limit(self) -> FloatArray:
+        """Amplitudes that states which go unseen do not exceed, at 95 % probability, (m,)."""
+        return np.asarray(
+            self.amplitude - self.sigma * ndtri_exp(np.log(1 - LIMIT) + log_ndtr(self.z))
+        )
+
+    def share(self, amplitude: FloatArray, data: WhitenedSeries, fit: StatesFit) -> FloatArray:
+        """Return the shares of amplitudes at the first frame in all light at lamp off, (m,)."""
+        start = data.series.start
+        at_lamp_off = amplitude * np.exp(np.exp(self.further.log_rates) * start)
+        others = float(fit.amplitudes @ np.exp(np.exp(fit.log_rates) * start))
+        return np.asarray(at_lamp_off / (at_lamp_off + others))
 
 
-def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
-    """Return what a state would do to the fitted ones that is gone after a step between frames.
+def fast_states(data: WhitenedSeries, fit: StatesFit) -> FastStates | None:
+    """Return the fast states that may be there beside the fitted ones.
 
-    The result is None if the fastest one fitted leaves no room, if the data show it, or if they do
-    not support it.
+    The result is None if the fastest one fitted leaves no room, or if the data show one.
 
     Parameters
     ----------
@@ -142,27 +167,53 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit) -> HiddenState | None:
         return None
     prior = USUAL_SHARE * float(fit.amplitudes.sum())
     kept = prior**2 / (prior**2 + further.amplitude_sigma**2)
-    amplitude, sigma = kept * further.amplitude, np.sqrt(kept) * further.amplitude_sigma
-    z = amplitude / sigma
-    # Of a normal distribution cut off below 0: its integral, its mean and its mean square.
-    log_evidence = np.log(2 * PRIOR_ODDS) + np.log1p(-kept) / 2 + log_ndtr(z) + z**2 / 2
-    mean = sigma * (z + np.exp(-(z**2) / 2 - log_ndtr(z)) / np.sqrt(2 * np.pi))
-    mean_square = sigma**2 + amplitude * mean
+    return FastStates(
+        further=further,
+        amplitude=kept * further.amplitude,
+        sigma=np.sqrt(kept) * further.amplitude_sigma,
+        kept=kept,
+    )
+
+
+@dataclass(frozen=True)
+class HiddenState:
+    """A fast state that the data support and do not show.
+
+    Attributes
+    ----------
+    lifetime
+        Lifetime at which the data support it most, in spans.
+    share
+        Its share of all light at lamp off.
+    covariance
+        Its part in the covariance of the fitted parameters, shape (p, p).
+    is_likely
+        Whether it is likely enough to be told.
+    """
+
+    lifetime: float
+    share: float
+    covariance: FloatArray
+    is_likely: bool
+
+
+def hidden_state(data: WhitenedSeries, fit: StatesFit, fast: FastStates) -> HiddenState | None:
+    """Return what a fast state does to the fitted ones; None if the data do not support any."""
+    z = fast.z
+    # Of a normal distribution cut off below 0: its integral, and its mean square.
+    log_evidence = np.log(2 * PRIOR_ODDS) + np.log1p(-fast.kept) / 2 + log_ndtr(z) + z**2 / 2
+    mean_square = fast.sigma**2 + fast.amplitude * fast.mean
     largest = max(float(log_evidence.max()), 0.0)
     evidence = np.exp(log_evidence - largest) / len(z)
     probability = evidence / (evidence.sum() + np.exp(-largest))
     chance = float(probability.sum())
     if chance <= POSSIBLE:
         return None
-    covariance = (further.effect * (probability * mean_square)) @ further.effect.T
+    effect = fast.further.effect
     likeliest = int(np.argmax(probability))
-    lifetime = float(np.exp(-further.log_rates[likeliest]))
-    start = data.series.start
-    at_lamp_off = float(mean[likeliest] * np.exp(start / lifetime))
-    total = float(fit.amplitudes @ np.exp(np.exp(fit.log_rates) * start))
     return HiddenState(
-        lifetime=lifetime,
-        share=at_lamp_off / max(total, at_lamp_off),
-        covariance=covariance,
+        lifetime=float(np.exp(-fast.further.log_rates[likeliest])),
+        share=float(fast.share(fast.mean, data, fit)[likeliest]),
+        covariance=(effect * (probability * mean_square)) @ effect.T,
         is_likely=chance > LIKELY,
     )

@@ -7,7 +7,7 @@ import numpy as np
 from labrig.fit.decay.bend import bend
 from labrig.fit.decay.drift import drift_effect
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
-from labrig.fit.decay.further_state import hidden_state
+from labrig.fit.decay.further_state import FastStates, fast_states, hidden_state
 from labrig.fit.decay.joint import covariance_under_flicker, weight_sigma
 from labrig.fit.decay.laws import LAW_RATE, LawFit
 from labrig.fit.decay.misfit_covariance import with_misfit
@@ -16,7 +16,7 @@ from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import DecayState, FittedDecay
+from labrig.results import DecayState, FittedDecay, UnseenState
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
     fitted_covariance = _fitted_covariance(fit, data, evidence)
-    hidden = hidden_state(data, fit)
+    fast = fast_states(data, fit)
+    hidden = None if fast is None else hidden_state(data, fit, fast)
     if hidden is not None:
         fitted_covariance = fitted_covariance + hidden.covariance
     correlation = _noise_correlation(data, fit, evidence)
@@ -116,6 +117,12 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         measured_until_s=float((series.t + series.exposure + series.start).max()) * series.span_s,
         scatter=evidence.scatter,
         sigma_factor=evidence.sigma_scale.factor if evidence.sigma_scale else 1.0,
+        # A likely one is told, and is in σ.
+        unseen_state=(
+            None
+            if fast is None or (hidden is not None and hidden.is_likely)
+            else _unseen_state(fit, data, fast, states)
+        ),
         sigma=sigma_used,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
@@ -126,10 +133,36 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
 def _drift_effect_s(
     fit: StatesFit, data: WhitenedSeries, states: tuple[DecayState, ...]
 ) -> FloatArray:
+    changes = _relative_changes(fit, data, states, drift_effect(data, fit)[:, None])[..., 0]
+    return data.series.span_s * changes
+
+
+def _relative_changes(
+    fit: StatesFit, data: WhitenedSeries, states: tuple[DecayState, ...], effects: FloatArray
+) -> FloatArray:
+    """Return relative changes of rates and amplitudes by those of the parameters, (n, 2, m)."""
     to_units, _ = _to_units(fit, data)
-    changes = (to_units @ drift_effect(data, fit))[: 2 * fit.n_states].reshape(-1, 2)
+    changes = (to_units @ effects)[: 2 * fit.n_states].reshape(fit.n_states, 2, -1)
     values = np.array([[state.k_r_per_s, state.amplitude] for state in states])
-    return np.asarray(data.series.span_s * changes / values)
+    return np.asarray(changes / values[..., None])
+
+
+def _unseen_state(
+    fit: StatesFit, data: WhitenedSeries, fast: FastStates, states: tuple[DecayState, ...]
+) -> UnseenState:
+    """Return the fast state that at its limit would change a rate by the most σ."""
+    limit = fast.limit
+    changes = _relative_changes(fit, data, states, fast.further.effect * limit)
+    relative_sigma = np.array([state.k_r_sigma_per_s / state.k_r_per_s for state in states])
+    held = relative_sigma == 0
+    in_sigma = np.abs(changes[:, 0]) / np.where(held, np.inf, relative_sigma)[:, None]
+    worst = int(np.argmax(in_sigma.max(axis=0)))
+    return UnseenState(
+        lifetime_s=float(np.exp(-fast.further.log_rates[worst])) * data.series.span_s,
+        share=float(fast.share(limit, data, fit)[worst]),
+        rate_changes=tuple(changes[:, 0, worst].tolist()),
+        amplitude_changes=tuple(changes[:, 1, worst].tolist()),
+    )
 
 
 def _noise_correlation(
