@@ -342,7 +342,7 @@ def table_sections(
     ... )
     >>> results, methods = table_sections(labrig.read_result("runs/decay"), about)
     >>> [section.title for section in results]
-    ['Results', 'Patch sample']
+    ['Results', 'Patch sample', 'Not in σ']
     """
     patches = tuple(_patch_report(name, patch) for name, patch in result.patches.items())
     results, method_sections = decay_sections(

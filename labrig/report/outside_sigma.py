@@ -6,13 +6,7 @@ may have no such state.
 
 from collections.abc import Callable
 
-from labrig.results import (
-    WORTH_A_WORD,
-    DecayPatch,
-    DecayResult,
-    change_text,
-    largest_in_sigma,
-)
+from labrig.results import DecayPatch, DecayResult
 
 
 def unrecorded_temperature(result: DecayResult) -> tuple[str, ...]:
@@ -35,17 +29,10 @@ def _of_patches(result: DecayResult, sentence: Callable[[DecayPatch], str]) -> t
 def _temperature(patch: DecayPatch) -> str:
     if patch.drift_effect is None or patch.fit is None:
         return ""
-    of_rates, of_amplitudes = patch.drift_effect.T
-    rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in patch.fit.states]
-    amplitudes = [(state.amplitude, state.amplitude_sigma) for state in patch.fit.states]
-    in_sigma = max(
-        largest_in_sigma(of_rates, rates)[1], largest_in_sigma(of_amplitudes, amplitudes)[1]
-    )
-    if in_sigma < WORTH_A_WORD:
+    changes = patch.fit.describe_changes(*patch.drift_effect.T.tolist())
+    if not changes:
         return ""
     return (
         "the temperature was not recorded: 1 K in an hour, with traps 0.65 eV deep, would change "
-        f"rates by up to {change_text(of_rates, rates)} and amplitudes by up to "
-        f"{change_text(of_amplitudes, amplitudes)}, which is not in σ; a thermometer in the rig "
-        "would tell"
+        f"{changes}; a thermometer in the rig would tell"
     )

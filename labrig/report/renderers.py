@@ -42,7 +42,7 @@ def render(result: RunResult, source: Source) -> Rendered:
     ... )
     >>> rendered = render(labrig.read_result(run.folder), Source(run, protocol, rig, about))
     >>> [section.title for section in rendered.sections]
-    ['Results', 'Sample', 'Patch sample', 'Timing and stability']
+    ['Results', 'Sample', 'Patch sample', 'Timing and stability', 'Not in σ']
     """
     show: Renderer = any_result.render
     if result.kind in names(REPORTS):

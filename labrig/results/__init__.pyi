@@ -73,16 +73,13 @@ from .fade import (
 )
 from .fitted_decay import (
     FORECAST_SPANS as FORECAST_SPANS,
-    WORTH_A_WORD as WORTH_A_WORD,
     Candidate as Candidate,
     ComparedLaw as ComparedLaw,
     DecayState as DecayState,
     FittedDecay as FittedDecay,
     ScatterSigma as ScatterSigma,
     UnseenState as UnseenState,
-    change_text as change_text,
     frames_for as frames_for,
-    largest_in_sigma as largest_in_sigma,
 )
 from .fitted_decay_file import (
     find_fitted_decays as find_fitted_decays,

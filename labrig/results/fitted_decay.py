@@ -168,25 +168,25 @@ class UnseenState:
 
 
 def frames_for(lifetime_s: float) -> str:
-    """Return the timing of frames that shows a state of a lifetime in seconds, in words."""
+    """Return the timing of frames that shows a state, in words.
+
+    Parameters
+    ----------
+    lifetime_s
+        Lifetime of the state in seconds, > 0.
+
+    Returns
+    -------
+    str
+        Distance of the frames, and for how long they have to be so close.
+
+    Examples
+    --------
+    >>> from labrig.results import frames_for
+    >>> frames_for(2.0)
+    'frames closer together than 1 s in the first 6 s'
+    """
     return f"frames closer together than {lifetime_s / 2:.2g} s in the first {3 * lifetime_s:.2g} s"
-
-
-def largest_in_sigma(
-    changes: Sequence[float], values: Sequence[tuple[float, float]]
-) -> tuple[float, float]:
-    """Return the size of the relative change that is the largest in σ, and that; of (value, σ)."""
-    sizes = [
-        (abs(change), abs(change * value) / sigma if 0 < sigma < math.inf else 0.0)
-        for change, (value, sigma) in zip(changes, values, strict=True)
-    ]
-    return max(sizes, key=lambda size: size[1])
-
-
-def change_text(changes: Sequence[float], values: Sequence[tuple[float, float]]) -> str:
-    """Return the relative change that is the largest in σ, in words; of values with their σ."""
-    relative, in_sigma = largest_in_sigma(changes, values)
-    return f"{rounded(100 * relative, 2)} % ({rounded(in_sigma, 2)} σ)"
 
 
 @dataclass(frozen=True)
@@ -485,16 +485,43 @@ class FittedDecay:
         unseen = self.unseen_state
         if unseen is None or self.law != EXPONENTIALS:
             return ""
-        rates = [(s.k_r_per_s, s.k_r_sigma_per_s) for s in self.states]
-        amplitudes = [(s.amplitude, s.amplitude_sigma) for s in self.states]
-        if largest_in_sigma(unseen.rate_changes, rates)[1] < WORTH_A_WORD:
+        changes = self.describe_changes(unseen.rate_changes, unseen.amplitude_changes)
+        if not changes:
             return ""
         return (
             f"a state that lives {rounded(unseen.lifetime_s, 2)} s would go unseen up to "
-            f"{rounded(100 * unseen.share, 2)} % of the light at lamp off; it would change rates "
-            f"by up to {change_text(unseen.rate_changes, rates)} and amplitudes by up to "
-            f"{change_text(unseen.amplitude_changes, amplitudes)}; {unseen.remedy} would show it"
+            f"{rounded(100 * unseen.share, 2)} % of the light at lamp off; it would change "
+            f"{changes}; {unseen.remedy} would show it"
         )
+
+    def describe_changes(
+        self, rate_changes: Sequence[float], amplitude_changes: Sequence[float]
+    ) -> str:
+        """Return the sizes of relative changes of rates and amplitudes in words.
+
+        Parameters
+        ----------
+        rate_changes, amplitude_changes
+            Relative change of rate and amplitude of every state, by falling rate.
+
+        Returns
+        -------
+        str
+            The ones that are the largest in σ; empty if none of them is worth a word.
+        """
+        rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in self.states]
+        amplitudes = [(state.amplitude, state.amplitude_sigma) for state in self.states]
+        largest = [
+            _largest_in_sigma(rate_changes, rates),
+            _largest_in_sigma(amplitude_changes, amplitudes),
+        ]
+        if max(in_sigma for _, in_sigma in largest) < WORTH_A_WORD:
+            return ""
+        of_rates, of_amplitudes = (
+            f"{rounded(100 * relative, 2)} % ({rounded(in_sigma, 2)} σ)"
+            for relative, in_sigma in largest
+        )
+        return f"rates by up to {of_rates} and amplitudes by up to {of_amplitudes}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `fit.json`; values that are not finite are None."""
@@ -594,3 +621,14 @@ class FittedDecay:
             f"{name} {with_uncertainty(value, sigma)}"
             for name, value, sigma in zip(self.channels, values, sigmas, strict=True)
         )
+
+
+def _largest_in_sigma(
+    changes: Sequence[float], values: Sequence[tuple[float, float]]
+) -> tuple[float, float]:
+    """Return size and size in σ of the relative change that is the largest in σ; of (value, σ)."""
+    sizes = [
+        (abs(change), abs(change * value) / sigma if 0 < sigma < math.inf else 0.0)
+        for change, (value, sigma) in zip(changes, values, strict=True)
+    ]
+    return max(sizes, key=lambda size: size[1])
