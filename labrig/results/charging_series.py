@@ -134,7 +134,8 @@ class ChargingSeries:
     name
         Name of the series in messages and results.
     charges
-        Charges by rising time; the first finds the sample dark, but for what `earlier` left.
+        Charges by rising time; the first finds the sample dark, but for `start` and what `earlier`
+        left.
     rise, fade
         Turn-on and turn-off transients of the lamp.
     irradiance
@@ -162,6 +163,9 @@ class ChargingSeries:
     earlier
         Charges before the first one of the series, which slow states and those of a kinetic order
         above 1 remember for long; None: there were none.
+    start
+        Concentration of every state at all sites when the first of all charges begins, shape (N,).
+        None: the sample is dark.
     """
 
     name: str
@@ -177,6 +181,7 @@ class ChargingSeries:
     frame_light: FloatArray | None = None
     veil_shapes: FloatArray | None = None
     earlier: EarlierCharges | None = None
+    start: FloatArray | None = None
 
     @property
     def sites(self) -> int:

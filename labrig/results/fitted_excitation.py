@@ -1,6 +1,6 @@
 """Fit of an excitation: rates of all states and bands with their uncertainties."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -248,6 +248,9 @@ class FittedExcitation:
         Relative scatter of the lamp's brightness from charge to charge, found or as given.
     site_sizes
         Size of each kind of the sites' error modes relative to that given, as found.
+    evenness
+        Brightness of every site after the same glow over that of the values, its geometric mean 1,
+        shape (P,); 1 if it was not fitted.
     """
 
     states: tuple[ExcitedState, ...]
@@ -263,6 +266,7 @@ class FittedExcitation:
     veil: Measured | None
     lamp_sigma: float
     site_sizes: tuple[float, ...] = ()
+    evenness: FloatArray = field(default_factory=lambda: np.ones(1))
     order_gain: float = 0.0
     models: tuple[ExcitationModel, ...] = ()
 

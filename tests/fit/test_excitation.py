@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from labrig.errors import FitError
 from labrig.fit.excitation import RelativeSigmas, fit_excitation as fit, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.material import Material, read_material
-from labrig.results import Charge, ChargingSeries, FittedExcitation, Transient
+from labrig.material import Material, dark_step, read_material
+from labrig.results import Charge, ChargingSeries, EarlierCharges, FittedExcitation, Transient
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import DOOR_S, WEIGHTS, Bench, lvf_windows, two_states
 from tests.pulls import assert_sigma_is_right
@@ -275,19 +276,40 @@ def test_values_not_measured_and_fresh_samples() -> None:
     assert found.states[0].k_e_per_s[1] == pytest.approx(0.05, rel=0.1)
 
 
-def test_the_jacobian_is_that_of_the_residuals() -> None:
-    bench = Bench(two_states())
-    series = measured(bench)
-    charges = tuple(replace(one, cold_deficit=0.3) for one in series[0].charges)
-    modes = np.random.default_rng(4).normal(0, 0.05, (3, *series[0].irradiance.shape))
-    veiled = [replace(one, frame_light=0.4 * one.values) for one in series]
-    shapes = np.linspace(-1.0, 1.0, len(LVF))[None]
-    series = [
-        replace(veiled[0], charges=charges, site_modes=modes),
-        replace(veiled[1], veil_shapes=shapes),
-    ]
+def one_after_another(bench: Bench) -> list[ChargingSeries]:
+    """Charges by the lamp itself soon after those through the filter, which have left much."""
+    through = bench.series("through LVF", LVF, CHARGES_S, 100.0)
+    everywhere = np.tile(BARE, (len(LVF), 1))
+    direct = bench.series("bare lamp", everywhere, [3.0, 10.0, 240.0], 100.0)
+    later_s = through.charges[-1].off_s + 100.0 - direct.charges[0].on_s
+    charges = tuple(
+        replace(
+            one, on_s=one.on_s + later_s, off_s=one.off_s + later_s, start_s=one.start_s + later_s
+        )
+        for one in direct.charges
+    )
+    earlier = EarlierCharges(through.charges, through.irradiance, through.rise, through.fade)
+    return [through, replace(direct, charges=charges, earlier=earlier)]
+
+
+@pytest.mark.parametrize("order", [1.0, None])
+def test_the_jacobian_is_that_of_the_residuals(order: float | None) -> None:
+    through, direct = one_after_another(Bench(two_states()))
+    random = np.random.default_rng(4)
+    charges = tuple(replace(one, cold_deficit=0.3) for one in through.charges)
+    modes = random.normal(0, 0.05, (3, *through.irradiance.shape))
+    across = np.exp(random.normal(0, 0.1, (2, *through.irradiance.shape)))
+    through = replace(
+        through,
+        charges=charges,
+        site_modes=modes,
+        across=across,
+        frame_light=0.4 * through.values,
+        veil_shapes=np.linspace(-1.0, 1.0, len(LVF))[None],
+    )
+    direct = replace(direct, frame_light=0.4 * direct.values)
     problem = ExcitationProblem(
-        series,
+        [through, direct],
         2,
         1,
         RelativeSigmas(
@@ -299,26 +321,29 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
             common_mode=(0.2, 0.1, 0.3),
             veil=0.02,
             veil_shape=0.01,
+            evenness=0.1,
+            start=0.1,
         ),
+        order,
     )
-    random = np.random.default_rng(3)
+    orders = np.ones(2) if order == 1 else np.array([1.4, 1.2])
     theta = problem.parameters.as_stated(
         np.array([0.07, 0.02]),
         np.array([2500.0, 500.0]),
         random.uniform(0.001, 0.1, (2, 8)),
         np.array([0.3, 1.0, 0.7]),
-        np.ones(2),
+        orders,
     )
     columns = problem.parameters.columns
     theta[columns.scale], theta[columns.brightness], theta[columns.lacking] = 0.01, 0.005, 0.02
     theta[columns.off] = random.normal(0, 1.0, 3)
     theta[columns.offset] = 0.3, -0.2, 0.1
     theta[columns.veil] = 0.01, -0.005
+    theta[columns.evenness] = random.normal(0, 0.02, len(LVF) - 1)
+    theta[columns.start] = 0.002, 0.004
     problem.rewhiten(theta)
     _, jacobian = problem.residuals(theta)
-    # Of a charge that leaves something to the next one, the derivative is not quite exact.
-    left = columns.off.start - 7
-    for column in [*range(0, left, 2), *range(columns.off.start, len(theta))]:
+    for column in range(len(theta)):
         h = 1e-6 * max(abs(theta[column]), 1e-3)
         up, down = theta.copy(), theta.copy()
         up[column] += h
@@ -327,6 +352,71 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
         assert slope == pytest.approx(
             jacobian[:, column], rel=1e-4, abs=1e-5 * np.abs(jacobian[:, column]).max()
         )
+
+
+def test_what_earlier_charges_left_is_not_evenness() -> None:
+    """Places differ by 3 %, and those that were charged through the filter glow on."""
+    bench = Bench(two_states(), flicker=0.003, photons=200.0, seed=6)
+    uneven = 1 + 0.03 * np.cos(np.linspace(0.0, 3.0, len(LVF)))
+    uneven = uneven / np.exp(np.log(uneven).mean())
+    through, direct = one_after_another(bench)
+    # The bench charges each series from nothing: this is what the first left in the second.
+    k_r = np.array([state.k_r_per_s for state in bench.material.states])
+    k_e = np.array([state.k_e_per_s for state in bench.material.states])
+    alone = levels(replace(direct, earlier=None), k_r, k_e).value
+    left = (levels(direct, k_r, k_e).value - alone) @ bench.amplitudes()
+    direct = replace(direct, values=direct.values + np.multiply.outer(left, WEIGHTS))
+    assert np.ptp(left[0]) > 0.03 * direct.values[0, :, 1].mean()
+    series = [
+        replace(one, values=one.values * uneven[:, None], sigma=one.sigma * uneven[:, None])
+        for one in (through, direct)
+    ]
+    sigmas = RelativeSigmas(bench.flicker, LAMP, scale=0.005, evenness=0.3)
+    found = fit(series, k_r, bench.amplitudes(), sigmas)
+    assert found.evenness == pytest.approx(uneven, rel=2e-3)
+    assert 0.9 < found.reduced_chi2 < 1.1
+    assert found.by_band is not None
+    assert not found.by_band.rate.differs
+    taken_for_even = fit(series, k_r, bench.amplitudes(), replace(sigmas, evenness=0.0))
+    assert (taken_for_even.evenness == 1).all()
+    assert taken_for_even.reduced_chi2 > 2
+
+
+@pytest.mark.parametrize("order", [None, np.array([1.4, 2.3])])
+def test_a_start_is_what_charges_before_have_left(order: NDArray[np.float64] | None) -> None:
+    series = Bench(two_states()).series("LVF", LVF[:1], (60.0, 8.0, 32.0), 100.0, shots=3)
+    k_r, k_e = np.array([0.08, 0.015]), np.linspace(0.001, 0.1, 16).reshape(2, 8)
+    at_off, (first, *others) = levels_at_off(series, k_r, k_e, order).value[0], series.charges
+    wait_s = others[0].on_s - first.off_s
+    b = np.ones(2) if order is None else order
+    start = dark_step(at_off, k_r, b, np.full((1, 2), wait_s))[0][0]
+    later = replace(
+        series, charges=tuple(others), values=series.values[3:], sigma=series.sigma[3:], start=start
+    )
+    whole = levels(series, k_r, k_e, order).value
+    assert levels(later, k_r, k_e, order).value == pytest.approx(whole[3:], rel=1e-4)
+    dark = levels(replace(later, start=None), k_r, k_e, order).value
+    assert np.abs(dark / whole[3:] - 1).max() > 0.02
+
+
+def test_what_was_left_at_the_start_is_found() -> None:
+    """Of two states, the slow one of a sample that was charged fully ten minutes ago."""
+    bench = Bench(two_states(), flicker=0.003, photons=200.0, seed=7)
+    through, direct = one_after_another(bench)
+    k_r = np.array([state.k_r_per_s for state in bench.material.states])
+    k_e = np.array([state.k_e_per_s for state in bench.material.states])
+    start = np.array([0.0, 0.003])
+    series = []
+    for one in (through, direct):
+        begun, alone = replace(one, start=start), replace(one, earlier=None)
+        left = levels(begun, k_r, k_e).value - levels(alone, k_r, k_e).value
+        values = one.values + np.multiply.outer(left @ bench.amplitudes(), WEIGHTS)
+        series.append(replace(one, values=values))
+    sigmas = RelativeSigmas(bench.flicker, LAMP, scale=0.005, evenness=0.3, start=0.1)
+    found = fit(series, k_r, bench.amplitudes(), sigmas)
+    assert 0.9 < found.reduced_chi2 < 1.1
+    taken_for_dark = fit(series, k_r, bench.amplitudes(), replace(sigmas, start=0.0))
+    assert taken_for_dark.chi2 > found.chi2 + 100
 
 
 def test_levels_do_not_depend_on_how_a_wait_is_cut() -> None:

@@ -55,6 +55,11 @@ CLOSURE_SIGMAS = 3.0
 #: σ of the fraction of the frame's light that lies over every site: glare of a photographic lens is
 #: 0.3 to 3 %, and surfaces light one another.
 VEIL_SIGMA = 0.02
+#: Relative σ of the evenness that the direct charges alone tell: what charges through the filter
+#: have left lies over them, up to the glow itself.
+EVENNESS_SIGMA = 0.3
+#: σ of the concentration that earlier charges, of a decay or of daylight, have left in the sample.
+START_SIGMA = 0.1
 #: Least standard uncertainty of a dark level in DN/s.
 MIN_DARK = 1e-3
 
@@ -109,6 +114,8 @@ def _patch_excitation(
         # The sensor warms and cools over hours of long exposures, more than dark frames show.
         common_mode=dark,
         veil=VEIL_SIGMA,
+        evenness=EVENNESS_SIGMA,
+        start=START_SIGMA,
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
         largest_factor=LARGEST_FACTOR,

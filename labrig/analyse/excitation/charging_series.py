@@ -165,8 +165,8 @@ def _divide_by_evenness(
 ) -> PatchCharging:
     """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
     is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
-    # What earlier charges have left is not known yet: `evened` takes it into account.
-    even = evenness(values[is_direct], sigma[is_direct], np.ones(1))
+    # What earlier charges have left is not known yet: the fit tells it from the evenness.
+    even = evenness(values[is_direct], sigma[is_direct])
     values, sigma = values / even[:, None], sigma / even[:, None]
     # Direct charges define what even light is, with the veil that lies over it.
     veils = frame_light[:, None, :] / np.where(is_direct[:, None], 1.0, even)[..., None]

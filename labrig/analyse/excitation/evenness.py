@@ -7,19 +7,17 @@ import numpy as np
 from labrig.errors import DataError
 from labrig.results import ChargingSeries, FittedExcitation, FloatArray, PatchCharging
 
-#: Change of the evenness that matters: a tenth of what is left of it by noise.
-SMALL = 1e-4
 
+def evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
+    """Return about how bright every place is after the same light, 1 on average, shape (P,).
 
-def evenness(values: FloatArray, sigma: FloatArray, course: FloatArray) -> FloatArray:
-    """Return the brightness of every place after the same light, 1 on average, shape (P,).
+    What earlier charges have left at the places counts as their brightness here; a fit tells the
+    two apart.
 
     Parameters
     ----------
     values, sigma
         Photographs after charges by the lamp itself, shape (n, P, C).
-    course
-        Glow expected of every place over its mean in the photograph, which broadcasts with them.
 
     Raises
     ------
@@ -28,10 +26,9 @@ def evenness(values: FloatArray, sigma: FloatArray, course: FloatArray) -> Float
     """
     weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
     is_known = weight.min(axis=1, keepdims=True) > 0
-    frame_mean = np.where(
+    expected = np.where(
         is_known, np.nanmean(np.where(is_known, values, 0.0), axis=1, keepdims=True), 0.0
     )
-    expected = np.where(is_known, course, 1.0) * frame_mean
     weight = np.where(is_known, weight, 0.0)
     total = (weight * expected**2).sum(axis=(0, 2))
     if not (total > 0).all():
@@ -44,26 +41,19 @@ def evenness(values: FloatArray, sigma: FloatArray, course: FloatArray) -> Float
 
 
 def evened(charging: PatchCharging, fit: FittedExcitation) -> PatchCharging:
-    """Divide by the evenness anew, with what earlier charges have left at every place.
+    """Divide by the evenness that a fit has found beside what earlier charges have left.
 
     After the first charges by the lamp itself places still glow by what charged them through the
-    filter, which a kinetic order above 1 keeps for long.
+    filter, which slow states and a kinetic order above 1 keep for long.
 
     Parameters
     ----------
     charging
         Charging of a patch.
     fit
-        Fit of it, of which the glow of every place is expected.
+        Fit of it.
     """
-    direct = charging.direct
-    expected = direct.values - fit.residuals[1] * direct.sigma
-    course = expected / expected.mean(axis=1, keepdims=True)
-    undone = charging.evenness[:, None]
-    found = evenness(direct.values * undone, direct.sigma * undone, course)
-    if np.abs(found / charging.evenness - 1).max() < SMALL:
-        return charging
-    factor = undone / found[:, None]
+    factor = 1 / fit.evenness[:, None]
 
     def divided(series: ChargingSeries) -> ChargingSeries:
         return replace(series, values=series.values * factor, sigma=series.sigma * factor)
@@ -72,6 +62,6 @@ def evened(charging: PatchCharging, fit: FittedExcitation) -> PatchCharging:
     return replace(
         charging,
         through=through if veils is None else replace(through, frame_light=veils * factor),
-        direct=divided(direct),
-        evenness=found,
+        direct=divided(charging.direct),
+        evenness=charging.evenness * fit.evenness,
     )

@@ -116,11 +116,10 @@ def _by_depth(problem: ExcitationProblem, rates: Rates) -> list[FloatArray]:
     changes = []
     for charging in problem.illuminated_series(rates):
         signals = [
-            problem.levels(
+            problem.glow(
                 replace(charging, irradiance=charging.irradiance * (1 + epsilon * absorption)),
                 rates,
-            ).value
-            @ rates.amplitude
+            )
             for epsilon in (-DEPTH_STEP, 0.0, DEPTH_STEP)
         ]
         second = (signals[0] - 2 * signals[1] + signals[2]) / DEPTH_STEP**2

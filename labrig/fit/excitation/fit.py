@@ -273,6 +273,7 @@ def _result(
         order_gain=order_gain(problem, theta, reference, uncertain),
         by_band=by_band,
         veil=_veil(problem, solution),
+        evenness=rates.evenness,
         lamp_sigma=uncertain.lamp,
         site_sizes=site_sizes,
     )

@@ -23,16 +23,24 @@ class Levels(NamedTuple):
         Derivatives by the state's own k_e of every band in s, shape (n, P, N, B).
     by_order
         Derivatives by the state's own kinetic order, shape (n, P, N); 0 where it is held at 1.
+    by_before
+        Derivatives by the concentration that the charge before has left when its lamp was dark, or
+        by that at the start, shape (n, P, N); 0 where there was neither.
     """
 
     value: FloatArray
     by_k_r: FloatArray
     by_k_e: FloatArray
     by_order: FloatArray
+    by_before: FloatArray
 
     def of(self, which: NDArray[np.intp]) -> "Levels":
         """Return the levels at some indices, in their order."""
         return Levels(*(part[which] for part in self))
+
+    def followed_by(self, later: "Levels") -> "Levels":
+        """Return the levels, and later ones after them."""
+        return Levels(*(np.concatenate(parts) for parts in zip(self, later, strict=True)))
 
     def meaned(self, places: int) -> "Levels":
         """Average over `places` per site, given all sites for one place after the other."""
@@ -53,4 +61,5 @@ class Levels(NamedTuple):
             (self.by_k_r + self.value * slope) * decay,
             self.by_k_e * decay[..., None],
             self.by_order,
+            self.by_before * decay,
         )

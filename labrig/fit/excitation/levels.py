@@ -12,8 +12,8 @@ import numpy as np
 
 from labrig.fit.excitation import levels_of_order
 from labrig.fit.excitation.level_slopes import Levels
-from labrig.material import phi1, relaxation_with_slopes
-from labrig.results import ChargingSeries, FloatArray
+from labrig.material import relaxation_with_slopes
+from labrig.results import ChargingSeries, FloatArray, IntArray
 
 
 class _Charges(NamedTuple):
@@ -64,19 +64,53 @@ def levels(
     if series.across is not None:
         spread_levels = levels(series.spread(), k_r_per_s, k_e_per_s, order)
         return spread_levels.meaned(len(series.across))
-    charges = series.charges
-    shots = [len(charge.start_s) for charge in charges]
-    exposure_s = np.concatenate([charge.exposure_s for charge in charges])
-    dark_s = np.concatenate([charge.start_s for charge in charges]) - np.repeat(
-        _dark_s(series), shots
-    )
-    of_charge = np.repeat(np.arange(len(charges)), shots)
-    if order is None:
-        after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s).of(of_charge)
-        return after_charges.decayed(k_r_per_s, dark_s, exposure_s)
-    after_charges = levels_of_order.levels_after_charges(series, k_r_per_s, k_e_per_s, order)
-    begins = levels_of_order.decayed(after_charges.of(of_charge), k_r_per_s, order, dark_s)
-    return levels_of_order.emitted(begins, k_r_per_s, order, exposure_s)
+    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s, order)
+    return _photographed(series, after_charges, k_r_per_s, order)
+
+
+def levels_and_slopes(
+    series: ChargingSeries,
+    k_r_per_s: FloatArray,
+    k_e_per_s: FloatArray,
+    order: FloatArray | None = None,
+) -> tuple[Levels, FloatArray, FloatArray]:
+    """Return the `levels`, and their derivatives by the light and by the start.
+
+    What a charge has left at those after it is in them. Charges before the series come first.
+
+    Returns
+    -------
+    levels, by_light, by_start
+        Levels, and their derivatives by ln E of every charge and band, shape (n, K, P, N, B), and
+        by the concentrations at the start, shape (n, P, N).
+    """
+    if series.across is not None:
+        places = len(series.across)
+        level, by_light, by_start = levels_and_slopes(series.spread(), k_r_per_s, k_e_per_s, order)
+        shots, charges, _, *others = by_light.shape
+        return (
+            level.meaned(places),
+            by_light.reshape(shots, charges, places, -1, *others).mean(axis=2),
+            by_start.reshape(shots, places, -1, *by_start.shape[2:]).mean(axis=1),
+        )
+    after = _levels_after_charges(series, k_r_per_s, k_e_per_s, order)
+    level = _photographed(series, after, k_r_per_s, order)
+    charges = len(after.value)
+    # By all light until then, by that of each charge, and by the start, before every charge.
+    by_all = np.zeros((charges + 1, *after.by_k_e.shape[1:]))
+    by_each = np.zeros((charges + 1, charges, *after.by_k_e.shape[1:]))
+    by_start = np.ones((charges + 1, *after.value.shape[1:]))
+    by_all[1:] = after.by_k_e * k_e_per_s
+    for number, kept in enumerate(after.by_before):
+        by_each[number + 1] = kept[..., None] * by_each[number]
+        by_each[number + 1, number] = by_all[number + 1] - kept[..., None] * by_all[number]
+        by_start[number + 1] = kept * by_start[number]
+    of_charge = _charge_of_shots(series, charges)
+    kept = level.by_before[..., None]
+    by_light = kept[:, None] * by_each[of_charge]
+    own = level.by_k_e * k_e_per_s - kept * by_all[of_charge]
+    by_light[np.arange(len(of_charge)), of_charge] += own
+    return level, by_light, level.by_before * by_start[of_charge]
 
 
 def levels_at_off(
@@ -85,53 +119,41 @@ def levels_at_off(
     k_e_per_s: FloatArray,
     order: FloatArray | None = None,
 ) -> Levels:
-    """Return the concentrations after every charge, traced back in the dark to lamp off.
+    """Return the concentrations after every charge of the series, traced back to lamp off.
 
     The turn-off transient itself charges a little: this is the r(0) to which the amplitude of a
     decay belongs. The arguments are those of `levels`.
     """
     zeros = np.zeros(len(series.charges))
     back_s = zeros - series.fade.total_s
+    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s, order)
+    own = after_charges.of(np.arange(len(after_charges.value))[-len(zeros) :])
     if order is None:
-        after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s)
-        return after_charges.decayed(k_r_per_s, back_s, zeros)
-    after_charges = levels_of_order.levels_after_charges(series, k_r_per_s, k_e_per_s, order)
-    return levels_of_order.decayed(after_charges, k_r_per_s, order, back_s)
+        return own.decayed(k_r_per_s, back_s, zeros)
+    return levels_of_order.decayed(own, k_r_per_s, order, back_s)
 
 
-def slopes_by_light(
-    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
-) -> FloatArray:
-    """Return the derivatives of the levels of all exposures by ln E of every charge and band.
-
-    Of first order, and with what a charge has left at those after it.
-
-    Returns
-    -------
-    ndarray
-        Derivatives, shape (n, K, P, N, B).
-    """
-    charges = _independent_charges(series, k_r_per_s, k_e_per_s)
-    dark_s = _dark_s(series)
-    own = charges.gained.by_k_e * k_e_per_s
-    after = np.zeros((len(series.charges), *own.shape))
-    value = charges.gained.value
-    for number, charge in enumerate(series.charges):
-        after[number, number] = own[number]
-        if number and not charge.fresh:
-            wait_s = charge.on_s - float(dark_s[number - 1])
-            kept = charges.kept[number] * np.exp(-k_r_per_s * wait_s)
-            left = kept * value[number - 1]
-            value[number] += left
-            after[number, :number] = kept[..., None] * after[number - 1, :number]
-            dose = charges.dose[number, :, None] * k_e_per_s
-            after[number, number] -= left[..., None] * dose
-    shots = [len(charge.start_s) for charge in series.charges]
-    of_charge = np.repeat(np.arange(len(shots)), shots)
-    starts_s = np.concatenate([charge.start_s for charge in series.charges]) - dark_s[of_charge]
+def _photographed(
+    series: ChargingSeries, after_charges: Levels, k_r_per_s: FloatArray, order: FloatArray | None
+) -> Levels:
+    """Return the light of all exposures from the levels after every charge."""
+    of_charge = _charge_of_shots(series, len(after_charges.value))
     exposure_s = np.concatenate([charge.exposure_s for charge in series.charges])
-    decay = np.exp(-k_r_per_s * starts_s[:, None]) * phi1(k_r_per_s * exposure_s[:, None])
-    return np.asarray(after[of_charge] * decay[:, None, None, :, None])
+    start_s = np.concatenate([charge.start_s for charge in series.charges])
+    shots = [len(charge.start_s) for charge in series.charges]
+    dark_s = start_s - np.repeat(_dark_s(series), shots)
+    begins = after_charges.of(of_charge)
+    if order is None:
+        return begins.decayed(k_r_per_s, dark_s, exposure_s)
+    begins = levels_of_order.decayed(begins, k_r_per_s, order, dark_s)
+    return levels_of_order.emitted(begins, k_r_per_s, order, exposure_s)
+
+
+def _charge_of_shots(series: ChargingSeries, charges: int) -> IntArray:
+    """Return the number of the charge before each photograph, of `charges` that end with them."""
+    first = charges - len(series.charges)
+    shots = [len(charge.start_s) for charge in series.charges]
+    return np.repeat(np.arange(first, charges), shots)
 
 
 def _dark_s(series: ChargingSeries) -> FloatArray:
@@ -140,12 +162,26 @@ def _dark_s(series: ChargingSeries) -> FloatArray:
 
 
 def _levels_after_charges(
-    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray, order: FloatArray | None
 ) -> Levels:
-    """Return the levels after every charge, when the lamp is dark, n = K."""
+    """Return the levels after every charge in the dark, those before the series first."""
+    if order is not None:
+        return levels_of_order.levels_after_charges(series, k_r_per_s, k_e_per_s, order)
     charges = _independent_charges(series, k_r_per_s, k_e_per_s)
-    value, by_k_r, by_k_e, _ = charges.gained
-    before, dark_s = _level_before(series, k_r_per_s, k_e_per_s), _dark_s(series)
+    value, by_k_r, by_k_e, _, by_before = charges.gained
+    before, dark_s, after_earlier = None, _dark_s(series), None
+    if (earlier := series.before()) is not None:
+        after_earlier = _levels_after_charges(earlier, k_r_per_s, k_e_per_s, None)
+        before = _Before(
+            float(_dark_s(earlier)[-1]),
+            after_earlier.value[-1],
+            after_earlier.by_k_r[-1],
+            after_earlier.by_k_e[-1],
+        )
+    elif series.start is not None:
+        at_start = np.broadcast_to(series.start, value.shape[1:])
+        nothing = np.zeros_like(value[0]), np.zeros_like(by_k_e[0])
+        before = _Before(series.charges[0].on_s, at_start, *nothing)
     for number, charge in enumerate(series.charges):
         if charge.saturated:
             value[number] = np.exp(-k_r_per_s * series.fade.total_s)
@@ -160,19 +196,9 @@ def _levels_after_charges(
             by_k_e[number] += decay[..., None] * (
                 before.by_k_e - before.value[..., None] * charges.dose[number, :, None]
             )
+            by_before[number] = decay
         before = _Before(float(dark_s[number]), value[number], by_k_r[number], by_k_e[number])
-    return charges.gained
-
-
-def _level_before(
-    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
-) -> _Before | None:
-    """Return the level after the last charge before the series; None if there was none."""
-    earlier = series.before()
-    if earlier is None:
-        return None
-    value, by_k_r, by_k_e, _ = _levels_after_charges(earlier, k_r_per_s, k_e_per_s)
-    return _Before(float(_dark_s(earlier)[-1]), value[-1], by_k_r[-1], by_k_e[-1])
+    return charges.gained if after_earlier is None else after_earlier.followed_by(charges.gained)
 
 
 def _independent_charges(
@@ -210,6 +236,7 @@ def _independent_charges(
             r_before[-1].reshape(shape),
             by_k_r.reshape(shape),
             by_fraction * light[:, :, None, :],
+            np.zeros(shape),
             np.zeros(shape),
         ),
     )

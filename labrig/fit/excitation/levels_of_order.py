@@ -19,18 +19,22 @@ PARTS = 4
 
 
 class _State(NamedTuple):
-    """Concentrations (P, N) at some time, and their derivatives; by_k_e has bands, (P, N, B)."""
+    """Concentrations (P, N) at some time, and their derivatives; by_k_e has bands, (P, N, B).
+
+    by_before is that by the concentration when the lamp was dark after the charge before.
+    """
 
     value: FloatArray
     by_k_r: FloatArray
     by_order: FloatArray
     by_k_e: FloatArray
+    by_before: FloatArray
 
     @classmethod
     def of(cls, value: FloatArray, bands: int) -> Self:
         """Return concentrations that depend on nothing."""
         nothing = np.zeros_like(value)
-        return cls(value, nothing, nothing, np.zeros((*value.shape, bands)))
+        return cls(value, nothing, nothing, np.zeros((*value.shape, bands)), nothing)
 
     def stepped(
         self,
@@ -46,6 +50,7 @@ class _State(NamedTuple):
             by_start * self.by_k_r + by_k_r,
             by_start * self.by_order + by_order,
             by_start[..., None] * self.by_k_e + by_k_e,
+            by_start * self.by_before,
         )
 
 
@@ -102,28 +107,39 @@ class _Sample(NamedTuple):
 def levels_after_charges(
     series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray, order: FloatArray
 ) -> Levels:
-    """Return the concentrations after every charge, when the lamp is dark, n = K."""
+    """Return the concentrations after every charge, when the lamp is dark.
+
+    Charges before the series come first.
+    """
     sample = _Sample(k_r_per_s, k_e_per_s, order, series.irradiance)
     return Levels(*(np.stack(parts) for parts in _columns(_after_charges(series, sample))))
 
 
 def _after_charges(series: ChargingSeries, sample: _Sample) -> list[_State]:
-    """Return the states after every charge, when the lamp is dark."""
+    """Return the states after every charge, those before the series first."""
     shape = series.sites, len(sample.k_r_per_s)
     bands = series.irradiance.shape[1]
     empty = _State.of(np.zeros(shape), bands)
     transients = _parts(series.rise), _parts(series.fade)
     state, dark_s, ends = empty, -np.inf, []
     if (earlier := series.before()) is not None:
-        state = _after_charges(earlier, sample._replace(irradiance=earlier.irradiance))[-1]
+        ends = _after_charges(earlier, sample._replace(irradiance=earlier.irradiance))
+        state = ends[-1]
         dark_s = earlier.charges[-1].off_s + earlier.fade.total_s
+    elif series.start is not None:
+        state = _State.of(np.broadcast_to(series.start, shape), bands)
+        dark_s = series.charges[0].on_s
     for charge in series.charges:
         if charge.saturated:
             full = _State.of(np.ones(shape), bands)
             state = sample.in_darkness(full, series.fade.total_s)
         else:
             is_empty = charge.fresh or np.isinf(dark_s)
-            state = empty if is_empty else sample.in_darkness(state, charge.on_s - dark_s)
+            if is_empty:
+                state = empty
+            else:
+                left = state._replace(by_before=np.ones(shape))
+                state = sample.in_darkness(left, charge.on_s - dark_s)
             lit = sample._replace(irradiance=series.irradiance_of(charge))
             state = _charged(lit, state, transients, charge)
         dark_s = charge.off_s + series.fade.total_s
@@ -184,6 +200,7 @@ def _chained(
         by_start * levels.by_k_r + by_k_r,
         by_start[..., None] * levels.by_k_e,
         by_start * levels.by_order + by_order,
+        by_start * levels.by_before,
     )
 
 
@@ -194,4 +211,5 @@ def _columns(states: list[_State]) -> tuple[list[FloatArray], ...]:
         [state.by_k_r for state in states],
         [state.by_k_e for state in states],
         [state.by_order for state in states],
+        [state.by_before for state in states],
     )

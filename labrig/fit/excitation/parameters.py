@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import helmert
 
 from labrig.errors import FitError
 from labrig.material import MAX_ORDER
@@ -42,6 +43,12 @@ class Rates(NamedTuple):
     veil
         Fraction of the frame's light that lies over every site, followed by amplitudes of
         `ChargingSeries.veil_shapes`, shape (1 + K,), or (0,) if it is not fitted.
+    evenness
+        Brightness of every site after the same glow over that of the values, shape (P,), or (1,) if
+        it is not fitted.
+    start
+        Concentration of every state when the first charge of the first series begins, shape (N,),
+        or (0,) if the sample is dark then.
     order
         Kinetic orders b, shape (N,).
     gain
@@ -58,6 +65,8 @@ class Rates(NamedTuple):
     off: FloatArray
     offset: FloatArray
     veil: FloatArray
+    evenness: FloatArray
+    start: FloatArray
     order: FloatArray
     gain: FloatArray
 
@@ -88,6 +97,13 @@ class RelativeSigmas:
     veil_shape
         σ of the amplitude of each of the shapes by which that differs from site to site; with 0 it
         does not.
+    evenness
+        Relative σ of the brightness of every site after the same glow, common to all photographs of
+        all series, beside the mean of the sites, which belongs to the amplitudes. Fitted where all
+        series have the same sites, several of them.
+    start
+        σ of the concentration of every state when the first charge of the first series begins, the
+        same at all sites; 0 is expected.
     irradiance
         Relative σ of E in every band, a scalar or (B,), common to all series: the fit cannot
         constrain it.
@@ -104,6 +120,8 @@ class RelativeSigmas:
     common_mode: tuple[float, ...] = ()
     veil: float = 0.0
     veil_shape: float = 0.0
+    evenness: float = 0.0
+    start: float = 0.0
     irradiance: float | tuple[float, ...] = 0.0
     largest_factor: float = 0.0
 
@@ -133,6 +151,8 @@ class ParameterLayout(NamedTuple):
     off: slice
     offset: slice
     veil: slice
+    evenness: slice
+    start: slice
 
 
 def is_fitted(place: slice) -> bool:
@@ -168,6 +188,9 @@ class Parameters:
         Layout of θ.
     prior_sigma
         Prior σ of the last h parameters of θ, all expected to be 0, shape (h,).
+    unevenness
+        Contrasts of the sites' logarithmic brightness, of which θ has the amplitudes, orthonormal
+        and without a mean, shape (P − 1, P); (0, 1) if it is not fitted.
     """
 
     def __init__(
@@ -202,8 +225,13 @@ class Parameters:
         if veils and uncertain.veil_shape > 0:
             shapes = max(0 if one.veil_shapes is None else len(one.veil_shapes) for one in series)
             veils += shapes * [uncertain.veil_shape]
+        sites = {charging.sites for charging in series}
+        is_uneven = uncertain.evenness > 0 and len(sites) == 1
+        self.unevenness: FloatArray = np.asarray(helmert(max(sites) if is_uneven else 1))
+        uneven = len(self.unevenness) * [uncertain.evenness]
+        begins = states * [uncertain.start] if uncertain.start > 0 else []
         self.prior_sigma: FloatArray = np.concatenate(
-            [np.repeat(sigmas, counts), uncertain.offset, veils]
+            [np.repeat(sigmas, counts), uncertain.offset, veils, uneven, begins]
         )
         free_counts = [
             states,
@@ -212,7 +240,8 @@ class Parameters:
             len(self.others),
             states if order is None else 0,
         ]
-        ends = _begins([*free_counts, *counts, len(uncertain.offset), len(veils)])
+        lengths = [len(sigma) for sigma in (uncertain.offset, veils, uneven, begins)]
+        ends = _begins([*free_counts, *counts, *lengths])
         self.columns = ParameterLayout(*(slice(*limits) for limits in pairwise(ends)))
         self.count = ends[-1]
 
@@ -230,7 +259,7 @@ class Parameters:
         return slice(*self._first_mode[number : number + 2])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of θ: excitation rates, weights and veil ≥ 0, amplitudes in their range."""
+        """Return bounds of θ: rates, weights, veil and start ≥ 0, amplitudes in their range."""
         lower, upper = np.full(self.count, -np.inf), np.full(self.count, np.inf)
         lower[self.columns.k_r] = np.log(LEAST_RATE_PER_S)
         lower[self.columns.growth.start : self.columns.weights.stop] = 0.0
@@ -239,6 +268,7 @@ class Parameters:
         lower[self.columns.order], upper[self.columns.order] = 1.0, MAX_ORDER
         if is_fitted(self.columns.veil):
             lower[self.columns.veil.start] = 0.0
+        lower[self.columns.start] = 0.0
         return lower, upper
 
     def as_stated(
@@ -286,6 +316,8 @@ class Parameters:
             theta[columns.off],
             theta[columns.offset],
             theta[columns.veil],
+            np.exp(theta[columns.evenness] @ self.unevenness),
+            theta[columns.start],
             order,
             gain,
         )

@@ -1,8 +1,8 @@
 """Residuals of all series as a function of rates, amplitudes and parameters with a prior.
 
-The signal of a site is w_c Σ_i A_i r_iᵇ with b = 1 of the first order: one amplitude A_i = Λ* k_r,i
-for every state, the signal of a fully charged sample in the brightest channel, and one weight per
-channel.
+The signal of a site is e_p w_c Σ_i A_i r_iᵇ with b = 1 of the first order: one amplitude A_i = Λ*
+k_r,i for every state, the signal of a fully charged sample in the brightest channel, one weight per
+channel, and the evenness e_p of the sites.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from labrig.fit.excitation.level_slopes import Levels
-from labrig.fit.excitation.levels import levels, slopes_by_light
+from labrig.fit.excitation.levels import levels, levels_and_slopes
 from labrig.fit.excitation.parameters import Parameters, Rates, RelativeSigmas, is_fitted
 from labrig.results import ChargingSeries, FloatArray
 
@@ -44,6 +44,7 @@ class ExcitationProblem:
     ) -> None:
         self.series = tuple(series)
         self.parameters = Parameters(series, states, reference, uncertain, order)
+        self._before = [_number_before(self.series, number) for number in range(len(self.series))]
         self._flicker = uncertain.flicker
         self._inverse_sigma = [
             np.where(
@@ -69,7 +70,7 @@ class ExcitationProblem:
         """Return the model of every series, shape (n, P, C) each."""
         rates = self.parameters.unpack(theta)
         return [
-            _signal(self.levels(charging, rates).value @ rates.amplitude, rates, charging)
+            _signal(self.glow(charging, rates), rates, charging)
             for charging in self.illuminated_series(rates)
         ]
 
@@ -109,7 +110,7 @@ class ExcitationProblem:
 
     def illuminated_series(self, rates: Rates) -> list[ChargingSeries]:
         """Return the series with the irradiance and the brightness of θ."""
-        illuminated = []
+        illuminated: list[ChargingSeries] = []
         for number, (charging, log_scale) in enumerate(
             zip(self.series, rates.log_scale, strict=True)
         ):
@@ -124,22 +125,39 @@ class ExcitationProblem:
             if charging.site_modes is not None:
                 amplitudes = rates.off[self.parameters.modes(number)]
                 scaled = scaled * np.exp(np.tensordot(amplitudes, charging.site_modes, axes=1))
-            illuminated.append(replace(charging, charges=charges, irradiance=scaled))
+            earlier, before = charging.earlier, self._before[number]
+            if earlier is not None and before is not None:
+                # The charges before have one light, whichever series looks at what they left.
+                lit = illuminated[before]
+                earlier = replace(earlier, charges=lit.charges, irradiance=lit.irradiance)
+            is_begun = len(rates.start) and (number == 0 or before is not None)
+            start = rates.start if is_begun else None
+            illuminated.append(
+                replace(charging, charges=charges, irradiance=scaled, earlier=earlier, start=start)
+            )
         return illuminated
 
     def levels(self, charging: ChargingSeries, rates: Rates) -> Levels:
         """Return the light of all exposures of a series over that of full states."""
+        return levels(charging, *self._of_levels(rates))
+
+    def _of_levels(self, rates: Rates) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """Return k_r, k_e and kinetic orders; None if all are 1."""
         order = None if self.parameters.is_first_order else rates.order
-        return levels(charging, rates.k_r_per_s, rates.k_e_per_s, order)
+        return rates.k_r_per_s, rates.k_e_per_s, order
+
+    def glow(self, charging: ChargingSeries, rates: Rates) -> FloatArray:
+        """Return the glow (n, P) of a series in the brightest channel."""
+        return np.asarray(self.levels(charging, rates).value @ rates.amplitude * rates.evenness)
 
     def _series_residuals(
         self, number: int, charging: ChargingSeries, rates: Rates
     ) -> tuple[FloatArray, FloatArray]:
-        level = self.levels(charging, rates)
+        level, by_light, by_start = levels_and_slopes(charging, *self._of_levels(rates))
         shots, sites = level.value.shape[:2]
         columns = self.parameters.columns
-        glow = level.value @ rates.amplitude
-        # By θ of the glow, before channels come into it.
+        glow = level.value @ rates.amplitude * rates.evenness
+        # By θ of the glow, before evenness and channels come into it.
         slopes = np.zeros((shots, sites, self.parameters.count))
         amplitude, order, gain = rates.amplitude, rates.order, rates.gain
         slopes[..., columns.k_r] = level.by_k_r * (amplitude * rates.k_r_per_s)
@@ -152,7 +170,12 @@ class ExcitationProblem:
         if is_fitted(columns.order):
             by_log_gain = level.value + rates.k_r_per_s * level.by_k_r
             slopes[..., columns.order] = amplitude * (level.by_order + np.log(gain) * by_log_gain)
-        self._set_light_derivatives(number, charging, rates, slopes)
+        self._set_light_derivatives(number, charging, rates, by_light, slopes)
+        if is_fitted(columns.start):
+            slopes[..., columns.start] = by_start * amplitude
+        slopes *= rates.evenness[:, None]
+        if is_fitted(columns.evenness):
+            slopes[..., columns.evenness] = glow[..., None] * self.parameters.unevenness.T
         inverse = self._inverse_sigma[number]
         jacobian = slopes[:, :, None, :] * (rates.weights * inverse)[..., None]
         for place, channel in enumerate(self.parameters.others, start=columns.weights.start):
@@ -166,66 +189,56 @@ class ExcitationProblem:
         return self._whitened(number, misfit.reshape(shots, -1), jacobian)
 
     def _set_light_derivatives(
-        self, number: int, charging: ChargingSeries, rates: Rates, slopes: FloatArray
+        self,
+        number: int,
+        charging: ChargingSeries,
+        rates: Rates,
+        by_light: FloatArray,
+        slopes: FloatArray,
     ) -> None:
-        """Set the derivatives by all parameters of the light, from those by A k_e."""
-        if charging.is_by_light and self.parameters.is_first_order:
-            self._set_selected_light_derivatives(number, charging, rates, slopes)
-            return
-        columns, charges = self.parameters.columns, self.parameters.charges(number)
-        growth = rates.gain[:, None] * rates.k_e_per_s
-        by_growth = slopes[..., columns.growth].reshape(*slopes.shape[:2], *growth.shape)
-        by_band = np.einsum("fpnb,nb->fpb", by_growth, growth)
-        by_light = by_band.sum(axis=2)
-        if is_fitted(columns.scale) and number:
-            slopes[..., columns.scale.start + number - 1] = by_light
-        shot = 0
-        for place, charge in enumerate(
-            charging.charges, start=columns.brightness.start + charges.start
-        ):
-            # The little that a charge leaves to the next one is neglected here.
-            charge_shots = slice(shot, shot + len(charge.start_s))
-            if is_fitted(columns.brightness):
-                slopes[charge_shots, :, place] = by_light[charge_shots]
-            if is_fitted(columns.lacking):
-                slopes[charge_shots, :, columns.lacking.start] = (
-                    -charge.cold_deficit * by_light[charge_shots]
-                )
-            shot = charge_shots.stop
-        if charging.site_modes is not None:
-            modes, first = self.parameters.modes(number), columns.off.start
-            of_rows = charging.site_modes[:, charging.row_of_shots()]
-            slopes[..., first + modes.start : first + modes.stop] = np.einsum(
-                "fpb,mfpb->fpm", by_band, of_rows
-            )
+        """Set the derivatives by all parameters of the light, from those by the light.
 
-    def _set_selected_light_derivatives(
-        self, number: int, charging: ChargingSeries, rates: Rates, slopes: FloatArray
-    ) -> None:
-        """Set the same exactly where one light follows another.
+        What a bright light has left may be most of the glow after a dim one, and more than what a
+        short charge has added.
 
-        What a bright light has left may be most of the glow after a dim one.
+        Parameters
+        ----------
+        number, charging, rates
+            A series in the light of θ, and θ by name.
+        by_light
+            Derivatives of its levels, shape (n, K, P, N, B), by ln E of every charge.
+        slopes
+            Derivatives (n, P, p) of its glow by θ.
         """
-        columns, charges = self.parameters.columns, self.parameters.charges(number)
-        by_state = slopes_by_light(charging, rates.k_r_per_s, rates.k_e_per_s)
-        by_band = np.einsum("fkpnb,n->fkpb", by_state, rates.amplitude)
-        by_charge = by_band.sum(axis=3)
-        if is_fitted(columns.scale) and number:
-            slopes[..., columns.scale.start + number - 1] = by_charge.sum(axis=1)
-        if is_fitted(columns.brightness):
-            first = columns.brightness.start
-            own = slice(first + charges.start, first + charges.stop)
-            slopes[..., own] = np.moveaxis(by_charge, 1, 2)
-        if is_fitted(columns.lacking):
-            cold_deficit = np.array([charge.cold_deficit for charge in charging.charges])
-            lacking = -np.tensordot(by_charge, cold_deficit, axes=(1, 0))
-            slopes[..., columns.lacking.start] = lacking
-        if charging.site_modes is not None:
-            modes, first = self.parameters.modes(number), columns.off.start
-            lights = [charge.light or 0 for charge in charging.charges]
-            slopes[..., first + modes.start : first + modes.stop] = np.einsum(
-                "fkpb,mkb->fpm", by_band, charging.site_modes[:, lights]
-            )
+        columns = self.parameters.columns
+        by_band = np.einsum("fkpnb,n->fkpb", by_light, rates.amplitude)
+        earlier = by_band.shape[1] - len(charging.charges)
+        parts = [(number, by_band[:, earlier:])]
+        before = self._before[number]
+        if before is not None:
+            parts.append((before, by_band[:, :earlier]))
+        for of, by_its_bands in parts:
+            lit, charges = self.series[of], self.parameters.charges(of)
+            by_charge = by_its_bands.sum(axis=3)
+            if is_fitted(columns.scale) and of:
+                slopes[..., columns.scale.start + of - 1] = by_charge.sum(axis=1)
+            if is_fitted(columns.brightness):
+                first = columns.brightness.start
+                own = slice(first + charges.start, first + charges.stop)
+                slopes[..., own] = np.moveaxis(by_charge, 1, 2)
+            if is_fitted(columns.lacking):
+                cold_deficit = np.array([charge.cold_deficit for charge in lit.charges])
+                lacking = np.tensordot(by_charge, cold_deficit, axes=(1, 0))
+                slopes[..., columns.lacking.start] -= lacking
+            if lit.site_modes is None:
+                continue
+            modes, first = self.parameters.modes(of), columns.off.start
+            if lit.is_by_light:
+                lights = [charge.light or 0 for charge in lit.charges]
+                by_modes = np.einsum("fkpb,mkb->fpm", by_its_bands, lit.site_modes[:, lights])
+            else:
+                by_modes = np.einsum("fpb,mpb->fpm", by_its_bands.sum(axis=1), lit.site_modes)
+            slopes[..., first + modes.start : first + modes.stop] = by_modes
 
     def whitened(self, number: int, columns: FloatArray) -> FloatArray:
         """Return changes (n, P, C, k) of a series' signal in whitened σ, shape (n P C, k)."""
@@ -244,6 +257,18 @@ class ExcitationProblem:
             common.whiten(misfit)
             common.whiten(jacobian)
         return misfit.ravel(), jacobian.reshape(-1, jacobian.shape[-1])
+
+
+def _number_before(series: Sequence[ChargingSeries], number: int) -> int | None:
+    """Return the number of the series of the charges before a series, if it is fitted, too."""
+    earlier = series[number].earlier
+    if earlier is None:
+        return None
+    on_s = [charge.on_s for charge in earlier.charges]
+    for before in range(number):
+        if [charge.on_s for charge in series[before].charges] == on_s:
+            return before
+    return None
 
 
 class _Common(NamedTuple):

@@ -1,14 +1,17 @@
 """What all places of a photograph have in common, and what each place has in all photographs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from labrig.analyse.excitation.evenness import evenness
+from labrig.analyse.excitation.evenness import evened, evenness
 from labrig.analyse.excitation.flicker import common_flicker
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import read_material
 from tests.fit.charged_samples import Bench
 from tests.fit.test_excitation_order import BARE, LVF
+from tests.results.made_excitation import excitation_result
 
 
 @pytest.mark.parametrize("flicker", [pytest.param(0.004, marks=pytest.mark.campaign), 0.012])
@@ -24,15 +27,21 @@ def test_flicker_is_that_of_all_photographs(flicker: float) -> None:
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(flicker, rel=0.12)
 
 
-def test_evenness_is_not_that_of_earlier_charges() -> None:
-    """Places that were charged through the filter, before all are charged by the lamp itself."""
+def test_evenness_is_that_of_places_in_the_same_light() -> None:
     rng = np.random.default_rng(6)
     even = 1 + 0.03 * np.cos(np.linspace(0.0, 3.0, 6))
-    course = 1 + np.outer([0.2, 0.05, 0.0], np.linspace(0.5, -0.5, 6))
-    glow = np.array([100.0, 400.0, 2000.0])[:, None] * course
+    glow = np.array([100.0, 400.0, 2000.0])[:, None]
     values = (glow * even)[..., None] * [0.3, 1.0, 0.7]
     sigma = 1e-3 * values
     values = values + sigma * rng.normal(size=values.shape)
-    found = evenness(values, sigma, course[..., None])
-    assert found == pytest.approx(even / even.mean(), rel=3e-3)
-    assert np.abs(evenness(values, sigma, np.ones(1)) / found - 1).max() > 0.02
+    assert evenness(values, sigma) == pytest.approx(even / even.mean(), rel=3e-3)
+
+
+def test_values_are_divided_by_the_evenness_that_a_fit_has_found() -> None:
+    patch = next(iter(excitation_result().patches.values()))
+    charging, fit = patch.charging, replace(patch.fit, evenness=np.array([1.02, 1.0, 1 / 1.02]))
+    found = evened(charging, fit)
+    assert found.evenness == pytest.approx(charging.evenness * fit.evenness)
+    for after, before in ((found.through, charging.through), (found.direct, charging.direct)):
+        assert after.values * fit.evenness[:, None] == pytest.approx(before.values, nan_ok=True)
+        assert after.sigma * fit.evenness[:, None] == pytest.approx(before.sigma)
