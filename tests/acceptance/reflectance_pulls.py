@@ -52,6 +52,13 @@ EDGE = {300: 0.08, 540: 0.08, 580: 0.75, 780: 0.8}
 STEEP = {300: 0.1, 500: 0.1, 515: 0.7, 780: 0.75}
 BLUE = {300: 0.35, 420: 0.45, 460: 0.6, 500: 0.35, 560: 0.15, 620: 0.12, 680: 0.2, 780: 0.4}
 WHITE = {300: 0.6, 400: 0.85, 450: 0.9, 780: 0.92}
+#: Smooth everywhere, with no straight piece: a dye's two bands below a pigment's edge.
+SMOOTH = {
+    nm: 0.12
+    + 0.55 / (1 + float(np.exp(-(nm - 585) / 9)))
+    + 0.2 * float(np.exp(-(((nm - 455) / 22) ** 2)))
+    for nm in range(300, 781, 2)
+}
 CASES = (
     Case("blue", BLUE),
     Case("orange edge", EDGE),
@@ -60,6 +67,9 @@ CASES = (
     Case("white", WHITE),
     Case("blue, prompt 20 %", BLUE, patch={"prompt": 0.2}),
     Case("orange edge, prompt 20 %", EDGE, patch={"prompt": 0.2}),
+    Case("blue, prompt 5 %", BLUE, patch={"prompt": 0.05}),
+    Case("smooth", SMOOTH),
+    Case("smooth, prompt 20 %", SMOOTH, patch={"prompt": 0.2}),
     Case("gloss and inter-reflection", BLUE, {"gloss": 0.04, "inter_reflection": 0.02}),
     Case("no door, prompt 20 %", BLUE, patch={"prompt": 0.2}, without=("door", "shield", "servo")),
     Case("fluorescent card", BLUE, {"grey_card_fluorescence": 0.05}),

@@ -7,8 +7,15 @@ import pytest
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.reflectance import LitStrip, fit_albedo, relative_to_card
-from labrig.fit.spectrum import SpectralSystem
+from labrig.fit.reflectance import (
+    LitStrip,
+    Luminescence,
+    StripLight,
+    fit_albedo,
+    luminescence_by_glow,
+    relative_to_card,
+)
+from labrig.fit.spectrum import SpectralSystem, fit_spectrum
 from labrig.optics import Transmittance
 from tests.pulls import assert_sigma_is_right
 
@@ -47,6 +54,39 @@ def ratios(
     return white, narrow
 
 
+def fluorescent(
+    albedo: FloatArray, rng: np.random.Generator, *, is_stokes: bool = False
+) -> tuple[LitStrip, LitStrip, Luminescence]:
+    """By white and by narrow light, fluorescence of a matrix of light in and light out.
+
+    If it `is_stokes`, light excites the part of the emission at longer wavelengths than its own.
+    """
+    light, relative = system(), relative_to_card(system(), CARD)
+    bands = light.design.reshape(31, 2, -1)[:, 0] / CHANNELS[0]
+    of_card = (light.design @ CARD.at(KNOTS_NM)).reshape(31, 2)
+    excites = 0.4 * np.exp(-(((KNOTS_NM - 440) / 30) ** 2))
+    emitted = np.outer(GLOW / GLOW.sum(), excites)
+    if is_stokes:
+        emitted *= KNOTS_NM[:, np.newaxis] >= KNOTS_NM
+    by_white = np.einsum("pk,ck,kj->pc", bands, CHANNELS, emitted)
+    by_narrow = np.einsum("ck,kj,pj->pc", CHANNELS, emitted, bands)
+    glow = 0.01 * (light.design @ GLOW).reshape(31, 2)
+    # Of places 10 nm apart the bands add up to one of all wavelengths.
+    weight = np.full(31, 10.0 / (10.0 * bands[15].sum()))
+    places = StripLight(CENTRE_NM, of_card, weight)
+    none = np.zeros(31)
+    excited = luminescence_by_glow(glow, places, places, ultraviolet=none, is_direct=True)
+    colour = np.kron(np.eye(31), CHANNELS @ GLOW) / of_card.ravel()
+    steady = (glow / of_card).ravel()
+    strips = []
+    for seen, courses in ((by_white, steady[np.newaxis]), (by_narrow, colour)):
+        value = relative.design @ albedo + (seen / of_card).ravel()
+        value = value + NOISE * value * rng.standard_normal(len(value))
+        dark = np.zeros_like(value)
+        strips.append(LitStrip(value, NOISE * value, relative, steady, dark, courses, 1e-6))
+    return strips[0], strips[1], excited
+
+
 def drawn(rng: np.random.Generator, over_nm: float = 60.0) -> FloatArray:
     """A reflectance of Matérn's kind (3/2), rougher than that of the prior."""
     away = np.sqrt(3) * np.abs(KNOTS_NM - KNOTS_NM[:, np.newaxis]) / over_nm
@@ -75,6 +115,56 @@ def test_the_sigma_is_right() -> None:
         pulls.append(((fit.albedo.value - albedo) / sigma)[judged])
         assert not fit.is_prompt
     assert_sigma_is_right(pulls)
+
+
+@pytest.mark.parametrize("is_stokes", [False, True], ids=["as the glow", "beyond the light"])
+def test_one_excitation_explains_the_luminescence_of_both_strips(is_stokes: bool) -> None:
+    """Emission that the exciting light cuts off is none that the fit has for likely."""
+    rng = np.random.default_rng(2)
+    albedo = drawn(rng)
+    white, narrow, excited = fluorescent(albedo, rng, is_stokes=is_stokes)
+    fit = fit_albedo(white, narrow, CARD, excited)
+    assert fit.is_prompt
+    judged = (KNOTS_NM >= 430) & (KNOTS_NM <= 680)
+    error, sigma = fit.albedo.value - albedo, fit.albedo.samples.std(axis=0, ddof=1)
+    assert np.abs(error)[judged].max() < (0.03 if is_stokes else 0.02)
+    assert np.abs(error / sigma)[judged].max() < 4
+    if is_stokes:
+        free = fit_albedo(white, narrow, CARD)
+        assert np.abs(error)[judged].max() < np.abs(free.albedo.value - albedo)[judged].max()
+
+
+@pytest.mark.campaign
+def test_the_sigma_beside_fluorescence_is_right() -> None:
+    pulls = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        albedo = drawn(rng)
+        white, narrow, excited = fluorescent(albedo, rng)
+        fit = fit_albedo(white, narrow, CARD, excited)
+        judged = np.searchsorted(KNOTS_NM, [430, 480, 530, 580, 630, 670])
+        sigma = fit.albedo.samples.std(axis=0, ddof=1)
+        pulls.append(((fit.albedo.value - albedo) / sigma)[judged])
+    assert_sigma_is_right(pulls)
+
+
+def test_an_edge_is_rougher_than_what_is_beside_it() -> None:
+    """An even prior draws it too flat, and gives too large a σ to what is straight."""
+    relative, rng = relative_to_card(system(), CARD), np.random.default_rng(5)
+    albedo = 0.1 + 0.6 / (1 + np.exp(-(KNOTS_NM - 555) / 6))
+    value = relative.design @ albedo
+    sigma = NOISE * value
+    value = value + sigma * rng.standard_normal(len(value))
+    even, local = (
+        fit_spectrum(value, sigma, relative, decisive=np.inf, stiffest=1e5, is_local=is_local)
+        for is_local in (False, True)
+    )
+    straight = (KNOTS_NM >= 430) & (KNOTS_NM <= 500)
+    spread = [fit.samples.std(axis=0)[straight].mean() for fit in (even, local)]
+    assert spread[1] < 0.7 * spread[0]
+    errors = [np.abs(fit.value - albedo)[3:-3].max() for fit in (even, local)]
+    assert errors[1] < errors[0]
+    assert errors[1] < 0.02
 
 
 def test_the_radiance_factor_has_the_luminescence_in_it() -> None:

@@ -1,6 +1,6 @@
 """Analysis of a reflectance run, from its frames to the albedo of each patch."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from labrig.analyse.strip import StripFrames, StripPatch, for_each_patch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
 from labrig.calibration import ReflectanceFile
 from labrig.errors import DataError, FitError, UsageError
-from labrig.fit.reflectance import AlbedoFit, fit_albedo, unresolved
+from labrig.fit.reflectance import AlbedoFit, Luminescence, fit_albedo, unresolved
 from labrig.number_format import plus_minus
 from labrig.optics import Transmittance, band_means, edges_from_centres
 from labrig.reduce import FLICKER
@@ -33,10 +33,11 @@ CONTRADICTION = 1.5
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """Values that all patches share: two arrangements, the card's curve, its σ at the results."""
+    """Values that all patches share: arrangements, luminescence, the card's curve, its σ."""
 
     white: Arranged
     narrow: Arranged
+    excited: Mapping[StripPatch, Luminescence | None]
     card: Transmittance
     card_sigma: FloatArray
 
@@ -60,10 +61,10 @@ def analyse(part: Part) -> ReflectanceResult:
             "process --optics"
         )
     frames, lamp, card = StripFrames(part), lamp_spectrum(part.rig), card_reflectance(part.rig)
-    white, narrow = both_arranged(
+    white, narrow, excited = both_arranged(
         part, frames, calibrated, calibrated.before_camera, calibrated.on_sample
     )
-    bench = _Bench(white, narrow, card, _card_sigma(card))
+    bench = _Bench(white, narrow, excited, card, _card_sigma(card))
     both = [patch for patch in white.patches if patch in narrow.patches]
     if not both:
         raise DataError("; ".join((*white.refused, *narrow.refused)))
@@ -91,7 +92,7 @@ def _patch(patch: StripPatch, bench: _Bench) -> tuple[MeasuredReflectance, list[
     """Return the patch's reflectance, and warnings."""
     white, narrow = bench.white.patches[patch], bench.narrow.patches[patch]
     try:
-        fit = fit_albedo(white.strip, narrow.strip, bench.card)
+        fit = fit_albedo(white.strip, narrow.strip, bench.card, bench.excited[patch])
     except FitError as error:
         raise DataError(str(error)) from None
     common = float(np.hypot(white.strip.scale_sigma, np.median(bench.card_sigma)))

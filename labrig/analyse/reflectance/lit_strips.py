@@ -12,7 +12,13 @@ from labrig.analyse.strip import Slices, StripFrames, StripPatch, slice_strip, s
 from labrig.analyse.strip_model import channel_positions, conditioned_on_white, strip_system
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import LvfFile
-from labrig.fit.reflectance import LitStrip, relative_to_card
+from labrig.fit.reflectance import (
+    LitStrip,
+    Luminescence,
+    StripLight,
+    luminescence_by_glow,
+    relative_to_card,
+)
 from labrig.fit.spectrum import SpectralSystem
 from labrig.optics import CameraResponse, Lvf, Spectrum, Strip, Transmittance
 from labrig.protocols.reflectance import ReflectanceFrames
@@ -131,8 +137,8 @@ class Arranged:
 
 def both_arranged(
     part: Part, frames: StripFrames, calibrated: LvfFile, before_camera: Strip, on_sample: Strip
-) -> tuple[Arranged, Arranged]:
-    """Measure card, sample and glow along both strips, for every patch.
+) -> tuple[Arranged, Arranged, Mapping[StripPatch, Luminescence | None]]:
+    """Measure card, sample and glow along both strips, and what luminescence both may have.
 
     Raises
     ------
@@ -146,7 +152,7 @@ def both_arranged(
     # Without a door the camera sees the sample through the filter that lies on it.
     below = calibrated.lvf if is_direct else calibrated.lvf.twice()
     narrow = _seen(part, frames, NARROW, calibrated, below, on_sample)
-    whites, narrows = {}, {}
+    whites, narrows, excited = {}, {}, {}
     for patch in white.patches:
         one = white.patches[patch]
         whites[patch] = one.strip(_white_courses(one.scenes, one.centre_nm))
@@ -155,19 +161,37 @@ def both_arranged(
                 other.scenes, one.scenes, one.centre_nm, other.centre_nm, is_direct=is_direct
             )
             narrows[patch] = other.strip(courses)
+            excited[patch] = _excited(one, other, lamp_spectrum(part.rig), is_direct=is_direct)
     return (
         Arranged(WHITE.name, whites, white.refused, white.drift),
         Arranged(NARROW.name, narrows, narrow.refused, narrow.drift),
+        excited,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _SeenPatch:
-    """Scenes of one patch, the system of their ratios, and the wavelength of each place."""
+    """Scenes of one patch.
+
+    Attributes
+    ----------
+    scenes
+        Light of card, sample and glow.
+    system
+        System of the ratios by the reflectance.
+    centre_nm
+        Wavelength of each place, shape (p,).
+    card_light
+        Light of the card by the system, shape (p, channels).
+    passed
+        Light that the filter passes once at each place of an even spectrum, shape (p,).
+    """
 
     scenes: "_Scenes"
     system: SpectralSystem
     centre_nm: FloatArray
+    card_light: FloatArray
+    passed: FloatArray
 
     def strip(self, courses: FloatArray) -> PatchStrip:
         """Return the ratios with the courses of luminescence."""
@@ -219,7 +243,10 @@ def _seen(
         light = _known_by_card(light, scenes.card, card)
         scenes = scenes.within(_in_band(light, centre_nm).reshape(scenes.sample.value.shape))
         drifts.append(scenes.drift)
-        patches[patch] = _SeenPatch(scenes, relative_to_card(light, card), centre_nm)
+        of_card = (light.design @ card.at(light.knots_nm)).reshape(scenes.sample.value.shape)
+        passed = np.interp(centre_nm, calibrated.lvf.bands.centre_nm, _passed(calibrated.lvf))
+        system = relative_to_card(light, card)
+        patches[patch] = _SeenPatch(scenes, system, centre_nm, of_card, passed)
     return _Seen(patches, refused, float(np.median(drifts)))
 
 
@@ -340,6 +367,44 @@ def _white_courses(scenes: _Scenes, centre_nm: FloatArray) -> FloatArray:
     redder = np.clip((centre_nm - mean_nm) / spread_nm, -REDDEST, REDDEST)[:, np.newaxis]
     ratio = glow.value / card
     return np.stack([(redder**power * ratio).ravel() for power in range(WHITE_AMOUNTS)])
+
+
+def _excited(
+    white: _SeenPatch, narrow: _SeenPatch, lamp: Spectrum, *, is_direct: bool
+) -> Luminescence | None:
+    """Return what luminescence the ratios of both strips may have; None without a glow."""
+    glow = white.scenes.glow
+    if glow is None:
+        return None
+    # In the units of both systems, without what lens and lamp do at a place.
+    seen = np.maximum(np.nan_to_num(glow.value / white.scenes.card.value), 0.0) * white.card_light
+    strips = (StripLight(one.centre_nm, one.card_light, _per_place(one)) for one in (white, narrow))
+    return luminescence_by_glow(
+        seen, *strips, ultraviolet=_ultraviolet(narrow, lamp), is_direct=is_direct
+    )
+
+
+def _per_place(patch: _SeenPatch) -> FloatArray:
+    """Return weights of the places of a strip whose sum is light that has not passed it, (p,)."""
+    return np.asarray(np.abs(np.gradient(patch.centre_nm)) / patch.passed)
+
+
+def _ultraviolet(patch: _SeenPatch, lamp: Spectrum) -> FloatArray:
+    """Return weights as of `_per_place` for light of shorter wavelengths than the strip's, (p,)."""
+    bluest = int(np.argmin(patch.centre_nm))
+    end_nm = patch.centre_nm[bluest]
+    below_nm = np.arange(
+        lamp.wavelength_nm[0], end_nm - abs(np.gradient(patch.centre_nm)[bluest]) / 2
+    )
+    weight = np.zeros_like(patch.centre_nm)
+    weight[bluest] = lamp.at(below_nm).sum() / lamp.at(end_nm) / patch.passed[bluest]
+    return weight
+
+
+def _passed(lvf: Lvf) -> FloatArray:
+    """Return the light that a filter passes of an even spectrum at its positions, shape (p,)."""
+    nodes = np.arange(KNOTS_NM[0], KNOTS_NM[-1] + 1.0)
+    return np.asarray(lvf.transmission(nodes).sum(axis=1))
 
 
 def _narrow_courses(

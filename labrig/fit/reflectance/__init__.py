@@ -7,5 +7,19 @@ from labrig.fit.reflectance.fit import (
     relative_to_card,
     unresolved,
 )
+from labrig.fit.reflectance.luminescence import (
+    Luminescence,
+    StripLight,
+    luminescence_by_glow,
+)
 
-__all__ = ["AlbedoFit", "LitStrip", "fit_albedo", "relative_to_card", "unresolved"]
+__all__ = [
+    "AlbedoFit",
+    "LitStrip",
+    "Luminescence",
+    "StripLight",
+    "fit_albedo",
+    "luminescence_by_glow",
+    "relative_to_card",
+    "unresolved",
+]

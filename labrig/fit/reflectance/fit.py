@@ -14,10 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
+from labrig.fit.reflectance.luminescence import Luminescence
 from labrig.fit.spectrum import SpectralSystem, SpectrumFit, fit_spectrum
 from labrig.optics import Transmittance
 
@@ -66,11 +68,17 @@ class LitStrip:
     scale_sigma: float
 
     @property
-    def usable(self) -> "LitStrip":
-        """The ratios that are known."""
+    def known(self) -> NDArray[np.bool_]:
+        """Which ratios are known, shape (m,)."""
         known = np.isfinite(self.value) & np.isfinite(self.sigma) & (self.sigma > 0)
         known &= np.isfinite(self.system.design).all(axis=1)
         known &= np.isfinite(self.luminescence).all(axis=0) & np.isfinite(self.glow)
+        return known
+
+    @property
+    def usable(self) -> "LitStrip":
+        """The ratios that are known."""
+        known = self.known
         return LitStrip(
             self.value[known],
             self.sigma[known],
@@ -80,6 +88,11 @@ class LitStrip:
             self.luminescence[:, known],
             self.scale_sigma,
         )
+
+    @property
+    def lit_only(self) -> "LitStrip":
+        """The strip as if nothing luminesced."""
+        return replace(self, luminescence=self.luminescence[:0])
 
     @property
     def without_prompt(self) -> "LitStrip":
@@ -177,7 +190,9 @@ def relative_to_card(light: SpectralSystem, card: Transmittance) -> SpectralSyst
     return replace(light, design=design, modes=modes)
 
 
-def fit_albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> AlbedoFit:
+def fit_albedo(
+    white: LitStrip, narrow: LitStrip, card: Transmittance, excited: Luminescence | None = None
+) -> AlbedoFit:
     """Fit the albedo that explains the ratios by white and by narrow light.
 
     Parameters
@@ -188,6 +203,9 @@ def fit_albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> Albedo
         Lit through the filter.
     card
         Reflectance of the card.
+    excited
+        Luminescence of both as one excitation explains it; None leaves the amounts free of one
+        another.
 
     Returns
     -------
@@ -214,20 +232,77 @@ def fit_albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> Albedo
     >>> fit_albedo(strip, strip, card).albedo.value[15].round(2)
     0.4
     """
+    if excited is not None:
+        excited = excited.of(white.known, narrow.known)
     white, narrow = white.usable, narrow.usable
-    total = _fitted([replace(white, luminescence=white.luminescence[:0])])
-    free = _albedo(white, narrow, card)
-    amount, amount_sigma = _amount(white, free)
+    total = _fitted([white.lit_only])
+    found = _free(white, narrow, card)
+    if excited is not None and np.isfinite(found.amount):
+        tied = _tied(white, narrow, card, excited, found)
+        # Fluorescence of a colour that is not the glow's, or none that adds up.
+        if tied.albedo.misfit < PROMPT_MISFIT * found.albedo.misfit:
+            found = tied
     strips = (white.without_prompt, narrow.without_prompt)
     albedo = _albedo(*strips, card)
     steady, steady_sigma = _steady(white)
     is_prompt = bool(
-        amount - steady > PROMPT_SIGMAS * np.hypot(amount_sigma, steady_sigma)
-        or albedo.misfit > PROMPT_MISFIT * free.misfit
+        found.amount - steady > PROMPT_SIGMAS * np.hypot(found.amount_sigma, steady_sigma)
+        or albedo.misfit > PROMPT_MISFIT * found.albedo.misfit
     )
     if is_prompt:
-        strips, albedo = (white, narrow), free
-    return AlbedoFit(albedo, total, amount, amount_sigma, is_prompt, *_thrown_back(*strips, card))
+        strips, albedo = (white, narrow), found.albedo
+    thrown_back = _thrown_back(*strips, card)
+    return AlbedoFit(albedo, total, found.amount, found.amount_sigma, is_prompt, *thrown_back)
+
+
+@dataclass(frozen=True, eq=False)
+class _Luminescent:
+    """Albedo of a sample that may fluoresce, amount of its luminescence by white light, and σ."""
+
+    albedo: SpectrumFit
+    amount: float
+    amount_sigma: float
+
+
+def _free(white: LitStrip, narrow: LitStrip, card: Transmittance) -> _Luminescent:
+    """Fit with amounts of luminescence that are free of one another."""
+    albedo = _albedo(white, narrow, card)
+    return _Luminescent(albedo, *_amount(white, albedo))
+
+
+def _tied(
+    white: LitStrip,
+    narrow: LitStrip,
+    card: Transmittance,
+    excited: Luminescence,
+    free: _Luminescent,
+) -> _Luminescent:
+    """Fit with amounts that one excitation explains, near those that were free."""
+    scaled = _scaled_freely(narrow, white.scale_sigma)
+    excess = _excess(narrow, free.albedo, card)
+    scaled = scaled.with_modes(THROWN_BACK_SIGMA * excess[np.newaxis])
+    value, system = _stacked([(one.value, one.system) for one in (white, scaled)])
+    noise = np.concatenate([white.sigma, scaled.sigma]) ** 2
+    largest = abs(free.amount) + 2 * free.amount_sigma
+    mean = largest / excited.by_white(np.ones_like(excited.share))
+    amounts = np.zeros_like(excited.share)
+    for samples in (FEW_SAMPLES, SAMPLES):
+        last = amounts
+        courses, prior = excited.courses(last), excited.prior(last, mean)
+        lever = prior @ courses
+        spread = np.diag(noise) + courses.T @ lever
+        lower = np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
+        albedo = _fitted_whole(value, system, lower, samples)
+        spread += system.covariance(albedo.value)
+        gain = np.linalg.solve(spread, lever.T).T
+        unknowns = gain @ (value - system.design @ albedo.value)
+        amounts = unknowns[: len(amounts)]
+    by_white = np.zeros(len(prior))
+    by_white[: len(amounts)] = excited.share + excited.ultraviolet
+    by_white[-2] = excited.sum_sigma(last)
+    draws = (value - albedo.samples @ system.design.T) @ (by_white @ gain)
+    rest = by_white @ (prior - gain @ lever.T) @ by_white
+    return _Luminescent(albedo, float(by_white @ unknowns), float(np.sqrt(draws.var() + rest)))
 
 
 def _albedo(white: LitStrip, narrow: LitStrip, card: Transmittance) -> SpectrumFit:
@@ -283,14 +358,22 @@ def _scaled_freely(narrow: LitStrip, other_sigma: float) -> LitStrip:
 
 def _fitted(strips: Sequence[LitStrip], samples: int = SAMPLES) -> SpectrumFit:
     """Fit one reflectance to several strips, each with errors of its own."""
-    parts = [strip.reflected() for strip in strips]
+    value, system = _stacked([strip.reflected() for strip in strips])
+    return _fitted_whole(value, system, None, samples)
+
+
+def _stacked(
+    parts: Sequence[tuple[FloatArray, SpectralSystem]],
+) -> tuple[FloatArray, SpectralSystem]:
+    """Return values and system of several strips of one reflectance, with errors of their own."""
     rows = [len(value) for value, _ in parts]
     if min(rows) == 0:
         raise FitError("expected light of sample and card along the filter, got none that is known")
     modes, first = [], 0
     for count, (_, system) in zip(rows, parts, strict=True):
         padded = np.zeros((len(system.modes), sum(rows), len(system.knots_nm)))
-        padded[:, first : first + count] = system.modes
+        if len(system.modes):
+            padded[:, first : first + count] = system.modes
         modes.append(padded)
         first += count
     whole = SpectralSystem(
@@ -298,9 +381,21 @@ def _fitted(strips: Sequence[LitStrip], samples: int = SAMPLES) -> SpectrumFit:
         np.concatenate([system.design for _, system in parts]),
         np.concatenate(modes),
     )
-    value = np.concatenate([value for value, _ in parts])
+    return np.concatenate([value for value, _ in parts]), whole
+
+
+def _fitted_whole(
+    value: FloatArray, system: SpectralSystem, lower: FloatArray | None, samples: int
+) -> SpectrumFit:
+    """Fit a reflectance to values of σ 1, or of the covariance of a Cholesky factor."""
+    if lower is not None:
+        onto = np.linalg.inv(lower)
+        value = onto @ value
+        system = SpectralSystem(system.knots_nm, onto @ system.design, onto @ system.modes)
     ones = np.ones_like(value)
-    return fit_spectrum(value, ones, whole, samples=samples, decisive=np.inf, stiffest=STIFFEST)
+    return fit_spectrum(
+        value, ones, system, samples=samples, decisive=np.inf, stiffest=STIFFEST, is_local=True
+    )
 
 
 def _excess(strip: LitStrip, fit: SpectrumFit, card: Transmittance) -> FloatArray:

@@ -72,6 +72,12 @@ class Problem:
         return np.array([toeplitz(line_at_knots(from_line_nm, 0.0, fwhm)) for fwhm in FWHM_NM])
 
     @cached_property
+    def information(self) -> FloatArray:
+        """Curvature of χ² by the smooth spectrum, shape (n, n), the same for every prior."""
+        design = self.values.design
+        return np.asarray(design.T @ design)
+
+    @cached_property
     def line_designs(self) -> FloatArray:
         """Whitened values of a line of integral 1 at each fine knot, shape (widths, m, q).
 
@@ -95,7 +101,9 @@ class Problem:
         n, design = len(self.values.knots_nm), self.values.design
         if len(basis.places):
             design = np.hstack([design, self.line_designs[basis.width][:, basis.places]])
-        curvature = design.T @ design
+            curvature = design.T @ design
+        else:
+            curvature = self.information.copy()
         curvature[:n, :n] += self.prior.precision(basis.weight)
         powers = np.arange(n, len(curvature))
         curvature[powers, powers] += float(np.ptp(self.values.knots_nm)) ** -2

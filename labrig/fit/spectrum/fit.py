@@ -101,6 +101,7 @@ def fit_spectrum(
     seed: int = 0,
     decisive: float = DECISIVE,
     stiffest: float = np.inf,
+    is_local: bool = False,
 ) -> SpectrumFit:
     """Fit the spectrum that explains some values.
 
@@ -121,6 +122,8 @@ def fit_spectrum(
     stiffest
         Largest weight of the smoothness prior, for a spectrum of about 1. Where most of a curve is
         straight, its evidence would be for a prior that is too stiff for a bend elsewhere.
+    is_local
+        Whether the spectrum may be smoother in one place than in another, as one with an edge is.
 
     Raises
     ------
@@ -150,6 +153,10 @@ def fit_spectrum(
         return problem, x, misfit
 
     problem, x, misfit = settled(flat, None)
+    if is_local:
+        weight = float(WEIGHTS[np.argmax(weighed(problem))])
+        prior = prior.local(problem.values, weight, stiffest)
+        problem, x, misfit = settled(x, None)
     log_evidence = weighed(problem)
     lines = None if np.isinf(decisive) else lines_of(problem, log_evidence, decisive)
     if lines is not None:
