@@ -28,6 +28,9 @@ UNKNOWN, UNKNOWN_VARIANCE = 1.0, 1e3
 #: Relative σ of a channel over another on a place: in a colour filter array they lie up to a pixel
 #: apart, and the glow is steep along the filter.
 HUE_SIGMA = 0.02
+#: Relative σ of rate and amplitude from band to band: no bench is steadier. 0.03 K change a rate by
+#: so much, and the noise of a bright glow is far less.
+RATE_SIGMA, AMPLITUDE_SIGMA = 0.0025, 0.01
 
 
 def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTests | None:
@@ -52,7 +55,7 @@ def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTes
     band_of_shot = band_of_row[through.row_of_shots()]
     masks = (band_of_shot == bands[:, None, None]).astype(np.float64)
 
-    def quantity(changes: Sequence[FloatArray], tolerance: float = 0.0) -> BandQuantity:
+    def quantity(changes: Sequence[FloatArray], tolerance: float) -> BandQuantity:
         columns = np.stack([mask[..., None] * change for change in changes for mask in masks], -1)
         whitened = np.zeros((len(residual), columns.shape[-1]))
         of_series = problem.whitened(0, columns)
@@ -86,8 +89,8 @@ def band_tests(problem: ExcitationProblem, solution: LeastSquaresFit) -> BandTes
         bands=bands,
         light_variance=Measured(float(of_depth.deviation[0, 0]), float(of_depth.sigma[0, 0])),
         charged_glow_by_variance=_charged_glow_change(problem, rates, jacobian, whitened[:, 0]),
-        amplitude=quantity([along(by_amplitude)]),
-        rate=quantity([along(by_rate)]),
+        amplitude=quantity([along(by_amplitude)], AMPLITUDE_SIGMA),
+        rate=quantity([along(by_rate)], RATE_SIGMA),
         hue=quantity(channels, HUE_SIGMA) if channels else None,
     )
 

@@ -11,6 +11,10 @@ from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.least_squares import LeastSquaresFit
 from labrig.results import Measured
 
+#: σ of the fraction, beside that by noise: exposures of different lengths are known relative to one
+#: another to some tenths of a per cent, by the camera's calibration.
+EXPOSURE_SIGMA = 0.002
+
 
 def missing_signal(problem: ExcitationProblem, solution: LeastSquaresFit) -> Measured:
     """Return the fraction that is missing of the largest signal.
@@ -40,7 +44,6 @@ def missing_signal(problem: ExcitationProblem, solution: LeastSquaresFit) -> Mea
     )
     column[: len(missing)] = missing
     reduced = max(solution.chi2 / max(problem.n_values - solution.rank, 1), 1.0)
-    found = change_along(
-        residual, column, column_space(jacobian), reduced, (1, 1), 0.0, UNKNOWN_VARIANCE
-    )
+    basis = column_space(jacobian)
+    found = change_along(residual, column, basis, reduced, (1, 1), EXPOSURE_SIGMA, UNKNOWN_VARIANCE)
     return Measured(float(found.deviation[0, 0]), float(found.sigma[0, 0]))
