@@ -27,6 +27,7 @@ MAX_BYTES = 5_000_000
 #: Limits of the depth, and of the values that aliases expand to.
 MAX_DEPTH = 30
 MAX_ALIASED = 100_000
+TOO_DEEP = f"nested more than {MAX_DEPTH} deep"
 #: Largest length of a text quoted in a message.
 MAX_SHOWN = 80
 
@@ -77,7 +78,7 @@ class _Loader(SafeLoader, Composer):
         if isinstance(event, yaml.ScalarEvent) and _NO_TEXT.search(event.value):
             raise _problem(f"expected text, got {_shortened(ascii(event.value))}", event)
         if self._depth > MAX_DEPTH:
-            raise _problem(f"nested more than {MAX_DEPTH} deep", event)
+            raise _problem(TOO_DEEP, event)
         self._depth += 1
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
@@ -181,6 +182,9 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
         # libyaml counts the end of the text as a line of its own.
         place = "" if mark is None else f", line {min(mark.line, text.count(chr(10))) + 1}"
         problem = " ".join(str(error.problem or error.context).split())
+        # Looking ahead for the end of a key, libyaml may meet a limit of its own first.
+        if "nesting depth" in problem:
+            problem = TOO_DEEP
         if mark is not None and _is_indented_by_tab(text, mark.line):
             problem = "expected spaces before the first word, got a tab; YAML indents with spaces"
         raise UsageError(f"{source}{place}: {problem}") from None
