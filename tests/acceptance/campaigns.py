@@ -127,6 +127,7 @@ CAMPAIGNS = {
         _module("veiling_glare"),
         _module("luminance_pulls", "--seeds", "50"),
         _module("camera_curves"),
+        _module("reflectance_pulls", "--seeds", "4"),
         _module("luminance_budget"),
         _module("law_confusion", "--seeds", "100"),
         _module("unequal_filling", "--seeds", "40"),

@@ -95,6 +95,18 @@ def glow_colours(printed: str) -> str:
     return f"mean {span(means, 2)}, largest {max(largest):.2f}"
 
 
+def albedo(printed: str) -> str:
+    said = []
+    for samples in (r"(?!step|fluorescent)", r"step"):
+        rms, largest, off = columns(
+            rf"^{samples}.* rms +([\d.]+)  largest +([\d.]+)  off ([\d.]+)", printed
+        )
+        said.append(
+            f"rms {span(rms, 2)} σ, largest {max(largest):.1f} σ, errors up to {max(off):.3f}"
+        )
+    return f"{said[0]}; at a step of 15 nm {said[1]}"
+
+
 def each_sample(printed: str) -> str:
     return match(r"^each sample +(.*)$", printed)
 

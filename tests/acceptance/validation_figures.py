@@ -159,6 +159,12 @@ FIGURES = (
         figure.glow_colours,
     ),
     Figure(
+        "Albedo from 430 nm to 680 nm of samples with edges, bands and fluorescence, with camera, "
+        "filter and card drawn from the σ of their files, four runs each",
+        "reflectance_pulls",
+        figure.albedo,
+    ),
+    Figure(
         "Eight phosphors of a sample changer measured in turn in one run, with one calibration",
         "samples_in_turn",
         figure.phosphor,
