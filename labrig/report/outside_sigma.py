@@ -1,4 +1,4 @@
-"""What may change rates and amplitudes without a trace in the data, in sentences for each patch.
+"""Sentences on what may change rates and amplitudes without a trace in the data, for each patch.
 
 These are statements, with the sizes, and no warnings: the room may have been steady, and the sample
 may have no such state.

@@ -481,7 +481,7 @@ class FittedDecay:
 
     @property
     def outside_sigma(self) -> str:
-        """What a state that goes unseen would change, in words; empty if it is next to nothing."""
+        """Changes by a state that goes unseen, in words; empty if they are next to nothing."""
         unseen = self.unseen_state
         if unseen is None or self.law != EXPONENTIALS:
             return ""

@@ -1,4 +1,4 @@
-"""What a state that is gone between two frames would change is stated, with its size."""
+"""A state that is gone between two frames is stated, with the size of what it would change."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_rates_change_as_stated_if_there_is_such_a_state() -> None:
 
 
 def test_errors_by_a_state_that_goes_unseen_are_within_what_is_stated() -> None:
-    """Of these a third are beyond 3 σ, most of them without a warning."""
+    """A third of the errors are beyond 3 σ, most of them without a warning."""
     truth = hidden_truth(FAST_DOUBLE, 0.08)
     beyond, is_far = [], []
     for seed in range(700, 712):
