@@ -225,12 +225,12 @@ def law_of(settings: KineticsSettings | None, order: float = 1.0) -> Law | None:
         leave at 1.
     """
     if settings is not None and settings.self_excitation:
-        law = _law_in_the_dark(settings, order) or GeneralOrder(1.0)
+        law = _law_without_own_glow(settings, order) or GeneralOrder(1.0)
         return SelfExcited(law, settings.self_excitation)
-    return _law_in_the_dark(settings, order)
+    return _law_without_own_glow(settings, order)
 
 
-def _law_in_the_dark(settings: KineticsSettings | None, order: float) -> Law | None:
+def _law_without_own_glow(settings: KineticsSettings | None, order: float) -> Law | None:
     """Return the law of a state that does not take up its own glow."""
     if settings is None:
         return None if order == 1 else GeneralOrder(order)

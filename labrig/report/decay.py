@@ -19,7 +19,7 @@ from labrig.report.decay_figures import (
 )
 from labrig.report.law_figure import law_figure
 from labrig.report.methods import REFERENCES, UNKNOWN, UNKNOWN_OF_A_TABLE, methods
-from labrig.report.outside_sigma import unrecorded_temperature, unseen_states
+from labrig.report.outside_sigma import outside_sections, unrecorded_temperature
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.report_model import (
     DECAY_ASSUMPTIONS,
@@ -247,17 +247,8 @@ def render(result: DecayResult, source: Source) -> Rendered:
     lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
     results, method_sections = decay_sections(report, source.anchor)
     unrecorded = unrecorded_temperature(result)
-    outside = outside_sigma(result)
-    return Rendered((*results, *outside), (*lines, *unrecorded), method_sections)
-
-
-def outside_sigma(result: DecayResult) -> tuple[Section, ...]:
-    """Return the section on what may change rates without a trace in the data, if anything may."""
-    statements = (*unrecorded_temperature(result), *unseen_states(result))
-    if not statements:
-        return ()
-    text = tuple(f"{line[0].upper()}{line[1:]}." for line in statements)
-    return (Section("Not in σ", text),)
+    sections = (*results, *outside_sections(result))
+    return Rendered(sections, (*lines, *unrecorded), method_sections)
 
 
 def decay_sections(
@@ -348,7 +339,7 @@ def table_sections(
     results, method_sections = decay_sections(
         DecayReport(about, patches, states=result.states_requested)
     )
-    return (*results, *outside_sigma(result)), method_sections
+    return (*results, *outside_sections(result)), method_sections
 
 
 def _patch_report(name: str, patch: DecayPatch) -> PatchReport:

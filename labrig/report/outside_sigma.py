@@ -6,6 +6,7 @@ may have no such state.
 
 from collections.abc import Callable
 
+from labrig.report.sections import Section
 from labrig.results import DecayPatch, DecayResult
 
 
@@ -14,9 +15,14 @@ def unrecorded_temperature(result: DecayResult) -> tuple[str, ...]:
     return _of_patches(result, _temperature)
 
 
-def unseen_states(result: DecayResult) -> tuple[str, ...]:
-    """Return a sentence for each patch of which a state that is gone too soon would matter."""
-    return _of_patches(result, lambda patch: patch.fit.outside_sigma if patch.fit else "")
+def outside_sections(result: DecayResult) -> tuple[Section, ...]:
+    """Return the section with all statements of a decay; empty if there are none."""
+    unseen = _of_patches(result, lambda patch: patch.fit.outside_sigma if patch.fit else "")
+    statements = (*unrecorded_temperature(result), *unseen)
+    if not statements:
+        return ()
+    text = tuple(f"{line[0].upper()}{line[1:]}." for line in statements)
+    return (Section("Not in σ", text),)
 
 
 def _of_patches(result: DecayResult, sentence: Callable[[DecayPatch], str]) -> tuple[str, ...]:

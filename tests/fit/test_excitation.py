@@ -400,7 +400,7 @@ def test_a_start_is_what_charges_before_have_left(order: NDArray[np.float64] | N
 
 
 def test_what_was_left_at_the_start_is_found() -> None:
-    """Of two states, the slow one of a sample that was charged fully ten minutes ago."""
+    """The slow one of two states, of a sample that was charged fully ten minutes ago."""
     bench = Bench(two_states(), flicker=0.003, photons=200.0, seed=7)
     through, direct = one_after_another(bench)
     k_r = np.array([state.k_r_per_s for state in bench.material.states])
