@@ -311,6 +311,7 @@ class _Connections:
         self._locked: set[str] = set()
 
     def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
+        _require_port(address)
         try:
             port = serial.serial_for_url(
                 self._names.look_up(address),
@@ -446,6 +447,22 @@ def _with_serial(
             f"{', '.join(other_numbers)}"
         )
     return None
+
+
+def _require_port(address: str) -> None:
+    """Refuse pyserial's own addresses: `spy://` empties a file, `socket://` calls another computer.
+
+    Raises
+    ------
+    UsageError
+        The address is neither a port nor in a simulated room.
+    """
+    scheme, separator, _ = address.partition("://")
+    if separator and scheme != "sim":
+        raise UsageError(
+            f"'{address}' is no serial port; write COM3, /dev/… or, in a simulated room, "
+            "sim://room/DEVICE"
+        )
 
 
 def _host_and_port(address: str, default_port: int) -> tuple[str, int]:
