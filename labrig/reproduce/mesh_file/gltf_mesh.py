@@ -193,7 +193,7 @@ def _mesh(
             else numbers.integers(primitive.indices)
         )
     except UsageError as error:
-        packed = ", ".join(primitive.extensions)
+        packed = ", ".join(primitive.extensions)[:60]
         raise UsageError(f"{error} (the mesh uses {packed})" if packed else str(error)) from None
     if corners.max() >= len(places):
         raise UsageError(
@@ -269,4 +269,6 @@ def _placed(mesh: Mesh, to_scene: FloatArray) -> Mesh:
     """Return a mesh in other coordinates, with its front where it was."""
     places = mesh.vertices_m @ to_scene[:3, :3].T + to_scene[:3, 3]
     placed = Mesh(places, mesh.faces, mesh.uv)
-    return placed.turned_over() if np.linalg.det(to_scene[:3, :3]) < 0 else placed
+    x, y, z = to_scene[:3, :3].T
+    is_mirrored = np.cross(x, y) @ z < 0
+    return placed.turned_over() if is_mirrored else placed

@@ -22,6 +22,8 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 #: Rows without data of their own, which a damaged file states for nothing.
 MOST_ZEROS = 10**8
+#: Longest name of a file.
+MOST_LETTERS = 1000
 #: Part of the largest number by which others may differ from the least and largest stated: files
 #: have these with few digits.
 STATED_DIGITS = 1e-4
@@ -87,7 +89,7 @@ class GltfNumbers:
         if accessor.type != kind or accessor.component_type not in COMPONENTS:
             raise UsageError(
                 f"accessor {number}: expected {kind} of a known component type, got "
-                f"{accessor.type} of {accessor.component_type}"
+                f"{accessor.type[:20]} of {accessor.component_type}"
             )
         component, width = COMPONENTS[accessor.component_type], WIDTHS[kind]
         if accessor.buffer_view is not None:
@@ -122,7 +124,7 @@ class GltfNumbers:
     ) -> NDArray[Any]:
         """Return numbers in a buffer view, shape (count, width)."""
         view = part_of(self._document.buffer_views, view_number, "bufferView")
-        buffer = self._buffer(view.buffer, ", ".join(view.extensions))
+        buffer = self._buffer(view.buffer, ", ".join(view.extensions)[:60])
         if view.byte_offset + view.byte_length > len(buffer):
             raise UsageError(
                 f"bufferView {view_number}: expected {view.byte_length} bytes from "
@@ -155,8 +157,8 @@ class GltfNumbers:
             raise UsageError(f"buffer {number}: expected a file beside it, got '{uri[:60]}'")
         else:
             path = self._folder / unquote(uri)
-            if not path.is_file():
-                raise UsageError(f"buffer {number}: expected a file {path}, got no such file")
+            if len(uri) > MOST_LETTERS or "\0" in str(path) or not path.is_file():
+                raise UsageError(f"buffer {number}: expected a file {uri[:60]!r}, got no such file")
             content = read_bytes(path, path.stat().st_size)
         if len(content) < buffer.byte_length:
             raise UsageError(

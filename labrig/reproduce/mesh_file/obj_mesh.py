@@ -3,6 +3,7 @@
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +85,7 @@ def _numbers(words: list[str], least: int, number: int) -> list[float]:
         values = [float(word) for word in words]
     except ValueError:
         values = []
-    if len(values) < least or not np.isfinite(values).all():
+    if len(values) < least or not all(map(isfinite, values)):
         raise UsageError(
             f"expected {least} finite numbers or more, got '{' '.join(words)[:40]}' in line "
             f"{number}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -217,7 +218,13 @@ class Mesh:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return several meshes as one, of which all or none have texture coordinates."""
+        """Return several meshes as one.
+
+        Parameters
+        ----------
+        parts
+            At least one mesh; all or none have texture coordinates.
+        """
         first = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
         uvs = [part.uv for part in parts if part.uv is not None]
         return cls(
@@ -286,7 +293,7 @@ class Mesh:
 
     def pieces(self) -> list[Self]:
         """Return the parts that share no edge, vertices at one place being one."""
-        faces = self._places_of_corners()
+        faces = self._places_of_corners
         before = np.roll(faces, 1, axis=1)
         number = np.minimum(faces, before) * len(self.vertices_m) + np.maximum(faces, before)
         _, edge = np.unique(number, return_inverse=True)
@@ -314,6 +321,7 @@ class Mesh:
             uv=uv,
         )
 
+    @cached_property
     def _places_of_corners(self) -> IntArray64:
         """Return a number for the place of each corner of the triangles, shape (m, 3)."""
         _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
@@ -321,7 +329,7 @@ class Mesh:
 
     def _edges(self) -> tuple[IntArray64, IntArray64]:
         """Return a number for each edge of each triangle, and that of the way back along it."""
-        faces = self._places_of_corners()
+        faces = self._places_of_corners
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
         n = len(self.vertices_m)
