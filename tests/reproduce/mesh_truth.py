@@ -141,7 +141,7 @@ def _gltf(path: Path) -> list[FloatArray]:
         primitives = said["meshes"][node["mesh"]]["primitives"] if "mesh" in node else []
         for primitive in primitives:
             places = rows(primitive["attributes"]["POSITION"])
-            indices = range(len(places))
+            indices = list(range(len(places)))
             if "indices" in primitive:
                 indices = [int(index) for (index,) in rows(primitive["indices"])]
             for first in range(0, len(indices), 3):

@@ -231,6 +231,7 @@ def test_texture_coordinates_are_those_of_the_base_colour(tmp_path: Path) -> Non
     primitive = {"attributes": attributes, "material": material}
     file.show(mesh=file.add("meshes", {"primitives": [primitive]}))
     mesh = read_mesh(file.write(tmp_path / "a.glb"))
+    assert mesh.uv is not None
     np.testing.assert_allclose(mesh.uv, [[0.25, 1], [0.75, 1], [0.25, 0.75]])
 
 
@@ -299,7 +300,7 @@ REFUSED: dict[str, tuple[Callable[[GltfFile], None], str]] = {
     "ring": (changed(("nodes", 0, "children"), [0]), "two"),
     "rotation": (changed(("nodes", 0, "rotation"), [1, 1, 0, 0]), "length 1"),
     "type": (changed(("accessors", 0, "type"), "VEC4"), "VEC3"),
-    "lines": (changed((*PRIMITIVE, "mode"), 1), "no triangle"),
+    "lines": (changed((*PRIMITIVE, "mode"), 1), "triangles"),
 }  # fmt: skip
 
 
@@ -325,7 +326,7 @@ def test_an_animated_glow_is_no_animated_shape(tmp_path: Path) -> None:
 def outline(radii: list[float]) -> FloatArray:
     """A polygon around the origin, which most of its corners do not see whole."""
     angle = np.arange(len(radii)) * 2 * np.pi / len(radii)
-    return np.array(radii)[:, np.newaxis] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.stack([radii * np.cos(angle), radii * np.sin(angle)], axis=1)
 
 
 def prism(around: FloatArray, turn: list[float]) -> tuple[FloatArray, list[list[int]]]:
@@ -447,7 +448,7 @@ def test_obj_in_all_its_forms(tmp_path: Path) -> None:
     [("f 1 2 4", "4"), ("f 1 2 -4", "line 4"), ("f 1 2 0", "line 4"), ("f 1 2", "line 4"),
      ("f 1 2 x", "line 4"), ("v 1 2", "line 4"), ("v 1,5 2 3", "line 4"), ("v nan 0 0", "line 4"),
      ("f 1/1 2/1 3/1", "texture"), ("surf 0 1 0 1 1 2 3", "surf"), ("ff 1 2 3", "'ff'"),
-     ("l 1 2", "triangle"), ("f 1 1 2", "area"), ("f 1 2 3 \\", "\\")],
+     ("l 1 2", "triangles"), ("f 1 1 2", "area"), ("f 1 2 3 \\", "\\")],
 )  # fmt: skip
 def test_obj_that_is_not_read_is_refused(tmp_path: Path, line: str, says: str) -> None:
     (tmp_path / "a.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{line}\n")

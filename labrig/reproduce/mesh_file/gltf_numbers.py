@@ -156,9 +156,10 @@ class GltfNumbers:
         elif "://" in uri:
             raise UsageError(f"buffer {number}: expected a file beside it, got '{uri[:60]}'")
         else:
-            path = self._folder / unquote(uri)
-            if len(uri) > MOST_LETTERS or "\0" in str(path) or not path.is_file():
-                raise UsageError(f"buffer {number}: expected a file {uri[:60]!r}, got no such file")
+            name = unquote(uri)
+            path = self._folder / name
+            if len(name) > MOST_LETTERS or "\0" in name or not path.is_file():
+                raise UsageError(f"buffer {number}: expected a file {name[:60]!r}, got none")
             content = read_bytes(path, path.stat().st_size)
         if len(content) < buffer.byte_length:
             raise UsageError(

@@ -96,9 +96,9 @@ def _head(content: bytes) -> tuple[str, list[_Element], int]:
                 pass
             case ["format", name, "1.0"] if name in FORMS and not form:
                 form = name
-            case ["element", name, count] if (
-                re.fullmatch("[0-9]{1,12}", count) and name not in [each.name for each in elements]
-            ):
+            case ["element", name, count] if re.fullmatch("[0-9]{1,12}", count) and name not in [
+                each.name for each in elements
+            ]:
                 elements.append(_Element(name, int(count)))
             case ["property", *types, name] if (
                 elements
@@ -216,8 +216,8 @@ def _read_one_by_one(
                 lengths[name].append(n)
     except ValueError:
         raise UsageError(
-            f"expected {element.count} elements '{element.name[:40]}', as the head states, got a file "
-            "that ends before them"
+            f"expected {element.count} elements '{element.name[:40]}', as the head states, got a "
+            "file that ends before them"
         ) from None
     columns = {
         name: _Column(np.concatenate([np.empty(0), *values[name]]).astype(np.float64),

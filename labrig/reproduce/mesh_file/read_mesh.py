@@ -101,7 +101,7 @@ def read_parts(path: Path) -> list[Mesh]:
                 "all of the mesh"
             )
         if not parts:
-            raise UsageError("expected a mesh, got no triangle")
+            raise UsageError("expected a mesh of triangles, got none")
         if not 0 < area < np.inf or not all(np.isfinite(part.vertices_m).all() for part in parts):
             raise UsageError("expected finite triangles with an area, got others")
     except UsageError as error:

@@ -1,15 +1,20 @@
 """Meshes of files where a scene puts them, held to have their front on the side that is seen."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.reproduce.mesh_file.read_mesh import read_parts
+from labrig.reproduce.mesh_file.read_mesh import read_mesh
 from labrig.reproduce.scene.object_entry import MeshEntry, ObjectEntry
 from labrig.reproduce.transport.mesh import Mesh, rotation
+
+FloatArray = NDArray[np.float64]
+
+#: Patches of one body that are looked at, the largest ones.
+MOST_PATCHES = 100
 
 
 def placed_mesh(name: str, entry: ObjectEntry, shape: MeshEntry, folder: Path) -> Mesh:
@@ -34,14 +39,11 @@ def placed_mesh(name: str, entry: ObjectEntry, shape: MeshEntry, folder: Path) -
     turn = np.eye(3)
     for axis, angle_deg in zip(np.eye(3), shape.turned_deg, strict=True):
         turn = rotation(axis, angle_deg) @ turn
-    parts = [
-        replace(part, vertices_m=part.vertices_m @ turn.T * shape.size_m + shape.position_m)
-        for part in read_parts(folder / shape.file)
-    ]
+    mesh = read_mesh(folder / shape.file)
+    placed_m = mesh.vertices_m @ turn.T * shape.size_m + shape.position_m
+    mesh = replace(mesh, vertices_m=placed_m)
     # What a file already has with its front inside stays so.
-    mesh = Mesh.joined(parts)
     if shape.inward and not (mesh.is_closed and mesh.volume_m3 < 0):
-        parts = [part.turned_over() for part in parts]
         mesh = mesh.turned_over()
     if entry.two_sided:
         return mesh
@@ -55,7 +57,7 @@ def placed_mesh(name: str, entry: ObjectEntry, shape: MeshEntry, folder: Path) -
             f"{name}: expected a closed mesh, got one with holes in {shape.file}; its back "
             "would be black: close it, or give 'two_sided: true'"
         )
-    if not _is_seen_from_front(_bodies(parts), shape.inward):
+    if not _is_seen_from_front(mesh, shape.inward):
         raise UsageError(
             f"{name}: expected bodies whose front is {'in' if shape.inward else 'out'}side, got "
             f"an inverted one in {shape.file}; turn its normals over, or give "
@@ -64,31 +66,34 @@ def placed_mesh(name: str, entry: ObjectEntry, shape: MeshEntry, folder: Path) -
     return mesh
 
 
-def _bodies(parts: Sequence[Mesh]) -> list[Mesh]:
-    """Return the closed bodies of some parts: pieces of one part, or of several together."""
-    pieces = [piece for part in parts for piece in part.pieces()]
-    open_ones = [piece for piece in pieces if not piece.is_closed]
-    over_parts = Mesh.joined(open_ones).pieces() if open_ones else []
-    return [piece for piece in (*pieces, *over_parts) if piece.is_closed and piece.volume_m3]
-
-
-def _is_seen_from_front(bodies: Sequence[Mesh], inward: bool) -> bool:
-    """Return whether the space in front of all bodies is air, or filled by other bodies.
+def _is_seen_from_front(mesh: Mesh, inward: bool) -> bool:
+    """Return whether the space in front of all triangles is air, or filled by other bodies.
 
     A point is within so many bodies: one with its front inside, such as a hollow of another or a
     room, counts −1 within. Air is where none is, or within a room.
     """
-    if not bodies:
-        return True
+    bodies = [piece for piece in mesh.pieces() if piece.is_closed]
     low = np.array([body.vertices_m.min(axis=0) for body in bodies])
     high = np.array([body.vertices_m.max(axis=0) for body in bodies])
-    in_front = []
-    for number, body in enumerate(bodies):
-        corner = body.vertices_m[0]
-        is_near = ((low <= corner) & (corner <= high)).all(axis=1)
-        is_near[number] = False
-        solid_angle_sr = sum(
-            bodies[other].solid_angle_sr(corner) for other in np.flatnonzero(is_near).tolist()
-        )
-        in_front.append(round(solid_angle_sr / (4 * np.pi)) - (body.volume_m3 < 0))
-    return min(in_front) == (-1 if inward else 0)
+
+    def bodies_at(point_m: FloatArray) -> int:
+        within = np.logical_and(low <= point_m, point_m <= high).all(axis=1)
+        near = np.flatnonzero(within).tolist()
+        return round(sum(bodies[number].solid_angle_sr(point_m) for number in near) / (4 * np.pi))
+
+    # Bodies that touch along a whole side are one piece, but several between their common edges.
+    patches = []
+    for body in bodies:
+        by_area = sorted(body.pieces(most_at_edge=2), key=lambda patch: -patch.area_m2)
+        patches += by_area[:MOST_PATCHES]
+    air = -1 if inward else 0
+    in_front = [bodies_at(_point_in_front(patch)) for patch in patches if patch.area_m2 > 0]
+    least = min(in_front, default=air)
+    return least == air if inward else least >= air
+
+
+def _point_in_front(mesh: Mesh) -> FloatArray:
+    """Return a point just in front of the largest triangle, in m."""
+    largest = int(np.argmax(mesh.areas_m2))
+    middle = mesh.vertices_m[mesh.faces[largest]].mean(axis=0)
+    return np.asarray(middle + 1e-6 * np.sqrt(mesh.areas_m2[largest]) * mesh.normals[largest])

@@ -291,18 +291,26 @@ class Mesh:
         same_way, count = np.unique(edges, return_counts=True)
         return not bool((~np.isin(same_way[count == 2], back)).any())
 
-    def pieces(self) -> list[Self]:
-        """Return the parts that share no edge, vertices at one place being one."""
+    def pieces(self, most_at_edge: int | None = None) -> list[Self]:
+        """Return the parts that share no edge, vertices at one place being one.
+
+        Parameters
+        ----------
+        most_at_edge
+            Number of triangles at an edge above which it parts them; None for any number.
+        """
         faces = self._places_of_corners
         before = np.roll(faces, 1, axis=1)
         number = np.minimum(faces, before) * len(self.vertices_m) + np.maximum(faces, before)
-        _, edge = np.unique(number, return_inverse=True)
-        is_edge = (faces != before).ravel()
-        owner = np.arange(len(faces)).repeat(3)[is_edge]
+        _, edge, count = np.unique(number, return_inverse=True, return_counts=True)
+        edge = edge.reshape(-1)
+        joins = (faces != before).ravel()
+        if most_at_edge is not None:
+            joins &= count[edge] <= most_at_edge
         # Triangles and edges are the nodes of one graph.
-        edge = len(faces) + edge.reshape(-1)[is_edge]
-        n = len(faces) + number.size
-        graph = coo_array((np.ones(len(edge), np.int8), (owner, edge)), shape=(n, n))
+        ends = np.arange(len(faces)).repeat(3)[joins], len(faces) + edge[joins]
+        n = len(faces) + len(count)
+        graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(n, n))
         piece = connected_components(graph, directed=False)[1][: len(faces)]
         order = np.argsort(piece, kind="stable")
         groups = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
