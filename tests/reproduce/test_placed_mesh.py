@@ -123,7 +123,7 @@ def test_halves_that_are_mirrored_make_one_body(tmp_path: Path) -> None:
         ([box(0, 2), box(1.2, 1)], False, True),
         # Side by side, one that stands before another, and ones that reach into each other.
         ([box(0, 1), box(1, 1)], False, True),
-        ([box(0, 1), box(1, 1).turned_over()], False, False),
+        ([box(1, 1), box(0, 1).turned_over()], False, False),
         ([box(0, 2), box(1.5, 1).turned_over()], False, False),
         ([box(0, 2), box(1, 2)], False, True),
         # Rooms, drawn from without or from within, and what stands in them.

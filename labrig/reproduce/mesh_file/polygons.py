@@ -31,7 +31,7 @@ def triangles(places_m: FloatArray, lengths: IntArray) -> IntArray:
     Returns
     -------
     ndarray
-        Corners of the triangles by their numbers, in the order of the polygons, shape (m, 3).
+        Corners of the triangles by their numbers, shape (m, 3).
 
     Raises
     ------
@@ -44,7 +44,7 @@ def triangles(places_m: FloatArray, lengths: IntArray) -> IntArray:
             f"expected faces of three corners or more, got {lengths[number]} of face {number + 1}"
         )
     first = np.cumsum(lengths) - lengths
-    found, owners = [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)]
+    found = [np.empty((0, 3), np.int64)]
     for n in np.unique(lengths).tolist():
         polygons = np.flatnonzero(lengths == n)
         corners = first[polygons, np.newaxis] + np.arange(n)
@@ -57,9 +57,7 @@ def triangles(places_m: FloatArray, lengths: IntArray) -> IntArray:
                 inner = _ears_cut(places_m[corners[number]], int(polygons[number]) + 1)
                 fans[number] = corners[number][inner]
         found.append(fans.reshape(-1, 3))
-        owners.append(np.repeat(polygons, n - 2))
-    order = np.argsort(np.concatenate(owners), kind="stable")
-    return np.asarray(np.concatenate(found)[order])
+    return np.concatenate(found)
 
 
 def strip_triangles(n_corners: int) -> IntArray:
