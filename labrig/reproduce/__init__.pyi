@@ -17,7 +17,6 @@ from .export.scene_export import (
 )
 from .mesh_file.read_mesh import (
     read_mesh as read_mesh,
-    read_parts as read_parts,
 )
 from .picture.display import (
     Display as Display,

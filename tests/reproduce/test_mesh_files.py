@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.reproduce import Mesh, read_mesh, read_parts
+from labrig.reproduce import Mesh, read_mesh
 from tests.reproduce.gltf_files import GltfFile
 from tests.reproduce.mesh_truth import Truth, truth
 
@@ -110,10 +110,9 @@ def test_nodes_within_nodes_put_meshes_where_they_say(
     for number, below in children.items():
         file.said["nodes"][number]["children"] = below
     path = file.write(tmp_path_factory.mktemp("tree") / "tree.glb")
-    parts = read_parts(path)
-    assert len(parts) == len(tree)
-    assert all(part.volume_m3 > 0 for part in parts)
-    assert_same(Mesh.joined(parts), truth(path), rel=1e-5)
+    mesh = read_mesh(path)
+    assert len(mesh.faces) == 12 * len(tree)
+    assert_same(mesh, truth(path), rel=1e-5)
 
 
 def strip(file: GltfFile) -> dict[str, Any]:
@@ -211,8 +210,8 @@ def test_morph_targets_stand_where_their_weights_put_them(tmp_path: Path) -> Non
     file.said["meshes"][shape]["weights"] = [0.5]
     file.show(mesh=shape)
     file.show(mesh=shape, weights=[3.0], translation=[2, 0, 0])
-    parts = read_parts(file.write(tmp_path / "a.glb"))
-    assert [part.volume_m3 for part in parts] == pytest.approx([1.5, 4])
+    pieces = read_mesh(file.write(tmp_path / "a.glb")).pieces()
+    assert [piece.volume_m3 for piece in pieces] == pytest.approx([1.5, 4])
 
 
 def test_texture_coordinates_are_those_of_the_base_colour(tmp_path: Path) -> None:
@@ -418,7 +417,8 @@ def test_faces_that_cross_themselves_are_refused(tmp_path: Path) -> None:
     for places in (bow, twisted):
         face = list(range(len(places)))
         path = write_obj(tmp_path / "a.obj", places, [[0, 1, 2], face])
-        assert "face 2" in refusal(path)
+        assert f"line {len(places) + 2}" in refusal(path)
+        assert "face 1" in refusal(write_ply(tmp_path / "a.ply", places, [face], "ascii"))
 
 
 def test_obj_in_all_its_forms(tmp_path: Path) -> None:
@@ -431,16 +431,14 @@ def test_obj_in_all_its_forms(tmp_path: Path) -> None:
         "g second\r\nv 0 1 0\r\nvt 0 1\r\nf 1/1 3/3 -1/-1\r\ng empty\r\n",
         newline="", encoding="utf-8",
     )  # fmt: skip
-    first, second = read_parts(path)
-    assert first.uv is not None
-    assert second.uv is not None
+    mesh = read_mesh(path)
     np.testing.assert_array_equal(
-        first.vertices_m[first.faces[0]], [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
+        mesh.vertices_m[mesh.faces],
+        [[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]],
     )
-    np.testing.assert_array_equal(
-        second.vertices_m[second.faces[0], :2], second.uv[second.faces[0]]
-    )
-    assert read_mesh(path).area_m2 == pytest.approx(1)
+    np.testing.assert_array_equal(mesh.vertices_m, [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    assert mesh.uv is not None
+    np.testing.assert_array_equal(mesh.uv, mesh.vertices_m[:, :2])
 
 
 @pytest.mark.parametrize(
@@ -484,7 +482,10 @@ def test_ply_is_held_to_its_counts(
 ) -> None:
     path = write_ply(tmp_path / "a.ply", BLOCK, [*SIDES[:5], last], form)
     read_mesh(path)
-    path.write_bytes(path.read_bytes().replace(b"face 6", b"face %d" % n_stated))
+    sound = path.read_bytes()
+    path.write_bytes(sound.replace(b"vertex_indices", b"vertex_index\nproperty list uchar int x"))
+    refusal(path)
+    path.write_bytes(sound.replace(b"face 6", b"face %d" % n_stated))
     assert "the head states" in refusal(path)
 
 
@@ -509,7 +510,7 @@ def test_stl_in_both_forms(tmp_path: Path) -> None:
     both = facets.replace("vertex 0.0", "vertex 4.0").replace("vertex 1.0", "vertex 5.0")
     text = f"solid vertex normal facet\n{facets}endsolid vertex\nsolid\n{both}endsolid\n"
     path.write_text(text)
-    assert [part.volume_m3 for part in read_parts(path)] == pytest.approx([1, 1])
+    assert [piece.volume_m3 for piece in read_mesh(path).pieces()] == pytest.approx([1, 1])
     assert_same(read_mesh(path), truth(path))
     path.write_text(text.removesuffix("endsolid\n"))
     assert "endsolid" in refusal(path)

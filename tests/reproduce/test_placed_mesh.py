@@ -16,7 +16,7 @@ from labrig.reproduce import (
     SceneFile,
     build_scene,
     exported_meshes,
-    read_parts,
+    read_mesh,
     write_gltf,
     write_mitsuba_scene,
 )
@@ -79,7 +79,7 @@ def test_mirrored_twins_are_exported_alike(tmp_path: Path) -> None:
     write_mitsuba_scene(tmp_path / "mitsuba", meshes, twins.camera)
     for path in (tmp_path / "pair.glb", tmp_path / "mitsuba" / "mesh_00.ply"):
         assert truth(path).volume == pytest.approx(2)
-        (both,) = read_parts(path)
+        both = read_mesh(path)
         assert [piece.volume_m3 for piece in both.pieces()] == pytest.approx([1, 1])
         axis = 0
         assert sorted(piece.vertices_m[:, axis].mean() for piece in both.pieces()) == [-1, 1]

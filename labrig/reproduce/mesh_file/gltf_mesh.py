@@ -41,8 +41,8 @@ OF_NODES = ("EXT_mesh_gpu_instancing", "KHR_node_visibility")
 MOVING = "expected a shape at rest, got {}; bake it into its vertices at one moment"
 
 
-def gltf_parts(content: bytes, folder: Path) -> list[Mesh]:
-    """Return the meshes of the nodes of a glTF file's scene, in the scene's coordinates.
+def gltf_mesh(content: bytes, folder: Path) -> Mesh:
+    """Return the meshes of all nodes of a glTF file's scene, in the scene's coordinates.
 
     Mirrored ones are turned over, so that their front is where their twin's is.
 
@@ -55,9 +55,9 @@ def gltf_parts(content: bytes, folder: Path) -> list[Mesh]:
 
     Returns
     -------
-    list of Mesh
-        A mesh for each node that has triangles, with the texture coordinates of its base colour,
-        whose v counts from below as everywhere in labrig.
+    Mesh
+        Triangles of all nodes, with the texture coordinates of their base colours, whose v counts
+        from below as everywhere in labrig.
 
     Raises
     ------
@@ -82,16 +82,13 @@ def gltf_parts(content: bytes, folder: Path) -> list[Mesh]:
             )
     document = validate(said, GltfDocument, "glTF")
     numbers = GltfNumbers(document, binary, folder)
-    meshes = []
-    for node, to_scene in _shown(document):
-        shape = part_of(document.meshes, node.mesh or 0, "mesh")
-        parts = [_mesh(each, shape, node, document, numbers) for each in shape.primitives
-                 if each.mode >= TRIANGLES]  # fmt: skip
-        if len({part.uv is None for part in parts}) > 1:
-            meshes += [_placed(part, to_scene) for part in parts]
-        elif parts:
-            meshes.append(_placed(Mesh.joined(parts), to_scene))
-    return meshes
+    return Mesh.joined([
+        _placed(_mesh(primitive, shape, node, document, numbers), to_scene)
+        for node, to_scene in _shown(document)
+        for shape in [part_of(document.meshes, node.mesh or 0, "mesh")]
+        for primitive in shape.primitives
+        if primitive.mode >= TRIANGLES
+    ])  # fmt: skip
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:

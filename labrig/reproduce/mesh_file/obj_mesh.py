@@ -10,28 +10,29 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.reproduce.mesh_file.polygons import triangles
-from labrig.reproduce.transport.mesh import Mesh
+from labrig.reproduce.transport.mesh import PARTLY_UNWRAPPED, Mesh
 
 FloatArray = NDArray[np.float64]
 
-#: Statements that change no surface: lines, points, normals, materials, smoothing, looks.
+#: Statements that change no surface: lines, points, names, normals, materials, smoothing, looks.
 WITHOUT_SURFACE = frozenset({
-    "vn", "vp", "l", "p", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "bevel", "c_interp",
-    "d_interp", "lod", "shadow_obj", "trace_obj",
+    "vn", "vp", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "bevel",
+    "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj",
 })  # fmt: skip
 
 
 @dataclass
-class _Group:
-    """Polygons of an object or group: their corners one after the other, and how many each has."""
+class _Polygons:
+    """Corners of polygons one after the other, how many each has, and in which line it stands."""
 
     vertices: list[int] = field(default_factory=list)
     uvs: list[int] = field(default_factory=list)
     lengths: list[int] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
 
 
-def obj_parts(content: bytes) -> list[Mesh]:
-    """Return the objects and groups of an OBJ file.
+def obj_mesh(content: bytes) -> Mesh:
+    """Return the objects and groups of an OBJ file as one mesh.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def obj_parts(content: bytes) -> list[Mesh]:
     """
     vertices: list[list[float]] = []
     uvs: list[list[float]] = []
-    groups = [_Group()]
+    polygons = _Polygons()
     for number, keyword, words in _statements(content.removeprefix(BOM_UTF8)):
         if keyword == "v":
             # After the place, a weight or a colour.
@@ -54,16 +55,14 @@ def obj_parts(content: bytes) -> list[Mesh]:
         elif keyword == "vt":
             uvs.append([*_numbers(words, 1, number), 0.0][:2])
         elif keyword in ("f", "fo"):
-            _add_face(groups[-1], words, len(vertices), len(uvs), number)
-        elif keyword in ("o", "g"):
-            groups.append(_Group())
+            _add_face(polygons, words, len(vertices), len(uvs), number)
         elif keyword not in WITHOUT_SURFACE:
             raise UsageError(
                 f"expected polygons as OBJ has them, got '{keyword[:40]}' in line {number}, which "
                 "labrig does not read"
             )
     places, texture = np.array(vertices).reshape(-1, 3), np.array(uvs).reshape(-1, 2)
-    return [_part(group, places, texture) for group in groups if group.lengths]
+    return _cut(polygons, places, texture)
 
 
 def _statements(content: bytes) -> Iterator[tuple[int, str, list[str]]]:
@@ -93,17 +92,16 @@ def _numbers(words: list[str], least: int, number: int) -> list[float]:
     return values
 
 
-def _add_face(group: _Group, words: list[str], n_vertices: int, n_uvs: int, number: int) -> None:
+def _add_face(
+    polygons: _Polygons, words: list[str], n_vertices: int, n_uvs: int, number: int
+) -> None:
     for word in words:
         vertex, _, rest = word.partition("/")
-        group.vertices.append(_index(vertex, n_vertices, number))
+        polygons.vertices.append(_index(vertex, n_vertices, number))
         uv = rest.partition("/")[0]
-        group.uvs.append(_index(uv, n_uvs, number) if uv else -1)
-    group.lengths.append(len(words))
-    if len(words) < 3:
-        raise UsageError(
-            f"expected faces of three corners or more, got {len(words)} in line {number}"
-        )
+        polygons.uvs.append(_index(uv, n_uvs, number) if uv else -1)
+    polygons.lengths.append(len(words))
+    polygons.lines.append(number)
 
 
 def _index(word: str, n_before: int, number: int) -> int:
@@ -120,22 +118,26 @@ def _index(word: str, n_before: int, number: int) -> int:
     return index - 1 if index > 0 else n_before + index
 
 
-def _part(group: _Group, places: FloatArray, texture: FloatArray) -> Mesh:
-    vertices, uvs = np.array(group.vertices), np.array(group.uvs)
-    if vertices.max() >= len(places):
+def _cut(polygons: _Polygons, places: FloatArray, texture: FloatArray) -> Mesh:
+    """Return the triangles of the polygons, with a vertex for each pair of place and texture."""
+    vertices = np.array(polygons.vertices, dtype=np.int64)
+    uvs = np.array(polygons.uvs, dtype=np.int64)
+    if vertices.max(initial=-1) >= len(places):
         raise UsageError(
             f"expected vertices 1 to {len(places)}, got {vertices.max() + 1} in a face"
         )
-    if uvs.max() >= len(texture):
+    if uvs.max(initial=-1) >= len(texture):
         raise UsageError(
             f"expected texture coordinates 1 to {len(texture)}, got {uvs.max() + 1} in a face"
         )
-    if uvs.min() < 0 <= uvs.max():
-        raise UsageError(
-            "expected texture coordinates on all faces or on none, got them on some; unwrap all "
-            "of the mesh"
-        )
-    faces = triangles(places[vertices], np.array(group.lengths))
+    has_uv = uvs >= 0
+    if has_uv.any() and not has_uv.all():
+        raise UsageError(PARTLY_UNWRAPPED)
+    faces = triangles(
+        places[vertices],
+        np.array(polygons.lengths, dtype=np.int64),
+        lambda face: f"line {polygons.lines[face]}",
+    )
     pairs, corner = np.unique(np.stack([vertices, uvs], axis=1), axis=0, return_inverse=True)
-    uv = texture[pairs[:, 1]] if uvs.min() >= 0 else None
+    uv = texture[pairs[:, 1]] if has_uv.any() else None
     return Mesh(places[pairs[:, 0]], corner.reshape(-1)[faces].astype(np.int32), uv)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.reproduce.mesh_file.polygons import strip_triangles, triangles
-from labrig.reproduce.transport.mesh import Mesh
+from labrig.reproduce.transport.mesh import PARTLY_UNWRAPPED, Mesh
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -46,7 +46,7 @@ class _Column:
     lengths: IntArray
 
 
-def ply_parts(content: bytes) -> list[Mesh]:
+def ply_mesh(content: bytes) -> Mesh:
     """Return the mesh of a PLY file.
 
     Parameters
@@ -81,7 +81,7 @@ def ply_parts(content: bytes) -> list[Mesh]:
             parts.append(Mesh(places[corners], cut.astype(np.int32), of_corners))
     if (listed := _indices(columns.get("tristrips", {}))) is not None:
         parts.append(Mesh(places, _of_strips(listed, len(places)), of_vertices))
-    return [part for part in parts if len(part.faces)]
+    return Mesh.joined(parts)
 
 
 def _head(content: bytes) -> tuple[str, list[_Element], int]:
@@ -134,7 +134,7 @@ def _columns(data: bytes, elements: list[_Element], order: str) -> dict[str, dic
     for element in elements:
         columns, at = _read(data, at, element, order)
         found[element.name] = columns
-    if data[at:].strip(b"\0 \r\n"):
+    if data[at:].strip(b" \r\n"):
         raise UsageError(
             f"expected the data to end after the {sum(each.count for each in elements)} elements "
             f"that the head states, got {len(data) - at} more bytes"
@@ -185,7 +185,7 @@ def _kind(
     element: _Element, lengths: Mapping[str, int], order: str, until: str = ""
 ) -> np.dtype[np.void]:
     """Return the type of elements whose lists have given lengths, up to one of the properties."""
-    fields: list[tuple[str, str] | tuple[str, str, int]] = []
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     for name, types in element.properties.items():
         if name == until:
             break
@@ -193,7 +193,7 @@ def _kind(
             fields.append((name, order + types[0]))
         else:
             fields += [(f"{name} length", order + types[0]),
-                       (name, order + types[1], lengths[name])]  # fmt: skip
+                       (name, order + types[1], (lengths[name],))]  # fmt: skip
     return np.dtype(fields)
 
 
@@ -259,10 +259,7 @@ def _uvs_of_corners(faces: Mapping[str, _Column], lengths: IntArray) -> FloatArr
     if own is None or not len(own.values):
         return None
     if (own.lengths != 2 * lengths).any():
-        raise UsageError(
-            "expected texture coordinates on all faces or on none, got them on some; unwrap all "
-            "of the mesh"
-        )
+        raise UsageError(PARTLY_UNWRAPPED)
     return own.values.reshape(-1, 2)
 
 

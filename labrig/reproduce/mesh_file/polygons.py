@@ -1,5 +1,6 @@
 """Polygons and strips of mesh files as triangles of the same corners."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,11 @@ IntArray = NDArray[np.int64]
 NO_AREA, CROSSED = 1e-12, 1e-6
 
 
-def triangles(places_m: FloatArray, lengths: IntArray) -> IntArray:
+def triangles(
+    places_m: FloatArray,
+    lengths: IntArray,
+    named: Callable[[int], str] = lambda number: f"face {number + 1}",
+) -> IntArray:
     """Divide polygons into triangles, two fewer than each has corners.
 
     All corners are kept, those on straight edges too: a neighbour may have an edge of its own
@@ -27,6 +32,8 @@ def triangles(places_m: FloatArray, lengths: IntArray) -> IntArray:
         Places of the corners of all polygons, one polygon after the other, shape (n, 3).
     lengths
         Number of corners of each polygon, which follow each other around it.
+    named
+        Name of a polygon for a message, by its number from 0.
 
     Returns
     -------
@@ -41,7 +48,7 @@ def triangles(places_m: FloatArray, lengths: IntArray) -> IntArray:
     if lengths.min(initial=3) < 3:
         number = int(np.argmin(lengths))
         raise UsageError(
-            f"expected faces of three corners or more, got {lengths[number]} of face {number + 1}"
+            f"expected faces of three corners or more, got {lengths[number]} of {named(number)}"
         )
     first = np.cumsum(lengths) - lengths
     found = [np.empty((0, 3), np.int64)]
@@ -54,7 +61,7 @@ def triangles(places_m: FloatArray, lengths: IntArray) -> IntArray:
                          corners[:, 1:-1], corners[:, 2:]], axis=2)  # fmt: skip
         if n > 3:
             for number in np.flatnonzero(~_sees_all(places_m[corners])).tolist():
-                inner = _ears_cut(places_m[corners[number]], int(polygons[number]) + 1)
+                inner = _ears_cut(places_m[corners[number]], named(int(polygons[number])))
                 fans[number] = corners[number][inner]
         found.append(fans.reshape(-1, 3))
     return np.concatenate(found)
@@ -95,7 +102,7 @@ def _sees_all(rings_m: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(is_line | (goes_on & (length > NO_AREA * area)))
 
 
-def _ears_cut(ring_m: FloatArray, number: int) -> IntArray:
+def _ears_cut(ring_m: FloatArray, name: str) -> IntArray:
     """Return the triangles of one polygon that has hollows, shape (n − 2, 3)."""
     spokes = ring_m - ring_m[0]
     whole = np.cross(spokes[:-1], spokes[1:]).sum(axis=0)
@@ -108,8 +115,8 @@ def _ears_cut(ring_m: FloatArray, number: int) -> IntArray:
         if len(cut) == len(ring_m) - 2 and twice.min() > -CROSSED:
             return cut
     raise UsageError(
-        f"expected faces that do not cross themselves, got face {number}, which does or is far "
-        "from flat; divide it into triangles"
+        f"expected faces that do not cross themselves, got {name}, which does or is far from "
+        "flat; divide it into triangles"
     )
 
 

@@ -7,53 +7,24 @@ import numpy as np
 
 from labrig.errors import UsageError
 from labrig.input_file import read_bytes
-from labrig.reproduce.mesh_file.gltf_mesh import gltf_parts
-from labrig.reproduce.mesh_file.obj_mesh import obj_parts
-from labrig.reproduce.mesh_file.ply_mesh import ply_parts
-from labrig.reproduce.mesh_file.stl_mesh import stl_parts
+from labrig.reproduce.mesh_file.gltf_mesh import gltf_mesh
+from labrig.reproduce.mesh_file.obj_mesh import obj_mesh
+from labrig.reproduce.mesh_file.ply_mesh import ply_mesh
+from labrig.reproduce.mesh_file.stl_mesh import stl_mesh
 from labrig.reproduce.transport.mesh import Mesh
 
 #: Readers of the content of a file in a folder, by the ending of its name.
-READERS: dict[str, Callable[[bytes, Path], list[Mesh]]] = {
-    ".obj": lambda content, _: obj_parts(content),
-    ".ply": lambda content, _: ply_parts(content),
-    ".glb": gltf_parts,
-    ".gltf": gltf_parts,
-    ".stl": lambda content, _: stl_parts(content),
+READERS: dict[str, Callable[[bytes, Path], Mesh]] = {
+    ".obj": lambda content, _: obj_mesh(content),
+    ".ply": lambda content, _: ply_mesh(content),
+    ".glb": gltf_mesh,
+    ".gltf": gltf_mesh,
+    ".stl": lambda content, _: stl_mesh(content),
 }
 
 
 def read_mesh(path: Path) -> Mesh:
     r"""Read a mesh from a file.
-
-    Parameters
-    ----------
-    path
-        OBJ, PLY, glTF or STL file; see `read_parts`.
-
-    Returns
-    -------
-    Mesh
-        Triangles of all parts, in the file's own unit, with texture coordinates where it has some.
-
-    Raises
-    ------
-    UsageError
-        As by `read_parts`.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.reproduce import read_mesh
-    >>> _ = Path("triangle.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    >>> read_mesh(Path("triangle.obj")).area_m2
-    0.5
-    """
-    return Mesh.joined(read_parts(path))
-
-
-def read_parts(path: Path) -> list[Mesh]:
-    r"""Read the parts of a mesh from a file: its objects, groups, solids, or nodes.
 
     The front of a triangle is where its corners run counter-clockwise, also in parts of glTF that
     are mirrored. Vertices stand in the order of the file, without those that no triangle has; one
@@ -67,23 +38,24 @@ def read_parts(path: Path) -> list[Mesh]:
 
     Returns
     -------
-    list of Mesh
-        Parts that have triangles, all or none with texture coordinates.
+    Mesh
+        Triangles of all objects, groups, solids or nodes, in the file's own unit, with texture
+        coordinates where it has some.
 
     Raises
     ------
     UsageError
         There is no such file, its format is another, it is damaged or says something that labrig
-        does not read, its numbers are not those that it states, or it has no surface.
+        does not read, its numbers are not those that it states, it has no surface, or texture
+        coordinates on a part of it only.
 
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.reproduce import read_parts
-    >>> text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no a\nf 1 2 3\no b\nf -4 -3 -1\n"
-    >>> _ = Path("two.obj").write_text(text)
-    >>> [part.vertices_m[2].tolist() for part in read_parts(Path("two.obj"))]
-    [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    >>> from labrig.reproduce import read_mesh
+    >>> _ = Path("triangle.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    >>> read_mesh(Path("triangle.obj")).area_m2
+    0.5
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -93,17 +65,12 @@ def read_parts(path: Path) -> list[Mesh]:
     content = read_bytes(path, path.stat().st_size)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            parts = [part.without_loose_vertices() for part in reader(content, path.parent)]
-            area = sum(part.area_m2 for part in parts)
-        if len({part.uv is None for part in parts}) > 1:
-            raise UsageError(
-                "expected texture coordinates on all faces or on none, got them on some; unwrap "
-                "all of the mesh"
-            )
-        if not parts:
-            raise UsageError("expected a mesh of triangles, got none")
-        if not 0 < area < np.inf or not all(np.isfinite(part.vertices_m).all() for part in parts):
-            raise UsageError("expected finite triangles with an area, got others")
+            mesh = reader(content, path.parent).without_loose_vertices()
+            area = mesh.area_m2
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from None
-    return parts
+    if not len(mesh.faces):
+        raise UsageError(f"{path}: expected a mesh of triangles, got none")
+    if not 0 < area < np.inf or not np.isfinite(mesh.vertices_m).all():
+        raise UsageError(f"{path}: expected finite triangles with an area, got others")
+    return mesh

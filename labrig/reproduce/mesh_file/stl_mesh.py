@@ -1,20 +1,17 @@
 """Triangles of STL files, in text or binary."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.reproduce.mesh_file.polygons import triangles
 from labrig.reproduce.transport.mesh import Mesh
 
-FloatArray = NDArray[np.float64]
-
 HEAD_BYTES = 84
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def stl_parts(content: bytes) -> list[Mesh]:
-    """Return the solids of an STL file.
+def stl_mesh(content: bytes) -> Mesh:
+    """Return the solids of an STL file as one mesh.
 
     Normals are left out: the order of the corners says where the front is.
 
@@ -32,7 +29,8 @@ def stl_parts(content: bytes) -> list[Mesh]:
     stated = int.from_bytes(content[80:HEAD_BYTES], "little")
     if len(content) >= HEAD_BYTES and len(content) == HEAD_BYTES + stated * FACET.itemsize:
         corners = np.frombuffer(content, FACET, offset=HEAD_BYTES)["corners"]
-        return [_solid(corners.reshape(-1, 3).astype(np.float64))] if stated else []
+        faces = np.arange(3 * stated, dtype=np.int32).reshape(-1, 3)
+        return Mesh(corners.reshape(-1, 3).astype(np.float64), faces)
     if not content[:HEAD_BYTES].lstrip().lower().startswith(b"solid") or b"\0" in content:
         raise UsageError(
             f"expected a binary STL of {HEAD_BYTES} + {FACET.itemsize} bytes for each of the "
@@ -42,8 +40,7 @@ def stl_parts(content: bytes) -> list[Mesh]:
     return _of_text(content)
 
 
-def _of_text(content: bytes) -> list[Mesh]:
-    solids: list[Mesh] = []
+def _of_text(content: bytes) -> Mesh:
     places: list[list[float]] = []
     lengths: list[int] = []
     # What has been opened and not yet been ended.
@@ -63,16 +60,13 @@ def _of_text(content: bytes) -> list[Mesh]:
                 lengths.append(0)
         elif word == f"end{inside}" and inside:
             open_parts.pop()
-            if inside == "solid" and lengths:
-                corners = np.array(places, dtype=np.float64).reshape(-1, 3)
-                solids.append(_solid(corners, np.array(lengths)))
-                places, lengths = [], []
         else:
             said = " ".join(words)[:40]
             raise UsageError(f"expected STL, got '{said}' in line {number}")
     if open_parts:
         raise UsageError(f"expected 'end{open_parts[-1]}' at the end, got a file that was cut off")
-    return solids
+    corners = np.array(places, dtype=np.float64).reshape(-1, 3)
+    return Mesh(corners, triangles(corners, np.array(lengths, dtype=np.int64)).astype(np.int32))
 
 
 #: What begins with a word within something else.
@@ -87,11 +81,3 @@ def _place(words: list[str], number: int) -> list[float]:
             f"expected three numbers after 'vertex', got '{' '.join(words)[:40]}' in line {number}"
         ) from None
     return [x, y, z]
-
-
-def _solid(corners: FloatArray, lengths: NDArray[np.int64] | None = None) -> Mesh:
-    if lengths is None:
-        faces = np.arange(len(corners)).reshape(-1, 3)
-    else:
-        faces = triangles(corners, lengths)
-    return Mesh(corners, faces.astype(np.int32))

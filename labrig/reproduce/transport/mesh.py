@@ -10,9 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from labrig.errors import UsageError
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 IntArray64 = NDArray[np.int64]
+
+PARTLY_UNWRAPPED = (
+    "expected texture coordinates on all faces or on none, got them on some; unwrap all of the mesh"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,15 +229,21 @@ class Mesh:
         Parameters
         ----------
         parts
-            At least one mesh; all or none have texture coordinates.
+            The meshes.
+
+        Raises
+        ------
+        UsageError
+            Some have texture coordinates and some have none.
         """
-        first = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
         uvs = [part.uv for part in parts if part.uv is not None]
+        if len(uvs) not in (0, len(parts)):
+            raise UsageError(PARTLY_UNWRAPPED)
+        first = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
+        faces = [part.faces + begin for part, begin in zip(parts, first, strict=False)]
         return cls(
-            np.concatenate([part.vertices_m for part in parts]),
-            np.concatenate(
-                [part.faces + begin for part, begin in zip(parts, first, strict=False)]
-            ).astype(np.int32),
+            np.concatenate([np.empty((0, 3)), *(part.vertices_m for part in parts)]),
+            np.concatenate([np.empty((0, 3)), *faces]).astype(np.int32),
             np.concatenate(uvs) if uvs else None,
         )
 
