@@ -81,18 +81,28 @@ def test_mirrored_twins_are_exported_alike(tmp_path: Path) -> None:
         assert truth(path).volume == pytest.approx(2)
         both = read_mesh(path)
         assert [piece.volume_m3 for piece in both.pieces()] == pytest.approx([1, 1])
-        axis = 0
-        assert sorted(piece.vertices_m[:, axis].mean() for piece in both.pieces()) == [-1, 1]
+        assert sorted(piece.vertices_m[:, 0].mean() for piece in both.pieces()) == [-1, 1]
 
 
 def test_one_mirrored_mesh_is_taken_as_it_is_meant(tmp_path: Path) -> None:
-    """As a lamp, too, which shines from its front."""
     file = PAIR.with_name("mirrored.glb")
     for objects in ({}, {"two_sided": True}):
         (surface,) = scene(tmp_path, file, objects).surfaces(0.0)
         assert surface.mesh.volume_m3 == pytest.approx(1)
     (surface,) = scene(tmp_path, file, inward=True).surfaces(0.0)
     assert surface.mesh.volume_m3 == pytest.approx(-1)
+
+
+def test_a_mirrored_lamp_shines_from_its_front(tmp_path: Path) -> None:
+    """A cube of 1 cd/m² is seen with that from without."""
+    content = scene(tmp_path, PAIR).file.model_dump(exclude_unset=True)
+    content["lamps"] = {"cube": {"kind": "area", "luminance_cd_per_m2": 1}}
+    content["objects"] = {"thing": {"lamp": "cube", "mesh": {"file": str(PAIR)}}}
+    content["programme"] = [{"at_s": 0, "lamps": {"cube": 1}}]
+    (frame,) = Renderer(build_scene(SceneFile.model_validate(content), tmp_path)).frames()
+    light = np.asarray(frame.radiance[..., 0])
+    assert light[:, 16:].sum() > 0
+    assert light[:, 16:].sum() == pytest.approx(light[:, :16].sum(), rel=0.01)
 
 
 def test_halves_that_are_mirrored_make_one_body(tmp_path: Path) -> None:
