@@ -97,7 +97,7 @@ def test_a_file_with_all_colours_in_every_pixel_is_refused(tmp_path: Path) -> No
     path = tmp_path / "linear.dng"
     pixels = np.random.default_rng(2).integers(0, 65536, (40, 60, 3)).astype(np.uint16)
     tags = [(50706, "B", 4, (1, 4, 0, 0), True), (50708, "s", 0, "linear", True)]
-    imwrite(path, pixels, photometric=34892, extratags=tags)
+    imwrite(path, pixels, photometric=34892, planarconfig="contig", extratags=tags)
     with pytest.raises(FrameError, match="all colours in every pixel"):
         read_raw(path)
 
