@@ -1,4 +1,4 @@
-"""Decays that other laboratories measured; their licences do not allow copies here."""
+"""Decays that other laboratories measured."""
 
 from pathlib import Path
 
@@ -9,6 +9,22 @@ from labrig.fit import fit_decay
 
 #: Mean squared weighted residual by the number of states, of an independent fit.
 MEAN_SQUARES = {1: 49.6, 2: 3.85, 3: 1.66}
+
+
+@pytest.mark.parametrize("level", [2, 4])
+def test_halves_of_a_time_resolved_luminescence_agree(real_data: Path, level: int) -> None:
+    """Every other channel of 0.26 ns; with more light there are two states: the slower one."""
+    table = np.genfromtxt(real_data / "trpl_grossmann/sample1.csv", delimiter=",", skip_header=4)
+    table = table[(table[:, 0] > 20) & (table[:, 0] < 400)]
+    t_s, counts = table[:, 0] * 1e-9, table[:, level]
+    even, odd = (
+        fit_decay(t_s[half::2], counts[half::2], np.sqrt(np.maximum(counts[half::2], 1)),
+                  offset_sigma=np.inf).states[-1]
+        for half in (0, 1)
+    )  # fmt: skip
+    sigma = np.hypot(even.k_r_sigma_per_s, odd.k_r_sigma_per_s)
+    assert abs(even.k_r_per_s - odd.k_r_per_s) < 3 * sigma
+    assert sigma < 0.05 * even.k_r_per_s
 
 
 def test_strontium_aluminate(shared_data: Path) -> None:

@@ -128,6 +128,13 @@ def test_lines_that_cannot_be_are_refused() -> None:
     )
 
 
+def test_the_lines_are_those_of_a_spectrographs_table(real_data: Path) -> None:
+    """Å in air, with heights in another instrument."""
+    table = np.loadtxt(real_data / "hg_lines/hgar.arc", comments=["#", "*"])
+    mercury = {round(float(nm), 4) for nm in table[:, 0] / 10 if nm < 700}
+    assert {nm for line in MERCURY for nm in line.wavelength_nm} <= mercury
+
+
 def rms_nm(lamp: Spectrum, lines: tuple[Line, ...], low_nm: float, count: int) -> float:
     """What is left of the lines' wavelengths after a straight line through where they are."""
     part = (lamp.wavelength_nm > low_nm) & (lamp.wavelength_nm < 590)
