@@ -21,11 +21,6 @@ from labrig.optics import read_light
 INPUT_NM = np.arange(300.0, 781.0, 10.0)
 OUTPUT_NM = np.arange(380.0, 781.0, 10.0)
 IS_STOKES = OUTPUT_NM[:, np.newaxis] > INPUT_NM
-BISPECTRAL = Path(__file__).parents[3] / "shared" / "data" / "bispectral"
-shared_data = pytest.mark.shared_data
-needs_bispectral = pytest.mark.skipif(
-    not BISPECTRAL.is_dir(), reason="no ../shared/data beside the checkout"
-)
 #: Threshold of physics.md's reference for the Post-Its, and its errors by K.
 POSTIT_THRESHOLD = 0.004
 POSTIT_MSE = {
@@ -426,12 +421,11 @@ def test_what_cannot_be_fitted_is_refused_in_one_line(
     assert "\n" not in str(caught.value)
 
 
-def postit(colour: str) -> ReradiationMatrix:
-    path = BISPECTRAL / "art_postit" / f"fluorescent_{colour}.csv"
+def postit(path: Path) -> ReradiationMatrix:
     with path.open(encoding="utf-8") as file:
         rows = list(csv.reader(file))[1:]
     values = np.array([row[1:] for row in rows], dtype=np.float64)
-    return ReradiationMatrix.from_bands(colour, INPUT_NM, OUTPUT_NM, values)
+    return ReradiationMatrix.from_bands(path.stem, INPUT_NM, OUTPUT_NM, values)
 
 
 def bfc(path: Path) -> ReradiationMatrix:
@@ -443,11 +437,9 @@ def bfc(path: Path) -> ReradiationMatrix:
     )  # fmt: skip
 
 
-@shared_data
-@needs_bispectral
 @pytest.mark.parametrize("colour", [pytest.param("yellow", marks=pytest.mark.campaign), "green"])
-def test_postits_have_at_most_the_reference_error(colour: str) -> None:
-    matrix = postit(colour)
+def test_postits_have_at_most_the_reference_error(shared_data: Path, colour: str) -> None:
+    matrix = postit(shared_data / f"bispectral/art_postit/fluorescent_{colour}.csv")
     fits: dict[int, MixtureFit] = {}
     for components, reference in POSTIT_MSE[colour].items():
         fit = fit_mixture(matrix, components, threshold=POSTIT_THRESHOLD)
@@ -459,10 +451,9 @@ def test_postits_have_at_most_the_reference_error(colour: str) -> None:
 
 
 @pytest.mark.campaign
-@shared_data
-@needs_bispectral
-def test_measured_materials_are_four_components_to_a_millionth() -> None:
-    matrices = (bfc(path) for path in sorted((BISPECTRAL / "rit_bfc450").glob("*.BFC")))
+def test_measured_materials_are_four_components_to_a_millionth(shared_data: Path) -> None:
+    paths = sorted((shared_data / "bispectral/rit_bfc450").glob("*.BFC"))
+    matrices = (bfc(path) for path in paths)
     glowing = [one for one in matrices if one.reradiated_fraction.max() > 0.1]
     assert len(glowing) == 44
     # Every fourth, for time.
