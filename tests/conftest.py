@@ -35,9 +35,7 @@ from hypothesis import settings
 for _name in ("SIGINT", "SIGQUIT", "SIGHUP"):
     _signum = getattr(signal, _name, None)
     if _signum is not None and signal.getsignal(_signum) == signal.SIG_IGN:
-        signal.signal(
-            _signum, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL
-        )
+        signal.signal(_signum, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
 
 from labrig.signals import STOP_SIGNALS
 from tests.quick_yaml import read_quickly, write_quickly
