@@ -137,5 +137,11 @@ def _codec(name: str) -> codecs.CodecInfo | None:
         return spelled(text, encoding, errors).encode(encoding, errors), len(text)
 
     return codecs.CodecInfo(
-        encode, plain.decode, plain.streamreader, plain.streamwriter, Encoder, name=name
+        encode,
+        plain.decode,
+        plain.streamreader,
+        plain.streamwriter,
+        Encoder,
+        plain.incrementaldecoder,
+        name=name,
     )
