@@ -77,16 +77,19 @@ def command(
 def test_all_ways_of_printing_spell(encoding: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Command line libraries write UTF-8 past a stream that says it is ASCII."""
     texts = "σ = 2 s⁻¹", "样品 \udcff"
-    for name in ("stdout", "stderr"):
-        stream = TextIOWrapper(BytesIO(), encoding, errors="strict", write_through=True)
+    streams = {
+        name: TextIOWrapper(BytesIO(), encoding, errors="strict", write_through=True)
+        for name in ("stdout", "stderr")
+    }
+    for name, stream in streams.items():
         monkeypatch.setattr(sys, name, stream)
     monkeypatch.setattr(sys, "stdin", TextIOWrapper(BytesIO(b"a\xff\n"), "utf-8"))
     make_streams_readable()
-    for err, stream in ((False, sys.stdout), (True, sys.stderr)):
+    for name, stream in streams.items():
         print(texts[0], file=stream)
-        typer.echo(texts[1], err=err)
+        typer.echo(texts[1], err=name == "stderr")
         Console(file=stream).print(texts[0])
-        written = stream.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
+        written = stream.buffer.getvalue().decode(encoding)
         expected = [texts[0], texts[1], texts[0]]
         assert written.split("\n") == [*(spelled(text, encoding) for text in expected), ""]
     assert sys.stdin.readline() == "a\\xff\n"

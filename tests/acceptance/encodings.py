@@ -85,7 +85,7 @@ COMMANDS = (
     Command("queue run --queue mine.yaml --yes"),
     Command("material show blue-paint"),
     Command("material show yellow-textile"),
-    Command("fit mixture yellow-textile"),
+    Command("fit mixture yellow-textile --threshold 1e-3"),
     Command("schema protocol"),
     Command("optics list"),
     Command("run nothing --rig sim", 2),
