@@ -30,6 +30,13 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
+# A job in the background of a script ignores Ctrl-C, and so would labrig and all that tests start;
+# has to be said before labrig looks at it.
+for _name in ("SIGINT", "SIGQUIT", "SIGHUP"):
+    _signum = getattr(signal, _name, None)
+    if _signum is not None and signal.getsignal(_signum) == signal.SIG_IGN:
+        signal.signal(_signum, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
+
 from labrig.signals import STOP_SIGNALS
 from tests.quick_yaml import read_quickly, write_quickly
 from tests.real_data import REAL, SHARED
