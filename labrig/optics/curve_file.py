@@ -267,7 +267,7 @@ def _wanted(
             f"{file.path}: {name}: expected {expected}, got {_GOT[quantity]}; {_REMEDY[quantity]}"
         )
     for note in file.notes.get(name, ()):
-        _logger.warning("%s: %s: %s", file.path, name, note)
+        _logger.warning("note: %s: %s: %s", file.path, name, note)
     return name, curve
 
 
