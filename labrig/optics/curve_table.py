@@ -59,7 +59,9 @@ def is_own_table(text: str) -> bool:
     cells = [cell.strip() for cell in header.split(_separator(header))]
     if WAVELENGTH in (cells[0], *cells[1:2]):
         return cells[0] == WAVELENGTH or cells[0] == "name"
-    return len(cells) == 1 + len(_CHANNELS) and all(map(_is_number, cells))
+    # JCAMP-DX has several values of one spectrum in a row.
+    is_jcamp = "XYDATA" in text
+    return len(cells) == 1 + len(_CHANNELS) and all(map(_is_number, cells)) and not is_jcamp
 
 
 def curves_from_table(text: str) -> tuple[str, Curves]:

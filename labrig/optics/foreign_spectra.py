@@ -32,7 +32,9 @@ _VALUE_KEY = re.compile(
     r"spectrumtype"
 )
 _COUNT_KEY = re.compile(r"npoints|numberofpixelsinspectrum|numberof(data)?points")
-_KEY = re.compile(r"[#\s\"'*]*(?P<key>\S.*?)\s*(?:[=:\t;,]+|\s{2,})\s*(?P<value>.*?)[\s;,\"']*")
+_KEY = re.compile(
+    r"[#\s\"'*]*(?P<key>\S.*?)\s*(?:[=:\t;,]+|\s{2,}|(?<=[A-Z]) )\s*(?P<value>.*?)[\s;,\"']*"
+)
 _PACKED = re.compile(r"xydata\W*\(x\+\+\(y\.\.y\)\)", re.IGNORECASE)
 #: First cell of a line that names what stands in the columns below.
 _SAMPLES = frozenset(

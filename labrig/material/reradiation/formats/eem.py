@@ -54,9 +54,7 @@ class MatrixLayout:
     excitation_nm: FloatArray | None = None
 
 
-def parse_eem(
-    text: str, layout: MatrixLayout, place: str
-) -> ReradiationMatrix:
+def parse_eem(text: str, layout: MatrixLayout, place: str) -> ReradiationMatrix:
     """Return the matrix in the text of an EEM, without a name, in a relative unit.
 
     What was taken and left out is logged.

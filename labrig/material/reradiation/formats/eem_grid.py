@@ -24,8 +24,10 @@ from labrig.text_table.style import SEPARATORS, Style
 Axis: TypeAlias = Literal["emission", "excitation"]
 #: Name of the upper left cell of labrig's own tables of curves, which are no matrices.
 _CURVES = "wavelength_nm"
-_EXCITATION = re.compile(r"(?<![a-z])(λ?_?ex|exc|excitation|anregung)(?![a-z])")
-_EMISSION = re.compile(r"(?<![a-z])(λ?_?em|emi|emission|emissions)(?![a-z])")
+_NAMES: dict[Axis, re.Pattern[str]] = {
+    "excitation": re.compile(r"(?<![a-z])(λ?_?ex|exc|excitation|anregung)(?![a-z])"),
+    "emission": re.compile(r"(?<![a-z])(λ?_?em|emi|emission|emissions)(?![a-z])"),
+}
 _LABEL = re.compile(
     r"(?:.*?(?P<kind>(?<![a-z])(?:ex[a-z]*|em[a-z]*|syn[a-z]*))[\s_:=(\[]*)?"
     r"(?:λ|wl|wavelength)?[\s_:=(\[]*(?P<nm>\d+(?:[.,]\d+)?)\s*_?(?:nm)?[)\]]?"
@@ -84,8 +86,6 @@ def read_grid(text: str, excitation_nm: FloatArray | None = None) -> Grid:
         )
         raise ValueError(reason) from None
     block = max(blocks, key=lambda block: len(block.rows) * len(block.rows[0]))
-    if block.names and block.names[0] == _CURVES:
-        raise ValueError("expected an excitation-emission matrix, got a table of curves")
     width = len(block.rows[0])
     if width == 2:
         return _stacked(block, excitation_nm)
@@ -103,17 +103,15 @@ def read_grid(text: str, excitation_nm: FloatArray | None = None) -> Grid:
     return _named_spectra(text)
 
 
-def axes_of(label: str) -> tuple[bool, bool]:
-    """Return whether a text names the excitation, and whether it names the emission."""
-    plain = label.lower()
-    return _EXCITATION.search(plain) is not None, _EMISSION.search(plain) is not None
-
-
 def _axis_of(label: str) -> Axis | None:
-    is_excitation, is_emission = axes_of(label)
-    if is_excitation == is_emission:
-        return None
-    return "excitation" if is_excitation else "emission"
+    """Return the axis that a text names first: `Emission`, or the rows of `Ex/Em`."""
+    plain = label.lower()
+    found = {
+        axis: match.start()
+        for axis, pattern in _NAMES.items()
+        if (match := pattern.search(plain)) is not None
+    }
+    return min(found, key=lambda axis: found[axis]) if found else None
 
 
 def _other(axis: Axis | None) -> Axis | None:
@@ -158,6 +156,8 @@ def _plain(block: Block) -> Grid | None:
         found = _labels(labels, block.decimal)
         if found is None:
             continue
+        if corner == _CURVES:
+            raise ValueError("expected an excitation-emission matrix, got a table of curves")
         column_nm, columns = found
         first = [parse_number(row[0], block.decimal) for row in rows]
         if any(number is None for number in first):
@@ -165,26 +165,16 @@ def _plain(block: Block) -> Grid | None:
             raise ValueError(
                 f"line {block.lines[wrong]}: expected a wavelength, got {shown(rows[wrong][0])}"
             )
-        said = [_other(columns), _corner_rows(corner)]
-        over = next((other for other in block.above if line and other.number == line.number - 1), None)
+        said = [_other(columns), _axis_of(corner)]
+        over = next(
+            (other for other in block.above if line and other.number == line.number - 1), None
+        )
         if over is not None and not corner:
             said.append(_other(_axis_of(over.text)))
         row_nm = np.array(first, dtype=np.float64)
         intensity = _intensities(block, rows, range(1, width))
         return Grid(row_nm, column_nm, intensity, next((axis for axis in said if axis), None))
     return None
-
-
-def _corner_rows(corner: str) -> Axis | None:
-    r"""Return what the rows are by the upper left cell: `Emission`, or `Ex\Em` of rows and columns."""
-    is_excitation, is_emission = axes_of(corner)
-    if is_excitation and is_emission:
-        excitation, emission = (
-            pattern.search(corner.lower()) for pattern in (_EXCITATION, _EMISSION)
-        )
-        assert excitation is not None and emission is not None
-        return "excitation" if excitation.start() < emission.start() else "emission"
-    return _axis_of(corner)
 
 
 def _splits(line: Line, width: int, decimal: str) -> list[tuple[str, ...]]:
@@ -196,9 +186,7 @@ def _splits(line: Line, width: int, decimal: str) -> list[tuple[str, ...]]:
     return [cells for cells in splits if len(cells) in (width, width - 1)]
 
 
-def _intensities(
-    block: Block, rows: Sequence[Sequence[str]], columns: Sequence[int]
-) -> FloatArray:
+def _intensities(block: Block, rows: Sequence[Sequence[str]], columns: Sequence[int]) -> FloatArray:
     """Return the numbers in some columns of rows; NaN where nothing was measured."""
     first = len(block.rows) - len(rows)
     table = np.full((len(rows), len(columns)), np.nan)

@@ -7,7 +7,7 @@ Fluorescence Spectroscopy, 3rd edition, section 2.5). Such lines are looked for,
 as measured from where they rise above what is beside them; without lines nothing is left out.
 """
 
-from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,13 +18,27 @@ _RAMAN_PER_NM = 3400e-7
 #: Half the width in nm of the middle of a line, and the distances at which its surroundings are.
 _MIDDLE_NM, _BESIDE_NM = 6.0, (20.0, 40.0)
 #: How far a line rises above both sides, as a ratio and over their noise, to be one.
-_RATIO, _NOISES = 3.0, 5.0
+_RATIO, _NOISES = 1.8, 5.0
 #: Fewest excitations, and part of them, in which a line stands out.
 _FEWEST, _PART = 4, 0.5
+#: Ratio of widths of a line and of the one that it follows.
+_WIDER = 1.5
 #: A line ends where it is no more than this many times what is beside it.
 _END_RATIO = 1.5
 #: Plateau of a detector that is saturated: fewest entries, each beside another one.
 _FEWEST_SATURATED = 3
+
+
+class _Line(NamedTuple):
+    """A line of scattered light.
+
+    Where it cannot be looked for, it is there if the lines are that it `follows`, and is wider than
+    the first of them.
+    """
+
+    name: str
+    emission_nm: FloatArray
+    follows: tuple[str, ...] = ()
 
 
 def without_scatter(
@@ -48,21 +62,23 @@ def without_scatter(
     """
     notes = []
     left_out = np.zeros(intensity.shape, dtype=bool)
-    reach_nm: tuple[float, float] | None = None
-    for name, line_nm, order in _lines(excitation_nm):
-        offset_nm = emission_nm[:, np.newaxis] - line_nm
+    reaches: dict[str, tuple[float, float] | None] = {}
+    for line in _lines(excitation_nm):
+        offset_nm = emission_nm[:, np.newaxis] - line.emission_nm
         # A line may take the side of another one for its own.
-        found = _reach(offset_nm, np.where(left_out, np.nan, intensity))
-        if order >= 3:
-            found = reach_nm
-        elif order == 2:
-            reach_nm = found
-        if found is None:
+        reach = _reach(offset_nm, np.where(left_out, np.nan, intensity))
+        narrower = [reaches[name] for name in line.follows]
+        if reach is None and narrower and all(narrower):
+            # At the edge of a matrix there are too few excitations to look.
+            low, high = narrower[0]
+            reach = (_WIDER * low, _WIDER * high)
+        reaches[line.name] = reach
+        if reach is None:
             continue
-        is_line = (offset_nm >= found[0]) & (offset_nm <= found[1])
+        is_line = (offset_nm >= reach[0]) & (offset_nm <= reach[1])
         if is_line.any():
             left_out |= is_line
-            notes.append(f"{name} left out, {found[0]:+.0f} to {found[1]:+.0f} nm about it")
+            notes.append(f"{line.name} left out, {reach[0]:+.0f} to {reach[1]:+.0f} nm about it")
     is_saturated = _saturated(intensity)
     if (is_saturated & ~left_out).any():
         notes.append(
@@ -72,12 +88,17 @@ def without_scatter(
     return np.where(left_out | is_saturated, np.nan, intensity), tuple(notes)
 
 
-def _lines(excitation_nm: FloatArray) -> Iterator[tuple[str, FloatArray, int]]:
-    """Yield the lines: name, emission wavelength for each excitation, order of the grating."""
-    yield "scattered light at the excitation", excitation_nm, 1
-    yield "its second order", 2 * excitation_nm, 2
-    yield "its third order", 3 * excitation_nm, 3
-    yield "Raman scattering of water", 1 / (1 / excitation_nm - _RAMAN_PER_NM), 1
+def _lines(excitation_nm: FloatArray) -> tuple[_Line, ...]:
+    # Beyond, a difference of wavenumbers is none of light.
+    raman_nm = 1 / (1 / np.minimum(excitation_nm, 2500.0) - _RAMAN_PER_NM)
+    first, second, raman = "scattered light", "its second order", "Raman scattering of water"
+    return (
+        _Line(first, excitation_nm),
+        _Line(second, 2 * excitation_nm),
+        _Line("its third order", 3 * excitation_nm, (second,)),
+        _Line(raman, raman_nm),
+        _Line(f"the second order of {raman}", 2 * raman_nm, (raman, second)),
+    )
 
 
 def _reach(offset_nm: FloatArray, intensity: FloatArray) -> tuple[float, float] | None:
@@ -94,9 +115,11 @@ def _reach(offset_nm: FloatArray, intensity: FloatArray) -> tuple[float, float] 
             continue
         looked_at += 1
         level = max(float(np.median(side)) for side in sides)
-        noise = max(float(np.median(np.abs(np.diff(side)))) for side in sides if len(side) > 1) if (
-            any(len(side) > 1 for side in sides)
-        ) else 0.0
+        noise = (
+            max(float(np.median(np.abs(np.diff(side)))) for side in sides if len(side) > 1)
+            if (any(len(side) > 1 for side in sides))
+            else 0.0
+        )
         top = float(middle.max())
         stands_out += top > _RATIO * max(level, 0.0) and top > level + _NOISES * noise
     if stands_out < _FEWEST or stands_out < _PART * looked_at:
@@ -121,7 +144,9 @@ def _ends(offset_nm: FloatArray, intensity: FloatArray) -> tuple[float, float] |
             return None
         limit = _END_RATIO * max(float(np.median(side)), 0.0)
         outwards = sorted((k for k in profile if sign * k >= 2), key=abs)
-        end = next((k for k in outwards if profile[k] <= limit), sign * int(_BESIDE_NM[0] / width_nm))
+        end = next(
+            (k for k in outwards if profile[k] <= limit), sign * int(_BESIDE_NM[0] / width_nm)
+        )
         ends.append(end * width_nm)
     return ends[0], ends[1]
 
@@ -129,8 +154,10 @@ def _ends(offset_nm: FloatArray, intensity: FloatArray) -> tuple[float, float] |
 def _saturated(intensity: FloatArray) -> BoolArray:
     """Return where the detector shows its largest number, in more than one entry together."""
     with np.errstate(invalid="ignore"):
-        is_top = intensity == np.nanmax(intensity) if np.isfinite(intensity).any() else (
-            np.zeros(intensity.shape, dtype=bool)
+        is_top = (
+            intensity == np.nanmax(intensity)
+            if np.isfinite(intensity).any()
+            else (np.zeros(intensity.shape, dtype=bool))
         )
     pairs = (is_top[1:] & is_top[:-1]).sum()
     return is_top if pairs >= _FEWEST_SATURATED - 1 else np.zeros(intensity.shape, dtype=bool)
