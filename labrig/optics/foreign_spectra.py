@@ -382,7 +382,8 @@ def _samples(block: Block, above: Sequence[Line]) -> dict[int, str]:
         if not is_next and plain(cells[0] if cells else "") not in _SAMPLES:
             continue
         labels = {column: cell for column, cell in enumerate(cells[:width]) if cell}
-        if is_next and plain(cells[0]) not in _SAMPLES and style.count_numbers(cells):
+        is_about = style.count_numbers(cells) or any(re.search("[:=]", cell) for cell in cells)
+        if plain(cells[0]) not in _SAMPLES and is_about:
             continue
         # A line of settings has the same in all columns, or a key of its own.
         if len(set(labels.values())) == len(labels) and (len(labels) > 1 or width == 2):

@@ -122,7 +122,7 @@ _REFUSED = {
     )
 }
 _ABSORBANCE = re.compile(
-    r"abs|absorbance|absorbanz|absorption|extinction|extinktion|od|optical density|"
+    r"abs|absorbance|absorbanz|absorption|extinction|extinktion|od|optical ?density|"
     r"optische dichte|densité optique|m?au|log10 ?\(1/[rt]\)|log ?\(1/[rt]\)"
 )
 _TRANSMITTANCE = re.compile(
@@ -174,7 +174,10 @@ def read_ordinate(name: str, unit: str = "", *, whole_name: bool = False) -> Ord
     if fraction := _fraction_of_light(spaced, whole_name):
         return fraction
     if whole_name:
-        return UNKNOWN
+        # A unit in brackets is a unit, whatever the curve is called.
+        if re.search(r"\bdbm?\b", plain(_in_brackets(name))):
+            raise ValueError(f"the column '{name}' is in decibels; convert it first")
+        return _irradiance(_in_brackets(name)) or UNKNOWN
     for text in (unit, _in_brackets(name), name):
         if irradiance := _irradiance(text):
             return irradiance

@@ -152,8 +152,9 @@ def test_axes_in_other_units(tmp_path: Path, axis: str, nm: list[float]) -> None
 
 
 def test_an_irradiance_is_per_square_metre_and_nm(tmp_path: Path) -> None:
-    path = write(tmp_path, "Wavelength (nm)\tIrradiance (µW/cm²/nm)\n400\t3\n500\t5\n")
-    assert_allclose(read_spectrum(path).value, [0.03, 0.05])
+    for axis in ("Wavelength (nm)", "wavelength_nm"):
+        path = write(tmp_path, f"{axis}\tIrradiance (µW/cm²/nm)\n400\t3\n500\t5\n")
+        assert_allclose(read_spectrum(path).value, [0.03, 0.05])
 
 
 def test_labrigs_own_table_from_a_german_spreadsheet(tmp_path: Path) -> None:
