@@ -1,181 +1,176 @@
-"""One spectrum and one excitation-emission matrix in the many shapes that programs write."""
+"""One decay as instruments, spreadsheets and scripts write it, and how it was read."""
 
+import math
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.errors import LabrigError
+from labrig.results import TableLayout, read_described_series
 
-SEPARATORS = ("\t", ";", ",", " ", "  ", ", ")
-ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "latin-1", "cp1252")
-NEWLINES = ("\n", "\r\n", "\r")
-_ABOVE = (
-    "Instrument: U-2900",
-    "Operator: J. Doe",
-    "Date: 12.03.2024",
-    "Scan speed: 300 nm/min",
-    "Temperature (°C): 21.5",
-    "Slit width: 5.0 nm",
-)
-_BELOW = ("*END", ">>>>>End Spectral Data<<<<<", "Collection Time: 3/31/2019 12:23:13 PM")
-#: Unit of the axis: how a column is called, nm in it, and digits that keep 1e-7 of them.
-AXES: tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...] = (
-    ("Wavelength (nm)", lambda nm: nm),
-    ("wavelength_nm", lambda nm: nm),
-    ("Wavelength [nm]", lambda nm: nm),
-    ("λ / nm", lambda nm: nm),
-    ("Wellenlänge in nm", lambda nm: nm),
-    ("nm", lambda nm: nm),
-    ("Wavelength (Å)", lambda nm: nm * 10),
-    ("Wavelength/µm", lambda nm: nm / 1e3),
-    ("Wavenumber (cm-1)", lambda nm: 1e7 / nm),
-    ("Energy (eV)", lambda nm: 1239.8419843320026 / nm),
-    ("Frequency [THz]", lambda nm: 299792.458 / nm),
-)
-#: Names of columns that hold a transmittance: what is written of it.
-FRACTIONS: tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...] = (
-    ("Abs", lambda t: -np.log10(t)),
-    ("Absorbance (AU)", lambda t: -np.log10(t)),
-    ("mAU", lambda t: -1000 * np.log10(t)),
-    ("Optical density", lambda t: -np.log10(t)),
-    ("%T", lambda t: 100 * t),
-    ("T (%)", lambda t: 100 * t),
-    ("Transmission [%]", lambda t: 100 * t),
-    ("Transmittance", lambda t: t),
-)
-#: Names of columns that hold light: what is written of it.
-LIGHTS: tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...] = (
-    ("Counts", lambda v: v),
-    ("Intensity (a.u.)", lambda v: v),
-    ("Ee [W/(sqm*nm)]", lambda v: v),
-    ("Irradiance (µW/cm²/nm)", lambda v: 100 * v),
-)
+#: Times in ns, and counts, that every table below holds.
+T_NS = [0.4 * k for k in range(30)]
+COUNTS = [round(2000 * math.exp(-0.06 * k)) + k % 3 for k in range(30)]
+CHANNELS = "".join(f"{k}\t{count}\r\n" for k, count in enumerate(COUNTS))
+ALONE = "".join(f"{count}\t\n" for count in COUNTS)
+BESIDE = "".join(f"{count}\t{count // 2}\n" for count in COUNTS)
+
+
+def rows(form: str = "{t:.2f},{n}\n", scale: float = 1.0) -> str:
+    """Rows of times and counts, with times of `scale` in 1 ns."""
+    return "".join(form.format(t=t * scale, n=n) for t, n in zip(T_NS, COUNTS, strict=True))
 
 
 @dataclass(frozen=True)
-class Writing:
-    """How a table is written: separator, decimal mark, encoding, end of a line."""
+class Export:
+    """A text, and what the user has to say; what is refused has a word of the refusal."""
 
-    separator: str
-    decimal: str
-    encoding: str
-    newline: str
-    is_trailing: bool
-
-    @classmethod
-    def drawn(cls, rng: random.Random) -> "Writing":
-        """Draw one; commas are decimal marks only where they do not separate."""
-        separator = rng.choice(SEPARATORS)
-        decimal = rng.choice(".,") if "," not in separator else "."
-        return cls(
-            separator,
-            decimal,
-            rng.choice(ENCODINGS),
-            rng.choice(NEWLINES),
-            separator.strip() != "" and rng.random() < 0.3,
-        )
-
-    def number(self, value: float) -> str:
-        """Write a number with ten digits; nothing where it is NaN."""
-        return "" if np.isnan(value) else f"{value:.10g}".replace(".", self.decimal)
-
-    def line(self, cells: Sequence[str]) -> str:
-        """Write the cells of a row."""
-        return self.separator.join(cells) + (self.separator if self.is_trailing else "")
-
-    def encoded(self, lines: Sequence[str]) -> bytes:
-        """Return the bytes of a text, with ? for what the encoding does not have."""
-        return (self.newline.join(lines) + self.newline).encode(self.encoding, "replace")
+    name: str
+    text: str
+    layout: TableLayout = field(default_factory=TableLayout)
+    refused: str = ""
 
 
-def about(rng: random.Random) -> list[str]:
-    """Draw lines about a measurement."""
-    return rng.sample(_ABOVE, rng.randint(0, 4))
+WIDTH = TableLayout(time_per_channel="0.4 ns")
+BLOCK = "*BLOCK {} ( Time[ns]  No_of_photons )\n" + rows("{t:.6f} , {n:4d}\n") + "*END\n"
+PICO = (
+    "#PicoHarp 300  Histogram Data\r\n#channels per curve\r\n{0}\r\n#display curve no.\r\n{1}\r\n"
+    "#memory block no.\r\n{1}\r\n#ns/channel\r\n{2}\r\n#counts\r\n"
+)
+FLS = (
+    "Labels,a{0}\nType,TCSPC Decay{0}\nStart,0.00{0}\nStop,12.00{0}\nStep,0.40{0}\n"
+    "Xaxis,Time(ns){0}\nYaxis,Counts{0}\n\n"
+)
+LVM = (
+    "LabVIEW Measurement\t\nSeparator\tTab\nDate\t2026/11/28\nTime\t10:00:00.0\n"
+    "***End_of_Header***\t\n\t\nChannels\t1\t\nSamples\t30\t\nX_Dimension\tTime\t\n"
+    "X0\t0.0E+0\t\nDelta_X\t4E-10\t\n***End_of_Header***\t\t\nX_Value\tVoltage\tComment\n"
+)
+JCAMP = "##TITLE=a\n##XUNITS={}\n##YUNITS=COUNTS\n##FIRSTX=0\n##DELTAX=0.4\n##XYDATA=(X++(Y..Y))\n"
+PACKED = "".join(
+    f"{T_NS[k]:.1f} {' '.join(map(str, COUNTS[k : k + 6]))}\n" for k in range(0, len(COUNTS), 6)
+)
+
+EXPORTS = [
+    Export("Becker & Hickl SPCM", "  Title : a\n  Time : 13:26:44\n  \n" + BLOCK.format(1)),
+    Export("SPCM, two blocks", BLOCK.format(1) + BLOCK.format(2), refused="--block"),
+    Export("SPCM, second block", BLOCK.format(1) + BLOCK.format(2), TableLayout(block=2)),
+    Export("Edinburgh FLS", FLS.format("") + rows()),
+    Export("FLS, two curves", FLS.format(",") + rows("{t:.2f},{n},1\n"), refused="--column"),
+    Export("HORIBA DAS6", "Chan\tData\r\nTime calibration = 4.0E-10 sec/ch\r\n\r\n" + CHANNELS),
+    Export("DAS6, µs", "Chan\tData\nTime calibration = 4.0E-4 \u03bcs/ch\n" + CHANNELS),
+    Export("PicoHarp, one curve", PICO.format(30, 0, "0.4000\t") + ALONE),
+    Export("PicoHarp, decimal comma", PICO.format(30, 0, "0,4000") + ALONE),
+    Export(
+        "PicoHarp, two curves",
+        PICO.format("30\t30", "0\t1", "0.4\t0.4") + BESIDE,
+        TableLayout(column="1"),
+    ),
+    Export(
+        "PicoHarp, which curve",
+        PICO.format("30\t30", "0\t1", "0.4\t0.4") + BESIDE,
+        refused="--column",
+    ),
+    Export("channels, ns per channel", "0.4 ns per channel\nChannel,Counts\n"
+           + CHANNELS.replace("\t", ",")),
+    Export("channels, resolution", "Resolution: 400 ps\nBin;Counts\n"
+           + CHANNELS.replace("\t", ";")),
+    Export("channels, no width", "Channel\tCounts\n" + CHANNELS, refused="--time-per-channel"),
+    Export("channels, width said", "Channel\tCounts\n" + CHANNELS, WIDTH),
+    Export("counts alone", "Counts\n" + ALONE, refused="--time-per-channel"),
+    Export("counts alone, width said", "Counts\n" + ALONE, WIDTH),
+    Export("two widths", "0.4 ns/ch\n0.5 ns/ch\nChan\tI\n" + CHANNELS, refused="0.5 ns/ch"),
+    Export("PicoQuant FluoFit", "Time [ns]\tDecay [Cnts]\tIRF [Cnts]\n"
+           + rows("{t:.2f}\t{n}\t0\n"), TableLayout(column="Decay [Cnts]")),
+    Export("Origin", "Time\tIntensity\nns\tcounts\n\tsample A\n" + rows("{t:.2f}\t{n}\n")),
+    Export("HORIBA FluorEssence", "T\tS1c\nns\tCPS\n" + rows("{t:.2f}\t{n}\n")),
+    Export("LabVIEW", LVM + rows("{t:.3e}\t{n}\n", 1e-9)),
+    Export("oscilloscope", "Horizontal Units,s\nHorizontal Scale,4e-08\n\nTIME,CH1\n"
+           + rows("{t:.3e},{n}\n", 1e-9)),
+    Export("JCAMP-DX", JCAMP.format("NANOSECONDS") + PACKED + "##END=\n"),
+    Export("JCAMP-DX, compressed", JCAMP.format("NANOSECONDS") + "0A12J3k\n", refused="AFFN"),
+    Export("drawn", "| t / ns | I |\n|---|---|\n" + rows("| {t:.2f} | {n} |\n")),
+    Export("unit after a comma", '"Time, ns";"I"\n' + rows("{t:.2f};{n}\n").replace(".", ",")),
+    Export("unit as the name", "ns\tI\n" + rows("{t:.2f}\t{n}\n")),
+    Export("names in quotation marks", '"Time (ns)" "I"\n' + rows("{t:.2f} {n}\n")),
+    Export("names otherwise separated", "Time[ns] Counts\n" + rows()),
+    Export("unit of the axis", "Time unit: ns\nt;I\n" + rows("{t:.2f};{n}\n")),
+    Export("units in brackets below", "time,I\n(ns),(V)\n" + rows()),
+    Export("trailing separators", "t/ns;I;;\n" + rows("{t:.2f};{n};;\n")),
+    Export("parameters below", "t (ns),I\n" + rows()
+           + "\nParameter List :\nInstrument , Cary\nStart (nm) , 900.0\nStop (nm) , 200.0\n"),
+    Export("its end", "t (ns),I\n" + rows() + "EOD\n"),
+    Export("range in the header", "Time range: 12 ns\nt,I\n" + rows(), refused="--time-unit ns"),
+    Export("resolution in the header", "Resolution: 400 ps\nt,I\n" + rows(), refused="ns"),
+    Export("contradiction", "X-axis: time [us]\nt (ns),I\n" + rows(), refused="--time-unit"),
+    Export("unknown unit", "Time (fortnights),I\n" + rows(), refused="fortnights"),
+    Export("a note between rows", "t (ns),I\n" + rows() + "lamp off\n" + rows(), refused="--block"),
+    Export("values first, no names", rows("{n},{t:.2f}\n"), refused="names"),
+    Export("an exposure in the header", "Integration Time (msec): 8\nt,I\n"
+           + rows("{t:.3e},{n}\n", 1e-9)),
+]  # fmt: skip
 
 
-def below(rng: random.Random) -> list[str]:
-    """Draw lines that stand below a table."""
-    return ["", rng.choice(_BELOW)] if rng.random() < 0.4 else []
-
-
-def spectrum_text(
-    rng: random.Random, wavelength_nm: FloatArray, columns: Sequence[tuple[str, FloatArray]]
-) -> bytes:
-    """Write spectra of the same axis: each column has its name and what stands in it."""
-    writing = Writing.drawn(rng)
-    # In a text separated by blanks, names are glued to their units.
-    glue = (lambda name: name.replace(" ", "")) if not writing.separator.strip() else str
-    axis_name, of_nm = rng.choice(
-        [axis for axis in AXES if axis[0].encode(writing.encoding, "replace").find(b"?") < 0]
+def verdict(path: Path, export: Export) -> tuple[str, str]:
+    """`right`, `refused` or `wrong`, and what labrig says."""
+    try:
+        series, columns = read_described_series(path, export.layout)
+    except LabrigError as error:
+        return "refused", str(error).removeprefix(f"{path}: ")
+    (one,) = series
+    right = (
+        one.values[:, 0].tolist() == COUNTS
+        and np.allclose(one.t_s, np.multiply(T_NS, 1e-9), rtol=1e-9, atol=1e-20)
+        and not np.isfinite(one.sigma[:, 0]).any()
     )
-    table = np.column_stack([of_nm(wavelength_nm), *(values for _, values in columns)])
-    order = rng.choice(["rising", "falling", "mixed"])
-    rows = np.argsort(table[:, 0])[:: -1 if order == "falling" else 1]
-    if order == "mixed":
-        rows = np.array(rng.sample(list(rows), len(rows)))
-    names = [axis_name, *(name for name, _ in columns)]
-    if not writing.separator.strip():
-        names = [name.replace(" in ", "/") for name in names]
-    return writing.encoded(
-        [
-            *about(rng),
-            writing.line([glue(name) for name in names]),
-            *(writing.line([writing.number(cell) for cell in row]) for row in table[rows]),
-            *below(rng),
-        ]
-    )
+    return ("right" if right and len(one.channels) == 1 else "wrong"), columns
 
 
-def matrix_text(
-    rng: random.Random, excitation_nm: FloatArray, emission_nm: FloatArray, intensity: FloatArray
-) -> bytes:
-    """Write a matrix, shape (emission, excitation), as a grid or as a column for each spectrum."""
-    writing = Writing.drawn(rng)
-    rows_nm, columns_nm, table = emission_nm, excitation_nm, intensity
-    kind = ["Ex", "Em"]
-    if rng.random() < 0.5:
-        rows_nm, columns_nm, table, kind = excitation_nm, emission_nm, intensity.T, ["Em", "Ex"]
-    rows = np.arange(len(rows_nm))[:: rng.choice([1, -1])]
-    columns = np.arange(len(columns_nm))[:: rng.choice([1, -1])]
-    rows_nm, columns_nm, table = rows_nm[rows], columns_nm[columns], table[np.ix_(rows, columns)]
-    number = writing.number
-    form = rng.choice(["grid", "named", "list", "pairs"])
-    lines = about(rng)
-    if form == "grid":
-        corner = rng.choice(["sample", "Wavelength", f"{kind[1]}/{kind[0]}"])
-        head = [corner, *map(number, columns_nm)]
-        if not writing.separator.strip() and rng.random() < 0.3:
-            head = head[1:]
-        lines.append(writing.line(head))
-        lines += [
-            writing.line([number(nm), *map(number, row)])
-            for nm, row in zip(rows_nm, table, strict=True)
-        ]
-    elif form == "list":
-        name = {"Ex": "Excitation", "Em": "Emission"}
-        lines.append(writing.line([name[kind[1]], name[kind[0]], "Intensity"]))
-        lines += [
-            writing.line([number(row_nm), number(nm), number(value)])
-            for row_nm, row in zip(rows_nm, table, strict=True)
-            for nm, value in zip(columns_nm, row, strict=True)
-        ]
-    elif form == "named" or not writing.separator.strip():
-        names = [f"S1_{kind[0].upper()}_{nm:.2f}" for nm in columns_nm]
-        lines.append(writing.line(["Wavelength(nm)", *names]))
-        lines += [
-            writing.line([number(nm), *map(number, row)])
-            for nm, row in zip(rows_nm, table, strict=True)
-        ]
-    else:
-        lines = [
-            writing.line([part for nm in columns_nm for part in (f"S1_{kind[0]}_{nm:.2f}", "")]),
-            writing.line(["Wavelength (nm)", "Intensity (a.u.)"] * len(columns_nm)),
-        ]
-        lines += [
-            writing.line([part for value in row for part in (number(nm), number(value))])
-            for nm, row in zip(rows_nm, table, strict=True)
-        ]
-    return writing.encoded([*lines, *below(rng)])
+Choose = Callable[[Sequence[str]], str]
+_ABOVE = (
+    "", "Sample: A\n", "Operator{0}X\n\nGain{0}5\n", "# made\n# by a script\n", "[Header]\nver=1.2\n",
+    "Date{0}28.11.2026\nTime{0}10:00:00\nName{0}5{0}7\n\n", "Laser pulse 5 ns\n>>>>>Begin<<<<<\n",
+)  # fmt: skip
+_BELOW = (
+    "", "*END\n", "EOD\n", "\n", "# end\n", "\nFit:\nk{0}0.02\n", ">>>>>End<<<<<\n",
+    "{0}{0}\n\x1a", "\nChi squared = 1.02\n[Gain (dB)] {0} 4\n",
+)  # fmt: skip
+_NAMES = (
+    "Time (ns)", "t / ns", "Zeit [ns]", "time_ns", "Time, ns", "Time", "time in ns", "\u00b5s", "us",
+)  # fmt: skip
+_ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1252")
+
+
+def mutated(choose: Choose) -> bytes:
+    """The decay in a way of writing it that is drawn."""
+    separator = choose(["\t", ";", ",", " ", " , ", "; "])
+    comma = choose([".", ","])
+    name = choose(_NAMES)
+    unit = "ns" if name == "Time" else ""
+    scale = 1e-3 if name in ("\u00b5s", "us") else 1.0
+    if name == "\u00b5s":
+        name = choose(["t (\u00b5s)", "Time [\u00b5s]", "t/\u00b5s"])
+    elif name == "us":
+        name = choose(["t (us)", "time_us", "us"])
+    is_first, tail = choose(["yes", "yes", "no"]), choose(["", "", separator.strip(" ")])
+    names = [f'"{name}"' if separator.strip() and separator.strip() in name else name, "I"]
+    if not separator.strip():
+        names[0] = names[0].replace(", ", "_").replace(" in ", "/")
+    lines = [names] + ([[unit, "V"]] if unit else [])
+    for t, n in zip(T_NS, COUNTS, strict=True):
+        lines.append([f"{t * scale:.6g}".replace(".", comma), f"{n}"])
+    ordered = lines if is_first == "yes" else [line[::-1] for line in lines]
+    mark = separator.strip() or " "
+    text = choose(_ABOVE).format(mark)
+    text += "".join(separator.join(line) + tail + "\n" for line in ordered)
+    text += choose(_BELOW).format(mark)
+    text = text.replace("\n", choose(["\n", "\r\n", "\r"]))
+    return text.encode(choose(_ENCODINGS))
+
+
+def drawn(seed: int) -> bytes:
+    """A table of that seed."""
+    return mutated(random.Random(seed).choice)

@@ -20,7 +20,7 @@ import numpy as np
 from labrig.errors import UsageError
 from labrig.material import MatrixLayout, read_reradiation
 from labrig.optics import read_curve_file, read_spectrum, read_transmittance
-from tests.foreign_tables import FRACTIONS, LIGHTS, matrix_text, spectrum_text
+from tests.written_spectra import FRACTIONS, LIGHTS, matrix_text, spectrum_text
 
 VARIANTS = 200
 SHARED = Path(__file__).parents[3] / "shared" / "data"

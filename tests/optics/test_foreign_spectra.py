@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from labrig.errors import UsageError
 from labrig.optics import read_curve_file, read_spectrum, read_transmittance
-from tests.foreign_tables import FRACTIONS, LIGHTS, spectrum_text
+from tests.written_spectra import FRACTIONS, LIGHTS, spectrum_text
 
 EXPORTS = Path(__file__).parents[1] / "data" / "wrighttools"
 

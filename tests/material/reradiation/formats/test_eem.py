@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.material import MatrixLayout, ReradiationMatrix, read_reradiation
-from tests.foreign_tables import matrix_text
+from tests.written_spectra import matrix_text
 
 FloatArray = NDArray[np.float64]
 EXCITATION_NM = np.arange(300.0, 465, 10)
