@@ -171,8 +171,8 @@ def apply(
     }
     if returned.total.sigma is not None:
         columns["total_sigma"] = returned.total.sigma
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    numbers = zip(*(column.tolist() for column in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in numbers)]
     _write_lines(lines, out)
 
 

@@ -106,12 +106,12 @@ def read_grid(text: str, excitation_nm: FloatArray | None = None) -> Grid:
 def _axis_of(label: str) -> Axis | None:
     """Return the axis that a text names first: `Emission`, or the rows of `Ex/Em`."""
     plain = label.lower()
-    found = {
-        axis: match.start()
+    found: list[tuple[int, Axis]] = [
+        (match.start(), axis)
         for axis, pattern in _NAMES.items()
         if (match := pattern.search(plain)) is not None
-    }
-    return min(found, key=lambda axis: found[axis]) if found else None
+    ]
+    return min(found)[1] if found else None
 
 
 def _other(axis: Axis | None) -> Axis | None:

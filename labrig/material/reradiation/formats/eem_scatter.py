@@ -67,8 +67,8 @@ def without_scatter(
         offset_nm = emission_nm[:, np.newaxis] - line.emission_nm
         # A line may take the side of another one for its own.
         reach = _reach(offset_nm, np.where(left_out, np.nan, intensity))
-        narrower = [reaches[name] for name in line.follows]
-        if reach is None and narrower and all(narrower):
+        narrower = [found for name in line.follows if (found := reaches[name]) is not None]
+        if reach is None and narrower and len(narrower) == len(line.follows):
             # At the edge of a matrix there are too few excitations to look.
             low, high = narrower[0]
             reach = (_WIDER * low, _WIDER * high)
