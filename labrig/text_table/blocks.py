@@ -321,6 +321,9 @@ def _end(rows: Sequence[_Row], first: int, style: Style) -> int:
         looks = [_looks_like_a_number(cell) for cell in filled]
         if not any(looks):
             return index
+        # A word below a blank line that begins with a digit, as the name of a sample may.
+        if row.is_after_gap and width > 1 and len(filled) == 1 and not style.count_readings(filled):
+            return index
         # A text where all rows before began with a number.
         if starts_as_number and row.cells[0] and not looks[0]:
             if row.is_after_gap or _ABOUT.search(row.cells[0]) or len(row.cells) > width:
