@@ -255,7 +255,16 @@ def _spans_of_single_columns(rows: Sequence[_Row], style: Style) -> list[tuple[i
             spans[-1] = (spans[-1][0], index + 1)
         else:
             spans.append((index, index + 1))
-    return spans if all(end > first + 1 for first, end in spans) else []
+    if any(end == first + 1 for first, end in spans):
+        return []
+    # Some programs write the number of rows above them.
+    return [
+        (first + (_number_in(rows[first], style) == end - first - 1), end) for first, end in spans
+    ]
+
+
+def _number_in(row: _Row, style: Style) -> float | None:
+    return parse_number(row.cells[0], style.decimal)
 
 
 def _is_first(
