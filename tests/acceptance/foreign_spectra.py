@@ -20,11 +20,11 @@ import numpy as np
 from labrig.errors import UsageError
 from labrig.material import MatrixLayout, read_reradiation
 from labrig.optics import read_curve_file, read_spectrum, read_transmittance
+from tests.real_data import REAL, SHARED
 from tests.written_spectra import FRACTIONS, LIGHTS, matrix_text, spectrum_text
 
 VARIANTS = 200
-SHARED = Path(__file__).parents[3] / "shared" / "data"
-REPOSITORY = Path(__file__).parents[1] / "data" / "wrighttools"
+EXPORTS = REAL / "wrighttools"
 #: File, column or none, wavelength in nm, value there as the file has it after conversion.
 FRACTION_FILES = (
     ("cary_absorbance.csv", None, 899.9957886, 10**-0.03348613903),
@@ -75,7 +75,7 @@ def real_curves(folder: Path) -> list[bool]:
     verdicts = []
     for files, read in ((FRACTION_FILES, read_transmittance), (LIGHT_FILES, read_spectrum)):
         for name, column, nm, truth in files:
-            got = float(read(REPOSITORY / name, column).at([nm])[0])
+            got = float(read(EXPORTS / name, column).at([nm])[0])
             verdicts.append(
                 line(name, f"{read.__name__} at {nm:g} nm", f"{got:.6g}", f"{truth:.6g}")
             )

@@ -12,8 +12,6 @@ from labrig.errors import UsageError
 from labrig.optics import read_curve_file, read_spectrum, read_transmittance
 from tests.written_spectra import FRACTIONS, LIGHTS, spectrum_text
 
-EXPORTS = Path(__file__).parents[1] / "data" / "wrighttools"
-
 
 def write(folder: Path, text: str, name: str = "export.txt") -> Path:
     path = folder / name
@@ -29,23 +27,25 @@ def write(folder: Path, text: str, name: str = "export.txt") -> Path:
     ],
 )
 def test_absorbance_is_a_transmittance_and_no_light(
-    name: str, points: int, nm: float, absorbance: float
+    real_data: Path, name: str, points: int, nm: float, absorbance: float
 ) -> None:
-    curve = read_transmittance(EXPORTS / name)
+    path = real_data / "wrighttools" / name
+    curve = read_transmittance(path)
     assert len(curve.wavelength_nm) == points
     assert_allclose(curve.at([nm]), 10**-absorbance, rtol=1e-12)
     with pytest.raises(UsageError, match="expected a spectrum of light, got a transmittance"):
-        read_spectrum(EXPORTS / name)
-    (note,) = read_curve_file(EXPORTS / name).notes[curve.name]
+        read_spectrum(path)
+    (note,) = read_curve_file(path).notes[curve.name]
     assert "10^-A" in note
 
 
-def test_a_spectrum_of_counts() -> None:
-    spectrum = read_spectrum(EXPORTS / "oobase32.scope")
+def test_a_spectrum_of_counts(real_data: Path) -> None:
+    path = real_data / "wrighttools/oobase32.scope"
+    spectrum = read_spectrum(path)
     assert len(spectrum.wavelength_nm) == 2048
     assert spectrum.at([787.02]) == 656.6
     with pytest.raises(UsageError, match="got light"):
-        read_transmittance(EXPORTS / "oobase32.scope")
+        read_transmittance(path)
 
 
 @pytest.mark.parametrize(
@@ -53,12 +53,13 @@ def test_a_spectrum_of_counts() -> None:
     [("labspec_spectrum_nm.txt", 425.178, 124.32), ("shimadzu_uv.txt", 340.0, 0.1308)],
 )
 def test_what_nobody_says_is_named(
-    name: str, nm: float, value: float, caplog: pytest.LogCaptureFixture
+    real_data: Path, name: str, nm: float, value: float, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert read_spectrum(EXPORTS / name).at([nm]) == value
+    path = real_data / "wrighttools" / name
+    assert read_spectrum(path).at([nm]) == value
     assert "is not stated" in caplog.text
     with pytest.raises(UsageError, match="whose meaning is not stated; write above the columns"):
-        read_transmittance(EXPORTS / name)
+        read_transmittance(path)
 
 
 def test_columns_of_an_instrument_and_the_names_of_samples(tmp_path: Path) -> None:

@@ -207,7 +207,6 @@ def test_a_matrix_in_any_writing(
     assert_allclose(matrix.reradiation, counts, rtol=1e-8)
 
 
-@pytest.mark.shared_data
 @pytest.mark.parametrize(
     ("name", "shape", "place"),
     [
@@ -226,7 +225,6 @@ def test_real_exports(
     assert peak(matrix) == place
 
 
-@pytest.mark.shared_data
 def test_a_real_export_without_excitations(shared_data: Path) -> None:
     path = shared_data / "instrument_exports" / "eemr" / "shimadzu_shimadzu.TXT"
     matrix = read_reradiation(path, layout=MatrixLayout(excitation_nm=np.arange(230.0, 451, 5)))
