@@ -208,6 +208,13 @@ def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:
     return mean, sigma
 
 
+def cut_off_sigmas(views: Sequence[RegionMeasurement]) -> Floats:
+    """Return σ of the means in DN by the correction for noise cut off below black, shape (n, C)."""
+    return np.array(
+        [[stats.cut_off_sigma for stats in view.measured.channels.values()] for view in views]
+    )
+
+
 def pixels(views: Sequence[RegionMeasurement]) -> Floats:
     """Return the number of pixels of each channel, shape (C,)."""
     return np.array([stats.n for stats in views[0].measured.channels.values()], dtype=np.float64)

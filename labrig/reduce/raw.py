@@ -9,13 +9,16 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from labrig.errors import FrameError
 from labrig.input_file import read_bytes
+from labrig.reduce.black_cut_off import BlackCutOff, find_cut_off
 from labrig.reduce.dng import (
     MONOCHROME,
     DngPattern,
@@ -318,6 +321,25 @@ class RawFrame:
     def channels(self) -> tuple[str, ...]:
         """Names of the channels: R, G and B, or L."""
         return channels_of(self.cfa)
+
+    @cached_property
+    def cut_off(self) -> BlackCutOff | None:
+        """Cut-off of noise below black; None where the camera keeps it, or none is seen."""
+        side = self.cfa_side
+        planes: dict[str, list[Mosaic]] = {name: [] for name in self.channels}
+        for position, letter in enumerate(self.cfa):
+            row, column = divmod(position, side)
+            planes[letter].append(self.mosaic[row::side, column::side])
+        return find_cut_off(planes)
+
+    def levels_dn(self, pixels: npt.NDArray[np.integer], position: int) -> Floats:
+        """Return the values that pixels of a position of `cfa` stand for, black level in them.
+
+        They are the pixels' own numbers but near black, if noise below it is cut off.
+        """
+        if self.cut_off is None:
+            return pixels.astype(np.float64)
+        return self.cut_off.levels_dn(pixels, self.cfa[position])
 
 
 def read_raw(source: str | Path | bytes, name: str = "the frame") -> RawFrame:

@@ -16,6 +16,7 @@ from labrig.reduce.measured_frames import (
     MeasuredFrame,
     RegionMeasurement,
     SeriesFrame,
+    cut_off_sigmas,
     levels,
     measure_frames,
     pixels,
@@ -282,7 +283,7 @@ def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]
     level, sigma = levels(views)
     light = level - fit_dark(exposure_s, level, sigma).base
     frames = PatchFrames(exposure_s, strips(views), light, sigma, pixels(views))
-    frames = replace(frames, sigma=paired_dark_sigma(frames))
+    frames = replace(frames, sigma=np.hypot(paired_dark_sigma(frames), cut_off_sigmas(views)))
     return _PatchDark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
 
 
@@ -408,7 +409,7 @@ def _patch_series(
         return paired_noise(frames, t_s, unit, patch.usable, patch.darks, together)
 
     patch_noise = noise(patch.frames)
-    sigma = patch_noise.sigma
+    sigma = np.hypot(patch_noise.sigma, cut_off_sigmas(patch.views))
     if backgrounds := _backgrounds(measured):
         _, alone = levels(backgrounds)
         beside = replace(
