@@ -1,6 +1,5 @@
 from .black_cut_off import (
     BlackCutOff as BlackCutOff,
-    ChannelCutOff as ChannelCutOff,
     find_cut_off as find_cut_off,
 )
 from .channels import (

@@ -20,7 +20,7 @@ References
 A. C. Cohen, *Truncated and Censored Samples* (1991), on normal variates below a limit of detection.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,16 +29,16 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from labrig.reduce.plane_noise import Floats, Mosaic, tiles, variances_by_differences
+from labrig.reduce.plane_noise import TILE, Floats, Mosaic, tiles, variances_by_differences
 
 #: Pixels, and fraction of the frame's pixels, at its lowest level that are no chance or damage.
 _MIN_PIXELS, _MIN_FRACTION = 20, 2e-4
 #: Pixels at a lowest level above 0 over those at any of the levels next above it: at 0 numbers end.
 _STANDS_OUT, _LEVELS_ABOVE = 2.0, 3
-#: Tiles across a plane.
+#: Most tiles across a plane.
 _TILES_ACROSS = 64
 #: Tiles of similar brightness that are taken together, and the most groups of them.
-_GROUP_TILES, _MOST_GROUPS = 6, 16
+_GROUP_TILES, _MOST_GROUPS = 3, 16
 #: Multiple of the median variance from which a tile has structure or a hot pixel.
 _ROUGH = 4.0
 #: Multiple of the read noise up to which a level tells the noise near black.
@@ -64,7 +64,7 @@ _WEIGHT_OF_NOISE = 0.03
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of one channel, in steps of the camera's numbers.
+    """Noise of a pixel, in steps of the camera's numbers.
 
     Attributes
     ----------
@@ -91,19 +91,24 @@ class Noise:
 
 
 @dataclass(frozen=True, eq=False)
-class ChannelCutOff:
-    """What the numbers of one channel stand for, above the number at which they are cut off.
+class BlackCutOff:
+    """What the numbers of a frame stand for whose noise is cut off at the lowest of them.
+
+    Levels, means and values are in DN above that number.
 
     Attributes
     ----------
+    lowest_dn
+        The number at which pixels are cut off, in DN.
     noise
-        Noise of the channel in steps.
+        Noise of pixels in steps; a sensor's colours share their electronics.
     step_dn
         Step of the camera's numbers in DN.
     one_sigma_off
         The noise when it is one standard uncertainty off, in two independent ways.
     """
 
+    lowest_dn: int
     noise: Noise
     step_dn: float
     one_sigma_off: tuple[Noise, ...] = ()
@@ -154,6 +159,14 @@ class ChannelCutOff:
             sigma = np.hypot(sigma, change @ values[:common])
         return self.step_dn * level, np.maximum.accumulate(mean), sigma, variance
 
+    def file_levels_dn(self, pixels: npt.NDArray[np.integer]) -> Floats:
+        """Return the values in DN for which pixels of the file stand, black level in them."""
+        numbers = np.arange(65536.0)
+        low = self.lowest_dn + np.arange(len(self.values_dn)) * int(self.step_dn)
+        low = low[low < len(numbers)]
+        numbers[low] = self.lowest_dn + self.values_dn[: len(low)]
+        return np.asarray(numbers[pixels])
+
     def level_dn(self, mean_dn: Floats) -> Floats:
         """Return the level of pixels, alike but for noise, whose values have a mean, in DN."""
         level, mean, *_ = self._means
@@ -182,38 +195,13 @@ class ChannelCutOff:
         return float(uncut / np.sqrt(np.interp(level_dn, level, variance)))
 
 
-@dataclass(frozen=True, eq=False)
-class BlackCutOff:
-    """Cut-off of a frame's noise at its lowest number.
-
-    Attributes
-    ----------
-    lowest_dn
-        The number at which pixels are cut off, in DN.
-    channels
-        The cut-off in each channel.
-    """
-
-    lowest_dn: int
-    channels: Mapping[str, ChannelCutOff]
-
-    def levels_dn(self, pixels: npt.NDArray[np.integer], channel: str) -> Floats:
-        """Return the values in DN that pixels of a channel stand for, black level in them."""
-        numbers = np.arange(65536.0)
-        cut_off = self.channels[channel]
-        low = self.lowest_dn + np.arange(len(cut_off.values_dn)) * int(cut_off.step_dn)
-        low = low[low < len(numbers)]
-        numbers[low] = self.lowest_dn + cut_off.values_dn[: len(low)]
-        return numbers[pixels]
-
-
-def find_cut_off(planes: Mapping[str, Sequence[Mosaic]]) -> BlackCutOff | None:
+def find_cut_off(planes: Sequence[Mosaic]) -> BlackCutOff | None:
     """Find whether a frame's noise is cut off at its lowest number, and its noise if so.
 
     Parameters
     ----------
     planes
-        Pixels of each CFA position of the whole frame in DN, by channel.
+        Pixels of each CFA position of the whole frame in DN.
 
     Returns
     -------
@@ -224,27 +212,22 @@ def find_cut_off(planes: Mapping[str, Sequence[Mosaic]]) -> BlackCutOff | None:
     --------
     >>> import numpy as np
     >>> from labrig.reduce import find_cut_off
-    >>> noise = np.random.default_rng(1).normal(0.0, 5.0, (300, 300))
-    >>> dark = np.maximum(np.rint(noise), 0).astype(np.uint16)
-    >>> cut_off = find_cut_off({"L": [dark]})
-    >>> print(f"{dark.mean():.1f} DN; read noise {cut_off.channels['L'].read_dn:.1f} DN")
-    1.8 DN; read noise 5.0 DN
-    >>> find_cut_off({"L": [dark + np.rint(noise).astype(np.uint16) + 1024]}) is None
+    >>> noise = np.rint(np.random.default_rng(1).normal(0.0, 5.0, (300, 300)))
+    >>> dark = np.maximum(noise, 0).astype(np.uint16)
+    >>> print(f"{dark.mean():.1f} DN; read noise {find_cut_off([dark]).read_dn:.1f} DN")
+    2.0 DN; read noise 5.0 DN
+    >>> find_cut_off([(1024 + noise).astype(np.uint16)]) is None
     True
     """
-    every = [plane for channel in planes.values() for plane in channel]
-    lowest = min(int(plane.min()) for plane in every)
-    at_lowest = sum(int(np.count_nonzero(plane == lowest)) for plane in every)
-    if at_lowest < max(_MIN_PIXELS, _MIN_FRACTION * sum(plane.size for plane in every)):
+    lowest = min(int(plane.min()) for plane in planes)
+    at_lowest = sum(int(np.count_nonzero(plane == lowest)) for plane in planes)
+    if at_lowest < max(_MIN_PIXELS, _MIN_FRACTION * sum(plane.size for plane in planes)):
         return None
-    if lowest and not _stands_out(every, lowest, at_lowest):
+    if min(min(plane.shape) for plane in planes) < TILE:
         return None
-    found = {name: _channel_cut_off(channel, lowest) for name, channel in planes.items()}
-    known = [cut_off for cut_off in found.values() if cut_off is not None]
-    if not known:
+    if lowest and not _stands_out(planes, lowest, at_lowest):
         return None
-    # A channel that nowhere comes near black has the noise of the others, and no use of it.
-    return BlackCutOff(lowest, {name: cut_off or known[0] for name, cut_off in found.items()})
+    return _cut_off(planes, lowest)
 
 
 def _stands_out(planes: Sequence[Mosaic], lowest: int, at_lowest: int) -> bool:
@@ -256,8 +239,8 @@ def _stands_out(planes: Sequence[Mosaic], lowest: int, at_lowest: int) -> bool:
     return len(next_above) == _LEVELS_ABOVE and at_lowest >= _STANDS_OUT * next_above.max()
 
 
-def _channel_cut_off(planes: Sequence[Mosaic], lowest: int) -> ChannelCutOff | None:
-    """Return the cut-off of a channel; None if its tiles near the lowest number show no noise."""
+def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
+    """Return the cut-off at a number; None if tiles near it show no noise that is cut off."""
     cut = np.concatenate([tiles(plane, _TILES_ACROSS) - lowest for plane in planes])
     step = float(np.gcd.reduce(cut.astype(np.int64), axis=None))
     if not step:
@@ -294,7 +277,7 @@ def _channel_cut_off(planes: Sequence[Mosaic], lowest: int) -> ChannelCutOff | N
     ):
         return None
     deviations = np.linalg.cholesky(np.linalg.inv(fit.jac.T @ fit.jac))
-    return ChannelCutOff(noise, step, tuple(_noise(fit.x + off) for off in deviations.T))
+    return BlackCutOff(lowest, noise, step, tuple(_noise(fit.x + off) for off in deviations.T))
 
 
 def _noise(logarithms: Floats) -> Noise:

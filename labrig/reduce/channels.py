@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import DataError, FrameError
-from labrig.reduce.black_cut_off import TOO_MANY, ChannelCutOff
+from labrig.reduce.black_cut_off import TOO_MANY, BlackCutOff
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
 from labrig.reduce.plane_noise import TILE, Floats, Mosaic, PlaneNoise, plane_noise
 from labrig.reduce.raw import RawFrame
@@ -200,9 +200,9 @@ def count_planes(
     """
     windows = [_Window.about(area, raw) for area in areas]
     planes = [
-        plane if raw.cut_off is None else raw.levels_dn(plane, position)
+        plane if raw.cut_off is None else raw.levels_dn(plane)
         for window in windows
-        for position, plane in enumerate(window.planes())
+        for plane in window.planes()
     ]
     noises = plane_noise(planes)
     positions = raw.cfa_side**2
@@ -278,7 +278,7 @@ def _count_region(
         position = side * row + column
         plane_count = PlaneCount(
             colour=raw.cfa[position],
-            value=np.asarray(raw.levels_dn(level, position) - raw.black[position]),
+            value=np.asarray(raw.levels_dn(level) - raw.black[position]),
             count=count,
             saturated=int(count[level >= raw.white].sum()),
             hot=hot_counts.get((row, column)),
@@ -287,14 +287,13 @@ def _count_region(
         if raw.cut_off is not None:
             lowest = float(count[level == raw.cut_off.lowest_dn].sum())
             black_dn = raw.black[position] - raw.cut_off.lowest_dn
-            cut_off = raw.cut_off.channels[raw.cfa[position]]
-            plane_count = _uncut(plane_count, cut_off, black_dn, lowest)
+            plane_count = _uncut(plane_count, raw.cut_off, black_dn, lowest)
         planes.append(plane_count)
     return planes
 
 
 def _uncut(
-    plane: PlaneCount, cut_off: ChannelCutOff, black_dn: float, lowest: float
+    plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: float
 ) -> PlaneCount:
     """Return a count whose mean is right though `lowest` of its pixels are cut off.
 
@@ -609,7 +608,7 @@ def _measured(raw: RawFrame, planes: Sequence[PlaneCount]) -> FrameMeasurement:
         channels={
             name: replace(
                 _channel(name, [plane for plane in planes if plane.colour == name]),
-                read_dn=None if raw.cut_off is None else raw.cut_off.channels[name].read_dn,
+                read_dn=None if raw.cut_off is None else raw.cut_off.read_dn,
             )
             for name in raw.channels
         },

@@ -102,7 +102,7 @@ class LinearFrame:
         light = np.empty(pixels.shape)
         dark = np.zeros(len(self.raw.channels)) if self.dark_dn is None else self.dark_dn
         for plane in self._planes(area):
-            level = self.raw.levels_dn(pixels[plane.slices], plane.position)
+            level = self.raw.levels_dn(pixels[plane.slices])
             light[plane.slices] = level - (plane.black + dark[plane.channel])
             if self.flat is not None:
                 light[plane.slices] /= self._falloff(self.flat, plane, area)
@@ -158,8 +158,7 @@ class LinearFrame:
         for row, column in np.ndindex(side, side):
             position = side * ((y + row) % side) + (x + column) % side
             slices = slice(row, None, side), slice(column, None, side)
-            channel = raw.channels.index(raw.cfa[position])
-            yield _Plane(position, channel, raw.black[position], slices)
+            yield _Plane(raw.channels.index(raw.cfa[position]), raw.black[position], slices)
 
     def _falloff(self, flat: Flat, plane: "_Plane", area: Area | None) -> Floats:
         """Return the transmission of the lens relative to its axis at the pixels of a plane."""
@@ -176,8 +175,6 @@ class _Plane(NamedTuple):
 
     Attributes
     ----------
-    position
-        Number of the position in `RawFrame.cfa`.
     channel
         Number of their channel.
     black
@@ -186,7 +183,6 @@ class _Plane(NamedTuple):
         Their rows and columns in the area.
     """
 
-    position: int
     channel: int
     black: float
     slices: tuple[slice, slice]
@@ -206,7 +202,7 @@ def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
         letter, black = raw.cfa[position], np.float32(raw.black[position])
         fraction = np.float32(len(raw.cfa) / side**2 / raw.cfa.count(letter))
         plane = raw.mosaic[y : side * rows : side, x : side * columns : side]
-        level = raw.levels_dn(plane, position).astype(np.float32)
+        level = raw.levels_dn(plane).astype(np.float32)
         picture[..., raw.channels.index(letter)] += (level - black) * fraction
     return picture
 

@@ -137,7 +137,7 @@ def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Fl
         if raw.cut_off is None:
             level = plane.sum(axis=1, dtype=np.int64, where=kept)
         else:
-            level = raw.levels_dn(plane, position).sum(axis=1, where=kept)
+            level = raw.levels_dn(plane).sum(axis=1, where=kept)
         light = level - raw.black[position] * pixels
         starts = np.arange(strips) * len(plane) // strips
         channel = raw.channels.index(letter)

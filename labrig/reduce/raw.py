@@ -326,20 +326,18 @@ class RawFrame:
     def cut_off(self) -> BlackCutOff | None:
         """Cut-off of noise below black; None where the camera keeps it, or none is seen."""
         side = self.cfa_side
-        planes: dict[str, list[Mosaic]] = {name: [] for name in self.channels}
-        for position, letter in enumerate(self.cfa):
-            row, column = divmod(position, side)
-            planes[letter].append(self.mosaic[row::side, column::side])
-        return find_cut_off(planes)
+        return find_cut_off(
+            [self.mosaic[row::side, column::side] for row, column in np.ndindex(side, side)]
+        )
 
-    def levels_dn(self, pixels: npt.NDArray[np.integer], position: int) -> Floats:
-        """Return the values that pixels of a position of `cfa` stand for, black level in them.
+    def levels_dn(self, pixels: npt.NDArray[np.integer]) -> Floats:
+        """Return the values in DN that pixels stand for, black level in them.
 
         They are the pixels' own numbers but near black, if noise below it is cut off.
         """
         if self.cut_off is None:
             return pixels.astype(np.float64)
-        return self.cut_off.levels_dn(pixels, self.cfa[position])
+        return self.cut_off.file_levels_dn(pixels)
 
 
 def read_raw(source: str | Path | bytes, name: str = "the frame") -> RawFrame:
