@@ -43,6 +43,8 @@ _GROUP_TILES, _MOST_GROUPS = 3, 16
 _ROUGH = 4.0
 #: Multiple of the read noise up to which a level tells the noise near black.
 _NEAR_BLACK = 12.0
+#: Fraction of its pixels at the lowest number from which a group is near black.
+_NEAR_FRACTION = 0.05
 #: Relative variance of a variance of n pixels by differences, times n.
 _VARIANCE_OF_VARIANCE = 3.0
 #: Read noise in photo-electrons where the frame does not tell it, and its σ in logarithms.
@@ -134,7 +136,7 @@ class BlackCutOff:
         )
         weights = np.where(level < 0, _WEIGHT_BELOW, 1.0)
         means = expected @ basis
-        noise = _WEIGHT_OF_NOISE * expected.sum(axis=0)
+        noise = _WEIGHT_OF_NOISE * expected.mean(axis=0)
         change = np.linalg.solve(
             means.T @ (weights[:, np.newaxis] * means) + basis.T @ (noise[:, np.newaxis] * basis),
             means.T @ (weights * (level - expected @ numbers)),
@@ -246,7 +248,7 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
     if not step:
         return None
     groups = _Groups.of(cut / step)
-    start = np.sqrt(2 * groups.variance.min())
+    start = np.sqrt(np.quantile(groups.variance[groups.at_lowest >= _some(groups.at_lowest)], 0.75))
     groups = groups.below(_NEAR_BLACK * start)
     if not start > _LEAST_NOISE or not groups.mean.size:
         return None
@@ -255,8 +257,9 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
         noise = _noise(logarithms)
         expected = np.interp(groups.mean, *_moments(noise, groups.mean.max())[:2])
         relative = np.sqrt(_VARIANCE_OF_VARIANCE / groups.pixels)
+        # The logarithm of a measured variance is too small by half of its own variance on average.
         return np.append(
-            (groups.variance / expected - 1) / relative,
+            np.log(groups.variance / expected) / relative + relative / 2,
             (logarithms[1] + np.log(_USUAL_ELECTRONS)) / _LOG_SIGMA,
         )
 
@@ -278,6 +281,11 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
         return None
     deviations = np.linalg.cholesky(np.linalg.inv(fit.jac.T @ fit.jac))
     return BlackCutOff(lowest, noise, step, tuple(_noise(fit.x + off) for off in deviations.T))
+
+
+def _some(at_lowest: Floats) -> float:
+    """Return the fraction at the lowest number from which groups are near it."""
+    return min(_NEAR_FRACTION, float(at_lowest.max()))
 
 
 def _noise(logarithms: Floats) -> Noise:
