@@ -179,7 +179,9 @@ class BlackCutOff:
         level, mean, *_ = self._means
         if mean_dn >= mean[-1]:
             return 1.0
-        return float(np.interp(mean_dn, mean, np.gradient(level) / np.gradient(mean + 1e-9 * level)))
+        return float(
+            np.interp(mean_dn, mean, np.gradient(level) / np.gradient(mean + 1e-9 * level))
+        )
 
     def level_sigma_dn(self, mean_dn: float) -> float:
         """Return σ of `level_dn` in DN by the uncertainty of the noise."""

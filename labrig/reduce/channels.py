@@ -292,9 +292,7 @@ def _count_region(
     return planes
 
 
-def _uncut(
-    plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: float
-) -> PlaneCount:
+def _uncut(plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: float) -> PlaneCount:
     """Return a count whose mean is right though `lowest` of its pixels are cut off.
 
     `black_dn` is the black level above the number at which they are cut off.

@@ -70,6 +70,11 @@ class RegionMeasurement:
         measured = self.measured
         return (measured.width, measured.height, tuple(measured.channels))
 
+    @property
+    def is_cut_off(self) -> bool:
+        """Whether the camera cut off noise below black in this frame."""
+        return any(stats.read_dn is not None for stats in self.measured.channels.values())
+
 
 @dataclass(frozen=True)
 class MeasuredFrame:

@@ -9,10 +9,10 @@ import pytest
 import usb.core
 
 from labrig import plugins
+from labrig.acquire import Program, linux_programs
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
-from labrig.acquire import Program, linux_programs
 from labrig.setup import Host, discover
 from labrig.sim import open_room
 from labrig.sim.camera import SimulatedCamera
