@@ -2,8 +2,9 @@
 
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 PROCESSES = Path("/proc")
@@ -31,9 +32,11 @@ class Program:
 
 def running_programs() -> Iterable[Program]:
     """List the programs that run on this PC; none where the platform does not tell."""
-    if sys.platform == "linux":
-        return linux_programs(PROCESSES)
-    return _mac_programs() if sys.platform == "darwin" else ()
+    listings: dict[str, Callable[[], Iterable[Program]]] = {
+        "linux": partial(linux_programs, PROCESSES),
+        "darwin": _mac_programs,
+    }
+    return listings.get(sys.platform, tuple)()
 
 
 def linux_programs(processes: Path) -> Iterable[Program]:

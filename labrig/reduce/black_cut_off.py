@@ -291,7 +291,7 @@ def _some(at_lowest: Floats) -> float:
 
 
 def _noise(logarithms: Floats) -> Noise:
-    """Return the noise by ln r and ln(g/r), the latter of the reciprocal read noise in electrons."""
+    """Return the noise by ln r and ln(g/r), which is −ln of the read noise in electrons."""
     read = float(np.exp(logarithms[0]))
     return Noise(read, read * float(np.exp(logarithms[1])))
 

@@ -18,7 +18,7 @@ Programs = Callable[[], Iterable[Program]]
 
 @pytest.fixture
 def proc(tmp_path: Path) -> Callable[..., Programs]:
-    """A /proc with programs by name, each with the device files that this user sees it have open."""
+    """A /proc with programs by name, each with the device file that this user sees it use."""
 
     def write(**open_files: str | None) -> Programs:
         for pid, (name, file) in enumerate(open_files.items(), start=100):
