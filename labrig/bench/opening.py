@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 
 SERIAL_WRITE_TIMEOUT_S = 2.0
 TCP_CONNECT_TIMEOUT_S = 5.0
+#: What opening a serial port raises; pyserial says of some wrong addresses that they are no value.
+_NOT_OPENED: tuple[type[Exception], ...] = (*PORT_FAILURES, ValueError)
 
 
 @dataclass(frozen=True)
@@ -353,7 +355,7 @@ class _Connections:
                 self._stack.callback(_close, port)
                 self._ports[devices] = port
                 self._settings[devices] = baudrate, framing
-        except (*PORT_FAILURES, ValueError) as error:
+        except _NOT_OPENED as error:
             raise DeviceError(
                 f"cannot open the serial port {address} ({' '.join(str(error).split())}); "
                 f"{not_opened(error, address)}"

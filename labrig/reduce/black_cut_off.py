@@ -272,7 +272,7 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
         bounds=bounds,
         loss="soft_l1",
         f_scale=3.0,
-        diff_step=1e-3,
+        diff_step=[1e-3, 1e-3],
     )
     noise = _noise(fit.x)
     mean, _, at_lowest = _moments(noise, groups.mean.max())
@@ -281,7 +281,8 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
         np.median(np.abs(groups.at_lowest - expected_fraction)) > _WRONG_FRACTION
     ):
         return None
-    deviations = np.linalg.cholesky(np.linalg.inv(fit.jac.T @ fit.jac))
+    jacobian: Floats = np.asarray(fit.jac, dtype=np.float64)
+    deviations = np.linalg.cholesky(np.linalg.inv(jacobian.T @ jacobian))
     return BlackCutOff(lowest, noise, step, tuple(_noise(fit.x + off) for off in deviations.T))
 
 
