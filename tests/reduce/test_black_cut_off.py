@@ -27,7 +27,7 @@ REGION = (0.2, 0.25, 0.5, 0.5)
 
 def photograph(
     light_dn: float | np.ndarray, seed: int, read_dn: float = READ_DN, black_dn: float = 0.0,
-    step: int = 1, lowest_dn: float = 0.0,
+    step: float = 1.0, lowest_dn: float = 0.0,
 ) -> RawFrame:  # fmt: skip
     """A frame of a camera whose numbers end at `lowest_dn`, with `black_dn` in them."""
     rng = np.random.default_rng(seed)
