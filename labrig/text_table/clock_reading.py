@@ -26,7 +26,9 @@ _ZONES_H = {
     "CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7,
 }  # fmt: skip
 
-_WEEKDAY = re.compile(r"[^\W\d_]{2,10}\.?,?\s+(?=\d|[^\W\d_]{3,9}\.?\s+\d)")
+_WEEKDAY = re.compile(r"[^\W\d_]{2,10}\.?,?\s+(?=\d)")
+#: As C's `ctime` and the shell's `date` print it: `Sat Oct 24 23:59:30 CEST 2026`.
+_YEAR_LAST = re.compile(r"([^\W\d_]{3} \d{1,2}) (\d\d?:\d\d:\d\d\S*(?: [A-Z]{3,4})?) (\d{4})")
 _NAMED_MONTH = re.compile(
     r"(?:(?P<d>\d{1,2})\.?[\s\-/]*(?P<m>[^\W\d_]{3,9})\.?[\s,\-/]+"
     r"|(?P<m2>[^\W\d_]{3,9})\.?\s+(?P<d2>\d{1,2}),?\s+)(?P<y>\d{4}|\d\d(?!:))(?!\d)"
@@ -43,7 +45,7 @@ _ZONE = (
     r"(?:\s*(?P<zone>Z|UTC|UT|GMT|[A-Z]{3,4})?(?P<offset>[+\-]\d\d?(?::?\d\d)?)?(?:\[[\w/]+\])?)?"
 )
 _FORMS = (
-    re.compile(rf"(?:{_ANY_DATE}(?:T|[\s,;_]+|-(?=\d\d?:)))?{_TIME}{_ZONE}"),
+    re.compile(rf"(?:{_ANY_DATE}(?:T|[\s,;_]+|[-:](?=\d\d?:)))?{_TIME}{_ZONE}"),
     re.compile(rf"{_TIME}{_ZONE}[\s,;]+{_ANY_DATE}"),
     re.compile(_DATE),
 )
@@ -90,8 +92,8 @@ def parse_clock(cell: str) -> ClockReading | None:
     True
     """
     text = " ".join(cell.replace("\N{MINUS SIGN}", "-").split())
-    text = _BASIC.sub(r"\1 \2:\3:\4", text)
-    text = _NAMED_MONTH.sub(_as_iso, _WEEKDAY.sub("", text, count=1), count=1)
+    text = _YEAR_LAST.sub(r"\1, \3 \2", _BASIC.sub(r"\1 \2:\3:\4", text))
+    text = _WEEKDAY.sub("", _NAMED_MONTH.sub(_as_iso, text, count=1), count=1)
     for form in _FORMS:
         if match := form.fullmatch(text):
             return _reading(match.groupdict())

@@ -27,6 +27,12 @@ _ORDERS = {
     "day.month.year": (2, 1, 0),
     "month/day/year": (2, 0, 1),
 }
+#: What says an order with the option `--time-unit`.
+_SAID = {
+    "year-month-day": "yyyy-mm-dd",
+    "day.month.year": "dd/mm/yyyy",
+    "month/day/year": "mm/dd/yyyy",
+}
 #: Longest row spacing over the median one of rows that are regular. With the wrong order of day
 #: and month the longest one is more by this factor.
 _REGULAR = 10.0
@@ -123,8 +129,8 @@ def read_clock(cells: Sequence[str], lines: Sequence[int], hint: str = "") -> Cl
     ]
     has_offsets = len({reading.offset_s for reading in readings}) > 1
     resolution_s = _resolution_s(readings, unit_s, per_s)
-    steps = [after - before for before, after in zip(ticks, ticks[1:], strict=False)]
-    newest_first = sum(step < 0 for step in steps) > sum(step > 0 for step in steps)
+    wrap_s = _wrap_s(readings, unit_s)
+    newest_first = _is_newest_first(ticks, wrap_s * per_s)
     rows = range(len(ticks))[:: -1 if newest_first else 1]
     clock = continuous(
         Clock(
@@ -133,7 +139,7 @@ def read_clock(cells: Sequence[str], lines: Sequence[int], hint: str = "") -> Cl
             resolution_s=resolution_s,
             cells=[cells[row] for row in rows],
             lines=[lines[row] for row in rows],
-            wrap_s=_wrap_s(readings, unit_s),
+            wrap_s=wrap_s,
             has_dates=bool(readings[0].date) and order != "",
             is_absolute=readings[0].offset_s is not None,
             could_be_12_hour=_could_be_12_hour(readings, unit_s),
@@ -243,6 +249,15 @@ def _wrap_s(readings: Sequence[ClockReading], unit_s: int) -> int:
     return SECONDS_A_DAY if highest < _DAY_H else 0
 
 
+def _is_newest_first(ticks: Sequence[int], wrap: int) -> bool:
+    """Return whether most rows are earlier than the row before."""
+    signs = 0
+    for before, after in zip(ticks, ticks[1:], strict=False):
+        step = (after - before + wrap // 2) % wrap - wrap // 2 if wrap else after - before
+        signs += (step > 0) - (step < 0)
+    return signs < 0
+
+
 def _could_be_12_hour(readings: Sequence[ClockReading], unit_s: int) -> bool:
     """Return whether the clock may be one of 12 hours that does not say which half of the day."""
     first = readings[0]
@@ -280,7 +295,8 @@ def _days(
     if len(days) > 1:
         raise UsageError(
             f"expected dates that can be read in one way, got '{cells[0].strip()}', "
-            f"{' or '.join(days)}: say '--time-unit dd/mm/yyyy' or '--time-unit mm/dd/yyyy'"
+            f"{' or '.join(days)}: say "
+            + " or ".join(f"'--time-unit {_SAID[order]}'" for order in days)
         )
     ((order, ordinals),) = days.items()
     return order, [ordinals[reading.date] for reading in readings]
