@@ -100,25 +100,6 @@ def parse_clock(cell: str) -> ClockReading | None:
     return None
 
 
-def is_clock(cell: str) -> bool:
-    """Return whether a cell holds a time of day, with a date or without.
-
-    Examples
-    --------
-    >>> from labrig.text_table.clock_reading import is_clock
-    >>> is_clock("12:05"), is_clock("2026-10-24T12:05:00Z"), is_clock("2026-10-24"), is_clock("5")
-    (True, True, False, False)
-    """
-    reading = parse_clock(cell)
-    return reading is not None and bool(reading.parts)
-
-
-def is_date(cell: str) -> bool:
-    """Return whether a cell holds a date without a time."""
-    reading = parse_clock(cell)
-    return reading is not None and not reading.parts
-
-
 def full_year(text: str) -> int:
     """Return the year that two or four digits stand for."""
     year = int(text)
