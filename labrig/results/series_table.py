@@ -19,8 +19,9 @@ from labrig.results.table_columns import (
     column_names,
     find_columns,
 )
+from labrig.results.table_rows import independent_rows, measured_rows
 from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block, read_blocks, read_table_text
-from labrig.text_table.clock_times import seconds_from_first
+from labrig.text_table.clock_times import ClockTimes, read_clock
 
 
 def join_series(parts: Sequence[Series]) -> Series:
@@ -74,12 +75,13 @@ def read_series(
 
     The columns are separated by tabs, semicolons, commas or blanks; numbers have a decimal point or
     a decimal comma. `#` begins a comment, and lines above the table are skipped. Columns are
-    recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`; times
-    of day, `12:00:05`, are counted from the first row),
-    uncertainties (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
+    recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`; a
+    clock, such as `24.10.2026 12:00:05`, is counted from the first row), uncertainties (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
     and those of series.csv (region, unit, flag and the like). Every other column of numbers is a
     channel, except one that only the first row fills: some programs put the settings of a
-    measurement there. Without names the columns are time, value and perhaps sigma.
+    measurement there. Without names the columns are time, value and perhaps sigma. Logarithms of
+    light (`I/dB`, `ln(I)`) become light. Rows that are no measurement (`OL`, 9.9e37, copies of the
+    row before) are left out; `warnings` of the series name them.
 
     Parameters
     ----------
@@ -194,14 +196,17 @@ def parse_series(text: str, source: str, layout: TableLayout = _FROM_THE_TABLE) 
 def _parse(text: str, source: str, layout: TableLayout) -> tuple[list[Series], str]:
     """Return the series in a text, and the roles of its columns in words."""
     try:
-        table = _own_table(text)
-        if table is not None:
-            columns = _own_columns(table)
-        else:
-            decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
-            table = _only(read_blocks(text, decimal))
-            columns = find_columns(table, layout)
-        return _series(table, columns), columns.describe(table.names)
+        own = _own_table(text)
+        if own is not None:
+            columns = _own_columns(own)
+            times_s = _numbers(own, columns.time, None)
+            return _series(own, columns, times_s), columns.describe(own.names)
+        decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
+        table = _only(read_blocks(text, decimal))
+        columns = find_columns(table, layout)
+        clock = _clock(table, columns)
+        series = _measured_series(table, columns, clock)
+        return series, columns.describe(table.names, clock.form if clock else "")
     except LabrigError as error:
         # In one line, though a cell may hold a form feed or another of Unicode's line ends.
         raise type(error)(f"{source}: {' '.join(str(error).split())}") from None
@@ -260,7 +265,29 @@ def _own_columns(table: Block) -> Columns:
     )
 
 
-def _series(table: Block, columns: Columns) -> list[Series]:
+def _measured_series(table: Block, columns: Columns, clock: ClockTimes | None) -> list[Series]:
+    """Return the series of another program's table, without rows that are no measurements."""
+    t_s = clock.t_s if clock else _numbers(table, columns.time, None) * columns.unit_s
+    used = [(channel.column, channel.sigma) for channel in columns.channels]
+    rows, warnings = measured_rows(
+        table, [column for pair in used for column in pair if column is not None]
+    )
+    measured = replace(
+        table,
+        rows=tuple(table.rows[row] for row in rows),
+        lines=tuple(table.lines[row] for row in rows),
+    )
+    parts = _series(measured, columns, t_s[rows])
+    warnings = [*(clock.warnings if clock else ()), *warnings]
+    if len(parts) == 1:
+        resolution_s = clock.resolution_s if clock else 0.0
+        independent, said = independent_rows(parts[0], measured.lines, resolution_s)
+        parts = [parts[0].take(independent)]
+        warnings += said
+    return [replace(part, warnings=tuple(warnings)) for part in parts]
+
+
+def _series(table: Block, columns: Columns, t_s: FloatArray) -> list[Series]:
     """Return the series of a table by region and unit."""
     n_rows = len(table.rows)
 
@@ -274,15 +301,15 @@ def _series(table: Block, columns: Columns) -> list[Series]:
         return tuple("" if column is None else row[column] for row in table.rows)
 
     channels = columns.channels
-    values = np.stack([numbers(channel.column, None) for channel in channels], axis=1)
-    given = np.stack([numbers(channel.sigma, math.nan) for channel in channels], axis=1)
-    relative = np.array([channel.sigma_is_relative for channel in channels])
-    scale = np.array([channel.sigma_scale for channel in channels])
+    pairs = [
+        channel.light(numbers(channel.column, None), numbers(channel.sigma, math.nan))
+        for channel in channels
+    ]
     series = Series(
-        t_s=_times_s(table, columns),
+        t_s=t_s,
         exposure_s=numbers(columns.exposure, 0.0),
-        values=values,
-        sigma=given * scale * np.where(relative, np.abs(values), 1.0),
+        values=np.stack([values for values, _ in pairs], axis=1),
+        sigma=np.stack([sigma for _, sigma in pairs], axis=1),
         dark_sigma=np.full(len(channels), math.nan),
         channels=tuple(channel.name for channel in channels),
         iso=numbers(columns.reserved.get("iso"), math.nan),
@@ -298,12 +325,12 @@ def _series(table: Block, columns: Columns) -> list[Series]:
     return [series.take(np.array(rows), region) for (region, _), rows in groups.items()]
 
 
-def _times_s(table: Block, columns: Columns) -> FloatArray:
-    """Return the times in seconds; times of day from the first row."""
-    clock_s = seconds_from_first([row[columns.time] for row in table.rows])
-    if clock_s is not None:
-        return clock_s
-    return _numbers(table, columns.time, None) * columns.unit_s
+def _clock(table: Block, columns: Columns) -> ClockTimes | None:
+    """Return the times of a clock, with the dates of a column beside it; None of plain numbers."""
+    cells = [row[columns.time] for row in table.rows]
+    if columns.date is not None:
+        cells = [f"{row[columns.date]} {cell}" for row, cell in zip(table.rows, cells, strict=True)]
+    return read_clock(cells, table.lines, columns.clock_hint)
 
 
 def _numbers(table: Block, column: int, empty: float | None) -> FloatArray:

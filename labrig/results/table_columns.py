@@ -6,9 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.errors import UsageError
+from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
 from labrig.results.sigma_unit import sigma_scale
 from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block
+from labrig.text_table.clock_reading import parse_clock
+from labrig.text_table.clock_times import is_clock_form
 from labrig.text_table.names import (
     ABSCISSAS,
     is_row_number,
@@ -19,8 +22,11 @@ from labrig.text_table.names import (
     split_unit,
     time_unit_s,
 )
+from labrig.text_table.value_units import LogScale, is_absorbance, log_scale
 
 _EXPOSURES = frozenset({EXPOSURE, "exposure"})
+#: Names of a column with the dates of a clock beside it.
+_DATES = frozenset({"date", "datum", "day", "tag", "jour", "fecha", "data"})
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,7 @@ class TableLayout:
     column
         Name of the column of values.
     time_unit
-        Unit of the times, such as `ms`.
+        Unit of the times, such as `ms`, or the form of a clock, such as `hh:mm` or `dd/mm/yyyy`.
     decimal
         Decimal mark of the numbers, `point` or `comma`.
     """
@@ -45,9 +51,11 @@ class TableLayout:
     decimal: str | None = None
 
     def __post_init__(self) -> None:
-        if self.time_unit is not None and time_unit_s(self.time_unit) is None:
+        unit = self.time_unit
+        if unit is not None and time_unit_s(unit) is None and not is_clock_form(unit):
             raise UsageError(
-                f"--time-unit: expected a unit such as ns, ms, s, min or h, got '{self.time_unit}'"
+                "--time-unit: expected a unit such as ns, ms, s, min or h, or the form of a clock "
+                f"such as hh:mm or dd/mm/yyyy, got '{unit}'"
             )
         if self.decimal is not None and self.decimal not in DECIMAL_MARKS:
             raise UsageError(f"--decimal: expected 'point' or 'comma', got '{self.decimal}'")
@@ -65,6 +73,8 @@ class Channel:
         Column of uncertainties; None without one.
     sigma_scale, sigma_is_relative
         Factor from that column to σ in the unit of the values, or to σ over the value.
+    scale
+        Logarithm of light that the column holds; None if it holds light.
     """
 
     name: str
@@ -72,6 +82,14 @@ class Channel:
     sigma: int | None
     sigma_scale: float = 1.0
     sigma_is_relative: bool = False
+    scale: LogScale | None = None
+
+    def light(self, values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return light and its σ by the numbers of the two columns (n,)."""
+        sigma = sigma * self.sigma_scale * (np.abs(values) if self.sigma_is_relative else 1.0)
+        if self.scale is None:
+            return values, sigma
+        return self.scale.light(values), self.scale.sigma(values, sigma)
 
 
 @dataclass(frozen=True)
@@ -90,6 +108,10 @@ class Columns:
         Columns of series.csv that are no channels, by name.
     value_unit
         Unit of the values; empty if unknown.
+    date
+        Column of the dates of a clock; None without one.
+    clock_hint
+        What header and user say of the form of a clock.
     """
 
     time: int
@@ -98,9 +120,14 @@ class Columns:
     channels: tuple[Channel, ...]
     reserved: dict[str, int]
     value_unit: str
+    date: int | None = None
+    clock_hint: str = ""
 
-    def describe(self, names: Sequence[str]) -> str:
-        """Return in words which columns are times, values and σ, by name or else by number."""
+    def describe(self, names: Sequence[str], clock: str = "") -> str:
+        """Return in words which columns are times, values and σ, by name or else by number.
+
+        `clock` says how a clock was understood.
+        """
 
         def text(columns: Sequence[int]) -> str:
             return ", ".join(
@@ -109,21 +136,29 @@ class Columns:
             )
 
         sigmas = [channel.sigma for channel in self.channels if channel.sigma is not None]
-        values = [channel.column for channel in self.channels]
+        values = ", ".join(
+            text([channel.column])
+            + (f", a logarithm: light is {channel.scale}" if channel.scale else "")
+            + (", an absorbance: fitted as it stands" if is_absorbance(channel.name) else "")
+            for channel in self.channels
+        )
+        times = [self.time] if self.date is None else [self.date, self.time]
+        time = text(times) + (f": {clock}" if clock else "")
         sigma = f"σ {text(sigmas)}" if sigmas else "no σ"
-        return f"time {text([self.time])}; values {text(values)}; {sigma}"
+        return f"time {time}; values {values}; {sigma}"
 
 
 def find_columns(table: Block, layout: TableLayout) -> Columns:
     """Return the roles of the columns by their names and the user's answers."""
     names = column_names(table)
     in_use = [column for column in range(len(names)) if not _is_idle(table, names, column, layout)]
-    time, unit_s = _time(table, names, in_use, layout)
+    time, unit_s, clock_hint = _time(table, names, in_use, layout)
+    date = _date(table, names, time)
     lower = {column: names[column].lower() for column in in_use}
     exposure = _only_match(names, [column for column in in_use if lower[column] in _EXPOSURES])
     reserved = {names[column]: column for column in in_use if names[column] in RESERVED}
     values = [
-        column for column in in_use if column not in {time, exposure} | set(reserved.values())
+        column for column in in_use if column not in {time, date, exposure} | set(reserved.values())
     ]
     if layout.column is not None and layout.column not in [names[column] for column in values]:
         raise UsageError(
@@ -138,18 +173,22 @@ def find_columns(table: Block, layout: TableLayout) -> Columns:
     ]
     if not signals:
         raise UsageError(f"{EXPECTED}, got {', '.join(names)}; a column of values is missing")
+    scales = {column: log_scale(names[column], _below(table, column)) for column in signals}
     channels = tuple(
         Channel(
-            _channel_name(names, column, signals),
+            _channel_name(names, column, signals, scales[column]),
             column,
             sigmas.get(column),
-            *_sigma_scale(table, names, column, sigmas.get(column)),
+            *_sigma_scale(table, names, column, sigmas.get(column), scales[column]),
+            scales[column],
         )
         for column in signals
     )
-    value_units = {_unit(table, names, column) for column in signals}
+    value_units = {
+        scale.unit if scale else _unit(table, names, column) for column, scale in scales.items()
+    }
     value_unit = value_units.pop() if len(value_units) == 1 else ""
-    return Columns(time, unit_s, exposure, channels, reserved, value_unit)
+    return Columns(time, unit_s, exposure, channels, reserved, value_unit, date, clock_hint)
 
 
 def column_names(table: Block) -> tuple[str, ...]:
@@ -185,8 +224,8 @@ def _is_idle(table: Block, names: Sequence[str], column: int, layout: TableLayou
 
 def _time(
     table: Block, names: Sequence[str], in_use: Sequence[int], layout: TableLayout
-) -> tuple[int, float]:
-    """Return the column of times and its unit in seconds."""
+) -> tuple[int, float, str]:
+    """Return the column of times, its unit in seconds, and what is said of a clock's form."""
     if layout.time is not None:
         matches = [column for column in in_use if names[column] == layout.time]
         if not matches:
@@ -198,6 +237,7 @@ def _time(
         matches = [column for column in in_use if is_time(names[column])] or [
             column for column in in_use if split_unit(names[column])[0].lower() in ABSCISSAS
         ]
+    matches = matches or _clocks(table)
     if not matches:
         raise UsageError(
             f"{EXPECTED}, got {', '.join(names)}; if one of them is the time, name it: "
@@ -210,13 +250,38 @@ def _time(
     unit = (split_time(names[column]) or split_unit(names[column]))[1]
     if table.units and not unit:
         unit = table.units[column] if column < len(table.units) else ""
-    unit_s = time_unit_s(layout.time_unit or unit or "s")
+    unit = layout.time_unit or unit
+    if parse_clock(table.rows[0][column]) is not None:
+        return column, 1.0, layout.time_unit or f"{names[column]} {unit}"
+    unit_s = time_unit_s(unit or "s")
     if unit_s is None:
         raise UsageError(
             f"expected a unit of time for '{names[column]}', got '{unit}'; say '--time-unit s', or "
             "which it is"
         )
-    return column, unit_s
+    return column, unit_s, ""
+
+
+def _clocks(table: Block) -> list[int]:
+    """Return the columns that hold clocks, or those with dates if none does."""
+    readings = [parse_clock(cell) for cell in table.rows[0]]
+    clocks = [column for column, reading in enumerate(readings) if reading and reading.parts]
+    return clocks or [column for column, reading in enumerate(readings) if reading]
+
+
+def _date(table: Block, names: Sequence[str], time: int) -> int | None:
+    """Return the column with the dates of a clock that shows none itself."""
+    clock = parse_clock(table.rows[0][time])
+    if clock is None or clock.date or not clock.parts:
+        return None
+    dates = [
+        column
+        for column, name in enumerate(names)
+        if split_unit(name)[0].lower() in _DATES
+        and (both := parse_clock(f"{table.rows[0][column]} {table.rows[0][time]}")) is not None
+        and both.date
+    ]
+    return _only_match(names, dates)
 
 
 def _sigmas(names: Sequence[str], values: Sequence[int], layout: TableLayout) -> dict[int, int]:
@@ -244,10 +309,13 @@ def _sigmas(names: Sequence[str], values: Sequence[int], layout: TableLayout) ->
 
 
 def _sigma_scale(
-    table: Block, names: Sequence[str], column: int, sigma: int | None
+    table: Block, names: Sequence[str], column: int, sigma: int | None, scale: LogScale | None
 ) -> tuple[float, bool]:
     """Return the factor from a column of uncertainties to σ, and whether σ is relative."""
     if sigma is None:
+        return 1.0, False
+    if scale is not None:
+        scale.require_unit(_unit(table, names, sigma), names[sigma])
         return 1.0, False
     unit, value_unit = _unit(table, names, sigma), _unit(table, names, column)
     # The brackets of `σ (I)` hold the name of the values.
@@ -258,8 +326,11 @@ def _sigma_scale(
 
 def _unit(table: Block, names: Sequence[str], column: int) -> str:
     """Return the unit in the name of a column, or in a line of units below the names."""
-    below = table.units[column] if column < len(table.units) else ""
-    return split_unit(names[column])[1] or below
+    return split_unit(names[column])[1] or _below(table, column)
+
+
+def _below(table: Block, column: int) -> str:
+    return table.units[column] if column < len(table.units) else ""
 
 
 def _owner_left_of(
@@ -283,7 +354,9 @@ def _owner_left_of(
     return left
 
 
-def _channel_name(names: Sequence[str], column: int, signals: Sequence[int]) -> str:
+def _channel_name(
+    names: Sequence[str], column: int, signals: Sequence[int], scale: LogScale | None
+) -> str:
     """Return the name of a channel without its unit, if that still tells it from the others."""
     name = " ".join(names[column].split())
     if not name or [names[other] for other in signals].count(names[column]) > 1:
@@ -291,7 +364,7 @@ def _channel_name(names: Sequence[str], column: int, signals: Sequence[int]) -> 
             f"expected a name of its own for every column, got '{name}' for column {column + 1}; "
             "rename it"
         )
-    base = split_unit(name)[0]
+    base = scale.name if scale and scale.name else split_unit(name)[0]
     bases = [split_unit(names[other])[0] for other in signals]
     taken = bases.count(base) > 1 or base in (TIME, EXPOSURE, *RESERVED)
     return name if taken or base.endswith(SIGMA_SUFFIX) else base

@@ -8,6 +8,7 @@ reason was set by hand, and nothing tells by how much.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from itertools import pairwise
 
 from labrig.errors import UsageError
 
@@ -111,9 +112,7 @@ def _past_wraps(clock: Clock) -> Clock:
 def _without_summer_time(clock: Clock) -> Clock:
     steps = _steps(clock.ticks)
     hour = _HOUR_S * clock.per_s
-    ahead = [
-        row for row, step in enumerate(steps) if _is_regular(clock, steps, row, step - hour)
-    ]
+    ahead = [row for row, step in enumerate(steps) if _is_regular(clock, steps, row, step - hour)]
     shift, shifts, warnings = 0, [0], []
     for row, step in enumerate(steps):
         from_to = (
@@ -136,8 +135,8 @@ def _without_summer_time(clock: Clock) -> Clock:
             )
         elif row in ahead and len(ahead) <= _MOST_JUMPS:
             warnings.append(
-                f"{from_to}, by just an hour more than the rows around it: it is taken for a pause; "
-                "if the clock was set, take the hour off the times that follow"
+                f"{from_to}, by just an hour more than the rows around it: it is taken for a "
+                "pause; if the clock was set, take the hour off the times that follow"
             )
         shifts.append(shift)
     ticks = [tick + by for tick, by in zip(clock.ticks, shifts, strict=True)]
@@ -158,7 +157,7 @@ def _refuse_backward(clock: Clock, row: int, from_to: str) -> None:
 
 
 def _steps(ticks: Sequence[int]) -> list[int]:
-    return [after - before for before, after in zip(ticks, ticks[1:], strict=False)]
+    return [after - before for before, after in pairwise(ticks)]
 
 
 def _is_regular(clock: Clock, steps: Sequence[int], row: int, step: int) -> bool:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
+from itertools import pairwise
 from statistics import median
 
 import numpy as np
@@ -196,8 +197,10 @@ def _unit_of_two_parts(readings: Sequence[ClockReading], cells: Sequence[str], h
     three = [row for row, reading in enumerate(readings) if len(reading.parts) == _THREE_PARTS]
     if three:
         # A stopwatch shows its hours when it has some.
-        if two[-1] < three[0] and readings[three[0]].parts[0] == 1 and not any(
-            readings[row].parts[0] >= 60 for row in two
+        if (
+            two[-1] < three[0]
+            and readings[three[0]].parts[0] == 1
+            and not any(readings[row].parts[0] >= 60 for row in two)
         ):
             return 1
         raise UsageError(
@@ -205,7 +208,7 @@ def _unit_of_two_parts(readings: Sequence[ClockReading], cells: Sequence[str], h
             f"'{cells[two[0]].strip()}'; write all as hh:mm:ss"
         )
     hours = [reading.parts[0] for reading in readings]
-    turns = list(zip(hours, hours[1:], strict=False))
+    turns = list(pairwise(hours))
     if any(reading.fraction for reading in readings) or (59, 0) in turns:
         return 1
     if (23, 0) in turns:
@@ -252,7 +255,7 @@ def _wrap_s(readings: Sequence[ClockReading], unit_s: int) -> int:
 def _is_newest_first(ticks: Sequence[int], wrap: int) -> bool:
     """Return whether most rows are earlier than the row before."""
     signs = 0
-    for before, after in zip(ticks, ticks[1:], strict=False):
+    for before, after in pairwise(ticks):
         step = (after - before + wrap // 2) % wrap - wrap // 2 if wrap else after - before
         signs += (step > 0) - (step < 0)
     return signs < 0
@@ -340,7 +343,7 @@ def _likely(
             ordinals[reading.date] * SECONDS_A_DAY + of
             for reading, of in zip(readings, of_day_s, strict=True)
         ]
-        steps_s[order] = [after - before for before, after in zip(t_s, t_s[1:], strict=False)]
+        steps_s[order] = [after - before for before, after in pairwise(t_s)]
     monotone = [
         order
         for order, steps in steps_s.items()
