@@ -76,7 +76,8 @@ def read_series(
     The columns are separated by tabs, semicolons, commas or blanks; numbers have a decimal point or
     a decimal comma. `#` begins a comment, and lines above the table are skipped. Columns are
     recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`; a
-    clock, such as `24.10.2026 12:00:05`, is counted from the first row), uncertainties (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
+    clock, such as `24.10.2026 12:00:05`, is counted from the first row), uncertainties
+    (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
     and those of series.csv (region, unit, flag and the like). Every other column of numbers is a
     channel, except one that only the first row fills: some programs put the settings of a
     measurement there. Without names the columns are time, value and perhaps sigma. Logarithms of

@@ -38,9 +38,8 @@ def measured_rows(table: Block, columns: Sequence[int]) -> tuple[Rows, list[str]
     """
     marks: dict[int, str] = {}
     for column in columns:
-        for row, cell in no_measurements(
-            [cells[column] for cells in table.rows], table.number
-        ).items():
+        cells = [row[column] for row in table.rows]
+        for row, cell in no_measurements(cells, table.number).items():
             marks.setdefault(row, cell)
     rows = np.array([row for row in range(len(table.rows)) if row not in marks], dtype=np.intp)
     by_cell: dict[str, list[int]] = {}
@@ -100,8 +99,8 @@ def independent_rows(
     if held.any():
         which = [lines[row] for row in np.flatnonzero(held)]
         warnings.append(
-            f"{_lines(which)}: equal to the row before though neighbours differ, as a logger writes "
-            f"that is faster than its meter; {_rows(len(which))} left out"
+            f"{_lines(which)}: equal to the row before though neighbours differ, as a logger "
+            f"writes that is faster than its meter; {_rows(len(which))} left out"
         )
     return np.flatnonzero(~(repeated | held)), warnings
 

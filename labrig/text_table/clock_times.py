@@ -120,7 +120,7 @@ def read_clock(cells: Sequence[str], lines: Sequence[int], hint: str = "") -> Cl
         return None
     readings = _readings(cells, lines)
     hint = hint.lower()
-    unit_s = _unit_of_two_parts(readings, cells, hint)
+    unit_s = _unit_of_two_parts(readings, cells, lines, hint)
     per_s = 10 ** max(len(reading.fraction) for reading in readings)
     of_day = [_ticks_of_day(reading, unit_s, per_s) for reading in readings]
     order, days = _days(readings, cells, hint, [ticks / per_s for ticks in of_day])
@@ -188,7 +188,9 @@ def _kind(reading: ClockReading) -> tuple[bool, bool, bool, str]:
     )
 
 
-def _unit_of_two_parts(readings: Sequence[ClockReading], cells: Sequence[str], hint: str) -> int:
+def _unit_of_two_parts(
+    readings: Sequence[ClockReading], cells: Sequence[str], lines: Sequence[int], hint: str
+) -> int:
     """Return the unit in seconds of the last part of `12:05`: 60, or 1 of a stopwatch."""
     two = [row for row, reading in enumerate(readings) if len(reading.parts) == _TWO_PARTS]
     first = readings[0]
@@ -204,8 +206,8 @@ def _unit_of_two_parts(readings: Sequence[ClockReading], cells: Sequence[str], h
         ):
             return 1
         raise UsageError(
-            f"expected times in one form, got '{cells[three[0]].strip()}' and "
-            f"'{cells[two[0]].strip()}'; write all as hh:mm:ss"
+            f"line {lines[two[0]]}: expected times in one form, got '{cells[two[0]].strip()}' and "
+            f"'{cells[three[0]].strip()}'; write all as hh:mm:ss"
         )
     hours = [reading.parts[0] for reading in readings]
     turns = list(pairwise(hours))

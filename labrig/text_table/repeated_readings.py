@@ -16,8 +16,8 @@ BoolArray = npt.NDArray[np.bool_]
 _STEPS = 10.0
 #: Fraction of the rows that are copies, and length of a run of equal values, from which they are.
 _FRACTION, _RUN = 0.15, 4
-#: Fewest copies.
-_FEWEST = 3
+#: Fewest copies, and fewest rows that tell them.
+_FEWEST, _FEWEST_ROWS = 3, 10
 #: Rows before and after a run in which the last digit of its values is looked for, and how well
 #: they are multiples of it.
 _NEAR, _MULTIPLE = 10, 1e-3
@@ -75,7 +75,7 @@ def held_readings(values: FloatArray) -> BoolArray:
     """
     none = np.zeros(len(values), dtype=np.bool_)
     starts = np.flatnonzero(np.append(True, np.diff(values) != 0))
-    if len(starts) < _FEWEST or len(starts) == len(values):
+    if len(values) < _FEWEST_ROWS or len(starts) < _FEWEST or len(starts) == len(values):
         return none
     lengths = np.diff(np.append(starts, len(values)))
     level, highest = values[starts], values.max()

@@ -92,10 +92,10 @@ class LogScale:
             The unit is another one, as that of the light or %.
         """
         if unit.strip() not in ("", self.unit_of_x, "dB" if self.unit_of_x else ""):
+            own = f" in {self.unit_of_x}" if self.unit_of_x else ""
             raise UsageError(
-                f"expected uncertainties of the logarithm{f' in {self.unit_of_x}' * bool(self.unit_of_x)}"
-                f", got '{unit}' in '{name}'; convert them, or delete the column: σ is then taken "
-                "from the scatter"
+                f"expected uncertainties of the logarithm{own}, got '{unit}' in '{name}'; convert "
+                "them, or delete the column: σ is then taken from the scatter"
             )
 
     def __str__(self) -> str:
