@@ -19,7 +19,7 @@ _WORDS = re.compile(
     r"|BAD|ERR|ERROR|FEHLER|#[A-Z/0!?]+[!?]?|-+|\*+|#+|\?+|[.]{2,}|[=_~]+|[–—]+"
 )
 #: Nines, perhaps with zeros behind, that mark missing data: 9999, -999.9, 9.99999e9.
-_NINES = re.compile(r"9{3,}0*")
+_NINES = re.compile(r"9{3,10}0*")
 #: A power of ten, which some meters show for overload: 1e9.
 _POWER = re.compile(r"10*")
 #: How far beyond every other value a number of nines, or a power of ten from 1e6 on, is a mark.
