@@ -19,7 +19,7 @@ from labrig.results.table_columns import (
     column_names,
     find_columns,
 )
-from labrig.results.table_rows import independent_rows, measured_rows
+from labrig.results.table_rows import independent_rows, measured_rows, with_limits
 from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block, read_blocks, read_table_text
 from labrig.text_table.clock_times import ClockTimes, read_clock
 
@@ -283,8 +283,10 @@ def _measured_series(table: Block, columns: Columns, clock: ClockTimes | None) -
     if len(parts) == 1:
         resolution_s = clock.resolution_s if clock else 0.0
         independent, said = independent_rows(parts[0], measured.lines, resolution_s)
-        parts = [parts[0].take(independent)]
-        warnings += said
+        lines = [measured.lines[row] for row in independent]
+        part, limits = with_limits(parts[0].take(independent), lines)
+        parts = [part]
+        warnings += [*said, *limits]
     return [replace(part, warnings=tuple(warnings)) for part in parts]
 
 

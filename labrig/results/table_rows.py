@@ -1,18 +1,22 @@
 """Rows of another program's table that are measurements, and what is said of the others."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import UsageError
-from labrig.results.series import Series
+from labrig.results.series import Series, add_flag
 from labrig.text_table import Block
+from labrig.text_table.detector_limits import at_ceiling, at_floor
 from labrig.text_table.no_measurement import no_measurements
 from labrig.text_table.repeated_readings import held_readings, repeated_rows
 from labrig.text_table.time_order import backward_rows, light_goes_on, starts_again
 
 Rows = npt.NDArray[np.intp]
+#: Flag of values at a detector's ceiling or floor.
+CLIPPED = "clipped"
 #: Lines that a message names.
 _NAMED = 4
 #: Fraction of the rows that share their time with the row before from which a clock is too coarse.
@@ -105,6 +109,41 @@ def independent_rows(
     return np.flatnonzero(~(repeated | held)), warnings
 
 
+def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[str]]:
+    """Return the series of one channel with values at the limits of its detector flagged.
+
+    Parameters
+    ----------
+    series
+        The series of a table with one region and unit.
+    lines
+        Line number of each row.
+    """
+    order = np.argsort(series.t_s, kind="stable")
+    if len(series.channels) > 1 or len(set(series.exposure_s)) > 1 or not _is_course(series.t_s):
+        return series, []
+    warnings = []
+    flags = list(series.flag)
+    for limit, name in ((at_ceiling, "ceiling"), (at_floor, "floor")):
+        rows = order[limit(series.values[order, 0])]
+        if not len(rows):
+            continue
+        warnings.append(
+            f"{_lines([lines[row] for row in np.sort(rows)])}: equal, "
+            f"{series.values[rows[0], 0]:.6g}, and far from the values beside: the detector was "
+            f"{'saturated' if name == 'ceiling' else 'at its lowest value'}; {_rows(len(rows))} "
+            "left out"
+        )
+        for row in rows:
+            flags[row] = add_flag(flags[row], CLIPPED)
+    return replace(series, flag=tuple(flags)), warnings
+
+
+def _is_course(t_s: npt.NDArray[np.float64]) -> bool:
+    steps = np.diff(t_s)
+    return bool(np.all(steps > 0) or np.all(steps < 0))
+
+
 def _of_order(series: Series, lines: Sequence[int]) -> list[str]:
     """Return what is to be said of times that go back."""
     warnings = []
@@ -127,9 +166,7 @@ def _of_order(series: Series, lines: Sequence[int]) -> list[str]:
 def _held(series: Series, own: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Return which rows, of those that are no repeated ones, hold the values of the row before."""
     held = np.zeros(len(own), dtype=np.bool_)
-    steps = np.diff(series.t_s[own])
-    is_course = np.all(steps > 0) or np.all(steps < 0)
-    if is_course and len(set(series.exposure_s)) == 1:
+    if _is_course(series.t_s[own]) and len(set(series.exposure_s)) == 1:
         held[own] = np.all([held_readings(values) for values in series.values[own].T], axis=0)
     return held
 

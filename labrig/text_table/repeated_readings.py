@@ -6,6 +6,8 @@ the zeros of faint light, are no copies: they differ from their neighbours by li
 last digit.
 """
 
+from decimal import Decimal
+
 import numpy as np
 import numpy.typing as npt
 
@@ -21,6 +23,8 @@ _FEWEST, _FEWEST_ROWS = 3, 10
 #: Rows before and after a run in which the last digit of its values is looked for, and how well
 #: they are multiples of it.
 _NEAR, _MULTIPLE = 10, 1e-3
+#: Most levels from which the last digit of a whole table is found.
+_LEVELS = 1000
 
 
 def repeated_rows(t_s: FloatArray, values: FloatArray) -> BoolArray:
@@ -62,8 +66,8 @@ def held_readings(values: FloatArray) -> BoolArray:
     Returns
     -------
     ndarray of bool, shape (n,)
-        Copies; the first of each run of equal values is none, and a long run at the largest value,
-        where a detector is saturated, has none.
+        Copies; the first of each run of equal values is none, and long runs at the largest or the
+        smallest value, the limits of a detector, have none.
 
     Examples
     --------
@@ -78,34 +82,47 @@ def held_readings(values: FloatArray) -> BoolArray:
     if len(values) < _FEWEST_ROWS or len(starts) < _FEWEST or len(starts) == len(values):
         return none
     lengths = np.diff(np.append(starts, len(values)))
-    level, highest = values[starts], values.max()
-    step = float(np.diff(np.unique(values)).min())
+    level = values[starts]
+    is_limit = (level == values.max()) | (level == values.min())
+    step = last_digit(np.unique(values)[:_LEVELS])
     away = np.append(np.inf, np.append(np.abs(np.diff(level)), np.inf))
     nearest = np.minimum(away[:-1], away[1:])
     # Zero is where the light is below the last digit, or no photon came.
     runs = (lengths > 1) & (level != 0) & (nearest >= _STEPS * step)
     for run in np.flatnonzero(runs):
         near = values[max(starts[run] - _NEAR, 0) : starts[run] + lengths[run] + _NEAR]
-        runs[run] = nearest[run] >= _STEPS * _last_digit(near, step)
-    below = runs & (level < highest)
+        runs[run] = nearest[run] >= _STEPS * last_digit(near)
+    below = runs & ~is_limit
     copies = int((lengths[below] - 1).sum())
     if copies < _FEWEST:
         return none
     if copies < _FRACTION * len(values):
         below &= lengths >= _RUN
-    # A run at the top is a copy, too, where it is as long as others, else a detector at its limit.
+    # Runs of the largest or smallest value are a detector's limits, unless they are like others.
     longest = lengths[below].max(initial=0)
-    rows = np.repeat(below | (runs & (level == highest) & (lengths <= longest)), lengths)
+    rows = np.repeat(below | (runs & is_limit & (lengths <= longest)), lengths)
     rows[starts] = False
     return rows
 
 
-def _last_digit(values: FloatArray, step: float) -> float:
-    """Return the step of which all values (n,) are multiples; `step` if there is none.
+def last_digit(values: FloatArray) -> float:
+    """Return the step of which all values (n,) are multiples.
 
-    It may be larger than that of the whole table: meters change their range, counters their width.
+    That of some neighbours may be larger than that of a whole table: meters change their range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.text_table.repeated_readings import last_digit
+    >>> last_digit(np.array([0.75, 1.0, 2.0])), last_digit(np.array([12.5, 13.1, 14.5]))
+    (0.25, 0.1)
     """
     levels = np.unique(values)
-    own = float(np.diff(levels).min(initial=np.inf))
-    multiples = levels / own
-    return own if np.all(np.abs(multiples - np.round(multiples)) < _MULTIPLE) else step
+    differences = np.diff(levels)
+    if len(differences):
+        own = float(differences.min())
+        multiples = levels / own
+        if np.all(np.abs(multiples - np.round(multiples)) < _MULTIPLE):
+            return own
+    exponents = [Decimal(repr(float(level))).normalize().as_tuple().exponent for level in levels]
+    return float(10.0 ** min(int(exponent) for exponent in exponents))
