@@ -19,6 +19,8 @@ Rows = npt.NDArray[np.intp]
 CLIPPED = "clipped"
 #: Lines that a message names.
 _NAMED = 4
+#: Ratio of long and short row spacings up to which rows are regular.
+_REGULAR = 1.5
 #: Fraction of the rows that share their time with the row before from which a clock is too coarse.
 _SHARED = 0.2
 
@@ -125,6 +127,8 @@ def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[str]
     warnings = []
     flags = list(series.flag)
     for limit, name in ((at_ceiling, "ceiling"), (at_floor, "floor")):
+        if name == "floor" and not _is_regular(series.t_s):
+            continue
         rows = order[limit(series.values[order, 0])]
         if not len(rows):
             continue
@@ -142,6 +146,15 @@ def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[str]
 def _is_course(t_s: npt.NDArray[np.float64]) -> bool:
     steps = np.diff(t_s)
     return bool(np.all(steps > 0) or np.all(steps < 0))
+
+
+def _is_regular(t_s: npt.NDArray[np.float64]) -> bool:
+    """Return whether rows follow each other in equal steps, but for a few.
+
+    Counts that were divided by widths of bins that grow are multiples of no step.
+    """
+    low, high = np.quantile(np.abs(np.diff(t_s)), (0.1, 0.9)) if len(t_s) > 1 else (0.0, 0.0)
+    return _is_course(t_s) and bool(high <= _REGULAR * low)
 
 
 def _of_order(series: Series, lines: Sequence[int]) -> list[str]:
@@ -166,7 +179,7 @@ def _of_order(series: Series, lines: Sequence[int]) -> list[str]:
 def _held(series: Series, own: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Return which rows, of those that are no repeated ones, hold the values of the row before."""
     held = np.zeros(len(own), dtype=np.bool_)
-    if _is_course(series.t_s[own]) and len(set(series.exposure_s)) == 1:
+    if _is_regular(series.t_s[own]) and len(set(series.exposure_s)) == 1:
         held[own] = np.all([held_readings(values) for values in series.values[own].T], axis=0)
     return held
 

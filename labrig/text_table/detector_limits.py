@@ -16,7 +16,7 @@ BoolArray = npt.NDArray[np.bool_]
 #: Photons that get rare go to zero from some counts at once.
 _STEPS_BELOW_CEILING, _STEPS_ABOVE_FLOOR = 10.0, 50.0
 #: Fewest equal values, and fraction of the values from the first to the last of them.
-_FEWEST_AT_CEILING, _FEWEST_AT_FLOOR, _FRACTION = 3, 5, 0.5
+_FEWEST_AT_CEILING, _FEWEST_AT_FLOOR, _FRACTION = 4, 5, 0.5
 #: Values beside those at the limit from which the last digit is found.
 _NEAR = 20
 
@@ -38,8 +38,8 @@ def at_ceiling(values: FloatArray) -> BoolArray:
     --------
     >>> import numpy as np
     >>> from labrig.text_table.detector_limits import at_ceiling
-    >>> at_ceiling(np.array([4095.0, 4095, 4094, 4095, 3702, 3333, 3010])).tolist()
-    [True, True, True, True, False, False, False]
+    >>> at_ceiling(np.array([4095.0, 4095, 4094, 4095, 4095, 3702, 3333])).tolist()
+    [True, True, True, True, True, False, False]
     """
     found = np.zeros(len(values), dtype=np.bool_)
     rows = np.flatnonzero(values == values.max())
@@ -92,4 +92,4 @@ def at_floor(values: FloatArray) -> BoolArray:
 def _step(values: FloatArray, first: int, end: int) -> float:
     """Return the last digit of the values beside those from `first` to `end`."""
     near = np.append(values[max(first - _NEAR, 0) : first], values[end : end + _NEAR])
-    return last_digit(near)
+    return last_digit(near, values[first])

@@ -23,8 +23,8 @@ _FEWEST, _FEWEST_ROWS = 3, 10
 #: Rows before and after a run in which the last digit of its values is looked for, and how well
 #: they are multiples of it.
 _NEAR, _MULTIPLE = 10, 1e-3
-#: Most levels from which the last digit of a whole table is found.
-_LEVELS = 1000
+#: Largest number of steps that neighbouring levels are apart, where all are multiples of one.
+_PARTS = 6
 
 
 def repeated_rows(t_s: FloatArray, values: FloatArray) -> BoolArray:
@@ -84,14 +84,13 @@ def held_readings(values: FloatArray) -> BoolArray:
     lengths = np.diff(np.append(starts, len(values)))
     level = values[starts]
     is_limit = (level == values.max()) | (level == values.min())
-    step = last_digit(np.unique(values)[:_LEVELS])
     away = np.append(np.inf, np.append(np.abs(np.diff(level)), np.inf))
     nearest = np.minimum(away[:-1], away[1:])
     # Zero is where the light is below the last digit, or no photon came.
-    runs = (lengths > 1) & (level != 0) & (nearest >= _STEPS * step)
+    runs = (lengths > 1) & (level != 0)
     for run in np.flatnonzero(runs):
         near = values[max(starts[run] - _NEAR, 0) : starts[run] + lengths[run] + _NEAR]
-        runs[run] = nearest[run] >= _STEPS * last_digit(near)
+        runs[run] = nearest[run] >= _STEPS * last_digit(near, level[run])
     below = runs & ~is_limit
     copies = int((lengths[below] - 1).sum())
     if copies < _FEWEST:
@@ -105,24 +104,42 @@ def held_readings(values: FloatArray) -> BoolArray:
     return rows
 
 
-def last_digit(values: FloatArray) -> float:
-    """Return the step of which all values (n,) are multiples.
+def last_digit(values: FloatArray, level: float) -> float:
+    """Return the step by which a value may differ from those around it.
 
-    That of some neighbours may be larger than that of a whole table: meters change their range.
+    That of some neighbours may be larger than that of a whole table: meters change their range, and
+    programs write a number of significant digits.
+
+    Parameters
+    ----------
+    values
+        Some values, shape (n,).
+    level
+        One of them.
 
     Examples
     --------
     >>> import numpy as np
     >>> from labrig.text_table.repeated_readings import last_digit
-    >>> last_digit(np.array([0.75, 1.0, 2.0])), last_digit(np.array([12.5, 13.1, 14.5]))
-    (0.25, 0.1)
+    >>> last_digit(np.array([0.75, 1.0, 2.0]), 1.0)
+    0.25
+    >>> last_digit(np.array([997.0, 999.0, 1010.0]), 1010.0)
+    10.0
     """
     levels = np.unique(values)
-    differences = np.diff(levels)
-    if len(differences):
-        own = float(differences.min())
-        multiples = levels / own
-        if np.all(np.abs(multiples - np.round(multiples)) < _MULTIPLE):
-            return own
-    exponents = [Decimal(repr(float(level))).normalize().as_tuple().exponent for level in levels]
-    return float(10.0 ** min(int(exponent) for exponent in exponents))
+    if len(levels) > 1:
+        least = float(np.diff(levels).min())
+        for part in range(1, _PARTS + 1):
+            multiples = levels * part / least
+            if np.all(np.abs(multiples - np.round(multiples)) < _MULTIPLE):
+                return max(least / part, _last_written(levels, level))
+    return _last_written(levels, level)
+
+
+def _last_written(levels: FloatArray, level: float) -> float:
+    """Return the last digit that is written of a level, by the number of digits of all levels."""
+    written = [Decimal(repr(float(value))).normalize().as_tuple() for value in levels]
+    digits = max(len(number.digits) for number in written)
+    last = min(int(number.exponent) for number in written)
+    order = Decimal(repr(float(level))).adjusted()
+    return float(10.0 ** max(last, order + 1 - digits))

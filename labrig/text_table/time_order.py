@@ -8,9 +8,9 @@ FloatArray = npt.NDArray[np.float64]
 #: Fraction of the rows from which rows whose time goes back are in no order at all.
 _NO_ORDER = 0.1
 #: Fraction of the light's fall by which it rises again where a decay is repeated.
-_RISE = 0.1
-#: Fraction of the first value by which the light has to have fallen to tell.
-_FALL = 0.3
+_RISE = 0.2
+#: Values of which means are taken, and by how many of their σ the light has to have fallen.
+_VALUES, _SIGMAS = 5, 10.0
 
 
 def backward_rows(t_s: FloatArray) -> npt.NDArray[np.intp]:
@@ -53,5 +53,10 @@ def light_goes_on(values: FloatArray, row: int) -> bool:
 
     So it does where a counter of the time ran over. A decay that is repeated begins at its height.
     """
-    first, before, after = values[0], values[row - 1], values[row]
-    return bool(first - before > _FALL * abs(first) and after - before < _RISE * (first - before))
+    parts = values[:_VALUES], values[max(row - _VALUES, 0) : row], values[row : row + _VALUES]
+    if min(map(len, parts)) < _VALUES:
+        return False
+    first, before, after = (float(np.mean(part)) for part in parts)
+    sigma = np.hypot(*(np.std(part, ddof=1) / np.sqrt(_VALUES) for part in parts[1:]))
+    fall = first - before
+    return bool(fall > _SIGMAS * sigma and after - before < _RISE * fall)
