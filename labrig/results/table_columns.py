@@ -9,56 +9,21 @@ from labrig.errors import UsageError
 from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
 from labrig.results.sigma_unit import sigma_scale
-from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block
-from labrig.text_table.clock_reading import parse_clock
-from labrig.text_table.clock_times import is_clock_form
+from labrig.results.table_layout import TableLayout
+from labrig.results.time_axis import TimeAxis, find_time_axis
+from labrig.text_table import EXPECTED, Block
+from labrig.text_table.header import is_axis_line
 from labrig.text_table.names import (
-    ABSCISSAS,
+    is_channel,
     is_row_number,
     is_sigma,
     is_time,
     sigma_of,
-    split_time,
     split_unit,
-    time_unit_s,
 )
 from labrig.text_table.value_units import LogScale, is_absorbance, log_scale
 
 _EXPOSURES = frozenset({EXPOSURE, "exposure"})
-#: Names of a column with the dates of a clock beside it.
-_DATES = frozenset({"date", "datum", "day", "tag", "jour", "fecha", "data"})
-
-
-@dataclass(frozen=True)
-class TableLayout:
-    """Answers to what a table itself may leave open; None finds the answer in the table.
-
-    Attributes
-    ----------
-    time
-        Name of the column of times.
-    column
-        Name of the column of values.
-    time_unit
-        Unit of the times, such as `ms`, or the form of a clock, such as `hh:mm` or `dd/mm/yyyy`.
-    decimal
-        Decimal mark of the numbers, `point` or `comma`.
-    """
-
-    time: str | None = None
-    column: str | None = None
-    time_unit: str | None = None
-    decimal: str | None = None
-
-    def __post_init__(self) -> None:
-        unit = self.time_unit
-        if unit is not None and time_unit_s(unit) is None and not is_clock_form(unit):
-            raise UsageError(
-                "--time-unit: expected a unit such as ns, ms, s, min or h, or the form of a clock "
-                f"such as hh:mm or dd/mm/yyyy, got '{unit}'"
-            )
-        if self.decimal is not None and self.decimal not in DECIMAL_MARKS:
-            raise UsageError(f"--decimal: expected 'point' or 'comma', got '{self.decimal}'")
 
 
 @dataclass(frozen=True)
@@ -98,8 +63,10 @@ class Columns:
 
     Attributes
     ----------
-    time, unit_s
-        Column of times and its unit in seconds.
+    names
+        Names of the columns; their numbers without names.
+    time
+        Where the times come from.
     exposure
         Column of exposures; None without one.
     channels
@@ -108,32 +75,20 @@ class Columns:
         Columns of series.csv that are no channels, by name.
     value_unit
         Unit of the values; empty if unknown.
-    date
-        Column of the dates of a clock; None without one.
-    clock_hint
-        What header and user say of the form of a clock.
     """
 
-    time: int
-    unit_s: float
+    names: tuple[str, ...]
+    time: TimeAxis
     exposure: int | None
     channels: tuple[Channel, ...]
     reserved: dict[str, int]
     value_unit: str
-    date: int | None = None
-    clock_hint: str = ""
 
-    def describe(self, names: Sequence[str], clock: str = "") -> str:
-        """Return in words which columns are times, values and σ, by name or else by number.
-
-        `clock` says how a clock was understood.
-        """
+    def __str__(self) -> str:
+        """Return in words which columns are times, values and σ, and the unit of the times."""
 
         def text(columns: Sequence[int]) -> str:
-            return ", ".join(
-                " ".join(names[column].split()) if names else f"column {column + 1}"
-                for column in columns
-            )
+            return ", ".join(" ".join(self.names[column].split()) for column in columns)
 
         sigmas = [channel.sigma for channel in self.channels if channel.sigma is not None]
         values = ", ".join(
@@ -142,23 +97,33 @@ class Columns:
             + (", an absorbance: fitted as it stands" if is_absorbance(channel.name) else "")
             for channel in self.channels
         )
-        times = [self.time] if self.date is None else [self.date, self.time]
-        time = text(times) + (f": {clock}" if clock else "")
         sigma = f"σ {text(sigmas)}" if sigmas else "no σ"
-        return f"time {time}; values {values}; {sigma}"
+        of_time = [column for column in (self.time.date, self.time.column) if column is not None]
+        time = text(of_time) or "row number"
+        return f"time {time} ({self.time.source}); values {values}; {sigma}"
 
 
 def find_columns(table: Block, layout: TableLayout) -> Columns:
     """Return the roles of the columns by their names and the user's answers."""
     names = column_names(table)
-    in_use = [column for column in range(len(names)) if not _is_idle(table, names, column, layout)]
-    time, unit_s, clock_hint = _time(table, names, in_use, layout)
-    date = _date(table, names, time)
+    filled = [column for column in range(len(names)) if not _is_empty(table, names, column, layout)]
+    time = find_time_axis(table, names, filled, layout)
+    if time.column is None and not table.names and len(names) > 1:
+        names = tuple(str(column + 1) for column in range(len(names)))
+    in_use = [
+        column
+        for column in filled
+        if column == time.column
+        or names[column] == layout.column
+        or not _numbers_the_rows(table, names[column], column)
+    ]
     lower = {column: names[column].lower() for column in in_use}
     exposure = _only_match(names, [column for column in in_use if lower[column] in _EXPOSURES])
     reserved = {names[column]: column for column in in_use if names[column] in RESERVED}
     values = [
-        column for column in in_use if column not in {time, date, exposure} | set(reserved.values())
+        column
+        for column in in_use
+        if column not in {time.column, time.date, exposure} | set(reserved.values())
     ]
     if layout.column is not None and layout.column not in [names[column] for column in values]:
         raise UsageError(
@@ -173,6 +138,12 @@ def find_columns(table: Block, layout: TableLayout) -> Columns:
     ]
     if not signals:
         raise UsageError(f"{EXPECTED}, got {', '.join(names)}; a column of values is missing")
+    if len(signals) > 1 and (time.column is None or is_axis_line(table.names_line)):
+        listed = ", ".join(names[column] for column in signals)
+        raise UsageError(
+            f"expected one curve, got {len(signals)} in one memory or file: {listed}; choose one "
+            "with '--column NAME'"
+        )
     scales = {column: log_scale(names[column], _below(table, column)) for column in signals}
     channels = tuple(
         Channel(
@@ -188,7 +159,8 @@ def find_columns(table: Block, layout: TableLayout) -> Columns:
         scale.unit if scale else _unit(table, names, column) for column, scale in scales.items()
     }
     value_unit = value_units.pop() if len(value_units) == 1 else ""
-    return Columns(time, unit_s, exposure, channels, reserved, value_unit, date, clock_hint)
+    shown = names if table.names else [f"column {number + 1}" for number in range(len(names))]
+    return Columns(tuple(shown), time, exposure, channels, reserved, value_unit)
 
 
 def column_names(table: Block) -> tuple[str, ...]:
@@ -197,17 +169,14 @@ def column_names(table: Block) -> tuple[str, ...]:
         return table.names
     width = len(table.rows[0])
     if width == 1:
-        raise UsageError(
-            f"{EXPECTED}, got 1 column without names; put a column with the time of each row "
-            "before it"
-        )
+        return ("value",)
     if width <= 3:
         return (TIME, "value", "sigma")[:width]
     return (TIME, *(str(number) for number in range(2, width + 1)))
 
 
-def _is_idle(table: Block, names: Sequence[str], column: int, layout: TableLayout) -> bool:
-    """Return whether a column has no part in a series: settings, texts or the rows' numbers."""
+def _is_empty(table: Block, names: Sequence[str], column: int, layout: TableLayout) -> bool:
+    """Return whether a column has no part in a series: settings or texts."""
     name = names[column]
     if name in RESERVED or name in (layout.time, layout.column):
         return False
@@ -215,73 +184,14 @@ def _is_idle(table: Block, names: Sequence[str], column: int, layout: TableLayou
     if not any(cells[1:]) and (len(cells) > 1 or not cells[0]):
         return not name.endswith(SIGMA_SUFFIX) and not is_sigma(name)
     numbers = [table.number(cell) for cell in cells if cell]
-    if all(number is None for number in numbers):
-        return not is_time(name) and len(cells) > 1
-    if is_row_number(name) and None not in numbers:
-        return bool(np.all(np.diff(np.array(numbers, dtype=np.float64)) == 1))
-    return False
+    return all(number is None for number in numbers) and not is_time(name) and len(cells) > 1
 
 
-def _time(
-    table: Block, names: Sequence[str], in_use: Sequence[int], layout: TableLayout
-) -> tuple[int, float, str]:
-    """Return the column of times, its unit in seconds, and what is said of a clock's form."""
-    if layout.time is not None:
-        matches = [column for column in in_use if names[column] == layout.time]
-        if not matches:
-            raise UsageError(
-                f"--time: expected one of {', '.join(names[column] for column in in_use)}, got "
-                f"'{layout.time}'"
-            )
-    else:
-        matches = [column for column in in_use if is_time(names[column])] or [
-            column for column in in_use if split_unit(names[column])[0].lower() in ABSCISSAS
-        ]
-    matches = matches or _clocks(table)
-    if not matches:
-        raise UsageError(
-            f"{EXPECTED}, got {', '.join(names)}; if one of them is the time, name it: "
-            "'--time NAME'"
-        )
-    if len(matches) > 1:
-        several = ", ".join(names[column] for column in matches)
-        raise UsageError(f"expected one of the columns {several}, got several; say '--time NAME'")
-    (column,) = matches
-    unit = (split_time(names[column]) or split_unit(names[column]))[1]
-    if table.units and not unit:
-        unit = table.units[column] if column < len(table.units) else ""
-    unit = layout.time_unit or unit
-    if parse_clock(table.rows[0][column]) is not None:
-        return column, 1.0, layout.time_unit or f"{names[column]} {unit}"
-    unit_s = time_unit_s(unit or "s")
-    if unit_s is None:
-        raise UsageError(
-            f"expected a unit of time for '{names[column]}', got '{unit}'; say '--time-unit s', or "
-            "which it is"
-        )
-    return column, unit_s, ""
-
-
-def _clocks(table: Block) -> list[int]:
-    """Return the columns that hold clocks, or those with dates if none does."""
-    readings = [parse_clock(cell) for cell in table.rows[0]]
-    clocks = [column for column, reading in enumerate(readings) if reading and reading.parts]
-    return clocks or [column for column, reading in enumerate(readings) if reading]
-
-
-def _date(table: Block, names: Sequence[str], time: int) -> int | None:
-    """Return the column with the dates of a clock that shows none itself."""
-    clock = parse_clock(table.rows[0][time])
-    if clock is None or clock.date or not clock.parts:
-        return None
-    dates = [
-        column
-        for column, name in enumerate(names)
-        if split_unit(name)[0].lower() in _DATES
-        and (both := parse_clock(f"{table.rows[0][column]} {table.rows[0][time]}")) is not None
-        and both.date
-    ]
-    return _only_match(names, dates)
+def _numbers_the_rows(table: Block, name: str, column: int) -> bool:
+    numbers = [table.number(row[column]) for row in table.rows]
+    if not (is_row_number(name) or is_channel(name)) or None in numbers:
+        return False
+    return bool(np.all(np.diff(np.array(numbers, dtype=np.float64)) == 1))
 
 
 def _sigmas(names: Sequence[str], values: Sequence[int], layout: TableLayout) -> dict[int, int]:
