@@ -17,9 +17,9 @@ BoolArray = npt.NDArray[np.bool_]
 #: Differences to the neighbours, in steps of the last digit, from which equal values are no chance.
 _STEPS = 10.0
 #: Fraction of the rows that are copies, and length of a run of equal values, from which they are.
-_FRACTION, _RUN = 0.15, 4
+_FRACTION, _RUN = 0.15, 5
 #: Fewest copies, and fewest rows that tell them.
-_FEWEST, _FEWEST_ROWS = 3, 10
+_FEWEST, _FEWEST_ROWS = 4, 10
 #: Rows before and after a run in which the last digit of its values is looked for, and how well
 #: they are multiples of it.
 _NEAR, _MULTIPLE = 10, 1e-3
