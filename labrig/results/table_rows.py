@@ -90,7 +90,7 @@ def independent_rows(
     warnings = _of_order(series, lines)
     repeated = repeated_rows(series.t_s, series.values)
     if repeated.any():
-        which = [lines[row] for row in np.flatnonzero(repeated)]
+        which = [lines[row] for row in np.flatnonzero(repeated).tolist()]
         warnings.append(
             f"{_lines(which)}: the row before once more, with its time and value; "
             f"{_rows(len(which))} left out"
@@ -103,7 +103,7 @@ def independent_rows(
         )
     held = _held(series, ~repeated)
     if held.any():
-        which = [lines[row] for row in np.flatnonzero(held)]
+        which = [lines[row] for row in np.flatnonzero(held).tolist()]
         warnings.append(
             f"{_lines(which)}: equal to the row before though neighbours differ, as a logger "
             f"writes that is faster than its meter; {_rows(len(which))} left out"
@@ -133,12 +133,12 @@ def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[str]
         if not len(rows):
             continue
         warnings.append(
-            f"{_lines([lines[row] for row in np.sort(rows)])}: equal, "
+            f"{_lines([lines[row] for row in np.sort(rows).tolist()])}: equal, "
             f"{series.values[rows[0], 0]:.6g}, and far from the values beside: the detector was "
             f"{'saturated' if name == 'ceiling' else 'at its lowest value'}; {_rows(len(rows))} "
             "left out"
         )
-        for row in rows:
+        for row in rows.tolist():
             flags[row] = add_flag(flags[row], CLIPPED)
     return replace(series, flag=tuple(flags)), warnings
 
@@ -160,7 +160,7 @@ def _is_regular(t_s: npt.NDArray[np.float64]) -> bool:
 def _of_order(series: Series, lines: Sequence[int]) -> list[str]:
     """Return what is to be said of times that go back."""
     warnings = []
-    for row in backward_rows(series.t_s):
+    for row in backward_rows(series.t_s).tolist():
         before, after = (f"{series.t_s[index]:.6g} s" for index in (row - 1, row))
         if not starts_again(series.t_s, row):
             warnings.append(
