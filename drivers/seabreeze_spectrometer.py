@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict
 from labrig import resources
 from labrig.acquire import Connections, Finding, require_integration
 from labrig.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
+from labrig.named_files import ShippedOrFile
 from labrig.optics import SpectrometerReading, Spectrum, read_spectrum
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ class SeabreezeSpectrometer:
 
         model_config = ConfigDict(frozen=True, extra="forbid")
 
-        calibration: str | None = None
+        calibration: ShippedOrFile | None = None
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         _require_seabreeze()

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 
+from labrig.readable_output import make_streams_readable
 from labrig.signals import STOP_SIGNALS, end_at_once
 
 # The matrices here are small: threads of the linear algebra would only wait for one another, six
@@ -15,6 +16,7 @@ def main() -> None:
     """Run the command line; every ending has its exit code and at most one line of error."""
     for signum in STOP_SIGNALS:
         signal.signal(signum, end_at_once)
+    make_streams_readable()
     from labrig.cli import guarded
 
     sys.exit(guarded(sys.argv[1:]))

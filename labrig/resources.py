@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 from labrig.errors import UsageError
+from labrig.named_files import is_path
 from labrig.yaml_file import did_you_mean
 
 _PACKAGE = Path(__file__).parent
@@ -59,9 +60,8 @@ def curve_path(named: str) -> Path:
     named
         Name of a shipped table, such as `grey_card_18`, or path of a file.
     """
-    path = Path(named)
-    if path.suffix or len(path.parts) > 1:
-        return path
+    if is_path(named):
+        return Path(named)
     return folder("config/optics") / f"{named}.csv"
 
 

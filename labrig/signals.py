@@ -19,11 +19,12 @@ _OTHERS = {
     *("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL"),
 }
 #: Signals that end labrig, with the exit code 128 + number: Ctrl-C, SIGTERM, a closed terminal, a
-#: limit of the system. Signals that were ignored at the start (`nohup`) stay ignored.
+#: limit of the system. Signals that were ignored at the start (`nohup`, a job in the background of
+#: a script) stay ignored, but for SIGTERM: something has to be left that ends labrig safely.
 STOP_SIGNALS = [
     signum
     for signum in sorted(signal.valid_signals() - {getattr(signal, n, 0) for n in _OTHERS})
-    if signal.getsignal(signum) != signal.SIG_IGN
+    if signum == signal.SIGTERM or signal.getsignal(signum) != signal.SIG_IGN
 ]
 #: Signal of Ctrl-Z, None on Windows.
 PAUSE_SIGNAL = getattr(signal, "SIGTSTP", None)

@@ -12,6 +12,7 @@ from labrig.acquire import CalibrationRules, RigFile, Session
 from labrig.calibration import REFERENCE_KIND, CardPicture, ReferenceFile
 from labrig.errors import DataError, UsageError
 from labrig.fit.lvf import compare_card_pictures, place_means
+from labrig.named_files import FilePath
 from labrig.quantity import Count, DurationS
 from labrig.record import FrameRecord
 from labrig.reduce import find_strip, read_hdr_frame, strip_profile
@@ -50,7 +51,7 @@ class CalibrationCheck(ScenesProtocol):
     """
 
     protocol: Literal["calibration_check"] = "calibration_check"
-    reference: str | None = None
+    reference: FilePath | None = None
     rules: CalibrationRules | None = None
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)

@@ -32,6 +32,7 @@ from labrig.acquire import (
 from labrig.bench_optics import card_radiance, illuminance_lx, luminance
 from labrig.errors import UsageError
 from labrig.material import read_material
+from labrig.named_files import ShippedOrFile, is_path
 from labrig.optics import read_spectrum
 from labrig.quantity import DurationS, duration_text
 from labrig.record import FrameRecord, FrameRole
@@ -293,7 +294,7 @@ class Luminance(ProtocolModel):
     camera: CameraSettings = CameraSettings(iso=100)
     iso_at_most: Iso = 1600
     card: Literal["auto", "before", "after"] = "auto"
-    emission: str | None = None
+    emission: ShippedOrFile | None = None
     colours: str = ""
     rank: Class | None = Field(None, alias="class")
     require: tuple[Annotated[str, AfterValidator(_is_requirement)], ...] = ()
@@ -401,14 +402,15 @@ class Luminance(ProtocolModel):
 def _require_emission(named: str) -> None:
     """Refuse an emission that the analysis could not read, hours later."""
     path = Path(named)
-    if path.is_dir() and not (path / "result" / "result.json").is_file():
+    is_run = is_path(named) and path.is_dir()
+    if is_run and not (path / "result" / "result.json").is_file():
         raise UsageError(
             f"emission: {named}: expected a run of emission_spectrum with a result; make it with: "
             f"labrig process {named}"
         )
     if path.suffix in TABLES:
         read_spectrum(path)
-    elif not path.is_dir():
+    elif not is_run:
         read_material(named)
 
 

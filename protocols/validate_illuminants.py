@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import ProtocolModel, Unit
+from labrig.named_files import FilePath, ShippedOrFile
 from labrig.quantity import Count, DurationS
 
 from .steps.camera_settings import CameraSettings
@@ -69,7 +70,7 @@ class ValidateIlluminants(ProtocolModel):
     protocol: Literal["validate_illuminants"] = "validate_illuminants"
     lamps: Annotated[LampNames, Field(min_length=1)] = LAMP_NAMES
     patches: Patches = Field({"sample": (0.4, 0.4, 0.2, 0.2)}, min_length=1)
-    fluorescence: str | dict[str, str] | None = None
+    fluorescence: FilePath | dict[str, ShippedOrFile] | None = None
     balance: str | None = None
     chart: bool = False
     camera: CameraSettings = CameraSettings(iso=100)

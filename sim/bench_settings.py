@@ -4,6 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labrig.named_files import FilePath
 from labrig.quantity import DurationS, Fraction
 from labrig.region import Region
 
@@ -86,7 +87,7 @@ class LedSettings(Part):
     centre: Nanometres
     fwhm: Annotated[float, Field(ge=5, le=200)] = 25.0
     asymmetry: Annotated[float, Field(ge=0.2, le=5)] = 1.0
-    spectrum: str | None = None
+    spectrum: FilePath | None = None
     level: Annotated[Fraction, Field(gt=0)] = 0.1
     droop: Annotated[Fraction, Field(ge=0, lt=1)] = 0.0
     shift_nm: Annotated[float, Field(ge=-20, le=20)] = 0.0

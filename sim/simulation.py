@@ -12,6 +12,7 @@ from pydantic import (
     model_validator,
 )
 
+from labrig.named_files import FilePath, NamesFile, ShippedOrFile
 from labrig.quantity import DurationS, Fraction
 from labrig.region import Region
 
@@ -83,7 +84,7 @@ class Patch(Part):
         in the colour of its glow, for example `5 %`; elsewhere in proportion to its excitation.
     """
 
-    material: str
+    material: ShippedOrFile
     region: Region = MIDDLE
     brightness: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     shape: Literal["flat", "sphere"] = "flat"
@@ -100,6 +101,7 @@ def _alone(sample: Any) -> Any:
 Patches = Annotated[
     tuple[Patch, ...],
     BeforeValidator(_alone, json_schema_input_type=str | tuple[Patch, ...]),
+    NamesFile(or_shipped=True),
 ]
 
 
@@ -181,7 +183,7 @@ class SensorSettings(Part):
     black_wander_dn: Annotated[float, Field(ge=0, le=100)] = 0.0
     black_wander_over: Annotated[DurationS, Field(gt=0)] = 600.0
     nonlinearity: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
-    curves: str | None = None
+    curves: ShippedOrFile | None = None
 
 
 class LampSettings(Part):
@@ -379,7 +381,7 @@ class Simulation(Part):
     servo: ServoBoardSettings = ServoBoardSettings()
     lcus: Answers = "nothing"
     lvf: LvfSettings | None = None
-    filters: str | None = None
+    filters: FilePath | None = None
     filter_wheel: FilterWheelSettings | None = None
     camera_filter_wheel: FilterWheelSettings | None = None
     monochromator: MonochromatorSettings | None = None

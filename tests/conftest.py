@@ -30,8 +30,16 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
+# A job in the background of a script ignores Ctrl-C, and so would labrig and all that tests start;
+# has to be said before labrig looks at it.
+for _name in ("SIGINT", "SIGQUIT", "SIGHUP"):
+    _signum = getattr(signal, _name, None)
+    if _signum is not None and signal.getsignal(_signum) == signal.SIG_IGN:
+        signal.signal(_signum, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
+
 from labrig.signals import STOP_SIGNALS
 from tests.quick_yaml import read_quickly, write_quickly
+from tests.real_data import REAL, SHARED
 
 # Tests write thousands of files, which some disks take longer to delete than to write:
 # where the memory is a file system that runs programs, too, they are there.
@@ -54,7 +62,6 @@ if TYPE_CHECKING:
 
 # As Python sets it, the collector takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 10, 10)
-SHARED = Path(__file__).parents[2] / "shared" / "data"
 SYNC = os.fsync
 HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
@@ -97,8 +104,19 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests with a browser come first, so that one worker starts it and not each."""
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what needs shared data, leave campaigns to whom asks for them, put browsers first.
+
+    A browser is then started by one worker and not by each.
+    """
+    for item in items:
+        if "shared_data" in getattr(item, "fixturenames", ()):
+            item.add_marker("shared_data")
+    if "campaign" not in config.option.markexpr:
+        campaigns = [item for item in items if item.get_closest_marker("campaign")]
+        config.hook.pytest_deselected(items=campaigns)
+        items[:] = [item for item in items if item not in set(campaigns)]
     items.sort(key=lambda item: "chromium" not in getattr(item, "fixturenames", ()))
 
 
@@ -108,8 +126,17 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 @pytest.fixture(scope="session")
+def real_data() -> Path:
+    """Real measured data of the repository."""
+    return REAL
+
+
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Real measured data beside the checkout."""
+    """Real measured data that may not be copied; its tests have the marker of the same name.
+
+    Nothing else is skipped for want of data.
+    """
     if not SHARED.is_dir():
         pytest.skip(f"needs the real measured data in {SHARED}")
     return SHARED

@@ -18,7 +18,6 @@ ENDING = "HUP INT QUIT ABRT USR1 USR2 ALRM TERM XCPU VTALRM PROF IO PWR SYS TRAP
 
 def test_every_signal_that_would_end_the_process_is_answered_at_a_wait() -> None:
     known = {getattr(signal, f"SIG{name}", signal.SIGTERM) for name in ENDING.split()}
-    # Under nohup SIGHUP is ignored, and stays so.
     assert {each for each in known if signal.getsignal(each) != signal.SIG_IGN} <= set(STOP_SIGNALS)
     for signum in STOP_SIGNALS:
         clock = VirtualClock()
@@ -50,13 +49,25 @@ def python(text: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False)
 
 
-def test_what_was_ignored_before_labrig_began_stays_so() -> None:
+def test_what_was_ignored_before_labrig_began_stays_so_but_sigterm_ends_it() -> None:
+    """As of a job in the background of a script; the first library imported sends the signals."""
     ended = python(
-        "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "from labrig.signals import STOP_SIGNALS\n"
-        "assert signal.SIGTERM in STOP_SIGNALS and signal.SIGHUP not in STOP_SIGNALS"
+        "import os, signal, sys\n"
+        "ignored = signal.SIGINT, signal.SIGHUP, signal.SIGTERM\n"
+        "for signum in ignored:\n"
+        "    signal.signal(signum, signal.SIG_IGN)\n"
+        "class Sending:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'typer':\n"
+        "            for signum in ignored:\n"
+        "                print(signum.name, flush=True)\n"
+        "                os.kill(os.getpid(), signum)\n"
+        "from labrig.__main__ import main\n"
+        "sys.meta_path.insert(0, Sending())\n"
+        "main()"
     )
-    assert ended.returncode == 0, ended.stderr
+    assert ended.returncode == 128 + signal.SIGTERM
+    assert ended.stdout.split() == ["SIGINT", "SIGHUP", "SIGTERM"]
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])

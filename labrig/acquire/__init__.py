@@ -5,6 +5,7 @@ from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManu
 from labrig.acquire.calibration_rules import CalibrationRules
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.loading import (
+    changes_with_absolute_paths,
     driver_and_settings,
     illuminant_lights,
     led_lights,
@@ -22,7 +23,6 @@ from labrig.acquire.rig_file import (
     Optics,
     RigFile,
     read_rig_file,
-    with_absolute_paths,
 )
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
 from labrig.acquire.roles.role import Finding, Severity
@@ -70,6 +70,7 @@ __all__ = [
     "UndoManualStep",
     "Unit",
     "at",
+    "changes_with_absolute_paths",
     "driver_and_settings",
     "frame_bytes",
     "illuminant_lights",
@@ -83,6 +84,5 @@ __all__ = [
     "read_rig_file",
     "run_units",
     "shutter_text",
-    "with_absolute_paths",
 ]
 __all__ += roles.__all__

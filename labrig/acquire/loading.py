@@ -5,10 +5,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from pydantic import BaseModel
+
 from labrig.acquire.protocol import ProtocolModel
-from labrig.acquire.rig_file import RigFile, with_absolute_paths
+from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import ILLUMINANTS, LEDS, ROLES, Illuminant, LedLight
 from labrig.errors import UsageError
+from labrig.named_files import with_absolute_paths
 from labrig.plugins import DRIVERS, PROTOCOLS, load, names
 from labrig.yaml_file import read_yaml, validate
 
@@ -169,14 +172,16 @@ def read_protocol(
 ) -> ProtocolModel:
     """Read a protocol file and validate it with the model that its key `protocol` names.
 
-    Files and folders that it names relative to its own folder have absolute paths in the result.
+    Paths of files and folders that it names are relative to its own folder, and absolute in the
+    result.
 
     Parameters
     ----------
     path
         Protocol file in YAML.
     changes
-        Values of keys instead of those in the file, by dotted keys such as `sample.name`.
+        Values of keys instead of those in the file, by dotted keys such as `sample.name`; paths
+        among them are relative to the working folder.
 
     Returns
     -------
@@ -198,16 +203,63 @@ def read_protocol(
     ['dark', 'meter', 'decay-1']
     """
     path = Path(path)
-    content = with_absolute_paths(read_yaml(path), path.resolve().parent)
-    for key, value in changes.items():
+    content = read_yaml(path)
+    model = _model(content, str(path))
+    content = with_absolute_paths(content, model, path.resolve().parent)
+    for key, value in changes_with_absolute_paths(changes, model, Path.cwd()).items():
         _change(content, key, value, str(path))
+    return validate(content, _model(content, str(path)), str(path))
+
+
+def _model(content: Mapping[str, Any], source: str) -> type[ProtocolModel]:
     kind = content.get("protocol")
     if not isinstance(kind, str):
         raise UsageError(
-            f"{path}: the key 'protocol' must name one of: {', '.join(names(PROTOCOLS))}"
+            f"{source}: the key 'protocol' must name one of: {', '.join(names(PROTOCOLS))}"
         )
-    model: type[ProtocolModel] = load(PROTOCOLS, kind, str(path))
-    return validate(content, model, str(path))
+    model: type[ProtocolModel] = load(PROTOCOLS, kind, source)
+    return model
+
+
+def changes_with_absolute_paths(
+    changes: Mapping[str, Any], model: type[BaseModel], folder: Path
+) -> dict[str, Any]:
+    """Return changes of a protocol with absolute paths where its model has a path.
+
+    Parameters
+    ----------
+    changes
+        Values by dotted keys such as `sample.name`.
+    model
+        Model of the protocol.
+    folder
+        Folder to which paths among the values are relative.
+
+    Returns
+    -------
+    dict of str to object
+        The changes with absolute paths.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.acquire import changes_with_absolute_paths
+    >>> from labrig.protocols.luminance import Luminance
+    >>> typed = {"emission": "green.csv", "sample.name": "batch.a"}
+    >>> changes_with_absolute_paths(typed, Luminance, Path("/lab"))
+    {'emission': '/lab/green.csv', 'sample.name': 'batch.a'}
+    """
+    absolute = {}
+    for key, value in changes.items():
+        *outer, last = key.split(".")
+        content: dict[str, Any] = {last: value}
+        for name in reversed(outer):
+            content = {name: content}
+        content = with_absolute_paths(content, model, folder)
+        for name in outer:
+            content = content[name]
+        absolute[key] = content[last]
+    return absolute
 
 
 def _change(content: dict[str, Any], key: str, value: Any, source: str) -> None:

@@ -6,6 +6,7 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labrig.named_files import ShippedOrFile
 from labrig.quantity import Fraction
 
 #: Units of readings, each with the place at which it is taken.
@@ -46,7 +47,7 @@ class LuminanceReading(BaseModel):
     sigma: Fraction = Field(gt=0, lt=1)
     at: Literal["sample plane", "card"]
     lamp: LampType | None = None
-    spectrum: str | None = None
+    spectrum: ShippedOrFile | None = None
     f1_prime: Fraction | None = Field(None, ge=0, lt=1)
 
     @model_validator(mode="after")

@@ -1,6 +1,5 @@
 """The rig file: driver, address and warm-up time of each device, and the optics of the bench."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -13,6 +12,8 @@ from labrig.acquire.luminance_reading import LuminanceReading
 from labrig.acquire.roles import ROLES
 from labrig.calibration import CalibrationKind, kinds
 from labrig.errors import UsageError
+from labrig.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
+from labrig.plugins import DRIVERS, load
 from labrig.quantity import DurationS
 from labrig.yaml_file import did_you_mean, read_yaml, validate
 
@@ -71,7 +72,7 @@ def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
     """Return the model with a key for each kind of calibration."""
     keys: dict[str, Any] = {
         kind.optics_key: (
-            str | None,
+            FilePath | None,
             Field(
                 None, description=f"Result of {kind.protocol}: its file, or the folder of its run."
             ),
@@ -152,14 +153,14 @@ class Optics(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    camera: str | None = None
-    lamp: str | None = None
-    grey_card: str | None = None
-    filters: str | None = None
+    camera: ShippedOrFile | None = None
+    lamp: ShippedOrFile | None = None
+    grey_card: ShippedOrFile | None = None
+    filters: FilePath | None = None
     geometry: Annotated[str, Field(pattern=r"^\d{1,2}/\d{1,2}$")] | None = None
-    lens: str | None = None
+    lens: ShippedOrFile | None = None
     polarisers: Literal["crossed"] | None = None
-    polariser: str | None = None
+    polariser: FilePath | None = None
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
@@ -195,8 +196,8 @@ class Optics(BaseModel):
         polarised = () if self.polarisers is None else ("crossed polarisers",)
         return ", ".join((*angles, *polarised))
 
-    emission_library: str | None = None
-    direct: str | None = None
+    emission_library: FilePath | None = None
+    direct: FilePath | None = None
     luminance: LuminanceReading | None = None
 
     def filter_files(self) -> dict[str, Path]:
@@ -263,8 +264,8 @@ class RigFile(BaseModel):
 def read_rig_file(path: str | Path) -> RigFile:
     """Read and validate a rig file, except the keys that belong to its drivers.
 
-    Files that it names relative to its own folder have absolute paths in the result, so that the
-    result can be written elsewhere.
+    Paths of files that it names are relative to its own folder, and absolute in the result, so that
+    this can be written elsewhere; those of a simulated room are the bench's business.
 
     Parameters
     ----------
@@ -291,7 +292,12 @@ def read_rig_file(path: str | Path) -> RigFile:
     ('numato_relay', 'canon_eos_5d_mark_ii')
     """
     path = Path(path)
-    content = with_absolute_paths(read_yaml(path), path.resolve().parent)
+    folder = path.resolve().parent
+    content = with_absolute_paths(read_yaml(path), RigFile, folder)
+    if isinstance(devices := content.get("devices"), dict):
+        content["devices"] = {
+            key: _device_with_absolute_paths(entry, folder) for key, entry in devices.items()
+        }
     rig = validate(content, RigFile, str(path))
     for key in rig.devices:
         if key not in ROLES:
@@ -301,37 +307,23 @@ def read_rig_file(path: str | Path) -> RigFile:
     return rig
 
 
-def with_absolute_paths(value: Any, folder: Path) -> Any:
-    """Return the content of a YAML file in which paths of files beside it are absolute.
+def _device_with_absolute_paths(entry: Any, folder: Path) -> Any:
+    """Return a device's keys with absolute paths where its driver's settings name files."""
+    if not isinstance(entry, dict) or not isinstance(name := entry.get("driver"), str):
+        return entry
+    keys = {key: value for key, value in entry.items() if key not in DeviceEntry.model_fields}
+    if not _has_path(keys):
+        return entry  # nor is its driver needed yet
+    try:
+        driver = load(DRIVERS, name, "")
+    except UsageError:  # told where it is needed
+        return entry
+    return entry | with_absolute_paths(keys, driver.Settings, folder)
 
-    Parameters
-    ----------
-    value
-        Content, or a part of it.
-    folder
-        Folder of the file.
 
-    Returns
-    -------
-    object
-        The same with absolute paths of what is there; a bare word is a shipped name and is left.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.acquire import with_absolute_paths
-    >>> with_absolute_paths({"camera": "sim"}, Path.cwd())
-    {'camera': 'sim'}
-    """
+def _has_path(value: Any) -> bool:
     if isinstance(value, dict):
-        return {key: with_absolute_paths(inner, folder) for key, inner in value.items()}
+        return any(map(_has_path, value.values()))
     if isinstance(value, list):
-        return [with_absolute_paths(inner, folder) for inner in value]
-    if isinstance(value, str) and _looks_like_a_path(value) and (folder / value).exists():
-        return str(folder / value)
-    return value
-
-
-def _looks_like_a_path(value: str) -> bool:
-    """Whether `value` is a path; a bare word is a shipped name, whatever files exist."""
-    return bool(Path(value).suffix) or "/" in value or os.sep in value
+        return any(map(_has_path, value))
+    return isinstance(value, str) and is_path(value)

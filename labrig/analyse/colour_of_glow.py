@@ -22,6 +22,7 @@ from labrig.fit.spectrum import (
     fit_spectrum,
 )
 from labrig.material import Material, read_material
+from labrig.named_files import is_path
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -134,7 +135,7 @@ def emission_of(part: Part, name: str) -> Emission | None:
     named = part.protocol.emission
     if named is None and measured is None:
         return None
-    if named is not None and Path(named).is_dir():
+    if named is not None and is_path(named) and Path(named).is_dir():
         result = read_result(Path(named))
         if not isinstance(result, EmissionSpectrumResult):
             raise UsageError(

@@ -9,6 +9,7 @@ from typing import Any, Self, get_args
 from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
 from labrig.errors import UsageError
 from labrig.material import MAX_ORDER
+from labrig.named_files import with_absolute_paths
 from labrig.record import FileRecord
 from labrig.region import Region, parse_region
 from labrig.results import AUTO, EstimateMethod, require_law
@@ -215,14 +216,14 @@ class Overrides:
 
 
 def _parse_calibration(text: str) -> tuple[str, str]:
-    """Return key and path of a calibration, an existing path as an absolute one."""
+    """Return key and absolute path of a calibration."""
     key, _, named = text.partition("=")
     if key not in Optics.model_fields or not named:
         raise UsageError(
             f"--optics: expected KEY=PATH with a key of 'optics:' in a rig file, got '{text}'; "
             f"{did_you_mean(key, list(Optics.model_fields))}"
         )
-    return key, str(Path(named).resolve()) if Path(named).exists() else named
+    return key, with_absolute_paths({key: named}, Optics, Path.cwd())[key]
 
 
 def require_order(text: str) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
 
 from filelock import FileLock, Timeout
 
@@ -92,16 +92,13 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def serial_devices(port: str, platform: str = sys.platform) -> list[str]:
-    """Return the devices behind a serial port given by a link, a relative path or a pyserial URL.
+    """Return the devices behind a serial port given by a link, a relative path or a simulated name.
 
     Raises
     ------
     OSError
         There is no such port.
     """
-    url = urlsplit(port)
-    if url.scheme and url.hostname and url.port:
-        return network_devices(url.hostname, url.port)
     if "://" in port:
         return [port]
     if platform == "win32":

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -28,6 +29,7 @@ from labrig.bench.guard import Guard, guarding
 from labrig.bench.serial_ports import SerialPorts
 from labrig.clock import Clock, SystemClock
 from labrig.errors import DeviceError, LabrigError, UsageError
+from labrig.named_files import with_absolute_paths
 from labrig.record import REAL_DISK, Disk
 from labrig.signals import interrupting, pausing
 
@@ -153,7 +155,7 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
         return
     from labrig import sim  # a real bench has no need of the room's physics
 
-    with sim.open_room(file.simulation, source, not_before_s) as room:
+    with sim.open_room(_room(file, source), source, not_before_s) as room:
         yield Bench(file, source, room.clock, room)
 
 
@@ -183,12 +185,13 @@ def wall_at_start(file: RigFile, source: str) -> float:
         return SystemClock().wall()
     from labrig import sim
 
-    return sim.describe_room(file.simulation, source).epoch_s
+    return sim.describe_room(_room(file, source), source).epoch_s
 
 
 def with_frame_size(file: RigFile, source: str) -> RigFile:
     """Return a rig file that says how large its camera's frames are, if they are simulated.
 
+    Paths of files that the simulated room names are absolute in the result.
     A real camera's are said by the keys `frame_pixels` and `frame_size`, or seen in its first
     frame. The description of the simulated room is checked.
 
@@ -222,7 +225,9 @@ def with_frame_size(file: RigFile, source: str) -> RigFile:
         return file
     from labrig import sim
 
-    room = sim.describe_room(file.simulation, source)
+    content = _room(file, source)
+    file = file.model_copy(update={"simulation": content})
+    room = sim.describe_room(content, source)
     entry = file.devices.get(CAMERA.key)
     if entry is None:
         return file
@@ -283,11 +288,19 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
     from labrig.sim import camera
 
     clock = SystemClock()
-    with interrupting(clock), sim.open_room(file.simulation, source) as room:
+    with interrupting(clock), sim.open_room(_room(file, source), source) as room:
         pace = camera.Pace(clock, room.clock)
         with closing(camera.PtpIpServer(room.camera.responder, pace.catch_up, port)) as server:
             tell(server.address)
             server.serve(clock)
+
+
+def _room(file: RigFile, source: str) -> dict[str, Any]:
+    """Return the content of a simulated room with absolute paths of the files that it names."""
+    from labrig.sim import Simulation
+
+    folder = Path(source).resolve().parent
+    return with_absolute_paths(file.simulation or {}, Simulation, folder)
 
 
 def _open(file: RigFile, key: str, connections: "_Connections", source: str) -> Device:
@@ -311,6 +324,7 @@ class _Connections:
         self._locked: set[str] = set()
 
     def serial(self, address: str, baudrate: int, framing: str = "8N1") -> SerialPort:
+        _require_port(address)
         try:
             port = serial.serial_for_url(
                 self._names.look_up(address),
@@ -446,6 +460,22 @@ def _with_serial(
             f"{', '.join(other_numbers)}"
         )
     return None
+
+
+def _require_port(address: str) -> None:
+    """Refuse pyserial's own addresses: `spy://` empties a file, `socket://` calls another computer.
+
+    Raises
+    ------
+    UsageError
+        The address is neither a port nor in a simulated room.
+    """
+    scheme, separator, _ = address.partition("://")
+    if separator and scheme != "sim":
+        raise UsageError(
+            f"'{address}' is no serial port; write COM3, /dev/… or, in a simulated room, "
+            "sim://room/DEVICE"
+        )
 
 
 def _host_and_port(address: str, default_port: int) -> tuple[str, int]:

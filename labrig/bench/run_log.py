@@ -120,7 +120,9 @@ def run_log(run: Path, rig: str, clock: Clock) -> Iterator[None]:
     clock
         Clock of the rig.
     """
-    with logging_to(_LogFile(run / FILE, encoding="utf-8", delay=True), clock):
+    with logging_to(
+        _LogFile(run / FILE, encoding="utf-8", errors="backslashreplace", delay=True), clock
+    ):
         _logger.info("labrig %s on %s; rig: %s", version("labrig"), platform.platform(), rig)
         try:
             yield

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from labrig.cli.closed_pipe import DetachableStream
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError, UsageError
+from labrig.readable_output import spelled
 from labrig.signals import STOP_SIGNALS, raise_interrupted
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 MAX_SHOWN = 200
 #: Surrogates, to which Python decodes bytes of an argument that are not UTF-8.
 _NO_TEXT = re.compile("[\ud800-\udfff]")
+_SET_LOCALE = "set a locale with UTF-8, such as LC_ALL=C.UTF-8"
 
 
 def guarded(arguments: Sequence[str]) -> int:
@@ -63,8 +65,12 @@ def _run(arguments: Sequence[str]) -> int:
     from labrig.cli.app import command
 
     if any(_NO_TEXT.search(argument) for argument in arguments):
+        encoding = sys.getfilesystemencoding()
+        remedy = "" if encoding == "utf-8" else f"; {_SET_LOCALE}"
         return _print_error(
-            f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2
+            f"expected arguments in {encoding.upper()}, got {' '.join(map(ascii, arguments))}"
+            f"{remedy}",
+            2,
         )
     for signum in STOP_SIGNALS:
         signal.signal(signum, raise_interrupted)
@@ -86,6 +92,10 @@ def _run(arguments: Sequence[str]) -> int:
         name = str(error.filename or "disk")[:MAX_SHOWN]
         kind = UsageError if error.errno == errno.ENAMETOOLONG else DiskError
         return _print_error(f"{name}: {error.strerror or error}", kind.exit_code)
+    except UnicodeEncodeError as error:
+        if _cannot_be_named(error):
+            return _print_error(_unwritable(error), UsageError.exit_code)
+        return _print_error(_fault_message(error), 1)
     except Exception as error:
         return _print_error(_fault_message(error), 1)
     return 0
@@ -106,6 +116,20 @@ def _wrong_call(error: "TyperException") -> str:
     context = getattr(error, "ctx", None)
     command = "labrig" if context is None else context.command_path
     return f"{message} (see {command} --help)"
+
+
+def _cannot_be_named(error: UnicodeEncodeError) -> bool:
+    """Whether a name came from a file system that has other characters, or has to go to one."""
+    is_of_locale = error.encoding == sys.getfilesystemencoding() != "utf-8"
+    return is_of_locale or _NO_TEXT.search(error.object) is not None
+
+
+def _unwritable(error: UnicodeEncodeError) -> str:
+    """Return that a path is no text, or that the locale has no such file names."""
+    name = spelled(error.object, "ascii").strip()[:MAX_SHOWN]
+    if _NO_TEXT.search(error.object):
+        return f"{name}: expected names of files and folders in UTF-8; rename what is not"
+    return f"{name}: the locale has file names in {error.encoding} only; {_SET_LOCALE}"
 
 
 def _fault_message(error: Exception) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from labrig.clock import Interrupted
 from labrig.errors import LabrigError
+from labrig.readable_output import spelled
 
 #: Longest duration of the command.
 COMMAND_TIMEOUT_S = 30.0
@@ -48,7 +49,8 @@ def _notify(on_finish: str | Sequence[str] | None, status: str, message: str) ->
     if on_finish == "bell":
         print("\a", end="", file=sys.stderr, flush=True)
     elif on_finish:
-        _run_command(on_finish, {"LABRIG_STATUS": status, "LABRIG_MESSAGE": message})
+        text = spelled(message, sys.getfilesystemencoding(), "surrogateescape")
+        _run_command(on_finish, {"LABRIG_STATUS": status, "LABRIG_MESSAGE": text})
 
 
 def _run_command(command: Sequence[str], variables: dict[str, str]) -> None:

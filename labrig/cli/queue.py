@@ -9,6 +9,7 @@ import typer
 from labrig.cli.completion import complete_protocol
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.protocol import protocol_path
+from labrig.named_files import beside, is_path
 
 if TYPE_CHECKING:
     from labrig.acquire import RigFile
@@ -47,14 +48,14 @@ def add(
     queue: File = QUEUE,
 ) -> None:
     """Add a measurement, or a sweep of one, to the end of the queue."""
-    from labrig.acquire import read_protocol, with_absolute_paths
+    from labrig.acquire import changes_with_absolute_paths, read_protocol
     from labrig.queue import Queue, QueuedRun, change_queue, combinations
 
     folder = queue.absolute().parent
     added = []
     for typed in combinations(settings or [], sweeps or []):
-        changes = with_absolute_paths(typed, Path.cwd())
-        read_protocol(protocol_path(protocol), changes)
+        model = type(read_protocol(protocol_path(protocol), typed))
+        changes = changes_with_absolute_paths(typed, model, Path.cwd())
         named_rig = None if rig is None else _from(folder, rig, rig_path(rig))
         source = _from(folder, protocol, protocol_path(protocol))
         added.append(QueuedRun(protocol=source, rig=named_rig, set=changes))
@@ -120,11 +121,14 @@ class _Person:
         self._verbose = verbose
 
     def prepare(self, queued: "QueuedRun") -> "Recording":
+        from labrig.acquire import changes_with_absolute_paths, read_protocol
         from labrig.bench import Recording
 
-        rig = None if queued.rig is None else _at(self._folder, queued.rig)
-        protocol = protocol_path(_at(self._folder, queued.protocol))
-        return Recording.prepare(protocol, rig_path(rig), self._runs, queued.changes)
+        rig = None if queued.rig is None else beside(queued.rig, self._folder)
+        protocol = protocol_path(beside(queued.protocol, self._folder))
+        model = type(read_protocol(protocol))
+        changes = changes_with_absolute_paths(queued.changes, model, self._folder)
+        return Recording.prepare(protocol, rig_path(rig), self._runs, changes)
 
     def watch(self, rig: "RigFile") -> "Watch":
         from labrig.cli.progress import progress
@@ -168,14 +172,8 @@ def _content(entry: "QueueEntry") -> dict[str, object]:
 
 def _from(folder: Path, name: str, path: Path) -> str:
     """Return a shipped name, or the path of a file from the queue's folder if it is in there."""
-    if Path(name).suffix == "" and len(Path(name).parts) == 1:
+    if not is_path(name):
         return name
     absolute = path.absolute()
     inside = absolute.is_relative_to(folder)
     return f"./{absolute.relative_to(folder).as_posix()}" if inside else str(absolute)
-
-
-def _at(folder: Path, name: str) -> str:
-    """Return a shipped name, or the path of a file that is named from the queue's folder."""
-    is_name = Path(name).suffix == "" and len(Path(name).parts) == 1 and not name.startswith(".")
-    return name if is_name else str(folder / name)

@@ -21,6 +21,7 @@ from labrig.design.spread_wish import SpreadWish
 from labrig.errors import UsageError
 from labrig.finite import Finite, NotNegative, Positive, UnitFraction
 from labrig.material import MAX_ORDER
+from labrig.named_files import beside
 from labrig.optics import read_light
 from labrig.quantity import DurationS, Fraction, TimeS
 from labrig.reproduce import ProgrammeEntry
@@ -406,7 +407,7 @@ def _traced(file: WishFile, wish: SceneWish, bands: DesignBands, folder: Path) -
     from labrig.design.scene_light import PLACEHOLDER, SceneLight
 
     return SceneLight.of(
-        folder / wish.file if Path(wish.file).suffix else wish.file,
+        beside(wish.file, folder),
         wish.material,
         white_cd_per_m2=wish.white_cd_per_m2,
         bands=bands,

@@ -303,7 +303,7 @@ def write_nexus(path: Path, run: RunRecord, about: RunDescription, result: RunRe
         file.attrs["default"] = "entry"
         _add_entry(file, run, about, result)
     try:
-        path.write_bytes(content.getbuffer())
+        path.write_bytes(content.getvalue())
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error})") from None
 

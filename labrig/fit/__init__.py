@@ -19,6 +19,7 @@ from labrig.fit.least_squares import (
 from labrig.fit.luminance import fit_luminance
 from labrig.fit.mixture import (
     HeldOutError,
+    LightKept,
     MixtureCandidate,
     MixtureFit,
     MixtureTexture,
@@ -38,6 +39,7 @@ __all__ = [
     "FloatArray",
     "HeldOutError",
     "LeastSquaresFit",
+    "LightKept",
     "LitSpectrum",
     "MixtureCandidate",
     "MixtureFit",

@@ -69,7 +69,9 @@ def observer(name: str) -> Observer:
     [107.0, 107.0, 107.0]
     """
     if name == CIE_1931:
-        table_nm, *functions = np.loadtxt(_OBSERVER, delimiter=",", skiprows=2, unpack=True)
+        table_nm, *functions = np.loadtxt(
+            _OBSERVER, delimiter=",", skiprows=2, unpack=True, encoding="utf-8"
+        )
         return Observer(name, table_nm, np.stack(functions, axis=1))
     table = colour_science.load().MSDS_CMFS[name]
     return Observer(name, np.asarray(table.wavelengths), np.asarray(table.values))

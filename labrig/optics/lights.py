@@ -2,11 +2,11 @@
 
 import os
 import re
-from pathlib import Path
 
 import numpy as np
 
 from labrig.errors import UsageError
+from labrig.named_files import is_path
 from labrig.optics.colorimetry import illuminant
 from labrig.optics.curve_file import read_spectrum
 from labrig.optics.piecewise import band_integrals
@@ -53,7 +53,7 @@ def read_light(name_or_path: str | os.PathLike[str]) -> Spectrum:
             raise UsageError(f"expected a light from 200 nm to 2000 nm, got '{text}'")
         grid_nm = centre_nm + NARROW_FWHM_NM * np.array([-1.0, 0.0, 1.0])
         return Spectrum(text, grid_nm, np.array([0.0, 1.0, 0.0]))
-    if Path(text).suffix or (text and Path(text).exists()):
+    if is_path(text):
         return read_spectrum(text)
     try:
         return illuminant(text)

@@ -23,7 +23,7 @@ _SCOTOPIC = Path(__file__).with_name("cie_1951_scotopic.csv")
 
 @cache
 def _scotopic_table() -> tuple[FloatArray, FloatArray]:
-    nm, efficiency = np.loadtxt(_SCOTOPIC, delimiter=",", skiprows=2, unpack=True)
+    nm, efficiency = np.loadtxt(_SCOTOPIC, delimiter=",", skiprows=2, unpack=True, encoding="utf-8")
     return nm, efficiency
 
 

@@ -1,7 +1,9 @@
 """The run folder: protocol, rig, journal and frames; created once, then only appended to."""
 
+import os
 import re
 import shutil
+import sys
 import uuid
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +15,7 @@ from typing import Any, Self
 
 from labrig.clock import SystemClock
 from labrig.errors import DiskError
+from labrig.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, REAL_DISK, Disk, Journal, sync_folder, write_durably
 from labrig.record.made import MADE, made_text
@@ -241,7 +244,10 @@ def _make_new(runs: Path, name: str) -> Path:
 
 
 def _slug(name: str) -> str:
-    return re.sub(r"[^\w.-]+", "-", name).strip("-")[:80] or "run"
+    """Return a name as a part of a folder's: short, and with what the file system can name."""
+    text = spelled(name, sys.getfilesystemencoding())
+    slug = re.sub(r"[^\w.-]+", "-", text).strip("-.")
+    return os.fsencode(slug)[:80].decode(sys.getfilesystemencoding(), "ignore") or "run"
 
 
 def _highest_frame(frames: Path) -> int:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from labrig.fit import MixtureCandidate, MixtureFit
+from labrig.fit import LightKept, MixtureCandidate, MixtureFit
 from labrig.material import (
     REFERENCE_Y,
     ColourDifference,
@@ -16,6 +16,7 @@ from labrig.material import (
 )
 from labrig.number_format import aligned, rounded
 from labrig.optics import Spectrum
+from labrig.results import with_uncertainty
 
 #: How the number of components was found, by `MixtureFit.selection`.
 SELECTIONS = {"given": "as asked for", "bic": "by BIC", "cross-validation": "by cross-validation"}
@@ -98,7 +99,8 @@ def describe_mixture(fitted: FittedMatrix) -> str:
     lines += [f"  {line}" for line in aligned([component_head(fit), *component_rows(fit)])]
     lines += [
         f"  threshold     {threshold_text(fit)}",
-        f"  masked MSE    {rounded(fit.masked_mse, 3)} per band² (scale by {fit.scaling})",
+        f"  {_error_line(fit)} (scale by {fit.scaling})",
+        f"  light kept    {light_kept_text(fit.light_kept)}",
     ]
     if fit.selection == "bic":
         criteria = (f"{tried.components}: {tried.bic:.0f}" for tried in fit.candidates)
@@ -111,6 +113,21 @@ def describe_mixture(fitted: FittedMatrix) -> str:
     if fitted.differences:
         lines += [f"  {line}" for line in difference_lines(fitted.differences)]
     return "\n".join(lines)
+
+
+def _error_line(fit: MixtureFit) -> str:
+    if fit.reduced_chi2 is None:
+        return f"masked MSE    {rounded(fit.masked_mse, 3)} per band²"
+    return f"reduced χ²    {rounded(fit.reduced_chi2, 3)}"
+
+
+def light_kept_text(kept: LightKept) -> str:
+    """Return how much of the measured light a mixture re-radiates, in all and of one column."""
+    total, worst = (
+        f"{part:.3f}" if sigma is None else with_uncertainty(part, sigma)
+        for part, sigma in ((kept.total, kept.total_sigma), (kept.worst, kept.worst_sigma))
+    )
+    return f"{total} of all that was measured; worst at {kept.worst_input_nm:g} nm, {worst}"
 
 
 NOT_CONVERGED = "The refinement ended before it reached a minimum."

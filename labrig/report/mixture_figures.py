@@ -162,8 +162,28 @@ def error_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
     numbers = np.array([tried.components for tried in candidates], dtype=np.float64)
     if len(numbers) < 2:
         return ()
-    mse = np.array([tried.masked_mse for tried in candidates])
     bic = np.array([tried.bic for tried in candidates])
+    return (
+        _error_picture(fitted, numbers),
+        Picture(
+            "bic",
+            _number_chart(numbers, bic, fit.components, "Bayesian information criterion"),
+            "Bayesian information criterion: the least is best.",
+        ),
+    )
+
+
+def _error_picture(fitted: FittedMatrix, numbers: FloatArray) -> Picture:
+    """Return the picture of χ² where σ weighs the numbers, else of the mean squared error."""
+    fit, candidates = fitted.fit, fitted.candidates
+    chi2 = [tried.reduced_chi2 for tried in candidates if tried.reduced_chi2 is not None]
+    if len(chi2) == len(candidates):
+        return Picture(
+            "error",
+            _number_chart(numbers, np.array(chi2), fit.components, "Reduced χ²"),
+            "Reduced χ² by the number of components, its scale that of least error: 1 if nothing "
+            "but noise is left.",
+        )
     noise = noise_floor(fitted.matrix)
     about_noise = (
         ""
@@ -171,18 +191,12 @@ def error_pictures(fitted: FittedMatrix) -> tuple[Picture, ...]:
         else " Dashed: mean σ² of the measured numbers, of which those below the threshold are "
         "taken as 0."
     )
-    return (
-        Picture(
-            "error",
-            _error_chart(numbers, mse, fit, noise),
-            "Mean squared error per band² by the number of components, its scale that of least "
-            "error." + about_noise,
-        ),
-        Picture(
-            "bic",
-            _number_chart(numbers, bic, fit.components, "Bayesian information criterion"),
-            "Bayesian information criterion: the least is best.",
-        ),
+    mse = np.array([tried.masked_mse for tried in candidates])
+    return Picture(
+        "error",
+        _error_chart(numbers, mse, fit, noise),
+        "Mean squared error per band² by the number of components, its scale that of least error."
+        + about_noise,
     )
 
 

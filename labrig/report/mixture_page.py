@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.fit import MixtureFit
 from labrig.material import ColourDifference, colour_pair, physical_warnings
 from labrig.number_format import rounded
 from labrig.optics import Spectrum
@@ -16,6 +17,7 @@ from labrig.report.mixture import (
     component_rows,
     components_text,
     held_out_errors,
+    light_kept_text,
     selection_text,
     threshold_text,
     white_text,
@@ -32,7 +34,8 @@ from labrig.report.sections import Section, Table
 
 #: Sentences on the scale, by `MixtureFit.scaling`.
 SCALINGS = {
-    "integral": "The scale keeps the light of all numbers above the threshold.",
+    "integral": "The scale keeps the light of all numbers, where σ is known as far as their sum "
+    "tells it better than the fit; else of those above the threshold.",
     "least-squares": "The scale makes the mean squared error least.",
     "colour": "The scale makes the mean ΔE2000 under {lights} least.",
 }
@@ -101,8 +104,8 @@ def _mixture(fitted: FittedMatrix) -> Section:
     stored = (6 if fit.mixture.skew is None else 8) * fit.components
     text = (
         f"{components_text(fit).capitalize()} ({stored} numbers) {_verb(fit.components)} for the "
-        f"{fit.entries} measured numbers with the longer returning wavelength. The mean squared "
-        f"error is {rounded(fit.masked_mse, 3)} per band²."
+        f"{fit.entries} measured numbers with the longer returning wavelength. {_error(fit)} Light "
+        f"kept: {light_kept_text(fit.light_kept)}."
     )
     table = Table(
         ("component", *component_head(fit)),
@@ -112,6 +115,12 @@ def _mixture(fitted: FittedMatrix) -> Section:
         "nm⁻².",
     )
     return Section("Mixture", (text,), matrix_pictures(fitted), (table,))
+
+
+def _error(fit: MixtureFit) -> str:
+    if fit.reduced_chi2 is None:
+        return f"The mean squared error is {rounded(fit.masked_mse, 3)} per band²."
+    return f"Reduced χ² is {rounded(fit.reduced_chi2, 3)}: what is above 1 is misfit, not noise."
 
 
 def _verb(components: int) -> str:
@@ -171,7 +180,10 @@ def _numbers(fitted: FittedMatrix) -> Section:
     fit = fitted.fit
     text = f"{components_text(fit).capitalize()}, {selection_text(fit)}."
     noise = noise_floor(fitted.matrix)
-    caption = "MSE: mean squared error per band², with the scale that makes it least."
+    caption = (
+        "MSE: mean squared error per band², with the scale that makes it least; numbers below the "
+        "threshold count as 0."
+    )
     if noise is not None:
         caption += f" The measured numbers have a mean σ² of {rounded(noise, 3)}."
     head: tuple[str, ...] = ("components", "MSE", "BIC")
@@ -179,6 +191,10 @@ def _numbers(fitted: FittedMatrix) -> Section:
         (str(tried.components), rounded(tried.masked_mse, 3), rounded(tried.bic, 5))
         for tried in fitted.candidates
     ]
+    chi2 = [tried.reduced_chi2 for tried in fitted.candidates]
+    if None not in chi2:
+        head = (*head, "reduced χ²")
+        rows = [(*row, rounded(one, 3)) for row, one in zip(rows, chi2, strict=True) if one]
     held_out = held_out_errors(fitted.candidates)
     if len(held_out) == len(rows):
         head = (*head, "MSE of numbers left out")
@@ -194,13 +210,19 @@ def _methods(fitted: FittedMatrix) -> Section:
         + (
             "."
             if fit.false_discovery_rate is None
-            else ", by σ of each (Benjamini and Hochberg, J. R. Statist. Soc. B 57, 1995)."
+            else " for the start, by σ of each (Benjamini and Hochberg, J. R. Statist. Soc. B 57, "
+            "1995)."
         ),
         f"Weighted expectation maximisation from several starts; the taken one needed "
         f"{fit.iterations} iterations and leaves a mean squared error of "
         f"{rounded(fit.likelihood_mse, 3)} per band².",
-        f"Then least squares of all numbers, {fit.refinement_iterations} iterations: likelihood is "
-        "not the error that is told.",
+        f"Then least squares, {fit.refinement_iterations} iterations"
+        + (
+            ": likelihood is not the error that is told."
+            if fit.reduced_chi2 is None
+            else ", of all numbers as they were measured, weighted by σ: what a threshold takes "
+            "for noise is partly light."
+        ),
         *(
             ()
             if fit.mixture.skew is None

@@ -15,6 +15,9 @@ from .export.rgb_preview import (
 from .export.scene_export import (
     exported_meshes as exported_meshes,
 )
+from .mesh_file.read_mesh import (
+    read_mesh as read_mesh,
+)
 from .picture.display import (
     Display as Display,
     camera_values as camera_values,
@@ -114,7 +117,6 @@ from .transport.lamp import (
 )
 from .transport.mesh import (
     Mesh as Mesh,
-    read_mesh as read_mesh,
 )
 from .transport.tracing import (
     PathLength as PathLength,

@@ -83,8 +83,8 @@ def read_series(
     channel, except one that only the first row fills: some programs put the settings of a
     measurement there. Without names the columns are time, value and perhaps sigma. Rows that are
     channels of a stated width become times. Logarithms of light (`I/dB`, `ln(I)`) become light.
-    Rows that are no measurement (`OL`, 9.9e37, copies of the row before) are left out; `warnings` of
-    the series name them.
+    Rows that are no measurement (`OL`, 9.9e37, copies of the row before) are left out; `warnings`
+    of the series name them.
 
     Parameters
     ----------

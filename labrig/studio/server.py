@@ -11,6 +11,7 @@ from labrig.clock import Clock
 from labrig.design import WishFile
 from labrig.errors import UsageError
 from labrig.local_server import LocalConversation, LocalServer
+from labrig.named_files import beside
 from labrig.studio.scene_bench import SceneBench
 from labrig.studio.workbench import Workbench
 from labrig.yaml_file import read_model
@@ -190,8 +191,8 @@ def design_on_page(
     wished = None if start is None else read_model(start, WishFile)
     if wished is not None and wished.scene is not None:
         named = wished.scene.file
-        beside = str(start.parent / named) if start and Path(named).suffix else named
-        scene, material = scene or beside, material or wished.scene.material
+        in_place = beside(named, start.parent) if start else named
+        scene, material = scene or in_place, material or wished.scene.material
     folder = Path() if start is None else start.parent
     workbench = Workbench() if scene is None else SceneBench(scene, material, folder)
     first = workbench.start() if wished is None else workbench.take(wished, str(start))

@@ -40,14 +40,14 @@ from labrig.region import Region
 from labrig.results import Series
 from tests.acceptance.cramer_rao import Noise, rate_bound
 from tests.acceptance.decays_of_all_materials import shipped_rig
+from tests.real_data import SHARED
 
 FloatArray = NDArray[np.float64]
 
 SENSOR = {"width": 96, "height": 64}
 OTHER_CURVES = (
-    Path(__file__).parents[3] / "shared/data/camera_sensitivity/ampas_rawtoaces_2017"
-    / "canon_eos_5d_mark_ii_380_780_5.json"
-)  # fmt: skip
+    SHARED / "camera_sensitivity/ampas_rawtoaces_2017/canon_eos_5d_mark_ii_380_780_5.json"
+)
 #: Where samples lie, and what of them is measured.
 PLACES: tuple[Region, ...] = tuple(
     (x, y, 0.46, 0.44) for x, y in ((0.02, 0.03), (0.52, 0.03), (0.02, 0.53))

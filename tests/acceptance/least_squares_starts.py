@@ -27,8 +27,6 @@ def _misfit(reference: strd.ReferenceSet) -> Callable[[strd.ComplexArray], strd.
 
 def nist(factors: tuple[float, ...] = (1.0, 10.0, 0.1)) -> Iterator[Problem]:
     """Return NIST's sets from both of their starts, and from multiples of them."""
-    if not STRD.is_dir():
-        return
     for name in strd.MODELS:
         reference = strd.read(STRD / f"{name}.dat")
         unbounded = np.full(len(reference.certified), np.inf)

@@ -19,7 +19,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
@@ -45,11 +44,11 @@ from labrig.material import (
     read_reradiation,
 )
 from labrig.optics import CameraResponse, Spectrum, read_camera, read_light, read_spectrum
+from tests.real_data import SHARED
 
-DATA = Path(__file__).parents[3] / "shared/data"
-LED_FILE = DATA / "light_sources/photobiology/leds.csv"
+LED_FILE = SHARED / "light_sources/photobiology/leds.csv"
 CAMERA = "canon_eos_5d_mark_ii"
-OTHER_CURVES = DATA / "camera_sensitivity/ssf_data/jiang2013_Canon_5DMarkII.csv"
+OTHER_CURVES = SHARED / "camera_sensitivity/ssf_data/jiang2013_Canon_5DMarkII.csv"
 LIGHTS = ("D65", "A")
 #: Fraction of the light of some wavelength from which a surface counts as re-radiating here.
 LEAST_FRACTION = 0.1
@@ -176,7 +175,7 @@ def told_system(case: Case, camera: CameraResponse, photographs: Photographs) ->
 def reradiating() -> list[ReradiationMatrix]:
     """Return the measured matrices that re-radiate, as corrected, on their Stokes side."""
     found = []
-    for path in matrix_files(DATA / "bispectral/rit_bfc450"):
+    for path in matrix_files(SHARED / "bispectral/rit_bfc450"):
         measured = read_reradiation(path)
         if measured.reradiated_fraction.max() > LEAST_FRACTION:
             found.append(on_stokes_side(corrected(measured)))
@@ -186,7 +185,7 @@ def reradiating() -> list[ReradiationMatrix]:
 def not_reradiating() -> list[ReradiationMatrix]:
     """Return the other measured surfaces, their reflectance alone."""
     found = []
-    for path in matrix_files(DATA / "bispectral/rit_bfc450"):
+    for path in matrix_files(SHARED / "bispectral/rit_bfc450"):
         measured = read_reradiation(path)
         if measured.reradiated_fraction.max() <= LEAST_FRACTION:
             zero = np.zeros_like(measured.reradiation)

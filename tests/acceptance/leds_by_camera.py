@@ -18,8 +18,9 @@ from labrig.results import IrradianceResult
 from tests.analyse.lvf_calibration.room_truth import simulation_of
 from tests.analyse.recorded import record
 from tests.analyse.selected_lights import BANDS_NM, LED_NAMES, SITES, FloatArray, bench, true_light
+from tests.real_data import SHARED
 
-CURVES = Path(__file__).parents[3] / "shared" / "data" / "camera_sensitivity"
+CURVES = SHARED / "camera_sensitivity"
 ANOTHER_LABORATORY = CURVES / "ampas_rawtoaces_2017/canon_eos_5d_mark_ii_380_780_5.json"
 KEYS = {
     "protocol": "irradiance",

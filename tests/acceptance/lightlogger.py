@@ -14,7 +14,6 @@ states, and what σ noise alone would leave if the sensitivities were known.
 import csv
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -22,8 +21,9 @@ from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import LineFit, SpectralSystem, fit_line, fit_spectrum
 from labrig.optics import Spectrum, read_curve_file
 from labrig.optics.piecewise import hat_functions, quadrature
+from tests.real_data import REAL
 
-FOLDER = Path(__file__).parents[3] / "shared/data/light_sources/lightlogger"
+FOLDER = REAL / "lightlogger"
 INTENSITIES_PCT = (5, 30, 90, 100)
 TRAINED_PCT = 100
 KNOTS_NM = np.arange(370.0, 791.0, 5.0)

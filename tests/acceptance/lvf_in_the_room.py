@@ -34,8 +34,9 @@ from tests.analyse.lvf_calibration.room_truth import (
     true_bands,
     true_irradiance,
 )
+from tests.real_data import SHARED
 
-ROSCOLUX = Path(__file__).parents[3] / "shared/data/filters/art_roscolux/roscolux_transmittance.csv"
+ROSCOLUX = SHARED / "filters/art_roscolux/roscolux_transmittance.csv"
 #: The ends of the strip are told apart: there is little light.
 INSIDE_NM = (420.0, 680.0)
 

@@ -24,7 +24,8 @@ import yaml
 from labrig import resources
 from labrig.errors import UsageError
 from labrig.material import write_reradiation
-from tests.material.reradiation.formats.matrices import DATA, two_dyes
+from tests.material.reradiation.formats.matrices import two_dyes
+from tests.real_data import SHARED
 
 #: Without it a terminal's width would be in the outputs.
 ENVIRONMENT = {**os.environ, "COLUMNS": "80", "PYTHONUTF8": "1"}
@@ -162,7 +163,7 @@ def luminances(folder: Path) -> None:
 def matrices(folder: Path) -> None:
     """Write a re-radiation matrix as an instrument measures it, and a real one."""
     write_reradiation(folder / "paper.BFC", two_dyes())
-    shutil.copy(DATA / "bispectral/art_postit/fluorescent_yellow.csv", folder / "yellow.csv")
+    shutil.copy(SHARED / "bispectral/art_postit/fluorescent_yellow.csv", folder / "yellow.csv")
 
 
 #: Name of a run of the fluorescent bench, by protocol.

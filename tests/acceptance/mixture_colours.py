@@ -23,8 +23,9 @@ from labrig.material import (
     reradiates,
 )
 from labrig.optics import read_light
+from tests.real_data import SHARED
 
-FOLDER = Path(__file__).parents[3] / "shared/data/bispectral/rit_bfc450"
+FOLDER = SHARED / "bispectral/rit_bfc450"
 LIGHTS = ("D65", "A", "450nm", "395nm")
 #: Fraction of the light of some wavelength from which a surface counts as re-radiating here.
 LEAST_FRACTION = 0.1

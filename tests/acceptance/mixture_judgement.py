@@ -26,10 +26,11 @@ from labrig.material import (
 from labrig.optics import read_light
 from tests.acceptance.mixture_colours import LEAST_FRACTION, LIGHTS
 from tests.acceptance.mixture_peer_methods import Target
+from tests.real_data import SHARED
 
 Floats = npt.NDArray[np.float64]
 
-BISPECTRAL = Path(__file__).parents[3] / "shared/data/bispectral"
+BISPECTRAL = SHARED / "bispectral"
 POSTITS = ("yellow", "green")
 #: Reflectances of one tile on two days differ by less; some files have another tile's name.
 SAME_TILE = 0.05

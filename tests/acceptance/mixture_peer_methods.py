@@ -4,7 +4,7 @@ pomegranate is not a dependency; `Pomegranate` looks for it in the environment i
 """
 
 import importlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -46,6 +46,22 @@ class Target:
         return cls(matrix, entries, values)
 
     @property
+    def thresholded(self) -> ReradiationMatrix:
+        """The matrix that all methods follow: without σ, so that labrig follows it, too."""
+        matrix = self.matrix
+        return replace(
+            matrix,
+            reradiation=self.values / matrix.output_width_nm[:, np.newaxis],
+            reradiation_sigma=None,
+            column_correlation=None,
+        )
+
+    @property
+    def least(self) -> float:
+        """Threshold that keeps all that is kept."""
+        return (1 - 1e-9) * self.entries.threshold
+
+    @property
     def box(self) -> tuple[slice, slice]:
         """Rows and columns between the outermost entries above the threshold."""
         rows, columns = (np.flatnonzero(self.values.any(axis=axis)) for axis in (1, 0))
@@ -68,7 +84,9 @@ class Target:
 
 def mixture_values(target: Target, components: int) -> Floats:
     """Return labrig's mixture, per band."""
-    return _of_mixture(target, fit_mixture(target.matrix, components).mixture)
+    return _of_mixture(
+        target, fit_mixture(target.thresholded, components, threshold=target.least).mixture
+    )
 
 
 def texture_values(target: Target, components: int) -> Floats:
@@ -87,7 +105,8 @@ def _of_mixture(target: Target, mixture: ReradiationMixture) -> Floats:
 
 def likelihood_only(target: Target, components: int) -> Floats:
     """Return what labrig's expectation maximisation makes of 8 starts, without refinement."""
-    return _of_mixture(target, fit_mixture(target.matrix, components, refine=False).mixture)
+    fit = fit_mixture(target.thresholded, components, threshold=target.least, refine=False)
+    return _of_mixture(target, fit.mixture)
 
 
 @dataclass

@@ -13,10 +13,11 @@ import numpy as np
 from labrig.fit.least_squares import least_squares
 from labrig.fit.lvf import MERCURY, Line, locate_lines
 from labrig.optics import read_spectrum
-from tests.fit import lvf_pictures as made, strd
+from tests.fit import strd
+from tests.real_data import REAL, SHARED
 
-STRD = made.DATA / "decay/nist_strd"
-LAMP = made.DATA / "light_sources/photobiology/lamps.csv"
+STRD = REAL / "nist_strd"
+LAMP = SHARED / "light_sources/photobiology/lamps.csv"
 #: Of these lines the ultraviolet ones are strong enough to be found.
 ULTRAVIOLET = (Line((253.6517,)), Line((365.0158,)))
 

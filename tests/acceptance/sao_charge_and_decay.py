@@ -18,7 +18,6 @@ last, what `labrig fit charge` prints of the table.
 import io
 from contextlib import redirect_stdout
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +25,11 @@ from numpy.typing import NDArray
 from labrig.cli.exit_codes import guarded
 from labrig.fit import ChargeFit, LeastSquaresFit, fit_charge_and_decay, least_squares
 from labrig.material.rates import concentration, phi1
+from tests.real_data import SHARED
 
 FloatArray = NDArray[np.float64]
 
-TABLE = (
-    Path(__file__).parents[3] / "shared/data/decay/perslqy_sao" / "sample_400_524_300s.txt"
-)  # fmt: skip
+TABLE = SHARED / "decay/perslqy_sao/sample_400_524_300s.txt"
 ON_S, OFF_S, DARK_UNTIL_S = 30.0, 330.0, 29.0
 #: Every count weighs so much, and readings are that long.
 COUNT, READING_S = 1.448, 0.6

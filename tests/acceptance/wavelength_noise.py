@@ -25,7 +25,6 @@ import argparse
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +33,7 @@ from labrig.fit import fit_mixture
 from labrig.material import ReradiationMatrix, ReradiationMixture, corrected, read_reradiation
 from labrig.optics import CIE_1931, observer
 from labrig.reproduce import LampWavelengths, WavelengthShift, direct_light, rotated_wavelengths
+from tests.real_data import SHARED
 
 FloatArray = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ RAYS_US = (0.3, 10.0)
 LEAST_SURVIVAL = 0.05
 #: Probability with which a fold goes on: near the largest of the surfaces' albedos.
 SURVIVAL = 0.8
-MEASURED = Path(__file__).parents[3] / "shared/data/bispectral/rit_bfc450/PAPYEL.BFC"
+MEASURED = SHARED / "bispectral/rit_bfc450/PAPYEL.BFC"
 DYES = ReradiationMixture(
     25.0,
     np.array([0.7, 0.3]),

@@ -127,6 +127,22 @@ def test_two_names_of_one_board_are_one_port(
         assert set(devices.identities()) == {"lamp", "thermometer"}
 
 
+@pytest.mark.parametrize("scheme", ["spy://loop://?file=", "SPY://loop://?file=", "alt:///dev/"])
+def test_pyserials_own_addresses_are_refused_before_it_sees_them(
+    rig: Callable[[str], Path], tmp_path: Path, scheme: str
+) -> None:
+    mine = tmp_path / "mine.txt"
+    mine.write_text("kept")
+    path = rig(f"{scheme}{mine}")
+    with (
+        pytest.raises(UsageError, match="no serial port"),
+        open_bench(read_rig_file(path), str(path)) as bench,
+        bench.devices(),
+    ):
+        pass
+    assert mine.read_text() == "kept"
+
+
 def test_a_port_that_is_not_there(rig: Callable[[str], Path], tmp_path: Path) -> None:
     path = rig(str(tmp_path / "ttyACM9"))
     with (

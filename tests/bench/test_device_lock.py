@@ -43,7 +43,6 @@ def test_a_host_is_the_same_by_every_name() -> None:
     (number,) = network_devices("127.0.0.1", 15740)
     assert number in network_devices("localhost", 15740)
     assert [number] == network_devices("127.1", 15740) == network_devices("::ffff:127.0.0.1", 15740)
-    assert serial_devices("socket://127.1:15740") == [number]
     assert network_devices("127.0.0.1", 15741) != [number]
 
 

@@ -27,8 +27,9 @@ def test_a_rig_file_names_its_file_and_analyses_have_it(
     path = tmp_path / "rig.yaml"
     path.write_text(RIG.format(key=kind.optics_key, named="mine"))
     optics = read_rig_file(path).optics
-    assert [optics.named(one) for one in kinds() if optics.named(one)] == ["mine"]
-    assert optics.named(kind) == "mine"
+    mine = str(path.parent / "mine")
+    assert [optics.named(one) for one in kinds() if optics.named(one)] == [mine]
+    assert optics.named(kind) == mine
     assert kind.name in {field.name for field in fields(Inputs)}
     assert kind.protocol in plugins.names(plugins.ANALYSES)
 

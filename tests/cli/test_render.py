@@ -264,7 +264,7 @@ def test_what_failed_before_its_first_picture_does_not_stand_in_the_way(
         assert len([line for line in ended.err.splitlines() if "labrig:" in line]) == bool(code)
 
 
-@pytest.mark.parametrize("missing", ["embreex", "numba", "trimesh"])
+@pytest.mark.parametrize("missing", ["embreex", "manifold3d", "numba"])
 def test_without_the_extra_it_is_one_line(
     labrig: Callable[..., Ended], monkeypatch: pytest.MonkeyPatch, missing: str
 ) -> None:
@@ -272,7 +272,8 @@ def test_without_the_extra_it_is_one_line(
         if name.split(".")[0] == missing or name.endswith("kernels"):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, missing, None)
-    Path("a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    around = [(0, 0), (5, 0), (5, 4), (4, 4), (4, 1), (1, 1), (1, 4), (0, 4)]
+    Path("a.obj").write_text("".join(f"v {x} {y} 0\n" for x, y in around) + "f 1 2 3 4 5 6 7 8\n")
     Path("s.yaml").write_text(json.dumps({
         "name": "s", "kind": "scene", "materials": {"grey": {"albedo": 0.5}},
         "objects": {"a": {"material": "grey", "mesh": {"file": "a.obj"}, "two_sided": True}},

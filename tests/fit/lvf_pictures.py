@@ -1,7 +1,6 @@
 """Pictures through a variable filter, made for tests: real lights, real curves of cameras."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -17,9 +16,9 @@ from labrig.optics import (
     read_spectrum,
     signal_through,
 )
+from tests.real_data import SHARED
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
-CAMERAS = DATA / "camera_sensitivity"
+CAMERAS = SHARED / "camera_sensitivity"
 
 GRID_NM = np.arange(400.0, 701.0, 10.0)
 EDGES_NM = np.arange(395.0, 706.0, 10.0)
@@ -63,7 +62,7 @@ def photographed(
 
 def fluorophores(count: int, seed: int = 1) -> list[Spectrum]:
     """Emission of real dyes with their peak from 430 to 660 nm."""
-    file = DATA / "fluorophores/mcnamara_boswell_emission.csv"
+    file = SHARED / "fluorophores/mcnamara_boswell_emission.csv"
     curves = read_curve_file(file).curves
     peaks = {name: c.wavelength_nm[c.value.argmax()] for name, c in curves.items()}
     names = [name for name, peak_nm in peaks.items() if 430 < peak_nm < 660]
@@ -73,7 +72,7 @@ def fluorophores(count: int, seed: int = 1) -> list[Spectrum]:
 
 def narrow_leds(count: int) -> list[Spectrum]:
     """LEDs with their peak from 420 to 670 nm."""
-    curves = read_curve_file(DATA / "light_sources/photobiology/leds.csv").curves
+    curves = read_curve_file(SHARED / "light_sources/photobiology/leds.csv").curves
     peaks = {name: c.wavelength_nm[c.value.argmax()] for name, c in curves.items()}
     names = [name for name, peak_nm in peaks.items() if 420 < peak_nm < 670]
     return [Spectrum(name, *curves[name]) for name in names[:count]]
@@ -98,13 +97,13 @@ def lines(heights: dict[float, float], continuum: float) -> Spectrum:
 def halogen_lamp() -> Spectrum:
     """A halogen spot, as measured."""
     return read_spectrum(
-        DATA / "light_sources/photobiology/lamps.csv", "Philips.Inc.50W.spot.halogen"
+        SHARED / "light_sources/photobiology/lamps.csv", "Philips.Inc.50W.spot.halogen"
     )
 
 
 def colour_checker(lamp: Spectrum) -> list[Spectrum]:
     """The 24 patches under a lamp."""
-    patches = read_curve_file(DATA / "reflectances/art_macbeth_colourchecker.csv").curves
+    patches = read_curve_file(SHARED / "reflectances/art_macbeth_colourchecker.csv").curves
     return [lit(name, lamp, Spectrum(name, *curve)) for name, curve in patches.items()]
 
 

@@ -24,8 +24,6 @@ from tests.pulls import assert_sigma_is_right
 
 #: Of three makers, and none of them like the camera of the simulated room.
 THREE = ("nikon_d850", "sony_ilce_7m3", "fujifilm_x_t3")
-PHOTOGRAPH = Path(__file__).parents[3] / "shared/data/raw_photos/canon_550d_kissx4_colorchecker.dng"
-JIANG = Path(__file__).parents[3] / "shared/data/camera_sensitivity/ssf_data"
 
 
 @cache
@@ -125,12 +123,13 @@ def test_missing_patches_and_a_chart_without_greys_are_one_clear_line() -> None:
         fit_camera_curves(without, made.lamp(), cameras)
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not JIANG.is_dir(), reason="the folder of real data is not there")
-def test_cameras_of_another_laboratory_are_found_within_what_laboratories_differ() -> None:
+def test_cameras_of_another_laboratory_are_found_within_what_laboratories_differ(
+    shared_data: Path,
+) -> None:
+    jiang = shared_data / "camera_sensitivity/ssf_data"
     family = {camera: read_camera(camera.path) for camera in shipped_cameras()}
     rms, pulls = [], []
-    for number, path in enumerate(sorted(JIANG.glob("jiang2013_*.csv"))[::5]):
+    for number, path in enumerate(sorted(jiang.glob("jiang2013_*.csv"))[::5]):
         camera = read_camera(path)
         others = [curves for one, curves in family.items() if not one.is_called(camera.name)]
         rng = np.random.default_rng(number)
@@ -143,12 +142,13 @@ def test_cameras_of_another_laboratory_are_found_within_what_laboratories_differ
     assert np.sqrt(np.mean(np.square(pulls))) < 1.7
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not PHOTOGRAPH.is_file(), reason="the folder of real data is not there")
-def test_a_real_photograph_of_a_chart_tells_the_sensor_and_what_lamp_it_was() -> None:
+def test_a_real_photograph_of_a_chart_tells_the_sensor_and_what_lamp_it_was(
+    real_data: Path,
+) -> None:
     """A Canon EOS 550D, whose sensor is that of the 600D; nothing is known of the light."""
-    raw = read_raw(PHOTOGRAPH)
-    seen = [measure(raw, region).channels for region in find_colour_chart(PHOTOGRAPH)]
+    photograph = real_data / "canon_550d/canon_550d_kissx4_colorchecker.dng"
+    raw = read_raw(photograph)
+    seen = [measure(raw, region).channels for region in find_colour_chart(photograph)]
     value = np.array([[patch[name].mean for name in "RGB"] for patch in seen])
     noise = np.array([[patch[name].sigma for name in "RGB"] for patch in seen])
     readings = ChartReadings(

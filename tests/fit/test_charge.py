@@ -13,9 +13,6 @@ from tests.pulls import assert_sigma_is_right
 
 FloatArray = NDArray[np.float64]
 
-SAO = (
-    Path(__file__).parents[3] / "shared/data/decay/perslqy_sao" / "sample_400_524_300s.txt"
-)  # fmt: skip
 ON_S, OFF_S = 20.0, 220.0
 T_S = np.concatenate([np.arange(0.0, 400.0, 1.0), np.geomspace(400.0, 3000.0, 200)])
 
@@ -157,10 +154,9 @@ def test_bad_readings_are_refused(
         fit_charge_and_decay(t_s, values, sigma, light_on_s=light_s[0], light_off_s=light_s[1])
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not SAO.is_file(), reason="no ../shared/data beside the checkout")
-def test_strontium_aluminate() -> None:
-    t_s, counts = np.genfromtxt(SAO, skip_header=1, usecols=(0, 1), unpack=True)
+def test_strontium_aluminate(shared_data: Path) -> None:
+    table = shared_data / "decay/perslqy_sao/sample_400_524_300s.txt"
+    t_s, counts = np.genfromtxt(table, skip_header=1, usecols=(0, 1), unpack=True)
     fit = fit_charge_and_decay(t_s, counts, None, light_on_s=30.0, light_off_s=330.0)
     assert fit.candidates[fit.chosen].label == "2 states of general order"
     assert fit.chi2_charge < 2.6

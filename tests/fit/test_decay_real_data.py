@@ -1,4 +1,4 @@
-"""Decays that other laboratories measured (../shared/data/README.md)."""
+"""Decays that other laboratories measured."""
 
 from pathlib import Path
 
@@ -7,24 +7,37 @@ import pytest
 
 from labrig.fit import fit_decay
 
-DECAYS = Path(__file__).parents[3] / "shared" / "data" / "decay"
-pytestmark = [
-    pytest.mark.shared_data,
-    pytest.mark.skipif(not DECAYS.is_dir(), reason="no ../shared/data beside the checkout"),
-]
+#: Mean squared weighted residual by the number of states, of an independent fit.
+MEAN_SQUARES = {1: 49.6, 2: 3.85, 3: 1.66}
 
 
-def _strontium_aluminate() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@pytest.mark.parametrize("level", [2, 4])
+def test_halves_of_a_time_resolved_luminescence_agree(real_data: Path, level: int) -> None:
+    """Every other channel of 0.26 ns; with more light there are two states: the slower one."""
+    table = np.genfromtxt(real_data / "trpl_grossmann/sample1.csv", delimiter=",", skip_header=4)
+    table = table[(table[:, 0] > 20) & (table[:, 0] < 400)]
+    t_s, counts = table[:, 0] * 1e-9, table[:, level]
+    even, odd = (
+        fit_decay(t_s[half::2], counts[half::2], np.sqrt(np.maximum(counts[half::2], 1)),
+                  offset_sigma=np.inf).states[-1]
+        for half in (0, 1)
+    )  # fmt: skip
+    sigma = np.hypot(even.k_r_sigma_per_s, odd.k_r_sigma_per_s)
+    assert abs(even.k_r_per_s - odd.k_r_per_s) < 3 * sigma
+    assert sigma < 0.05 * even.k_r_per_s
+
+
+def test_strontium_aluminate(shared_data: Path) -> None:
     """Afterglow of SrAl2O4:Eu,Dy at 524 nm from 1.2 s after the light went off at 330 s."""
-    path = DECAYS / "perslqy_sao" / "sample_400_524_300s.txt"
+    path = shared_data / "decay/perslqy_sao/sample_400_524_300s.txt"
     t, counts = np.genfromtxt(path, skip_header=1, usecols=(0, 1), unpack=True)
-    after = t >= 331.2
-    return t[after] - 330, counts[after], np.sqrt(np.maximum(counts[after], 5))
+    t, counts = t[t >= 331.2] - 330, counts[t >= 331.2]
+    for n_states, mean_square in MEAN_SQUARES.items():
+        assert_described(t, counts, n_states, mean_square)
 
 
-@pytest.mark.parametrize(("n_states", "mean_square"), [(1, 49.6), (2, 3.85), (3, 1.66)])
-def test_strontium_aluminate(n_states: int, mean_square: float) -> None:
-    t, counts, sigma = _strontium_aluminate()
+def assert_described(t: np.ndarray, counts: np.ndarray, n_states: int, mean_square: float) -> None:
+    sigma = np.sqrt(np.maximum(counts, 5))
     fit = fit_decay(t, counts, sigma, n_states=n_states, offset_sigma=np.inf)
     # Every count weighs 1.45: the values scatter more than √counts.
     assert fit.sigma_factor == pytest.approx(1.245, rel=0.01)
@@ -41,8 +54,8 @@ def test_strontium_aluminate(n_states: int, mean_square: float) -> None:
         assert fit.offset == pytest.approx(35.6, rel=0.03)
 
 
-def test_quartz_luminescence_has_three_components() -> None:
-    path = DECAYS / "cran_luminescence" / "cw_osl_bt607_quartz.csv"
+def test_quartz_luminescence_has_three_components(shared_data: Path) -> None:
+    path = shared_data / "decay/cran_luminescence/cw_osl_bt607_quartz.csv"
     t, counts = np.genfromtxt(path, skip_header=1, delimiter=",", unpack=True)
     fit = fit_decay(t, counts, np.sqrt(np.maximum(counts, 1)), offset_sigma=np.inf)
     assert fit.n_states == 3

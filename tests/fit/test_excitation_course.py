@@ -12,11 +12,11 @@ from labrig.fit.excitation import excitation_course
 
 FloatArray = NDArray[np.float64]
 
-DYES = Path(__file__).parents[3] / "shared/data/fluorophores/mcnamara_boswell_excitation.csv"
 BANDS_NM: dict[str, FloatArray] = {
     "wide": np.linspace(400.0, 700.0, 9),
     "narrow": np.linspace(400.0, 700.0, 16),
 }
+FINE_NM = np.arange(400.25, 700.0, 0.5)
 CELLS_PER_BAND = {"wide": 15, "narrow": 8}
 
 
@@ -61,28 +61,47 @@ def light_within(
     return np.asarray(weight / weight.sum())
 
 
-def dyes() -> Iterator[FloatArray]:
+def measured_dyes(shared_data: Path) -> Iterator[FloatArray]:
     """Every sixth dye that visible light excites, on a grid of 0.5 nm."""
-    table = np.genfromtxt(DYES, delimiter=",", skip_header=1)
-    fine_nm = np.arange(400.25, 700.0, 0.5)
+    path = shared_data / "fluorophores/mcnamara_boswell_excitation.csv"
+    table = np.genfromtxt(path, delimiter=",", skip_header=1)
     for column in table[:, 1::6].T:
-        rate = np.interp(fine_nm, table[:, 0], np.maximum(np.nan_to_num(column), 1e-4))
-        if means(fine_nm, rate, BANDS_NM["wide"]).max() > 0.05:
+        rate = np.interp(FINE_NM, table[:, 0], np.maximum(np.nan_to_num(column), 1e-4))
+        if means(FINE_NM, rate, BANDS_NM["wide"]).max() > 0.05:
             yield rate
 
 
-@pytest.mark.shared_data
+def made_dyes(count: int = 60) -> Iterator[FloatArray]:
+    """Dyes with a shoulder, a vibration of 1200/cm above the band's origin."""
+    rng = np.random.default_rng(7)
+    for origin_nm in rng.uniform(420, 680, count):
+        above = 1e7 * (1 / FINE_NM - 1 / origin_nm)
+        width, shoulder = rng.uniform(200, 450), rng.uniform(0.2, 0.7)
+        band = 1 / np.cosh(above / width)
+        vibration = shoulder / np.cosh((above - 1200) / (1.2 * width))
+        yield np.maximum(band + vibration, 1e-4)
+
+
 @pytest.mark.parametrize("bands", list(BANDS_NM))
-def test_light_within_bands_of_dyes(bands: str) -> None:
+def test_light_within_bands_of_made_dyes(bands: str) -> None:
+    assert_light_within_bands_is_known(bands, made_dyes())
+
+
+def test_light_within_bands_of_measured_dyes(shared_data: Path) -> None:
+    for bands in BANDS_NM:
+        assert_light_within_bands_is_known(bands, measured_dyes(shared_data))
+
+
+def assert_light_within_bands_is_known(bands: str, dyes: Iterator[FloatArray]) -> None:
     """Lights of 8 and 20 nm near the bands' middles: nearer than their even bands, and σ is right.
 
     Some dyes have shoulders and lines: large deviations are more frequent than a Gaussian's.
     """
     rng = np.random.default_rng(31)
     edges_nm, cells_nm = BANDS_NM[bands], cells_of(bands)
-    middle_nm, fine_nm = (cells_nm[1:] + cells_nm[:-1]) / 2, np.arange(400.25, 700.0, 0.5)
+    middle_nm, fine_nm = (cells_nm[1:] + cells_nm[:-1]) / 2, FINE_NM
     before, after, pulls = [], [], []
-    for rate in dyes():
+    for rate in dyes:
         mean = means(fine_nm, rate, edges_nm)
         course = excitation_course(cells_nm, edges_nm, mean, 0.02 * mean)
         for band in np.flatnonzero(mean > 0.02 * mean.max()):

@@ -4,12 +4,8 @@ import pytest
 
 from tests.acceptance import sao_charge_and_decay as sao
 
-pytestmark = [
-    pytest.mark.shared_data,
-    pytest.mark.skipif(not sao.TABLE.exists(), reason="no ../shared/data beside the checkout"),
-]
 
-
+@pytest.mark.usefixtures("shared_data")
 def test_a_convex_charge_is_none_of_the_rate_equation() -> None:
     t_s, glow, dark = sao.measured()
     early, later = sao.convexity(t_s, glow)

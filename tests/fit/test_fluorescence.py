@@ -40,7 +40,6 @@ from tests.fit.fluorescent_samples import (
 )
 from tests.pulls import assert_sigma_is_right
 
-POSTITS = Path(__file__).parents[3] / "shared" / "data" / "bispectral" / "art_postit"
 SYSTEM, FEW = system_of(lights()), system_of(lights(FEW_NM))
 GREEN, RED = Dye(0.4, 450, 510), Dye(0.3, 545, 610)
 EVEN = np.full(len(OUTPUT_NM), 0.4)
@@ -279,17 +278,16 @@ def test_more_leds_are_found_better() -> None:
     assert errors[1] < 0.6 * errors[0]
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not POSTITS.is_dir(), reason="no ../shared/data beside the checkout")
-@pytest.mark.parametrize("name", ["fluorescent_yellow", "fluorescent_green"])
-def test_measured_post_its_are_found(name: str) -> None:
-    measured = read_reradiation(POSTITS / f"{name}.csv").rebinned(INPUT_NM, OUTPUT_NM)
-    truth = replace(
-        measured,
-        reradiation=np.where(measured.is_stokes, np.nan_to_num(measured.reradiation), 0.0),
-        reradiation_sigma=None,
-    )
-    value, variance = photographed(SYSTEM, truth, np.random.default_rng(8))
-    fit = fit_fluorescence(name, value, variance, SYSTEM)
-    assert likely_number(fit) > 0
-    assert worst_delta_e(fit, truth) < 2
+def test_measured_post_its_are_found(shared_data: Path) -> None:
+    for name in ("fluorescent_yellow", "fluorescent_green"):
+        path = shared_data / f"bispectral/art_postit/{name}.csv"
+        measured = read_reradiation(path).rebinned(INPUT_NM, OUTPUT_NM)
+        truth = replace(
+            measured,
+            reradiation=np.where(measured.is_stokes, np.nan_to_num(measured.reradiation), 0.0),
+            reradiation_sigma=None,
+        )
+        value, variance = photographed(SYSTEM, truth, np.random.default_rng(8))
+        fit = fit_fluorescence(name, value, variance, SYSTEM)
+        assert likely_number(fit) > 0
+        assert worst_delta_e(fit, truth) < 2

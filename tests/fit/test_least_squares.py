@@ -9,25 +9,17 @@ from labrig.errors import FitError
 from labrig.fit.least_squares import Ending, FloatArray, least_squares
 from tests.fit import strd
 
-STRD = Path(__file__).parents[3] / "shared" / "data" / "decay" / "nist_strd"
 CERTIFIED_DIGITS = 9
 
 
-needs_strd = pytest.mark.skipif(not STRD.is_dir(), reason="no ../shared/data beside the checkout")
+def test_no_reference_set_is_left_out(real_data: Path) -> None:
+    assert {path.stem for path in (real_data / "nist_strd").glob("*.dat")} == set(strd.MODELS)
 
 
-@pytest.mark.shared_data
-@needs_strd
-def test_no_reference_set_is_left_out() -> None:
-    assert {path.stem for path in STRD.glob("*.dat")} == set(strd.MODELS)
-
-
-@pytest.mark.shared_data
-@needs_strd
 @pytest.mark.parametrize("start", [0, 1])
 @pytest.mark.parametrize("name", strd.MODELS)
-def test_certified_digits(name: str, start: int) -> None:
-    reference = strd.read(STRD / f"{name}.dat")
+def test_certified_digits(real_data: Path, name: str, start: int) -> None:
+    reference = strd.read(real_data / f"nist_strd/{name}.dat")
     fit = least_squares(reference.residuals, reference.starts[start])
     assert fit.converged
     assert fit.rank == len(reference.certified)

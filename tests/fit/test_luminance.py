@@ -12,7 +12,6 @@ from labrig.material import DECAY_LAWS, exponential_means
 from labrig.results import FloatArray, LuminanceDecay, LuminanceRequirement, Measured, Verdict
 from tests.pulls import assert_sigma_is_right
 
-SAO = Path(__file__).parents[3] / "shared/data/decay/perslqy_sao" / "sample_400_524_300s.txt"
 LOGGED_S = np.geomspace(60, 40_000, 60)
 SCALE = 0.005
 Law = Callable[[FloatArray], FloatArray]
@@ -160,11 +159,10 @@ def test_a_requirement_is_met_with_a_probability_of_95_percent(
 
 
 @pytest.mark.campaign
-@pytest.mark.shared_data
-@pytest.mark.skipif(not SAO.exists(), reason="no ../shared/data beside the checkout")
-def test_halves_of_a_real_decay_agree() -> None:
+def test_halves_of_a_real_decay_agree(shared_data: Path) -> None:
     """Every other reading of strontium aluminate: the halves differ by their σ."""
-    t_s, value = np.loadtxt(SAO, skiprows=1, usecols=(0, 1), unpack=True)
+    table = shared_data / "decay/perslqy_sao/sample_400_524_300s.txt"
+    t_s, value = np.loadtxt(table, skiprows=1, usecols=(0, 1), unpack=True)
     later = t_s > 340
     t_s, value = t_s[later] - 330.0, value[later]
 

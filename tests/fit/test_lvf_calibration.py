@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -176,16 +177,14 @@ def test_a_position_without_light() -> None:
         )  # fmt: skip
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not made.DATA.is_dir(), reason="the folder of real data is not there")
 @pytest.mark.campaign
 @pytest.mark.parametrize("catalogue", ["rosco", "lee"])
-def test_real_filters_under_a_real_lamp(catalogue: str) -> None:
+def test_real_filters_under_a_real_lamp(shared_data: Path, catalogue: str) -> None:
     place = {
         "rosco": "filters/art_roscolux/roscolux_transmittance.csv",
         "lee": "filters/color_filter_sds/filters.json",
     }[catalogue]
-    curves = list(read_curve_file(made.DATA / place).curves.items())
+    curves = list(read_curve_file(shared_data / place).curves.items())
     none = Transmittance("none", np.array([380.0, 780.0]), np.ones(2))
     chosen = [Transmittance(name, *curve) for name, curve in curves[:: len(curves) // 40]]
     camera = bent(made.of_the_house(), 2)

@@ -1,6 +1,7 @@
 """Mercury lines along a variable filter, and the wavelengths they give."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,15 @@ import pytest
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import MERCURY, Line, fit_wavelengths, locate_lines
-from labrig.optics import Bands, CameraResponse, Lvf, WavelengthMap, read_spectrum, signal_through
+from labrig.optics import (
+    Bands,
+    CameraResponse,
+    Lvf,
+    Spectrum,
+    WavelengthMap,
+    read_spectrum,
+    signal_through,
+)
 from labrig.results.lvf_calibration import LocatedLines
 from tests.fit import lvf_pictures as made
 
@@ -119,19 +128,37 @@ def test_lines_that_cannot_be_are_refused() -> None:
     )
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not made.DATA.is_dir(), reason="the folder of real data is not there")
-def test_a_real_mercury_lamp() -> None:
-    lamp = read_spectrum(made.DATA / "light_sources/photobiology/lamps.csv", "Generic.germicidal")
+def test_the_lines_are_those_of_a_spectrographs_table(real_data: Path) -> None:
+    """Å in air, with heights in another instrument."""
+    table = np.loadtxt(real_data / "hg_lines/hgar.arc", comments=["#", "*"])
+    mercury = {round(float(nm), 4) for nm in table[:, 0] / 10 if nm < 700}
+    assert {nm for line in MERCURY for nm in line.wavelength_nm} <= mercury
 
-    def rms_nm(lines: tuple[Line, ...], low_nm: float, count: int) -> float:
-        part = (lamp.wavelength_nm > low_nm) & (lamp.wavelength_nm < 590)
-        found = locate_lines(lamp.wavelength_nm[part], lamp.value[part], lines=lines, fwhm_nm=1.2)
-        assert len(found.position) == count
-        straight = np.polyfit(found.position, found.wavelength_nm, 1)
-        return float(np.std(np.polyval(straight, found.position) - found.wavelength_nm))
 
+def rms_nm(lamp: Spectrum, lines: tuple[Line, ...], low_nm: float, count: int) -> float:
+    """What is left of the lines' wavelengths after a straight line through where they are."""
+    part = (lamp.wavelength_nm > low_nm) & (lamp.wavelength_nm < 590)
+    found = locate_lines(lamp.wavelength_nm[part], lamp.value[part], lines=lines, fwhm_nm=1.2)
+    assert len(found.position) == count
+    straight = np.polyfit(found.position, found.wavelength_nm, 1)
+    return float(np.std(np.polyval(straight, found.position) - found.wavelength_nm))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lines_of_a_spectrometer_a_third_of_a_nanometre_off(seed: int) -> None:
+    """Pixels of 0.45 nm, lines of 1.2 nm, as of the real one below."""
+    rng = np.random.default_rng(seed)
+    nm = np.arange(380.0, 600.0, 0.45)
+    apart_nm = (nm - 0.3)[:, np.newaxis] - made.MERCURY_NM
+    value = np.exp(-4 * np.log(2) * (apart_nm / 1.2) ** 2) @ made.MERCURY_HEIGHTS + 0.002
+    lamp = Spectrum("made", nm, value + 5e-4 * rng.standard_normal(len(nm)))
+    assert rms_nm(lamp, MERCURY, 395, 4) < 0.02
+
+
+def test_a_real_mercury_lamp(shared_data: Path) -> None:
+    table = shared_data / "light_sources/photobiology/lamps.csv"
+    lamp = read_spectrum(table, "Generic.germicidal")
     # Measured: 0.004 nm for the visible lines.
-    assert rms_nm(MERCURY, 395, 4) < 0.02
+    assert rms_nm(lamp, MERCURY, 395, 4) < 0.02
     with_ultraviolet = (Line((253.6517,)), Line((365.0158,)), *MERCURY)
-    assert rms_nm(with_ultraviolet, 250, 4) < 0.1
+    assert rms_nm(lamp, with_ultraviolet, 250, 4) < 0.1

@@ -8,12 +8,8 @@ from tests.acceptance import lightlogger
 from tests.acceptance.spectrum_through_lvf import colour_errors, coverage
 from tests.fit import lvf_pictures as made
 
-pytestmark = [
-    pytest.mark.shared_data,
-    pytest.mark.skipif(not made.DATA.is_dir(), reason="the folder of real data is not there"),
-]
 
-
+@pytest.mark.usefixtures("shared_data")
 @pytest.mark.campaign
 def test_bands_of_real_dyes_cover_them() -> None:
     lvf, ours = made.curved_lvf(), made.of_the_house()
@@ -28,6 +24,7 @@ def test_bands_of_real_dyes_cover_them() -> None:
     assert bright[1] > 0.8
 
 
+@pytest.mark.usefixtures("shared_data")
 @pytest.mark.campaign
 def test_the_colour_checker_through_the_filter() -> None:
     lvf, ours = made.curved_lvf(), made.of_the_house()

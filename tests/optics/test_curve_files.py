@@ -16,9 +16,7 @@ from labrig.optics import (
     read_spectrum,
     read_transmittance,
 )
-from tests.fit.lvf_pictures import DATA
 
-IS_THERE = pytest.mark.skipif(not DATA.is_dir(), reason="the folder of real data is not there")
 WIDE = "wavelength_nm,red,blue\n400,0,1\n500,0.5,0.5\n600,1,0\n"
 
 
@@ -126,12 +124,21 @@ REFUSED = {
 } | {f"spectral_sensor_{p}pct.csv": "expected a header" for p in (5, 30, 90, 100)}
 
 
-@pytest.mark.shared_data
-@IS_THERE
-@pytest.mark.parametrize("folder", ["camera_sensitivity", "light_sources", "filters"])
-def test_every_real_file_is_read_or_refused(folder: str) -> None:
+@pytest.mark.parametrize(("folder", "curves"), [("lightlogger", 4 * 41), ("rawtoaces", 1)])
+def test_lights_of_the_repository_are_read(real_data: Path, folder: str, curves: int) -> None:
+    paths = [*(real_data / folder).glob("jeti_*.csv"), *(real_data / folder).glob("*.json")]
+    files = [read_curve_file(path) for path in paths]
+    assert sum(len(file.curves) for file in files) == curves
+
+
+def test_every_real_file_is_read_or_refused(shared_data: Path) -> None:
+    for folder, curves in {"camera_sensitivity": 303, "light_sources": 375, "filters": 827}.items():
+        assert_read_or_refused(shared_data, folder, curves)
+
+
+def assert_read_or_refused(shared_data: Path, folder: str, curves: int) -> None:
     read = 0
-    for path in sorted(p for p in (DATA / folder).rglob("*") if p.is_file()):
+    for path in sorted(p for p in (shared_data / folder).rglob("*") if p.is_file()):
         if path.name in REFUSED:
             with pytest.raises(UsageError, match=REFUSED[path.name]):
                 read_curve_file(path)
@@ -142,4 +149,4 @@ def test_every_real_file_is_read_or_refused(folder: str) -> None:
             read += 1
         if set(file.curves) == {"R", "G", "B"}:
             assert read_camera(path).sensitivity.max() == 1.0
-    assert read == {"camera_sensitivity": 303, "light_sources": 375, "filters": 827}[folder]
+    assert read == curves

@@ -16,19 +16,18 @@ MakeRaw = Callable[..., RawFrame]
 #: colour.SDS_COLOURCHECKERS["BabelColor Average"] (colour-science 0.4.7), white 9.5 to black 2,
 #: mean reflectance over 400 to 700 nm.
 BABELCOLOR_NEUTRALS = (0.882548, 0.574161, 0.351677, 0.187161, 0.088097, 0.032161)
-#: Of data/README.md, raw_photos.
-README_GREEN_DN = (1162, 757, 477, 259, 126, 47)
+#: Green minus black of the neutrals, summed by another program.
+GREEN_DN = (1162, 757, 477, 259, 126, 47)
 
 
-@pytest.mark.shared_data
-def test_a_photographed_colorchecker_is_linear(shared_data: Path) -> None:
-    raw = read_raw(shared_data / "raw_photos" / "canon_550d_kissx4_colorchecker.dng")
+def test_a_photographed_colorchecker_is_linear(real_data: Path) -> None:
+    raw = read_raw(real_data / "canon_550d/canon_550d_kissx4_colorchecker.dng")
     patches = [
         measure(raw, (x - 24, 930 - 24, 48, 48)).channels["G"]
         for x in (704, 816, 926, 1034, 1146, 1256)
     ]
     green = np.array([patch.mean for patch in patches])
-    assert green == pytest.approx(README_GREEN_DN, abs=1)
+    assert green == pytest.approx(GREEN_DN, abs=1)
     assert np.corrcoef(green, BABELCOLOR_NEUTRALS)[0, 1] >= 0.9995
     # Flat paper: pixels scatter by their noise alone, so σ is about std/√n.
     for patch in patches:
@@ -36,10 +35,9 @@ def test_a_photographed_colorchecker_is_linear(shared_data: Path) -> None:
         assert 0.8 < patch.sigma / (patch.std / np.sqrt(patch.n)) < 1.2
 
 
-@pytest.mark.shared_data
-def test_bad_pixels_of_a_real_photograph_are_found(shared_data: Path) -> None:
+def test_bad_pixels_of_a_real_photograph_are_found(real_data: Path) -> None:
     good, bad = (
-        np.fromfile(shared_data / "raw_photos" / f"isp_DSC_1339_768x512_rggb_{name}.raw", "<u2")
+        np.fromfile(real_data / f"isp/isp_DSC_1339_768x512_rggb_{name}.raw", "<u2")
         for name in ("u16le", "badpixels_u16le")
     )
     good, bad = good.reshape(512, 768), bad.reshape(512, 768)

@@ -9,31 +9,30 @@ from labrig.errors import DataError
 from labrig.reduce import find_colour_chart, measure, read_raw
 from labrig.sim.dng import Shot, encode_dng
 
-PHOTOGRAPH = Path(__file__).parents[3] / "shared/data/raw_photos/canon_550d_kissx4_colorchecker.dng"
-#: Middles of columns and rows in pixels, by the data's README.
+#: Middles of columns and rows in pixels.
 X, Y = (704, 816, 926, 1034, 1146, 1256), (624, 720, 820, 930)
-needs_data = pytest.mark.skipif(
-    not PHOTOGRAPH.is_file(), reason="the folder of real data is not there"
-)
 
 
-@pytest.mark.shared_data
-@needs_data
-def test_the_patches_of_a_real_chart_are_found_where_they_are() -> None:
-    raw = read_raw(PHOTOGRAPH)
+@pytest.fixture
+def photograph(real_data: Path) -> Path:
+    return real_data / "canon_550d/canon_550d_kissx4_colorchecker.dng"
+
+
+def test_the_patches_of_a_real_chart_are_found_where_they_are(photograph: Path) -> None:
+    raw = read_raw(photograph)
     height, width = raw.mosaic.shape
-    found = find_colour_chart(PHOTOGRAPH)
+    found = find_colour_chart(photograph)
     middles = [((x + w / 2) * width, (y + h / 2) * height) for x, y, w, h in found]
     expected = [(x, y) for y in Y for x in X]
     # A quarter of the distance of neighbours.
     np.testing.assert_allclose(middles, expected, atol=25)
 
 
-@pytest.mark.shared_data
-@needs_data
 @pytest.mark.parametrize("turned", [False, True])
-def test_an_upside_down_chart_is_read_from_its_brown_patch(tmp_path: Path, turned: bool) -> None:
-    raw = read_raw(PHOTOGRAPH)
+def test_an_upside_down_chart_is_read_from_its_brown_patch(
+    photograph: Path, tmp_path: Path, turned: bool
+) -> None:
+    raw = read_raw(photograph)
     # Black and white of a file that the simulated camera writes; turned, RGGB stays RGGB.
     light = (raw.mosaic.astype(np.float64) - raw.black[0]) / (raw.white - raw.black[0])
     light = light[1:-1, 1:-1][::-1, ::-1] if turned else light

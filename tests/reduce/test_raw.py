@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
+from tifffile import imwrite
 
 from labrig.errors import FrameError, UsageError
 from labrig.reduce import RawFrame, read_raw
@@ -40,16 +41,12 @@ def test_placeholders_are_none(write_dng: WriteDng, settings: dict[str, object])
     assert (raw.exposure_s, raw.f_number, raw.iso) == (None, None, None)
 
 
-@pytest.mark.shared_data
-def test_real_bayer_photographs(shared_data: Path) -> None:
-    canon = read_raw(shared_data / "raw_photos" / "canon_550d_kissx4_colorchecker.dng")
+def test_a_real_photograph_of_a_canon(real_data: Path) -> None:
+    canon = read_raw(real_data / "canon_550d/canon_550d_kissx4_colorchecker.dng")
     assert canon.mosaic.shape == (1156, 1734)
     assert (canon.cfa, canon.black, canon.white) == ("RGGB", (2056,) * 4, 15000)
     assert (int(canon.mosaic.min()), int(canon.mosaic.max())) == (1958, 12128)
     assert (canon.model, canon.exposure_s, canon.iso) == ("Canon EOS Kiss X4", None, None)
-    kodak = read_raw(shared_data / "raw_photos" / "kodak_dc50.kdc")
-    assert (kodak.cfa, kodak.black, kodak.white) == ("GRBG", (0,) * 4, 16383)
-    assert (kodak.exposure_s, kodak.f_number, kodak.iso) == (0.00435, 6.2, None)
 
 
 @pytest.mark.parametrize(
@@ -96,6 +93,15 @@ def test_an_impossible_frame_cannot_be_made(change: dict[str, object], why: str)
         RawFrame(**fields | change)  # type: ignore[arg-type]
 
 
+def test_a_file_with_all_colours_in_every_pixel_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "linear.dng"
+    pixels = np.random.default_rng(2).integers(0, 65536, (40, 60, 3)).astype(np.uint16)
+    tags = [(50706, "B", 4, (1, 4, 0, 0), True), (50708, "s", 0, "linear", True)]
+    imwrite(path, pixels, photometric=34892, planarconfig="contig", extratags=tags)
+    with pytest.raises(FrameError, match="all colours in every pixel"):
+        read_raw(path)
+
+
 def test_cut_off_files_are_refused_quietly(
     write_dng: WriteDng, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -116,7 +122,6 @@ def test_damaged_files_are_read_or_refused(write_dng: WriteDng, data: st.DataObj
     _read_or_refused(bytes(content))
 
 
-@pytest.mark.shared_data
 @settings(max_examples=30, deadline=2000, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_damaged_real_files_are_read_or_refused(shared_data: Path, data: st.DataObject) -> None:

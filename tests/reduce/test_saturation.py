@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.reduce.saturation import clip_level, is_clipped
@@ -109,10 +108,9 @@ def test_above_white_the_files_level_holds() -> None:
     assert clip_level(frame, BLACK, WHITE) == WHITE
 
 
-@pytest.mark.shared_data
-def test_a_real_photograph_is_clipped_where_it_is(shared_data: Path) -> None:
+def test_a_real_photograph_is_clipped_where_it_is(real_data: Path) -> None:
     """14 bits of a Nikon, 432 pixels at 16383; had its file said 20000."""
-    path = shared_data / "raw_photos" / "isp_DSC_1339_768x512_rggb_u16le.raw"
+    path = real_data / "isp/isp_DSC_1339_768x512_rggb_u16le.raw"
     pixels = np.fromfile(path, "<u2").reshape(512, 768)
     assert clip_level(pixels, 600, 20000) == 16383
     assert clip_level(pixels[pixels < 16383].reshape(1, -1), 600, 20000) == 20000

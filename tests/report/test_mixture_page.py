@@ -119,6 +119,10 @@ def test_numbers_of_components_are_compared(fitted: FittedMatrix) -> None:
     assert {picture.name for picture in part.figures} == {"error", "bic"}
     assert len(part.tables[0].rows) == len(fitted.fit.candidates) > 1
     (panel,) = chart(part, "error").panels
+    drawn = next(mark for mark in panel.marks if isinstance(mark, Line))
+    assert drawn.y.tolist() == [one.reduced_chi2 for one in fitted.fit.candidates]
+    thresholded = FittedMatrix(fitted.matrix, fit_mixture(fitted.matrix, threshold=1e-3), LIGHTS)
+    (panel,) = chart(section(thresholded, "Number of components"), "error").panels
     noise = next(mark for mark in panel.marks if isinstance(mark, Line))
     assert "10⁻" in panel.y.label
     unit = 10.0 ** -int(panel.y.label[-1].translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")))

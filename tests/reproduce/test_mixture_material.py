@@ -142,25 +142,24 @@ def test_noise_that_takes_light_away_is_told() -> None:
         of_matrix(replace(matrix, reradiation=matrix.reradiation - 0.003), Bands.even())
 
 
-@pytest.mark.shared_data
-@pytest.mark.parametrize("name", ["TEXTYELL", "POLYYELL"])
 def test_measured_textiles_keep_their_colours_by_a_mixture(
-    name: str, shared_data: Path, tmp_path: Path
+    shared_data: Path, tmp_path: Path
 ) -> None:
     """Under D65 and A, in the bands of a scene; on the bands of the fit, not on finer ones."""
-    path = shared_data / f"bispectral/rit_bfc450/{name}.BFC"
-    measured = with_sigma(corrected(read_reradiation(path)))
-    (tmp_path / "fit.json").write_text(fit_mixture(measured, 4).to_json())
     bands = Bands.even()
-    surfaces = (
-        of_mixture(name, read_mixture(tmp_path / "fit.json"), measured, bands),
-        of_matrix(measured, bands),
-    )
-    for light in ("D65", "A"):
-        power = bands.means(illuminant(light))
-        white = tristimulus(power, bands.edges_nm)
-        found, expected = (
-            lab(tristimulus(surface.matrix @ power, bands.edges_nm) / white[1], white / white[1])
-            for surface in surfaces
+    for name in ("TEXTYELL", "POLYYELL"):
+        path = shared_data / f"bispectral/rit_bfc450/{name}.BFC"
+        measured = with_sigma(corrected(read_reradiation(path)))
+        (tmp_path / "fit.json").write_text(fit_mixture(measured, 4).to_json())
+        surfaces = (
+            of_mixture(name, read_mixture(tmp_path / "fit.json"), measured, bands),
+            of_matrix(measured, bands),
         )
-        assert delta_e(found, expected) < 1.05
+        for light in ("D65", "A"):
+            power = bands.means(illuminant(light))
+            white = tristimulus(power, bands.edges_nm)
+            found, expected = (
+                lab(tristimulus(each.matrix @ power, bands.edges_nm) / white[1], white / white[1])
+                for each in surfaces
+            )
+            assert delta_e(found, expected) < 1.05

@@ -20,6 +20,7 @@ from labrig.reproduce import (
 )
 from labrig.reproduce.transport.wavelength_shift import Start
 from tests.material.reradiation import bfc450
+from tests.material.reradiation.formats.matrices import two_dyes
 from tests.material.reradiation.test_mixture import random_mixture
 
 FloatArray = NDArray[np.float64]
@@ -168,12 +169,19 @@ def test_a_matrix_is_what_weights_tell_where_the_mixture_only_draws(start: Start
         assert is_within(share, sums.max() + (REFLECTANCE[band] if middle == NM[band] else 0))
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
-@pytest.mark.parametrize("name", ["PAPYEL", "PAPMAG", "GOLFYE"])
-def test_measured_matrices_give_back_their_sums(name: str) -> None:
-    (measured,) = (sample for sample in bfc450.samples() if sample.name == name)
-    matrix = corrected(measured)
+def test_a_matrix_of_two_dyes_under_noise_gives_back_its_sums() -> None:
+    assert_gives_back_its_sums(two_dyes(4))
+
+
+@pytest.mark.usefixtures("shared_data")
+def test_measured_matrices_give_back_their_sums() -> None:
+    samples = {sample.name: sample for sample in bfc450.samples()}
+    for name in ("PAPYEL", "PAPMAG", "GOLFYE"):
+        assert_gives_back_its_sums(samples[name])
+
+
+def assert_gives_back_its_sums(measured: ReradiationMatrix) -> None:
+    matrix, name = corrected(measured), measured.name
     surface = WavelengthShift(matrix, fit_mixture(matrix, 4, refine=False).mixture, "matrix")
     rng = np.random.default_rng(len(name) * ord(name[-1]))
     light = np.where(matrix.is_stokes, matrix.reradiation, 0.0) * 10

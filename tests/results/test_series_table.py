@@ -220,7 +220,6 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_series(tmp_path / "decay.xlsx")
 
 
-@pytest.mark.shared_data
 def test_a_real_decay_in_somebodys_table(shared_data: Path) -> None:
     folder = shared_data / "decay" / "perslqy_sao"
     (series,) = read_series(folder / "sample_400_524_300s.txt")

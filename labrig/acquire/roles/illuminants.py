@@ -10,6 +10,7 @@ from labrig import resources
 from labrig.acquire.roles.leds import LedLight
 from labrig.acquire.roles.light_bank import BankSwitch, LightBank, PlannedLightBank, exercise
 from labrig.acquire.roles.role import Role
+from labrig.named_files import ShippedOrFile
 from labrig.optics import Spectrum, read_light
 from labrig.quantity import DurationS
 
@@ -38,6 +39,7 @@ class Illuminant(LedLight):
     (600.0, [0.39, 1.49])
     """
 
+    spectrum: ShippedOrFile | None = None
     settling: Annotated[DurationS, Field(ge=0, le=7200)] = 0.0
     filter: Annotated[str, Field(min_length=1)] | None = None
 

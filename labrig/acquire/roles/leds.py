@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire.roles.light_bank import BankSwitch, LightBank, PlannedLightBank, exercise
 from labrig.acquire.roles.role import Role
+from labrig.named_files import FilePath
 from labrig.optics import Spectrum, read_spectrum
 from labrig.quantity import DurationS
 
@@ -51,7 +52,7 @@ class LedLight(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    spectrum: str | None = None
+    spectrum: FilePath | None = None
     centre: Annotated[float, Field(ge=200, le=1200)] | None = None
     fwhm: Annotated[float, Field(ge=1, le=400)] | None = None
     settling: Annotated[DurationS, Field(ge=0, le=600)] = 0.0

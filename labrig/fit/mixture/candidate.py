@@ -148,7 +148,8 @@ def _by_error(entries: StokesEntries, starts: Gaussians) -> list[tuple[Gaussians
     """Return the mixtures one by one with the scale of the integral, the least error first."""
     model = starts.density(entries.monomials) * entries.relative_width
     scales = entries.mass.sum() / (model @ entries.input_width_nm)
-    errors = ((scales[:, np.newaxis] * model - entries.value) ** 2).mean(axis=-1)
+    residuals = entries.weight * (scales[:, np.newaxis] * model - entries.wanted)
+    errors = (residuals**2).mean(axis=-1)
     order = np.argsort(errors, kind="stable")
     return [(starts[[index]], float(scales[index])) for index in order]
 

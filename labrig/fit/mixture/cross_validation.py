@@ -32,4 +32,5 @@ def _errors(
 ) -> Iterator[float]:
     training, test = entries.where(~held_out), entries.where(held_out)
     for candidate in islice(candidates(training, 1, skewed, is_final=False), most):
-        yield float(((modelled(test, candidate.mixture) - test.value) ** 2).mean())
+        off = modelled(test, candidate.mixture) - test.wanted
+        yield float(np.average(off**2, weights=test.weight**2))

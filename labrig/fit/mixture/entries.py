@@ -1,8 +1,10 @@
 """Entries of a re-radiation matrix to which mixtures are fitted.
 
-Noise scatters about a third of all entries below zero, which no density reproduces, and a mixture
-that follows the positive ones covers the whole matrix. Entries that are not above the noise are
-therefore set to zero before the fit (Hua et al. 2021, section 5.1).
+Noise scatters about a third of all entries below zero, which have no likelihood as amounts of
+light, and a mixture that follows the positive ones covers the whole matrix. Expectation
+maximisation therefore takes entries that are not above the noise as zero (Hua et al. 2021,
+section 5.1). That loses light: what follows it fits all entries as they were measured where their σ
+is known.
 """
 
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ FALSE_DISCOVERY_RATE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class StokesEntries:
-    """Measured entries with λ_o > λ_i, those below the threshold set to 0.
+    """Measured entries with λ_o > λ_i.
 
     Attributes
     ----------
@@ -32,21 +34,41 @@ class StokesEntries:
         Centres of the entries' bands in nm, shape (N,).
     input_width_nm, output_width_nm
         Widths of the entries' bands in nm, shape (N,).
-    value
+    measured
         Fraction of the light of the input band that comes back in the output band, shape (N,).
     is_kept
         Whether the entry is above the threshold, shape (N,).
     threshold
         The least value that is kept.
+    sigma
+        Standard deviations of `measured` by which the entries are weighted, shape (N,); None if all
+        weigh the same and those below the threshold are taken as 0.
     """
 
     input_nm: FloatArray
     output_nm: FloatArray
     input_width_nm: FloatArray
     output_width_nm: FloatArray
-    value: FloatArray
+    measured: FloatArray
     is_kept: NDArray[np.bool_]
     threshold: float
+    sigma: FloatArray | None = None
+
+    @cached_property
+    def value(self) -> FloatArray:
+        """Measured values, those below the threshold taken as 0, shape (N,)."""
+        return np.where(self.is_kept, self.measured, 0.0)
+
+    @property
+    def wanted(self) -> FloatArray:
+        """Values that least squares follow, shape (N,)."""
+        return self.value if self.sigma is None else self.measured
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Weights of residuals in least squares: 1/σ, or one over the largest entry, shape (N,)."""
+        sigma = self.value.max() if self.sigma is None else self.sigma
+        return np.broadcast_to(1 / sigma, self.measured.shape)
 
     @property
     def mass(self) -> FloatArray:
@@ -94,14 +116,15 @@ class StokesEntries:
             self.output_nm[chosen],
             self.input_width_nm[chosen],
             self.output_width_nm[chosen],
-            self.value[chosen],
+            self.measured[chosen],
             self.is_kept[chosen],
             self.threshold,
+            None if self.sigma is None else self.sigma[chosen],
         )
 
 
 def stokes_entries(matrix: ReradiationMatrix, threshold: float | None) -> StokesEntries:
-    """Return the entries of a matrix, thresholded.
+    """Return the entries of a matrix.
 
     Parameters
     ----------
@@ -109,8 +132,8 @@ def stokes_entries(matrix: ReradiationMatrix, threshold: float | None) -> Stokes
         The matrix; σ of its re-radiation is needed without a threshold. Entries that were not
         measured, or of unknown σ, are left out.
     threshold
-        Least value per band that is kept. Without it, entries are kept that are significant at
-        `FALSE_DISCOVERY_RATE`.
+        Least value per band that is kept; all entries then weigh the same. Without it they are
+        weighted by σ, and those are kept that are significant at `FALSE_DISCOVERY_RATE`.
 
     Raises
     ------
@@ -127,16 +150,19 @@ def stokes_entries(matrix: ReradiationMatrix, threshold: float | None) -> Stokes
             "expected σ of the re-radiation or a threshold, got neither; give the least value per "
             "band that is more than noise"
         )
-    measured = matrix.is_stokes & ~np.isnan(matrix.reradiation)
-    per_nm = matrix.reradiation[measured]
-    row, column = np.nonzero(measured)
+    used = matrix.is_stokes & ~np.isnan(matrix.reradiation)
+    if threshold is None and sigma is not None:
+        used &= sigma >= 0
+    row, column = np.nonzero(used)
     output_width_nm = matrix.output_width_nm[row]
-    value = per_nm * output_width_nm
+    measured = matrix.reradiation[used] * output_width_nm
     if threshold is not None:
-        is_kept = value >= threshold
+        is_kept, weighting = measured >= threshold, None
     else:
         assert sigma is not None
-        is_kept = _is_significant(per_nm, sigma[measured])
+        sigma_per_band = sigma[used] * output_width_nm
+        is_kept = _is_significant(measured, sigma_per_band)
+        weighting = _above_zero(sigma_per_band)
     if not is_kept.any():
         raise DataError(
             "expected re-radiation above the noise, got none on the Stokes side; lower the "
@@ -147,18 +173,24 @@ def stokes_entries(matrix: ReradiationMatrix, threshold: float | None) -> Stokes
         matrix.output_nm[row],
         matrix.input_width_nm[column],
         output_width_nm,
-        np.where(is_kept, value, 0.0),
+        measured,
         is_kept,
-        float(value[is_kept].min()) if threshold is None else threshold,
+        float(measured[is_kept].min()) if threshold is None else threshold,
+        weighting,
     )
+
+
+def _above_zero(sigma: FloatArray) -> FloatArray | None:
+    """Return σ, the least in place of 0, which would weigh without bound; None if all are 0."""
+    positive = sigma[sigma > 0]
+    return np.maximum(sigma, positive.min()) if len(positive) else None
 
 
 def _is_significant(value: FloatArray, sigma: FloatArray) -> NDArray[np.bool_]:
     """Return which values are above noise of standard deviation σ, by Benjamini and Hochberg."""
-    known = sigma >= 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        p_value = np.where(known & (value != 0), ndtr(-value / sigma), 1.0)
-    ordered = np.sort(p_value[known])
+        p_value = np.where(value != 0, ndtr(-value / sigma), 1.0)
+    ordered = np.sort(p_value)
     allowed = FALSE_DISCOVERY_RATE * np.arange(1, len(ordered) + 1) / len(ordered)
     passing = ordered[ordered <= allowed]
     return p_value <= passing[-1] if len(passing) else np.zeros(len(value), dtype=np.bool_)

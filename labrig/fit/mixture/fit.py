@@ -1,7 +1,9 @@
 """Fit of a mixture to a re-radiation matrix.
 
 Entries above the noise, then components with the least squared error, then the scale (Hua et al.,
-*A compact representation for fluorescent spectral data*, EGSR 2021, section 5).
+*A compact representation for fluorescent spectral data*, EGSR 2021, section 5). Where σ is known
+the error is χ² of all entries as they were measured, negative ones too: what a threshold takes for
+noise is partly light.
 """
 
 from collections.abc import Sequence
@@ -14,9 +16,10 @@ from labrig.errors import UsageError
 from labrig.fit.mixture.candidate import Candidate, candidates, likeliest
 from labrig.fit.mixture.cross_validation import held_out_errors
 from labrig.fit.mixture.entries import FALSE_DISCOVERY_RATE, StokesEntries, stokes_entries
+from labrig.fit.mixture.light_kept import light_kept, light_sigma
 from labrig.fit.mixture.refinement import PARAMETERS
 from labrig.fit.mixture.result import HeldOutError, MixtureCandidate, MixtureFit
-from labrig.fit.mixture.scaling import Scaling, masked_mse, with_colours, with_integral
+from labrig.fit.mixture.scaling import Scaling, chi2, masked_mse, with_colours, with_integral
 from labrig.fit.mixture.skewed_refinement import PARAMETERS as SKEWED_PARAMETERS
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
@@ -48,17 +51,16 @@ def fit_mixture(
     Parameters
     ----------
     matrix
-        The matrix. Its σ, where it is known, tells which entries are above the noise; the others
-        are taken as 0.
+        The matrix. Its σ, where it is known, weighs the entries.
     components
         Number of components; "auto" takes that which `selection` prefers.
     scaling
-        "integral" keeps the amount of light, and so the brightness, "least-squares" has the least
-        error (equations 4 and 5 of the paper), "colour" the least mean ΔE2000 under
-        `lights`.
+        "integral" keeps the amount of light, and so the brightness, as far as the sum of the
+        entries tells it better than their fit does; "least-squares" has the least error (equations
+        4 and 5 of the paper), "colour" the least mean ΔE2000 under `lights`.
     threshold
-        Least value per band that is more than noise. Without it, entries are kept of which 5 % are
-        expected to be noise.
+        Least value per band that is more than noise: entries below are taken as 0, and all weigh
+        the same, as in the paper. Without it all entries are fitted as they are, weighted by σ.
     selection
         "bic" takes the number of the least Bayesian information criterion; "cross-validation" the
         least number whose error at entries left out of the fit is within one standard error of the
@@ -68,9 +70,9 @@ def fit_mixture(
     lights
         Lights whose colours set the scale if `scaling` is "colour".
     refine
-        Whether the squared error is minimised after the likelihood. The likelihood alone is what
-        the paper maximises: ten times faster, with three times the error; not for "auto" or skewed
-        components.
+        Whether the squared error is minimised after the likelihood. The likelihood alone, of the
+        entries above the noise, is what the paper maximises: ten times faster, with three times the
+        error; not for "auto" or skewed components.
 
     Returns
     -------
@@ -121,8 +123,9 @@ def fit_mixture(
         )
     best = fits[_preferred(table, selection)]
     mixture = best.mixture
+    least_chi2 = chi2(entries, mixture)
     if scaling != "least-squares":
-        mixture = with_integral(entries, mixture)
+        mixture = with_integral(entries, mixture, light_sigma(matrix, entries))
     if scaling == "colour":
         mixture = with_colours(matrix, mixture, lights)
     widths_nm = matrix.output_width_nm
@@ -134,6 +137,8 @@ def fit_mixture(
         false_discovery_rate=FALSE_DISCOVERY_RATE if threshold is None else None,
         kept_entries=kept,
         entries=len(entries.value),
+        light_kept=light_kept(matrix, entries, mixture),
+        reduced_chi2=_reduced(least_chi2, entries, best, parameters),
         masked_mse=masked_mse(entries, mixture),
         likelihood_mse=best.likelihood_mse,
         band_nm=float(widths_nm[0]) if np.allclose(widths_nm, widths_nm[0]) else 1.0,
@@ -167,16 +172,24 @@ def _selected(
 def _scored(
     entries: StokesEntries, fit: Candidate, parameters: int, held_out: HeldOutError | None = None
 ) -> MixtureCandidate:
-    kept = int(entries.is_kept.sum())
     components = len(fit.mixture.weights)
     mse = masked_mse(entries, fit.mixture)
-    misfit = kept * float(np.log(max(mse, np.finfo(np.float64).tiny)))
-    return MixtureCandidate(
-        components,
-        mse,
-        misfit + parameters * components * float(np.log(kept)),
-        held_out,
-    )
+    misfit, number = chi2(entries, fit.mixture), len(entries.value)
+    reduced = _reduced(misfit, entries, fit, parameters)
+    if misfit is None:
+        number = int(entries.is_kept.sum())
+        misfit = number * float(np.log(max(mse, np.finfo(np.float64).tiny)))
+    bic = misfit + parameters * components * float(np.log(number))
+    return MixtureCandidate(components, mse, bic, reduced, held_out)
+
+
+def _reduced(
+    misfit: float | None, entries: StokesEntries, fit: Candidate, parameters: int
+) -> float | None:
+    """Return χ² over the degrees of freedom."""
+    if misfit is None:
+        return None
+    return misfit / max(len(entries.value) - parameters * len(fit.mixture.weights), 1)
 
 
 def _preferred(table: Sequence[MixtureCandidate], selection: Selection) -> int:

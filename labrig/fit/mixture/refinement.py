@@ -30,12 +30,12 @@ def refined(
     least_sd: float,
     is_final: bool,
 ) -> tuple[Gaussians, float, LeastSquaresFit]:
-    """Minimise the squared error of one mixture over all entries.
+    """Minimise the weighted squared error of one mixture over all entries.
 
     Parameters
     ----------
     entries
-        The entries, in which those below the threshold are 0.
+        The entries.
     start
         One mixture, B = 1.
     scale
@@ -48,10 +48,11 @@ def refined(
     Returns
     -------
     gaussians, scale, fit
-        The mixture, its scale and the fit, whose residuals are in units of the largest entry.
+        The mixture, its scale and the fit, whose residuals are weighted.
     """
     largest = float(entries.value.max())
-    measured = entries.value / largest
+    wanted = entries.weight * entries.wanted
+    weight = entries.weight * largest * entries.relative_width
     x, y = entries.points
 
     def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -60,7 +61,7 @@ def refined(
         per_sd_x, per_sd_y = np.exp(-log_sd_x), np.exp(-log_sd_y)
         off_x = x - mean_x
         u, v = off_x * per_sd_x, (y - mean_y - slope * off_x) * per_sd_y
-        value = np.exp(log_height - 0.5 * (u * u + v * v)) * entries.relative_width
+        value = np.exp(log_height - 0.5 * (u * u + v * v)) * weight
         by_mean_y = value * v * per_sd_y
         jacobian = np.empty((len(columns), PARAMETERS, len(x)))
         jacobian[:, 0] = value
@@ -69,7 +70,7 @@ def refined(
         jacobian[:, 3] = value * u * u
         jacobian[:, 4] = by_mean_y * off_x
         jacobian[:, 5] = value * v * v
-        return value.sum(axis=0) - measured, jacobian.reshape(-1, len(x)).T
+        return value.sum(axis=0) - wanted, jacobian.reshape(-1, len(x)).T
 
     count = start.weights.shape[-1]
     lower, upper = (
@@ -86,7 +87,7 @@ def refined(
         upper=upper,
         max_iterations=MAX_ITERATIONS,
         tolerance=TOLERANCE,
-        least_gain=0.0 if is_final else LEAST_GAIN * float(measured @ measured),
+        least_gain=0.0 if is_final else LEAST_GAIN * float(wanted @ wanted),
     )
     return *_gaussians(fit.parameters, largest), fit
 

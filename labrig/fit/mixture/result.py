@@ -24,6 +24,27 @@ class HeldOutError:
 
 
 @dataclass(frozen=True)
+class LightKept:
+    """Light that a mixture re-radiates over that in the measured entries, all of them counted.
+
+    Attributes
+    ----------
+    total, total_sigma
+        Of the whole matrix, and its σ from that of the entries; None without it. NaN if the
+        entries have no light in the mean.
+    worst_input_nm, worst, worst_sigma
+        The input band with 1 % of the light or more, known to 5 σ, whose light is kept worst: by
+        most of its σ, or by most of its light where σ is unknown.
+    """
+
+    total: float
+    total_sigma: float | None
+    worst_input_nm: float
+    worst: float
+    worst_sigma: float | None
+
+
+@dataclass(frozen=True)
 class MixtureCandidate:
     """A fit with some number of components.
 
@@ -34,8 +55,11 @@ class MixtureCandidate:
     masked_mse
         As `MixtureFit.masked_mse`, by least squares.
     bic
-        Bayesian information criterion M ln(masked_mse) + P K ln M of the M entries above the
-        threshold, P = 6 (8 if skewed); entries that were set to zero are no data.
+        Bayesian information criterion, P = 6 (8 if skewed): χ² + P K ln N of N entries weighted by
+        σ; else M ln(masked_mse) + P K ln M of the M entries above the threshold, since entries
+        that were set to zero are no data.
+    reduced_chi2
+        χ² over N − P K; None without σ. Above 1 by more than a few √(2/N) it is misfit, not noise.
     held_out
         Error at entries that were left out of the fit, by five-fold cross-validation; None without
         it.
@@ -44,6 +68,7 @@ class MixtureCandidate:
     components: int
     masked_mse: float
     bic: float
+    reduced_chi2: float | None = None
     held_out: HeldOutError | None = None
 
 
@@ -56,8 +81,9 @@ class MixtureFit:
     mixture
         The mixture.
     scaling
-        "integral" if the mixture re-radiates as much as the entries above the threshold,
-        "least-squares" if its scale minimises the error, "colour" if it minimises ΔE2000.
+        "integral" if the mixture re-radiates as much as the entries do (all of them if they are
+        weighted by σ, else those above the threshold), "least-squares" if its scale minimises the
+        error, "colour" if it minimises ΔE2000.
     lights
         Names of the lights under which it does; none otherwise.
     threshold
@@ -66,6 +92,11 @@ class MixtureFit:
         Rate by which that was found; None if the threshold was given.
     kept_entries, entries
         Number of entries above the threshold, and of all measured ones with λ_o > λ_i.
+    light_kept
+        Light of the mixture over that measured.
+    reduced_chi2
+        χ² of all entries over their number less that of the parameters, with the scale of least
+        squares; None if they are not weighted by σ.
     masked_mse
         Mean squared error, per band, of all measured entries with λ_o > λ_i, those below the
         threshold taken as 0.
@@ -94,6 +125,8 @@ class MixtureFit:
     false_discovery_rate: float | None
     kept_entries: int
     entries: int
+    light_kept: LightKept
+    reduced_chi2: float | None
     masked_mse: float
     likelihood_mse: float
     band_nm: float
@@ -143,6 +176,8 @@ class MixtureFit:
             "false_discovery_rate": self.false_discovery_rate,
             "kept_entries": self.kept_entries,
             "entries": self.entries,
+            "light_kept": asdict(self.light_kept),
+            "reduced_chi2": self.reduced_chi2,
             "masked_mse": self.masked_mse,
             "likelihood_mse": self.likelihood_mse,
             "iterations": self.iterations,

@@ -16,6 +16,8 @@ Scaling = Literal["integral", "least-squares", "colour"]
 
 #: How far from the scale of the integral, as a factor, colours may take it.
 FARTHEST = 2.0
+#: Difference in σ between fitted and summed light up to which it is taken for noise.
+NOISE_SIGMAS = 2.0
 #: Number of scales of which the best is the start of the search.
 GRID = 29
 
@@ -31,10 +33,45 @@ def masked_mse(entries: StokesEntries, mixture: ReradiationMixture) -> float:
     return float(((modelled(entries, mixture) - entries.value) ** 2).mean())
 
 
-def with_integral(entries: StokesEntries, mixture: ReradiationMixture) -> ReradiationMixture:
-    """Return the mixture with the scale that keeps the light in all entries (equation 5)."""
-    light = modelled(entries, mixture) @ entries.input_width_nm
-    return replace(mixture, scale=mixture.scale * float(entries.mass.sum() / light))
+def chi2(entries: StokesEntries, mixture: ReradiationMixture) -> float | None:
+    """Return the sum of squared residuals over σ; None without σ."""
+    if entries.sigma is None:
+        return None
+    return float((((modelled(entries, mixture) - entries.measured) / entries.sigma) ** 2).sum())
+
+
+def with_integral(
+    entries: StokesEntries, mixture: ReradiationMixture, sigma: float | None = None
+) -> ReradiationMixture:
+    """Return the mixture with the scale that keeps the light in all entries (equation 5).
+
+    Parameters
+    ----------
+    entries
+        The entries.
+    mixture
+        The mixture, with another scale.
+    sigma
+        Standard deviation of the light in all entries if the given scale is that of their fit,
+        which noise moves far less than their sum: a difference within `NOISE_SIGMAS` then leaves
+        the scale as it is, and a larger one moves it by all but the noise in it (shrinkage after
+        James and Stein, 1961).
+
+    Raises
+    ------
+    DataError
+        The entries have no light in the mean.
+    """
+    light = float(modelled(entries, mixture) @ entries.input_width_nm)
+    missing = float(entries.wanted @ entries.input_width_nm) - light
+    if sigma is not None and missing != 0:
+        missing *= max(1 - (NOISE_SIGMAS * sigma / missing) ** 2, 0.0)
+    if not light + missing > 0:
+        raise DataError(
+            "expected light in the sum of all entries, got none above the noise; take the scale "
+            "of least squares"
+        )
+    return replace(mixture, scale=mixture.scale * (1 + missing / light))
 
 
 def with_colours(

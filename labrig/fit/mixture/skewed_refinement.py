@@ -25,7 +25,7 @@ def refined_skewed(
     Parameters
     ----------
     entries
-        The entries, in which those below the threshold are 0.
+        The entries.
     start
         One mixture, B = 1.
     scale
@@ -39,10 +39,11 @@ def refined_skewed(
     -------
     gaussians, scale, skew, fit
         The mixture without its skews, its scale, the skews in input and output, shape (K, 2), and
-        the fit, whose residuals are in units of the largest entry.
+        the fit, whose residuals are weighted.
     """
     largest = float(entries.value.max())
-    measured = entries.value / largest
+    wanted = entries.weight * entries.wanted
+    weight = entries.weight * largest * entries.relative_width
     x, y = entries.points
 
     def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -52,7 +53,7 @@ def refined_skewed(
         rho, spread = np.tanh(slant), 1 / np.cosh(slant)
         q = (v - rho * u) / spread
         log_value = log_height + log_rate_x + log_rate_y - 0.5 * (u * u + q * q)
-        value = np.exp(log_value) * entries.relative_width
+        value = np.exp(log_value) * weight
         by_u, by_v = q * rho / spread - u, -q / spread
         slopes = [
             np.ones_like(value),
@@ -61,7 +62,7 @@ def refined_skewed(
             q * (u - rho * v) / spread,
         ]
         jacobian = value[:, np.newaxis] * np.stack(slopes, axis=1)
-        return value.sum(axis=0) - measured, jacobian.reshape(-1, len(x)).T
+        return value.sum(axis=0) - wanted, jacobian.reshape(-1, len(x)).T
 
     count = start.weights.shape[-1]
     slant = np.arctanh(LARGEST_CORRELATION)
@@ -79,7 +80,7 @@ def refined_skewed(
         upper=upper,
         max_iterations=MAX_ITERATIONS,
         tolerance=TOLERANCE,
-        least_gain=0.0 if is_final else LEAST_GAIN * float(measured @ measured),
+        least_gain=0.0 if is_final else LEAST_GAIN * float(wanted @ wanted),
     )
     return *_mixture(fit.parameters, largest), fit
 

@@ -76,7 +76,7 @@ def with_one_more(
         The mixture with a round component around one of the entries, and its scale.
     """
     model = scale * gaussians.density(entries.monomials)[0] * entries.relative_width
-    residual = entries.value - model
+    residual = entries.wanted - model
     # Where most is missing, most can be gained.
     lacking = np.argsort(-np.where(entries.is_kept, residual, -np.inf), kind="stable")
     centres = entries.points[:, lacking[: min(MOST_CENTRES, int(entries.is_kept.sum()))]]
@@ -85,9 +85,10 @@ def with_one_more(
     best = (-np.inf, 0.0, 0, 0.0)
     sd = WIDEST_SD_BANDS * entries.band_nm / entries.unit_nm
     shapes = np.exp(-0.5 * distance2 / sd**2)
+    weight2 = (entries.weight / entries.weight.max()) ** 2
     for _ in range(HALVINGS + 1):
-        norms2 = np.einsum("ij,ij->i", shapes, shapes)
-        along = np.maximum(shapes @ residual, 0.0)
+        norms2 = np.square(shapes) @ weight2
+        along = np.maximum(shapes @ (weight2 * residual), 0.0)
         gains = along**2 / norms2
         at = int(np.argmax(gains))
         best = max(best, (float(gains[at]), sd, at, float(along[at] / norms2[at])))

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
+from labrig.named_files import beside
 from labrig.optics import Spectrum, read_light
 from labrig.reproduce.scene.placed_objects import surface_over_time
 from labrig.reproduce.scene.scene_file import (
     DisplayEntry,
     ProgrammeEntry,
     SceneFile,
-    beside,
     read_scene,
 )
 from labrig.reproduce.scene.scene_lamps import bench_light, placed_lamp
@@ -131,7 +131,7 @@ class Scene:
         """
         content = self.file.display.model_dump()
         if white is not None:
-            content["white"] = str(Path(white).absolute()) if Path(white).suffix else white
+            content["white"] = beside(white, Path.cwd())
         if exposure is not None:
             content["exposure"] = exposure
         display = validate(content, DisplayEntry, "--white" if exposure is None else "--exposure")

@@ -86,7 +86,8 @@ class MeshEntry(ScenePart):
     Attributes
     ----------
     file
-        OBJ, PLY, glTF or STL file, relative to the scene's.
+        OBJ, PLY, glTF or STL file, relative to the scene's. Its materials, normals, lines and
+        points are left out.
     size_m
         Factor from the file's unit to m.
     turned_deg

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.reproduce.scene.object_entry import MaterialMap, ObjectEntry
+from labrig.reproduce.scene.placed_mesh import placed_mesh
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.geometry import Samples, Surface
-from labrig.reproduce.transport.mesh import Mesh, read_mesh, rotation
+from labrig.reproduce.transport.mesh import Mesh
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -78,32 +79,7 @@ def _mesh(name: str, entry: ObjectEntry, folder: Path) -> Mesh:
         _, position_m = _trajectory(folder / entry.particles.file)
         return Mesh.octahedra(position_m[0], entry.particles.radius_m)
     assert entry.mesh is not None
-    mesh = read_mesh(folder / entry.mesh.file)
-    turn = np.eye(3)
-    for axis, angle_deg in zip(np.eye(3), entry.mesh.turned_deg, strict=True):
-        turn = rotation(axis, angle_deg) @ turn
-    placed = mesh.vertices_m @ turn.T * entry.mesh.size_m + np.array(entry.mesh.position_m)
-    mesh = Mesh(placed, mesh.faces, mesh.uv)
-    if entry.mesh.inward:
-        mesh = mesh.turned_over()
-    if not entry.two_sided and not mesh.is_turned_alike:
-        raise UsageError(
-            f"{name}: expected triangles that all have their front on the same side, got some "
-            f"inverted ones in {entry.mesh.file}; turn their normals over, or give "
-            "'two_sided: true'"
-        )
-    if not entry.two_sided and not mesh.is_closed and entry.lamp is None:
-        raise UsageError(
-            f"{name}: expected a closed mesh, got one with holes in {entry.mesh.file}; its back "
-            "would be black: close it, or give 'two_sided: true'"
-        )
-    if not entry.two_sided and mesh.is_closed and (mesh.volume_m3 < 0) != entry.mesh.inward:
-        raise UsageError(
-            f"{name}: expected triangles whose front is {'in' if entry.mesh.inward else 'out'}"
-            f"side, got inverted ones in {entry.mesh.file}; turn its normals over, or give "
-            f"'inward: {str(not entry.mesh.inward).lower()}'"
-        )
-    return mesh
+    return placed_mesh(name, entry, entry.mesh, folder)
 
 
 def _motion(name: str, entry: ObjectEntry, mesh: Mesh, folder: Path) -> Callable[[float], Mesh]:

@@ -337,11 +337,6 @@ def read_scene(name_or_path: str | Path) -> tuple[SceneFile, Path]:
     return read_model(path, SceneFile), path.parent
 
 
-def beside(named: str, folder: Path) -> str:
-    """Return a file's path beside the scene's, or the name of something shipped as it is."""
-    return str(folder / named) if Path(named).suffix else named
-
-
 def _must_be_known(where: str, what: str, name: str, known: list[str]) -> None:
     if name not in known:
         raise ValueError(f"{where}: there is no {what} '{name}'; {did_you_mean(name, known)}")

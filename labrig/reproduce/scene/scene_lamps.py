@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
+from labrig.named_files import beside
 from labrig.optics import absolute_irradiance, read_light
 from labrig.reproduce.scene.lamp_entry import STRENGTHS, LampEntry
-from labrig.reproduce.scene.scene_file import SceneFile, beside
+from labrig.reproduce.scene.scene_file import SceneFile
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.surface_material import BenchLight
 from labrig.reproduce.transport.lamp import Lamp

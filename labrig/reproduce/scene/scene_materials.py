@@ -8,8 +8,9 @@ import numpy as np
 
 from labrig.errors import UsageError
 from labrig.material import Albedo, Material, read_any_material, read_mixture
+from labrig.named_files import beside
 from labrig.optics import Transmittance, read_colour_chart, read_transmittance
-from labrig.reproduce.scene.scene_file import AlbedoCurve, MaterialEntry, beside
+from labrig.reproduce.scene.scene_file import AlbedoCurve, MaterialEntry
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.parameter_texture import read_parameter_texture
 from labrig.reproduce.surface.surface_material import (

@@ -1,12 +1,14 @@
-"""Triangle meshes: shapes that a scene file names, and files."""
+"""Triangle meshes, and the shapes that a scene file names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Self
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from labrig.errors import UsageError
 
@@ -14,8 +16,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 IntArray64 = NDArray[np.int64]
 
-#: Formats of meshes that are read.
-FORMATS = (".obj", ".ply", ".glb", ".gltf", ".stl")
+PARTLY_UNWRAPPED = (
+    "expected texture coordinates on all faces or on none, got them on some; unwrap all of the mesh"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +222,31 @@ class Mesh:
         number = 6 * np.arange(len(centres))[:, None, None]
         return cls(vertices, (faces + number).reshape(-1, 3).astype(np.int32))
 
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return several meshes as one.
+
+        Parameters
+        ----------
+        parts
+            The meshes.
+
+        Raises
+        ------
+        UsageError
+            Some have texture coordinates and some have none.
+        """
+        uvs = [part.uv for part in parts if part.uv is not None]
+        if len(uvs) not in (0, len(parts)):
+            raise UsageError(PARTLY_UNWRAPPED)
+        first = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
+        faces = [part.faces + begin for part, begin in zip(parts, first, strict=False)]
+        return cls(
+            np.concatenate([np.empty((0, 3)), *(part.vertices_m for part in parts)]),
+            np.concatenate([np.empty((0, 3)), *faces]).astype(np.int32),
+            np.concatenate(uvs) if uvs else None,
+        )
+
     @property
     def normals(self) -> FloatArray:
         """Unit normals of the triangles, zero of those without area, shape (m, 3)."""
@@ -275,10 +303,53 @@ class Mesh:
         same_way, count = np.unique(edges, return_counts=True)
         return not bool((~np.isin(same_way[count == 2], back)).any())
 
+    def pieces(self, most_at_edge: int | None = None) -> list[Self]:
+        """Return the parts that share no edge, vertices at one place being one.
+
+        Parameters
+        ----------
+        most_at_edge
+            Number of triangles at an edge above which it parts them; None for any number.
+        """
+        faces = self._places_of_corners
+        before = np.roll(faces, 1, axis=1)
+        number = np.minimum(faces, before) * len(self.vertices_m) + np.maximum(faces, before)
+        _, edge, count = np.unique(number, return_inverse=True, return_counts=True)
+        edge = edge.reshape(-1)
+        joins = (faces != before).ravel()
+        if most_at_edge is not None:
+            joins &= count[edge] <= most_at_edge
+        # Triangles and edges are the nodes of one graph.
+        ends = np.arange(len(faces)).repeat(3)[joins], len(faces) + edge[joins]
+        n = len(faces) + len(count)
+        graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(n, n))
+        piece = connected_components(graph, directed=False)[1][: len(faces)]
+        order = np.argsort(piece, kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+        return [replace(self, faces=self.faces[group]).without_loose_vertices() for group in groups]
+
+    def without_loose_vertices(self) -> Self:
+        """Return the mesh without the vertices that no triangle has."""
+        used, faces = np.unique(self.faces, return_inverse=True)
+        if len(used) == len(self.vertices_m):
+            return self
+        uv = None if self.uv is None else self.uv[used]
+        return replace(
+            self,
+            vertices_m=self.vertices_m[used],
+            faces=faces.reshape(-1, 3).astype(np.int32),
+            uv=uv,
+        )
+
+    @cached_property
+    def _places_of_corners(self) -> IntArray64:
+        """Return a number for the place of each corner of the triangles, shape (m, 3)."""
+        _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
+        return np.asarray(same.reshape(-1)[self.faces], dtype=np.int64)
+
     def _edges(self) -> tuple[IntArray64, IntArray64]:
         """Return a number for each edge of each triangle, and that of the way back along it."""
-        _, same = np.unique(np.round(self.vertices_m, 9), axis=0, return_inverse=True)
-        faces = same.reshape(-1)[self.faces]
+        faces = self._places_of_corners
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
         edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
         n = len(self.vertices_m)
@@ -291,115 +362,6 @@ class Mesh:
     def _twice_area_vectors(self) -> FloatArray:
         a, b, c = self.vertices_m[self.faces].swapaxes(0, 1)
         return np.cross(b - a, c - a)
-
-
-def read_mesh(path: Path) -> Mesh:
-    r"""Read a mesh from a file.
-
-    Parameters
-    ----------
-    path
-        File in a format of `FORMATS`; parts of a scene in it are joined.
-
-    Returns
-    -------
-    Mesh
-        Its triangles, in the file's own unit, with texture coordinates where it has some.
-
-    Raises
-    ------
-    UsageError
-        There is no such file, its format is another, or it has no triangles of finite size.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.reproduce import read_mesh
-    >>> _ = Path("triangle.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    >>> read_mesh(Path("triangle.obj")).area_m2
-    0.5
-    """
-    if path.suffix.lower() not in FORMATS:
-        raise UsageError(f"{path}: expected a mesh as {', '.join(FORMATS)}, got '{path.suffix}'")
-    if not path.is_file():
-        raise UsageError(f"{path}: expected a file with a mesh, got no such file")
-    trimesh = _trimesh()
-    try:
-        parts = _parts(trimesh, path)
-    except Exception as error:  # the reader meets damage with errors of any kind
-        raise UsageError(
-            f"{path}: expected a mesh, got a file that cannot be read "
-            f"({str(error).partition(chr(10))[0]})"
-        ) from None
-    n_faces = sum(len(part.faces) for part in parts)
-    if not n_faces or not all(np.isfinite(part.vertices_m).all() for part in parts):
-        raise UsageError(
-            f"{path}: expected triangles with finite vertices, got {n_faces} triangles"
-        )
-    if any(part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m) for part in parts):
-        raise UsageError(f"{path}: expected triangles of its own vertices, got others")
-    if len({part.uv is None for part in parts}) > 1 or _is_partly_unwrapped(path):
-        raise UsageError(
-            f"{path}: expected texture coordinates on all faces or on none, got them on some; "
-            "unwrap all of the mesh"
-        )
-    mesh = _joined(parts)
-    if not mesh.area_m2 > 0:
-        raise UsageError(f"{path}: expected triangles with an area, got none")
-    return mesh
-
-
-def _parts(trimesh: Any, path: Path) -> list[Mesh]:
-    """Return the meshes of a file, each with one material, where its scene has them."""
-    loaded = trimesh.load(path, process=False)
-    placed = [(np.eye(4), loaded)]
-    if isinstance(loaded, trimesh.Scene):
-        # In an order that does not depend on the run.
-        nodes = [loaded.graph[node] for node in sorted(loaded.graph.nodes_geometry)]
-        placed = [(transform, loaded.geometry[name]) for transform, name in nodes]
-    meshes = []
-    for transform, part in placed:
-        if not isinstance(part, trimesh.Trimesh) or not len(part.faces):
-            continue
-        uv = getattr(part.visual, "uv", None)
-        vertices = np.asarray(part.vertices, dtype=np.float64)
-        meshes.append(
-            Mesh(
-                vertices @ transform[:3, :3].T + transform[:3, 3],
-                np.asarray(part.faces, dtype=np.int32),
-                None if uv is None or not len(uv) else np.asarray(uv, dtype=np.float64),
-            )
-        )
-    return meshes
-
-
-def _joined(parts: Sequence[Mesh]) -> Mesh:
-    """Return several meshes as one, all or none with texture coordinates."""
-    first = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
-    faces = [part.faces + begin for part, begin in zip(parts, first, strict=False)]
-    uvs = [part.uv for part in parts if part.uv is not None]
-    return Mesh(
-        np.concatenate([part.vertices_m for part in parts]),
-        np.concatenate(faces).astype(np.int32),
-        np.concatenate(uvs) if uvs else None,
-    )
-
-
-def _is_partly_unwrapped(path: Path) -> bool:
-    """Return whether an OBJ file has texture coordinates on some of its faces only.
-
-    Its reader leaves them all out then.
-    """
-    if path.suffix.lower() != ".obj":
-        return False
-    kinds: set[bool] = set()
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for line in lines:
-            if line.startswith(("f ", "f\t")):
-                kinds.update(
-                    corner.split("/")[1:2] not in ([], [""]) for corner in line.split()[1:]
-                )
-    return len(kinds) > 1
 
 
 def frame(normal: FloatArray) -> FloatArray:
@@ -416,13 +378,3 @@ def rotation(axis: FloatArray, angle_deg: float) -> FloatArray:
     angle = np.deg2rad(angle_deg)
     across = np.cross(np.eye(3), axis)
     return np.asarray(np.eye(3) - np.sin(angle) * across + (1 - np.cos(angle)) * across @ across)
-
-
-def _trimesh() -> Any:
-    try:
-        import trimesh
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"labrig render needs an extra ({error.name} is missing): pip install 'labrig[render]'"
-        ) from None
-    return trimesh

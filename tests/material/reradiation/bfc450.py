@@ -1,4 +1,4 @@
-"""Matrices of a real instrument, where the folder of real data is there."""
+"""Matrices of a real instrument, in the folder of real data beside the repository."""
 
 import re
 from collections.abc import Iterator
@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.material import ReradiationMatrix
+from tests.real_data import SHARED
 
-FOLDER = Path(__file__).parents[4] / "shared/data/bispectral/rit_bfc450"
+FOLDER = SHARED / "bispectral/rit_bfc450"
 INPUT_NM = np.arange(300.0, 781.0, 10.0)
 OUTPUT_NM = np.arange(380.0, 781.0, 10.0)
 

@@ -82,8 +82,7 @@ def test_a_sample_without_reflectance_is_judged_by_its_re_radiation() -> None:
     assert physical_warnings(truth) == ()
 
 
-@pytest.mark.shared_data
-@pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
+@pytest.mark.usefixtures("shared_data")
 def test_real_samples_pass_and_two_golf_balls_are_said() -> None:
     said = {sample.name: physical_warnings(sample) for sample in bfc450.samples()}
     assert len(said) == 97

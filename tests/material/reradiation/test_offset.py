@@ -82,8 +82,7 @@ def test_sigma_is_asked_for() -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.shared_data
-@pytest.mark.skipif(not bfc450.FOLDER.is_dir(), reason="the folder of real data is not there")
+@pytest.mark.usefixtures("shared_data")
 @pytest.mark.parametrize("repeats", [False, True])
 def test_real_tiles_have_smaller_sums_and_right_sigma(repeats: bool) -> None:
     tiles = list(bfc450.tiles())

@@ -1,15 +1,12 @@
 """Matrices for tests of files: two skewed dyes, the noise of an instrument, random ones."""
 
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from labrig.material import ReradiationMatrix
-
-DATA = Path(__file__).parents[5] / "shared/data"
 
 
 def two_dyes(seed: int = 0, noise: float = 1.5e-3) -> ReradiationMatrix:

@@ -18,14 +18,11 @@ from labrig.material import (
     write_reradiation,
 )
 from tests.material.reradiation.formats.matrices import (
-    DATA,
     assert_same,
     random_matrices,
     two_dyes,
 )
 
-IMAGES = DATA / "spectral_exr"
-IS_THERE = pytest.mark.skipif(not IMAGES.is_dir(), reason="the folder of real data is not there")
 #: Attributes of every image of the layout's authors, but for its size.
 HEADER: dict[str, Any] = {
     "EV": 0.0,
@@ -241,10 +238,8 @@ def test_a_broken_image_is_read_or_refused_in_one_line(
         assert "\n" not in str(error)
 
 
-@pytest.mark.shared_data
-@IS_THERE
-def test_the_authors_light_is_read() -> None:
-    read = read_spectral_image(IMAGES / "D65.exr")
+def test_the_authors_light_is_read(real_data: Path) -> None:
+    read = read_spectral_image(real_data / "spectral_exr/D65.exr")
     light = read.spectrum()
     assert (light.name, read.emissive_units) == ("D65", "W.m^-2.sr^-1")
     assert light.wavelength_nm[[0, -1]].tolist() == [380.0, 825.0]
@@ -254,10 +249,10 @@ def test_the_authors_light_is_read() -> None:
     assert not len(read.reflective_nm)
 
 
-@pytest.mark.shared_data
-@IS_THERE
-def test_the_authors_chart_is_read_and_written_with_its_attributes(tmp_path: Path) -> None:
-    chart = IMAGES / "Macbeth.exr"
+def test_the_authors_chart_is_read_and_written_with_its_attributes(
+    real_data: Path, tmp_path: Path
+) -> None:
+    chart = real_data / "spectral_exr/Macbeth.exr"
     read = read_spectral_image(chart)
     assert read.reflective.shape == (400, 600, 36)
     pixels = OpenEXR.File(str(chart), separate_channels=True).channels()

@@ -13,15 +13,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from labrig.errors import UsageError
 from labrig.material import ReradiationMatrix, read_reradiation, write_reradiation
 from tests.material.reradiation.formats.matrices import (
-    DATA,
     assert_same,
     random_matrices,
     two_dyes,
 )
 from tests.mutated_files import mutated
-
-BISPECTRAL = DATA / "bispectral"
-IS_THERE = pytest.mark.skipif(not DATA.is_dir(), reason="the folder of real data is not there")
 
 
 def eem() -> ReradiationMatrix:
@@ -324,10 +320,9 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
         read_reradiation(tmp_path / "a.csv", pixel=(0, 0))
 
 
-@pytest.mark.shared_data
-@IS_THERE
-def test_real_bfc_files() -> None:
-    paths = sorted((BISPECTRAL / "rit_bfc450").glob("*.BFC"))
+def test_real_bfc_files(shared_data: Path) -> None:
+    folder = shared_data / "bispectral/rit_bfc450"
+    paths = sorted(folder.glob("*.BFC"))
     matrices = [read_reradiation(path) for path in paths]
     assert len(matrices) == 97
     assert sum(float(matrix.reradiated_fraction.max()) > 0.1 for matrix in matrices) >= 44
@@ -335,26 +330,21 @@ def test_real_bfc_files() -> None:
     assert (golf.name, golf.reradiation.shape) == ("golfball", (41, 49))
     assert golf.reflectance[0] == 0.205374
     assert golf.reradiation[0, 0] == -0.0000215692
-    for path in sorted((BISPECTRAL / "rit_bfc450/bcra_repeats/bcraday01").glob("*.BFC")):
+    for path in sorted((folder / "bcra_repeats/bcraday01").glob("*.BFC")):
         assert np.isfinite(read_reradiation(path).reflectance).all()
 
 
-@pytest.mark.shared_data
-@IS_THERE
-@pytest.mark.parametrize("colour", ["green", "yellow"])
-def test_a_real_archive_is_its_tables(colour: str) -> None:
-    name = f"fluorescent_{colour}"
-    table = read_reradiation(BISPECTRAL / f"art_postit/{name}.csv")
-    archive = BISPECTRAL / "art_postit/FluorescentPostIt_yellow_green.ark"
-    archived = read_reradiation(archive, name)
-    assert archived.name == f"3M fluorescent {colour} Post-It (R) sticker"
-    assert_same(replace(archived, name=name), table)
+def test_a_real_archive_is_its_tables(shared_data: Path) -> None:
+    folder = shared_data / "bispectral/art_postit"
+    for colour in ("green", "yellow"):
+        name = f"fluorescent_{colour}"
+        archived = read_reradiation(folder / "FluorescentPostIt_yellow_green.ark", name)
+        assert archived.name == f"3M fluorescent {colour} Post-It (R) sticker"
+        assert_same(replace(archived, name=name), read_reradiation(folder / f"{name}.csv"))
 
 
-@pytest.mark.shared_data
-@IS_THERE
-def test_real_eem_files() -> None:
-    paths = sorted((BISPECTRAL / "webfluor_eem").glob("*.txt"))
+def test_real_eem_files(shared_data: Path) -> None:
+    paths = sorted((shared_data / "bispectral/webfluor_eem").glob("*.txt"))
     matrices = {path.stem: read_reradiation(path) for path in paths}
     assert {matrix.reradiation.shape for matrix in matrices.values()} == {(99, 28)}
     assert {matrix.unit for matrix in matrices.values()} == {"relative"}
