@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from labrig.errors import DataError, LabrigError, UsageError
-from labrig.input_file import read_table_text
-from labrig.results.clock_times import seconds_from_first
 from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 from labrig.results.table_columns import (
@@ -21,7 +19,8 @@ from labrig.results.table_columns import (
     column_names,
     find_columns,
 )
-from labrig.results.table_text import DECIMAL_MARKS, EXPECTED, Table, parse_table
+from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block, read_blocks, read_table_text
+from labrig.text_table.clock_times import seconds_from_first
 
 
 def join_series(parts: Sequence[Series]) -> Series:
@@ -200,7 +199,7 @@ def _parse(text: str, source: str, layout: TableLayout) -> tuple[list[Series], s
             columns = _own_columns(table)
         else:
             decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
-            table = parse_table(text, decimal)
+            table = _only(read_blocks(text, decimal))
             columns = find_columns(table, layout)
         return _series(table, columns), columns.describe(table.names)
     except LabrigError as error:
@@ -208,7 +207,15 @@ def _parse(text: str, source: str, layout: TableLayout) -> tuple[list[Series], s
         raise type(error)(f"{source}: {' '.join(str(error).split())}") from None
 
 
-def _own_table(text: str) -> Table | None:
+def _only(blocks: Sequence[Block]) -> Block:
+    if len(blocks) > 1:
+        raise UsageError(
+            f"expected one table, got {len(blocks)}: {'; '.join(map(str, blocks))}; keep one"
+        )
+    return blocks[0]
+
+
+def _own_table(text: str) -> Block | None:
     """Return the cells of a series.csv; None if the text is another program's table."""
     head, _, body = text.replace("\r\n", "\n").partition("\n")
     if not head.startswith(f"{TIME},{EXPOSURE},"):
@@ -227,7 +234,7 @@ def _own_table(text: str) -> Table | None:
                 f"line {number}: expected {len(names)} columns as in the first line, got {len(row)}"
             )
         rows.append(row)
-    return Table(names, (), tuple(rows), tuple(number for number, _ in lines), ".")
+    return Block(names, (), tuple(rows), tuple(number for number, _ in lines))
 
 
 def _cells(line: str, number: int) -> list[str]:
@@ -237,7 +244,7 @@ def _cells(line: str, number: int) -> list[str]:
         raise UsageError(f"line {number}: not a row of a table ({error})") from None
 
 
-def _own_columns(table: Table) -> Columns:
+def _own_columns(table: Block) -> Columns:
     """Return the roles of the columns of a series.csv, whose names are taken literally."""
     index = {name: column for column, name in enumerate(table.names)}
     channels = table.names[2 : -len(RESERVED) : 2]
@@ -253,7 +260,7 @@ def _own_columns(table: Table) -> Columns:
     )
 
 
-def _series(table: Table, columns: Columns) -> list[Series]:
+def _series(table: Block, columns: Columns) -> list[Series]:
     """Return the series of a table by region and unit."""
     n_rows = len(table.rows)
 
@@ -291,7 +298,7 @@ def _series(table: Table, columns: Columns) -> list[Series]:
     return [series.take(np.array(rows), region) for (region, _), rows in groups.items()]
 
 
-def _times_s(table: Table, columns: Columns) -> FloatArray:
+def _times_s(table: Block, columns: Columns) -> FloatArray:
     """Return the times in seconds; times of day from the first row."""
     clock_s = seconds_from_first([row[columns.time] for row in table.rows])
     if clock_s is not None:
@@ -299,7 +306,7 @@ def _times_s(table: Table, columns: Columns) -> FloatArray:
     return _numbers(table, columns.time, None) * columns.unit_s
 
 
-def _numbers(table: Table, column: int, empty: float | None) -> FloatArray:
+def _numbers(table: Block, column: int, empty: float | None) -> FloatArray:
     """Return the cells of a column as numbers, blank ones as `empty` (None forbids them)."""
     name = column_names(table)[column]
     mark = next(word for word, mark in DECIMAL_MARKS.items() if mark == table.decimal)

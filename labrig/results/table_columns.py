@@ -6,8 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.results.column_names import (
-    ABSCISSA,
+from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
+from labrig.results.sigma_unit import sigma_scale
+from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block
+from labrig.text_table.names import (
+    ABSCISSAS,
     is_row_number,
     is_sigma,
     is_time,
@@ -16,9 +19,6 @@ from labrig.results.column_names import (
     split_unit,
     time_unit_s,
 )
-from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
-from labrig.results.sigma_unit import sigma_scale
-from labrig.results.table_text import DECIMAL_MARKS, EXPECTED, Table
 
 _EXPOSURES = frozenset({EXPOSURE, "exposure"})
 
@@ -114,7 +114,7 @@ class Columns:
         return f"time {text([self.time])}; values {text(values)}; {sigma}"
 
 
-def find_columns(table: Table, layout: TableLayout) -> Columns:
+def find_columns(table: Block, layout: TableLayout) -> Columns:
     """Return the roles of the columns by their names and the user's answers."""
     names = column_names(table)
     in_use = [column for column in range(len(names)) if not _is_idle(table, names, column, layout)]
@@ -152,7 +152,7 @@ def find_columns(table: Table, layout: TableLayout) -> Columns:
     return Columns(time, unit_s, exposure, channels, reserved, value_unit)
 
 
-def column_names(table: Table) -> tuple[str, ...]:
+def column_names(table: Block) -> tuple[str, ...]:
     """Return the names of the columns; without any, time, value and sigma, or their numbers."""
     if table.names:
         return table.names
@@ -167,7 +167,7 @@ def column_names(table: Table) -> tuple[str, ...]:
     return (TIME, *(str(number) for number in range(2, width + 1)))
 
 
-def _is_idle(table: Table, names: Sequence[str], column: int, layout: TableLayout) -> bool:
+def _is_idle(table: Block, names: Sequence[str], column: int, layout: TableLayout) -> bool:
     """Return whether a column has no part in a series: settings, texts or the rows' numbers."""
     name = names[column]
     if name in RESERVED or name in (layout.time, layout.column):
@@ -184,7 +184,7 @@ def _is_idle(table: Table, names: Sequence[str], column: int, layout: TableLayou
 
 
 def _time(
-    table: Table, names: Sequence[str], in_use: Sequence[int], layout: TableLayout
+    table: Block, names: Sequence[str], in_use: Sequence[int], layout: TableLayout
 ) -> tuple[int, float]:
     """Return the column of times and its unit in seconds."""
     if layout.time is not None:
@@ -196,7 +196,7 @@ def _time(
             )
     else:
         matches = [column for column in in_use if is_time(names[column])] or [
-            column for column in in_use if split_unit(names[column])[0].lower() == ABSCISSA
+            column for column in in_use if split_unit(names[column])[0].lower() in ABSCISSAS
         ]
     if not matches:
         raise UsageError(
@@ -244,7 +244,7 @@ def _sigmas(names: Sequence[str], values: Sequence[int], layout: TableLayout) ->
 
 
 def _sigma_scale(
-    table: Table, names: Sequence[str], column: int, sigma: int | None
+    table: Block, names: Sequence[str], column: int, sigma: int | None
 ) -> tuple[float, bool]:
     """Return the factor from a column of uncertainties to σ, and whether σ is relative."""
     if sigma is None:
@@ -256,7 +256,7 @@ def _sigma_scale(
     return sigma_scale(unit, value_unit, names[sigma])
 
 
-def _unit(table: Table, names: Sequence[str], column: int) -> str:
+def _unit(table: Block, names: Sequence[str], column: int) -> str:
     """Return the unit in the name of a column, or in a line of units below the names."""
     below = table.units[column] if column < len(table.units) else ""
     return split_unit(names[column])[1] or below

@@ -11,23 +11,38 @@ _TIMES = frozenset(
         "stunden", "milliseconds", "millisekunden",
     }
 )  # fmt: skip
-#: Name of the abscissa, if no column is called a time.
-ABSCISSA = "x"
+#: Units that alone name a column of times; `min` may be a minimum, `d` a distance.
+_TIMES_BY_UNIT = frozenset({"fs", "ps", "ns", "us", "ms", "nsec", "usec", "msec"})
+#: Names of the abscissa, if no column is called a time.
+ABSCISSAS = frozenset({"x", "x_value", "x-value", "x value"})
+#: Names of a column that counts channels of a memory, or bins of a histogram.
+_CHANNELS = frozenset({"chan", "channel", "channels", "ch", "ch.", "bin", "bins", "kanal", "canal"})
+#: Names of other abscissas, and their units, which tell a header that is no table of times.
+_OTHER_ABSCISSAS = frozenset(
+    {
+        "wavelength", "wavelengths", "wl", "lambda", "λ", "nm", "wellenlänge", "longueur d'onde",
+        "wavelength_nm", "wavenumber", "raman shift", "energy", "photon energy", "frequency",
+    }
+)  # fmt: skip
+_OTHER_UNITS = frozenset({"nm", "nanometers", "nanometres", "um", "a", "å", "cm-1", "1/cm", "ev"})
 #: Units of time in seconds by their names, in lower case.
 _UNITS_S = {
     unit: seconds
     for seconds, units in (
-        (1e-12, ("ps",)),
-        (1e-9, ("ns", "nanoseconds")),
-        (1e-6, ("us", "µs", "μs", "microseconds")),
-        (1e-3, ("ms", "msec", "milliseconds", "millisekunden")),
-        (1.0, ("s", "sec", "second", "seconds", "sek", "sekunden", "secondes")),
+        (1e-15, ("fs", "fsec", "femtosecond", "femtoseconds")),
+        (1e-12, ("ps", "psec", "picosecond", "picoseconds", "pikosekunden")),
+        (1e-9, ("ns", "nsec", "nanosecond", "nanoseconds", "nanosekunden", "nanosecondes")),
+        (1e-6, ("us", "usec", "microsecond", "microseconds", "mikrosekunden", "microsecondes")),
+        (1e-3, ("ms", "msec", "millisecond", "milliseconds", "millisekunden", "millisecondes")),
+        (1.0, ("s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "secondes")),
         (60.0, ("min", "mins", "minute", "minutes", "minuten")),
-        (3600.0, ("h", "hr", "hrs", "hour", "hours", "std", "stunden", "heures")),
-        (86400.0, ("d", "day", "days", "tage", "jours")),
+        (3600.0, ("h", "hr", "hrs", "hour", "hours", "std", "stunde", "stunden", "heures")),
+        (86400.0, ("d", "day", "days", "tag", "tage", "jours")),
     )
     for unit in units
 }
+#: Letters that look alike, and blanks that do not break a line, as units are written with them.
+_TYPOGRAPHY = str.maketrans({"µ": "u", "μ": "u", "\u00a0": " ", "⁻": "-", "−": "-", "¹": "1"})
 #: Names of an uncertainty, in lower case.
 _SIGMA = (
     r"sigma|σ|±|\+/-|\+-|errors?|err|std|std\.? ?dev\.?|stdev|standard deviation|standard error|"
@@ -65,13 +80,14 @@ def split_unit(name: str) -> tuple[str, str]:
 
 def time_unit_s(unit: str) -> float | None:
     """Return a unit of time in seconds; None if it is none."""
-    return _UNITS_S.get(unit.strip(" ()[]/.").lower())
+    return _UNITS_S.get(unit.translate(_TYPOGRAPHY).strip(" ()[]/.").lower())
 
 
 def split_time(name: str) -> tuple[str, str] | None:
     """Divide the name of a column of times into name and unit; None if it is no name of times."""
     base, unit = split_unit(name)
-    if base.lower() in _TIMES:
+    lower = base.translate(_TYPOGRAPHY).lower()
+    if lower in _TIMES or (lower in _TIMES_BY_UNIT and not unit):
         return base, unit or (base if time_unit_s(base) is not None else "")
     match = _TIME_WITH_UNIT.fullmatch(base)
     if match and match["name"].lower() in _TIMES and time_unit_s(match["unit"]) is not None:
@@ -82,6 +98,23 @@ def split_time(name: str) -> tuple[str, str] | None:
 def is_time(name: str) -> bool:
     """Return whether a column of that name holds times."""
     return split_time(name) is not None
+
+
+def is_channel(name: str) -> bool:
+    """Return whether a column of that name counts channels."""
+    return split_unit(name)[0].lower() in _CHANNELS
+
+
+def is_abscissa(name: str) -> bool:
+    """Return whether a column of that name holds what values are plotted over."""
+    base = split_unit(name)[0].lower()
+    return is_time(name) or is_channel(name) or base in ABSCISSAS | _OTHER_ABSCISSAS
+
+
+def is_abscissa_unit(text: str) -> bool:
+    """Return whether a text is a unit of times, wavelengths, wavenumbers or energies."""
+    unit = text.translate(_TYPOGRAPHY).strip(" ()[]").lower()
+    return time_unit_s(text) is not None or unit in _OTHER_UNITS
 
 
 def is_row_number(name: str) -> bool:

@@ -4,8 +4,7 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-
-from labrig.results.measured import FloatArray
+from numpy.typing import NDArray
 
 DAY_S = 86400.0
 _CLOCK = re.compile(
@@ -13,7 +12,7 @@ _CLOCK = re.compile(
 )
 
 
-def seconds_from_first(cells: Sequence[str]) -> FloatArray | None:
+def seconds_from_first(cells: Sequence[str]) -> NDArray[np.float64] | None:
     """Return times of day in seconds from the first one; None if they are none.
 
     Without dates a time of day that falls by more than half a day is one of the next day.

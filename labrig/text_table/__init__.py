@@ -1,0 +1,20 @@
+"""Tables in texts that instruments, spreadsheets and scripts write.
+
+A text is divided into blocks, each with its names, units and rows of cells (`read_blocks`); what
+the columns are is for those to say who know the quantity: decays, curves, matrices.
+"""
+
+from labrig.text_table.blocks import EXPECTED, Block, read_blocks
+from labrig.text_table.encoding import read_table_text
+from labrig.text_table.numbers import DECIMAL_MARKS, parse_number
+from labrig.text_table.style import Line
+
+__all__ = [
+    "DECIMAL_MARKS",
+    "EXPECTED",
+    "Block",
+    "Line",
+    "parse_number",
+    "read_blocks",
+    "read_table_text",
+]

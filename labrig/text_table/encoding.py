@@ -1,0 +1,49 @@
+"""Text of another program's file, whatever its encoding."""
+
+import codecs
+import re
+from pathlib import Path
+
+from labrig.errors import UsageError
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+
+#: First bytes of a workbook: of a zip archive (Excel, OpenDocument), of an older Excel file.
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+#: Control characters that stand in no text.
+_NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
+#: What programs of DOS write after the end of a text.
+_END = b"\x1a\x00"
+
+
+def read_table_text(path: Path) -> str:
+    """Read the text of another program's table, in UTF-8, UTF-16, Windows-1252 or Latin-1.
+
+    Raises
+    ------
+    UsageError, DiskError
+        The file is refused by `read_bytes`, is a workbook, or is no text.
+    """
+    content = read_bytes(path, MAX_TEXT_BYTES)
+    if content.startswith(_WORKBOOKS):
+        raise UsageError(f"{path}: a workbook, not a text; save the sheet as CSV (UTF-8)")
+    for encoding in _encodings(content):
+        try:
+            return content.rstrip(_END if "16" not in encoding else b"").decode(encoding)
+        except UnicodeDecodeError as error:
+            reason = error
+    raise UsageError(f"{path}: not text in UTF-8 ({reason}); save it as UTF-8")
+
+
+def _encodings(content: bytes) -> list[str]:
+    """Return the encodings that a text may have, the likeliest first."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return ["utf-16"]
+    # Every second byte of Latin letters and digits in UTF-16 is zero, and none of other encodings.
+    high, low = content[0:400:2], content[1:400:2]
+    if len(content) % 2 == 0 and low.count(0) > len(low) / 2 and not high.count(0):
+        return ["utf-16-le"]
+    if len(content) % 2 == 0 and high.count(0) > len(high) / 2 and not low.count(0):
+        return ["utf-16-be"]
+    # Without this test almost any file is text in Windows-1252, and any in Latin-1.
+    is_text = _NOT_TEXT.search(content.rstrip(_END)) is None
+    return ["utf-8-sig", *(["cp1252", "latin-1"] if is_text else [])]
