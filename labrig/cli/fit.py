@@ -34,6 +34,13 @@ TimeUnit = Annotated[
 Decimal = Annotated[
     str | None, typer.Option("--decimal", help="Decimal mark of the numbers, 'point' or 'comma'.")
 ]
+TimePerChannel = Annotated[
+    str | None,
+    typer.Option("--time-per-channel", help="Width of a channel, '0.4 ns', if rows are channels."),
+]
+Block = Annotated[
+    int | None, typer.Option("--block", min=1, help="Which table of the file, of several.")
+]
 
 app = typer.Typer(help="Fit data from any source.")
 
@@ -87,6 +94,8 @@ def decay(
     time: Time = None,
     time_unit: TimeUnit = None,
     decimal: Decimal = None,
+    time_per_channel: TimePerChannel = None,
+    block: Block = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for result/: page, figures, fit.json, result.json."),
@@ -105,7 +114,9 @@ def decay(
         _require_folder(out)
     times_s = [_time_s(text) for text in at or ()]
     options = TableFitOptions(states, offset, flicker, weights, origin, start, law)
-    fitted = fit_table(table, options, TableLayout(time, column, time_unit, decimal))
+    fitted = fit_table(
+        table, options, TableLayout(time, column, time_unit, decimal, time_per_channel, block)
+    )
     if not json:
         typer.echo(f"columns  {fitted[0].columns}")
     for part in fitted:
@@ -153,6 +164,8 @@ def charge(
     time: Time = None,
     time_unit: TimeUnit = None,
     decimal: Decimal = None,
+    time_per_channel: TimePerChannel = None,
+    block: Block = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for result/: page, figures, fit.json, material.yaml."),
@@ -170,7 +183,7 @@ def charge(
     if out is not None:
         _require_folder(out)
     options = ChargeTableOptions(on, off, states, order, stimulated)
-    layout = TableLayout(time, column, time_unit, decimal)
+    layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     fit, columns = fit_charge_table(table, options, layout)
     typer.echo(fit.to_json() if json else f"columns  {columns}\n{fit}")
     if out is None:
@@ -221,6 +234,8 @@ def luminance(
     time: Time = None,
     time_unit: TimeUnit = None,
     decimal: Decimal = None,
+    time_per_channel: TimePerChannel = None,
+    block: Block = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Luminances at 2, 10, 30 and 60 min, the time until 0.3 mcd/m², and the marking.
@@ -234,7 +249,7 @@ def luminance(
     options = LuminanceTableOptions(
         unit, off, scale_sigma, tuple(require or ()), colours, excitation
     )
-    layout = TableLayout(time, column, time_unit, decimal)
+    layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     decay, columns = evaluate_luminance_table(table, options, layout)
     typer.echo(decay.to_json() if json else f"columns  {columns}\n{decay}")
 

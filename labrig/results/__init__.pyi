@@ -222,7 +222,7 @@ from .summary import (
     read_summary as read_summary,
     write_summary as write_summary,
 )
-from .table_columns import (
+from .table_layout import (
     TableLayout as TableLayout,
 )
 from .trap_depth import (

@@ -15,12 +15,13 @@ from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 from labrig.results.table_columns import (
     Channel,
     Columns,
-    TableLayout,
-    column_names,
     find_columns,
 )
+from labrig.results.table_layout import TableLayout
+from labrig.results.time_axis import TimeAxis
 from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block, read_blocks, read_table_text
 from labrig.text_table.clock_times import seconds_from_first
+from labrig.text_table.names import is_time
 
 
 def join_series(parts: Sequence[Series]) -> Series:
@@ -199,20 +200,49 @@ def _parse(text: str, source: str, layout: TableLayout) -> tuple[list[Series], s
             columns = _own_columns(table)
         else:
             decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
-            table = _only(read_blocks(text, decimal))
+            table = choose_block(read_blocks(text, decimal), layout.block)
             columns = find_columns(table, layout)
-        return _series(table, columns), columns.describe(table.names)
+        return _series(table, columns), str(columns)
     except LabrigError as error:
         # In one line, though a cell may hold a form feed or another of Unicode's line ends.
         raise type(error)(f"{source}: {' '.join(str(error).split())}") from None
 
 
-def _only(blocks: Sequence[Block]) -> Block:
-    if len(blocks) > 1:
-        raise UsageError(
-            f"expected one table, got {len(blocks)}: {'; '.join(map(str, blocks))}; keep one"
+def choose_block(blocks: Sequence[Block], number: int | None) -> Block:
+    """Return the table of that number from 1, or the only one that may be a decay."""
+    if number is not None and not 1 <= number <= len(blocks):
+        raise UsageError(f"--block: expected a number from 1 to {len(blocks)}, got {number}")
+    if number is None:
+        timed = [index for index, block in enumerate(blocks) if any(map(is_time, block.names))]
+        named = blocks[timed[0]] if timed else blocks[0]
+        # A table without names may go on with the one above it.
+        possible = [
+            index
+            for index, block in enumerate(blocks)
+            if index in timed or not timed or _goes_on(named, block)
+        ]
+        if len(possible) > 1:
+            listed = "; ".join(f"{k}: {block}" for k, block in enumerate(blocks, start=1))
+            raise UsageError(
+                f"expected one table, got {len(blocks)}, {listed}; choose one with '--block "
+                f"{possible[0] + 1}'"
+            )
+        number = possible[0] + 1
+    block, first = blocks[number - 1], blocks[0]
+    if block is not first and _goes_on(first, block):
+        block = replace(
+            block,
+            names=first.names,
+            units=first.units,
+            names_line=first.names_line,
+            units_line=first.units_line,
         )
-    return blocks[0]
+    # What stands at the head of a file holds for all tables in it.
+    return block if block is first else replace(block, above=(*first.above, *block.above))
+
+
+def _goes_on(block: Block, other: Block) -> bool:
+    return not other.names and len(other.rows[0]) == len(block.rows[0])
 
 
 def _own_table(text: str) -> Block | None:
@@ -251,8 +281,8 @@ def _own_columns(table: Block) -> Columns:
     if len(index) != len(table.names) or any(name + SIGMA_SUFFIX not in index for name in channels):
         raise UsageError(f"{EXPECTED}, got {', '.join(table.names)}; a column was renamed")
     return Columns(
-        time=0,
-        unit_s=1.0,
+        names=table.names,
+        time=TimeAxis(0, 1.0, "s, line 1"),
         exposure=1,
         channels=tuple(Channel(name, index[name], index[name + SIGMA_SUFFIX]) for name in channels),
         reserved={name: index[name] for name in RESERVED},
@@ -267,7 +297,7 @@ def _series(table: Block, columns: Columns) -> list[Series]:
     def numbers(column: int | None, empty: float | None) -> FloatArray:
         if column is None:
             return np.full(n_rows, empty, dtype=np.float64)
-        return _numbers(table, column, empty)
+        return _numbers(table, columns, column, empty)
 
     def texts(name: str) -> tuple[str, ...]:
         column = columns.reserved.get(name)
@@ -300,15 +330,18 @@ def _series(table: Block, columns: Columns) -> list[Series]:
 
 def _times_s(table: Block, columns: Columns) -> FloatArray:
     """Return the times in seconds; times of day from the first row."""
-    clock_s = seconds_from_first([row[columns.time] for row in table.rows])
+    time = columns.time
+    if time.column is None:
+        return np.arange(len(table.rows)) * time.unit_s
+    clock_s = seconds_from_first([row[time.column] for row in table.rows])
     if clock_s is not None:
         return clock_s
-    return _numbers(table, columns.time, None) * columns.unit_s
+    return _numbers(table, columns, time.column, None) * time.unit_s
 
 
-def _numbers(table: Block, column: int, empty: float | None) -> FloatArray:
+def _numbers(table: Block, columns: Columns, column: int, empty: float | None) -> FloatArray:
     """Return the cells of a column as numbers, blank ones as `empty` (None forbids them)."""
-    name = column_names(table)[column]
+    name = columns.names[column]
     mark = next(word for word, mark in DECIMAL_MARKS.items() if mark == table.decimal)
     values = np.empty(len(table.rows))
     for index, (row, line) in enumerate(zip(table.rows, table.lines, strict=True)):

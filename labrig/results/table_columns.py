@@ -8,49 +8,20 @@ import numpy as np
 from labrig.errors import UsageError
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
 from labrig.results.sigma_unit import sigma_scale
-from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block
+from labrig.results.table_layout import TableLayout
+from labrig.results.time_axis import TimeAxis, find_time_axis
+from labrig.text_table import EXPECTED, Block
+from labrig.text_table.header import is_axis_line
 from labrig.text_table.names import (
-    ABSCISSAS,
+    is_channel,
     is_row_number,
     is_sigma,
     is_time,
     sigma_of,
-    split_time,
     split_unit,
-    time_unit_s,
 )
 
 _EXPOSURES = frozenset({EXPOSURE, "exposure"})
-
-
-@dataclass(frozen=True)
-class TableLayout:
-    """Answers to what a table itself may leave open; None finds the answer in the table.
-
-    Attributes
-    ----------
-    time
-        Name of the column of times.
-    column
-        Name of the column of values.
-    time_unit
-        Unit of the times, such as `ms`.
-    decimal
-        Decimal mark of the numbers, `point` or `comma`.
-    """
-
-    time: str | None = None
-    column: str | None = None
-    time_unit: str | None = None
-    decimal: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.time_unit is not None and time_unit_s(self.time_unit) is None:
-            raise UsageError(
-                f"--time-unit: expected a unit such as ns, ms, s, min or h, got '{self.time_unit}'"
-            )
-        if self.decimal is not None and self.decimal not in DECIMAL_MARKS:
-            raise UsageError(f"--decimal: expected 'point' or 'comma', got '{self.decimal}'")
 
 
 @dataclass(frozen=True)
@@ -80,8 +51,10 @@ class Columns:
 
     Attributes
     ----------
-    time, unit_s
-        Column of times and its unit in seconds.
+    names
+        Names of the columns; their numbers without names.
+    time
+        Where the times come from.
     exposure
         Column of exposures; None without one.
     channels
@@ -92,38 +65,47 @@ class Columns:
         Unit of the values; empty if unknown.
     """
 
-    time: int
-    unit_s: float
+    names: tuple[str, ...]
+    time: TimeAxis
     exposure: int | None
     channels: tuple[Channel, ...]
     reserved: dict[str, int]
     value_unit: str
 
-    def describe(self, names: Sequence[str]) -> str:
-        """Return in words which columns are times, values and σ, by name or else by number."""
+    def __str__(self) -> str:
+        """Return in words which columns are times, values and σ, and the unit of the times."""
 
         def text(columns: Sequence[int]) -> str:
-            return ", ".join(
-                " ".join(names[column].split()) if names else f"column {column + 1}"
-                for column in columns
-            )
+            return ", ".join(" ".join(self.names[column].split()) for column in columns)
 
         sigmas = [channel.sigma for channel in self.channels if channel.sigma is not None]
-        values = [channel.column for channel in self.channels]
+        values = text([channel.column for channel in self.channels])
         sigma = f"σ {text(sigmas)}" if sigmas else "no σ"
-        return f"time {text([self.time])}; values {text(values)}; {sigma}"
+        time = "row number" if self.time.column is None else text([self.time.column])
+        return f"time {time} ({self.time.source}); values {values}; {sigma}"
 
 
 def find_columns(table: Block, layout: TableLayout) -> Columns:
     """Return the roles of the columns by their names and the user's answers."""
     names = column_names(table)
-    in_use = [column for column in range(len(names)) if not _is_idle(table, names, column, layout)]
-    time, unit_s = _time(table, names, in_use, layout)
+    filled = [column for column in range(len(names)) if not _is_empty(table, names, column, layout)]
+    time = find_time_axis(table, names, filled, layout)
+    if time.column is None and not table.names and len(names) > 1:
+        names = tuple(str(column + 1) for column in range(len(names)))
+    in_use = [
+        column
+        for column in filled
+        if column == time.column
+        or names[column] == layout.column
+        or not _numbers_the_rows(table, names[column], column)
+    ]
     lower = {column: names[column].lower() for column in in_use}
     exposure = _only_match(names, [column for column in in_use if lower[column] in _EXPOSURES])
     reserved = {names[column]: column for column in in_use if names[column] in RESERVED}
     values = [
-        column for column in in_use if column not in {time, exposure} | set(reserved.values())
+        column
+        for column in in_use
+        if column not in {time.column, exposure} | set(reserved.values())
     ]
     if layout.column is not None and layout.column not in [names[column] for column in values]:
         raise UsageError(
@@ -138,6 +120,12 @@ def find_columns(table: Block, layout: TableLayout) -> Columns:
     ]
     if not signals:
         raise UsageError(f"{EXPECTED}, got {', '.join(names)}; a column of values is missing")
+    if len(signals) > 1 and (time.column is None or is_axis_line(table.names_line)):
+        listed = ", ".join(names[column] for column in signals)
+        raise UsageError(
+            f"expected one curve, got {len(signals)} in one memory or file: {listed}; choose one "
+            "with '--column NAME'"
+        )
     channels = tuple(
         Channel(
             _channel_name(names, column, signals),
@@ -149,7 +137,8 @@ def find_columns(table: Block, layout: TableLayout) -> Columns:
     )
     value_units = {_unit(table, names, column) for column in signals}
     value_unit = value_units.pop() if len(value_units) == 1 else ""
-    return Columns(time, unit_s, exposure, channels, reserved, value_unit)
+    shown = names if table.names else [f"column {number + 1}" for number in range(len(names))]
+    return Columns(tuple(shown), time, exposure, channels, reserved, value_unit)
 
 
 def column_names(table: Block) -> tuple[str, ...]:
@@ -158,17 +147,14 @@ def column_names(table: Block) -> tuple[str, ...]:
         return table.names
     width = len(table.rows[0])
     if width == 1:
-        raise UsageError(
-            f"{EXPECTED}, got 1 column without names; put a column with the time of each row "
-            "before it"
-        )
+        return ("value",)
     if width <= 3:
         return (TIME, "value", "sigma")[:width]
     return (TIME, *(str(number) for number in range(2, width + 1)))
 
 
-def _is_idle(table: Block, names: Sequence[str], column: int, layout: TableLayout) -> bool:
-    """Return whether a column has no part in a series: settings, texts or the rows' numbers."""
+def _is_empty(table: Block, names: Sequence[str], column: int, layout: TableLayout) -> bool:
+    """Return whether a column has no part in a series: settings or texts."""
     name = names[column]
     if name in RESERVED or name in (layout.time, layout.column):
         return False
@@ -176,47 +162,14 @@ def _is_idle(table: Block, names: Sequence[str], column: int, layout: TableLayou
     if not any(cells[1:]) and (len(cells) > 1 or not cells[0]):
         return not name.endswith(SIGMA_SUFFIX) and not is_sigma(name)
     numbers = [table.number(cell) for cell in cells if cell]
-    if all(number is None for number in numbers):
-        return not is_time(name) and len(cells) > 1
-    if is_row_number(name) and None not in numbers:
-        return bool(np.all(np.diff(np.array(numbers, dtype=np.float64)) == 1))
-    return False
+    return all(number is None for number in numbers) and not is_time(name) and len(cells) > 1
 
 
-def _time(
-    table: Block, names: Sequence[str], in_use: Sequence[int], layout: TableLayout
-) -> tuple[int, float]:
-    """Return the column of times and its unit in seconds."""
-    if layout.time is not None:
-        matches = [column for column in in_use if names[column] == layout.time]
-        if not matches:
-            raise UsageError(
-                f"--time: expected one of {', '.join(names[column] for column in in_use)}, got "
-                f"'{layout.time}'"
-            )
-    else:
-        matches = [column for column in in_use if is_time(names[column])] or [
-            column for column in in_use if split_unit(names[column])[0].lower() in ABSCISSAS
-        ]
-    if not matches:
-        raise UsageError(
-            f"{EXPECTED}, got {', '.join(names)}; if one of them is the time, name it: "
-            "'--time NAME'"
-        )
-    if len(matches) > 1:
-        several = ", ".join(names[column] for column in matches)
-        raise UsageError(f"expected one of the columns {several}, got several; say '--time NAME'")
-    (column,) = matches
-    unit = (split_time(names[column]) or split_unit(names[column]))[1]
-    if table.units and not unit:
-        unit = table.units[column] if column < len(table.units) else ""
-    unit_s = time_unit_s(layout.time_unit or unit or "s")
-    if unit_s is None:
-        raise UsageError(
-            f"expected a unit of time for '{names[column]}', got '{unit}'; say '--time-unit s', or "
-            "which it is"
-        )
-    return column, unit_s
+def _numbers_the_rows(table: Block, name: str, column: int) -> bool:
+    numbers = [table.number(row[column]) for row in table.rows]
+    if not (is_row_number(name) or is_channel(name)) or None in numbers:
+        return False
+    return bool(np.all(np.diff(np.array(numbers, dtype=np.float64)) == 1))
 
 
 def _sigmas(names: Sequence[str], values: Sequence[int], layout: TableLayout) -> dict[int, int]:

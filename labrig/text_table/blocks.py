@@ -16,6 +16,7 @@ import numpy as np
 
 from labrig.errors import DataError, UsageError
 from labrig.text_table.header import COMMENT, Header, find_header, names_in
+from labrig.text_table.jcamp import jcamp_curves
 from labrig.text_table.names import ABSCISSAS, is_abscissa, is_time
 from labrig.text_table.numbers import is_clock, parse_number
 from labrig.text_table.style import FEWEST, Line, Style, find_style
@@ -120,6 +121,18 @@ def read_blocks(text: str, decimal: str | None = None) -> tuple[Block, ...]:
     """
     lines = [Line(number, line) for number, line in enumerate(_LINE_END.split(text), start=1)]
     filled = [line for line in lines if line.text.strip(BLANKS)]
+    if curves := jcamp_curves(filled):
+        return tuple(
+            Block(
+                names=(),
+                units=units,
+                rows=tuple(map(tuple, rows)),
+                lines=(line.number,) * len(rows),
+                above=tuple(other for other in filled if other.number < line.number),
+                units_line=line,
+            )
+            for line, units, rows in curves
+        )
     statements = _lines_per_curve(filled)
     content = [line for line in filled if not _is_comment(line) and line not in statements]
     if not content:

@@ -48,7 +48,7 @@ def find_header(above: Sequence[Line], width: int, style: Style) -> Header:
     lines = [line for line in above if not line.text.lstrip().startswith(COMMENT)]
     axes = _from_axes(above, width)
     # From the rows upwards.
-    near = [line for line in reversed(lines) if not _is_axis(line)][:_HEAD_LINES]
+    near = [line for line in reversed(lines) if not is_axis_line(line)][:_HEAD_LINES]
     named = [names_in(line, width, style) for line in near]
     for index, names in enumerate(named):
         if not any(map(is_abscissa, names)):
@@ -92,7 +92,7 @@ def names_in(line: Line, width: int, style: Style) -> tuple[str, ...]:
     for separator in SEPARATORS:
         other = Style(separator, style.decimal)
         names = other.cells(line) if separator else _split_by_blanks(line.text, width)
-        if len(names) == width and any(map(is_abscissa, names)):
+        if len(names) == width and any(map(is_abscissa, names)) and not style.count_numbers(names):
             return names
     return ()
 
@@ -111,16 +111,17 @@ def _split_by_blanks(line: str, width: int) -> tuple[str, ...]:
     return tuple(words) if len(words) == width else ()
 
 
-def _is_axis(line: Line) -> bool:
-    match = _AXIS.match(line.text)
-    return match is not None and _AXIS_WORD.search(line.text[: match.start("value")]) is not None
+def is_axis_line(line: Line | None) -> bool:
+    """Return whether a line says what an axis is, or what curves are called."""
+    match = _AXIS.match(line.text) if line is not None else None
+    return match is not None and _AXIS_WORD.search(match.string[: match.start("value")]) is not None
 
 
 def _from_axes(above: Sequence[Line], width: int) -> Header | None:
     """Return names and units from lines such as `Xaxis,Time(ns)` and `Yaxis,Counts`."""
     said: dict[str, tuple[tuple[str, ...], Line]] = {}
     for line in above:
-        match = _AXIS.match(line.text) if _is_axis(line) else None
+        match = _AXIS.match(line.text) if is_axis_line(line) else None
         if match is None:
             continue
         key = next(key for key in ("x", "y", "labels") if match[key])

@@ -1,0 +1,50 @@
+"""What the user says of a table where the table itself leaves it open."""
+
+from dataclasses import dataclass
+
+from labrig.errors import UsageError
+from labrig.text_table import DECIMAL_MARKS
+from labrig.text_table.names import time_unit_s
+from labrig.text_table.time_statements import parse_width
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """Answers to what a table itself may leave open; None finds the answer in the table.
+
+    Attributes
+    ----------
+    time
+        Name of the column of times.
+    column
+        Name of the column of values.
+    time_unit
+        Unit of the times, such as `ms`.
+    decimal
+        Decimal mark of the numbers, `point` or `comma`.
+    time_per_channel
+        Width of a channel with its unit, such as `0.4 ns`, where rows or numbers of channels stand
+        for times.
+    block
+        Number of the table, from 1, of several in the file.
+    """
+
+    time: str | None = None
+    column: str | None = None
+    time_unit: str | None = None
+    decimal: str | None = None
+    time_per_channel: str | None = None
+    block: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.time_unit is not None and time_unit_s(self.time_unit) is None:
+            raise UsageError(
+                f"--time-unit: expected a unit such as ns, ms, s, min or h, got '{self.time_unit}'"
+            )
+        if self.decimal is not None and self.decimal not in DECIMAL_MARKS:
+            raise UsageError(f"--decimal: expected 'point' or 'comma', got '{self.decimal}'")
+        if self.time_per_channel is not None and parse_width(self.time_per_channel) is None:
+            raise UsageError(
+                "--time-per-channel: expected a time above 0 with its unit, such as '0.4 ns', got "
+                f"'{self.time_per_channel}'"
+            )

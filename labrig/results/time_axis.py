@@ -1,0 +1,264 @@
+"""Times of the rows of a table: their column and its unit, or the width of a channel."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import UsageError
+from labrig.results.table_layout import TableLayout
+from labrig.text_table import EXPECTED, Block
+from labrig.text_table.names import (
+    ABSCISSAS,
+    is_channel,
+    is_row_number,
+    is_time,
+    split_time,
+    split_unit,
+    time_unit_s,
+)
+from labrig.text_table.numbers import is_clock
+from labrig.text_table.time_statements import (
+    ChannelWidth,
+    axis_times_s,
+    axis_unit,
+    channel_width,
+    parse_width,
+    quoted,
+)
+
+#: A time in a line about the axis belongs to another unit where it is shorter than the step of the
+#: times, or longer than their span, by more than these factors.
+_SHORTEST, _LONGEST = 0.1, 20.0
+#: A width of a channel and the step of the times that differ by more are not of one unit.
+_OTHER_UNIT = 500.0
+#: Largest share of steps back in a column without a name that may be times.
+_MOST_FALLS = 0.25
+#: Units that are proposed.
+_COMMON_UNITS = ("ps", "ns", "µs", "ms", "s", "min", "h")
+_UNSTATED = "s, as no line states another unit"
+
+
+@dataclass(frozen=True)
+class TimeAxis:
+    """Where the times of the rows come from.
+
+    Attributes
+    ----------
+    column
+        Column of times or of numbers of channels; None where rows are channels, the first at 0.
+    unit_s
+        Unit of that column in seconds, or the width of a channel.
+    source
+        Unit or width, and what states it, in words.
+    """
+
+    column: int | None
+    unit_s: float
+    source: str
+
+
+def find_time_axis(
+    table: Block, names: Sequence[str], in_use: Sequence[int], layout: TableLayout
+) -> TimeAxis:
+    """Return where the times of a table come from.
+
+    Raises
+    ------
+    UsageError
+        The table does not say it, or says it in two ways.
+    """
+    width = (
+        parse_width(layout.time_per_channel)
+        if layout.time_per_channel
+        else channel_width(table.above)
+    )
+    column = _time_column(table, names, in_use, layout)
+    if column is None or (layout.time_unit is None and is_channel(names[column])):
+        return _channels(table, names, in_use, column, width)
+    if table.names or layout.time is not None:
+        return _in_unit(table, names, column, width, layout)
+    return _without_names(table, column, width, layout)
+
+
+def _time_column(
+    table: Block, names: Sequence[str], in_use: Sequence[int], layout: TableLayout
+) -> int | None:
+    """Return the column of times; None without one."""
+    if layout.time is not None:
+        matches = [column for column in in_use if names[column] == layout.time]
+        if not matches:
+            raise UsageError(
+                f"--time: expected one of {', '.join(names[column] for column in in_use)}, got "
+                f"'{layout.time}'"
+            )
+    elif table.names or len(table.rows[0]) > 1:
+        matches = [column for column in in_use if is_time(names[column])] or [
+            column for column in in_use if split_unit(names[column])[0].lower() in ABSCISSAS
+        ]
+    else:
+        matches = []
+    if len(matches) > 1:
+        several = ", ".join(names[column] for column in matches)
+        raise UsageError(f"expected one of the columns {several}, got several; say '--time NAME'")
+    return matches[0] if matches else None
+
+
+def _channels(
+    table: Block,
+    names: Sequence[str],
+    in_use: Sequence[int],
+    column: int | None,
+    width: ChannelWidth | None,
+) -> TimeAxis:
+    """Return the times of a table whose rows are channels, with their numbers or without."""
+    if column is None:
+        counting = [
+            number
+            for number in in_use
+            if (is_channel(names[number]) or (table.names and is_row_number(names[number])))
+            and _counts_up(_numbers(table, number))
+        ]
+        column = counting[0] if counting else None
+    if width is None and (column is not None or len(names) == 1):
+        what = (
+            f"'{names[column]}' counts channels" if column is not None else "1 column without names"
+        )
+        raise UsageError(
+            f"{EXPECTED}, got {what}, and no line says how long a channel is; say it with "
+            "'--time-per-channel \"0.4 ns\"', or put a column with the time of each row before it"
+        )
+    if width is None:
+        raise UsageError(
+            f"{EXPECTED}, got {', '.join(names)}; if one of them is the time, name it: "
+            "'--time NAME'"
+        )
+    (width_s,) = set(width.widths_s[:1])
+    if len(set(width.widths_s)) > 1:
+        raise UsageError(
+            f"expected one width of a channel for all curves, got {width}; say that of the curve "
+            "to read with '--time-per-channel'"
+        )
+    each = f"{width_s / (time_unit_s(width.unit) or 1.0):.6g} {width.unit} a channel"
+    return TimeAxis(column, width_s, f"{each}, from {width}")
+
+
+def _without_names(
+    table: Block, column: int, width: ChannelWidth | None, layout: TableLayout
+) -> TimeAxis:
+    """Return the times of a table whose columns have no names: the first, or the rows."""
+    numbers = _numbers(table, column)
+    if width is not None:
+        unit_s = time_unit_s(width.unit) or 1.0
+        step = np.median(np.diff(numbers)) if len(numbers) > 1 else 0.0
+        names = [str(number + 1) for number in range(len(table.rows[0]))]
+        if len(width.widths_s) == len(table.rows[0]) or len(table.rows[0]) == 1:
+            return _channels(table, names, (), None, width)
+        if _counts_up(numbers) and not math.isclose(width.widths_s[0], unit_s):
+            return _channels(table, names, (), column, width)
+        if math.isclose(step * unit_s, width.widths_s[0], rel_tol=1e-3):
+            return TimeAxis(column, unit_s, f"{width.unit}, whose steps are those of {width}")
+        raise UsageError(
+            f"{EXPECTED}, got columns without names that do not fit {width}: steps of {step:g} in "
+            "column 1; give the columns names, or say '--time-unit'"
+        )
+    if layout.time_unit is None and not is_clock(table.rows[0][column]):
+        falls = np.diff(numbers) < 0
+        beside = [_numbers(table, other) for other in range(1, len(table.rows[0]))]
+        if _MOST_FALLS < np.mean(falls) < 1 or (
+            falls.any() and any(np.all(np.diff(other) > 0) for other in beside)
+        ):
+            raise UsageError(
+                f"{EXPECTED}, got columns without names, of which the first does not rise as times "
+                "do; give the columns names, or, if rows are channels, say how long one is: "
+                "'--time-per-channel \"0.4 ns\"'"
+            )
+    return _in_unit(table, ["t"], column, None, layout)
+
+
+def _in_unit(
+    table: Block,
+    names: Sequence[str],
+    column: int,
+    width: ChannelWidth | None,
+    layout: TableLayout,
+) -> TimeAxis:
+    """Return the times in a column, in the unit that the table states."""
+    if layout.time_unit is not None:
+        unit_s = time_unit_s(layout.time_unit) or 1.0
+        return TimeAxis(column, unit_s, f"{layout.time_unit}, from --time-unit")
+    if is_clock(table.rows[0][column]):
+        return TimeAxis(column, 1.0, "times of day")
+    own, line = (split_time(names[column]) or split_unit(names[column]))[1], table.names_line
+    below = table.units[column] if column < len(table.units) else ""
+    _require_unit(own, names[column])
+    if below and own and time_unit_s(below) not in (None, time_unit_s(own)):
+        raise UsageError(
+            f"expected one unit of the times, got '{own}' in '{names[column]}' and '{below}' below "
+            "it; say which with '--time-unit'"
+        )
+    if below and not own:
+        own, line = below, table.units_line
+        _require_unit(own, names[column])
+    stated = axis_unit(table.above)
+    if own and stated and time_unit_s(stated[0]) != time_unit_s(own):
+        raise UsageError(
+            f"expected one unit of the times, got '{own}' in '{names[column]}' and "
+            f"{quoted(stated[1])}; say which with '--time-unit'"
+        )
+    unit_s = time_unit_s(own or (stated[0] if stated else "s")) or 1.0
+    step_s, span_s = _step_and_span(_numbers(table, column) * unit_s)
+    if width is not None and step_s > 0:
+        ratio = width.widths_s[0] / step_s
+        if (own or stated) and not 1 / _OTHER_UNIT < ratio < _OTHER_UNIT:
+            raise UsageError(
+                f"expected times in steps of a channel, got steps of {step_s:.3g} s in "
+                f"'{names[column]}' and {width}; say the unit of the times with '--time-unit'"
+            )
+    if own:
+        where = f"from {quoted(line)}" if line and line.number > 1 else "line 1"
+        return TimeAxis(column, unit_s, f"{own.strip(' ()[]')}, {where}")
+    if stated:
+        return TimeAxis(column, unit_s, f"{stated[0]}, from {quoted(stated[1])}")
+    for time_s, unit, about in axis_times_s(table.above):
+        if step_s > 0 and not _SHORTEST * step_s < time_s < _LONGEST * span_s:
+            fitting = [
+                other
+                for other in _COMMON_UNITS
+                if math.isclose(step_s * (time_unit_s(other) or 0), time_s, rel_tol=1e-3)
+            ]
+            raise UsageError(
+                f"expected a unit for '{names[column]}', got none, and times of {unit} in "
+                f"{quoted(about)}; say '--time-unit {(*fitting, unit)[0]}', or which it is"
+            )
+    return TimeAxis(column, 1.0, _UNSTATED)
+
+
+def _require_unit(unit: str, name: str) -> None:
+    if unit and time_unit_s(unit) is None:
+        raise UsageError(
+            f"expected a unit of time for '{name}', got '{unit}'; say '--time-unit s', or which it "
+            "is"
+        )
+
+
+def _step_and_span(times: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the median step of times and their span; 0 where there is none."""
+    finite = times[np.isfinite(times)]
+    if len(finite) < 2:
+        return 0.0, 0.0
+    # Absurd times overflow.
+    with np.errstate(over="ignore"):
+        return float(np.median(np.abs(np.diff(finite)))), float(np.ptp(finite))
+
+
+def _numbers(table: Block, column: int) -> NDArray[np.float64]:
+    """Return the numbers in a column; NaN where there is none."""
+    cells = [table.number(row[column]) for row in table.rows]
+    return np.array([np.nan if cell is None else cell for cell in cells])
+
+
+def _counts_up(numbers: NDArray[np.float64]) -> bool:
+    return len(numbers) > 1 and bool(np.all(np.diff(numbers) == 1))
