@@ -29,6 +29,10 @@ LENGTH_MM = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0}
 MASS_PER_AREA_G_PER_M2 = {"g/m2": 1.0, "g/m²": 1.0, "mg/cm2": 10.0, "mg/cm²": 10.0}
 SIZE_BYTES = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}
 
+#: Characters that look like those of the units above, or like a blank; a reader cannot tell them.
+_LOOKALIKES = str.maketrans(
+    {"\u03bc": "µ", **dict.fromkeys("\u00a0\u2007\u2009\u202f\u3000", " "), "\uff05": "%"}
+)
 _PATTERN = re.compile(
     r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|\.\d+)(?:\s*/\s*(?P<divisor>\d+(?:\.\d+)?))?"
     r"\s*(?P<unit>[A-Za-zµ%]+(?:/[a-z]+[2²])?)\s*"
@@ -43,7 +47,7 @@ def parse(text: str, units: dict[str, float]) -> float:
     ValueError
         The text is not a number with one of the units, or it is negative or not finite.
     """
-    match = _PATTERN.fullmatch(text)
+    match = _PATTERN.fullmatch(text.translate(_LOOKALIKES))
     if match is None or match["unit"] not in units:
         example = next(unit for unit, factor in units.items() if factor == max(units.values()))
         raise ValueError(
@@ -92,7 +96,7 @@ _DURATION = _read(TIME_S, bare=False)
 def _time(value: Any) -> Any:
     """Return a time of a clock, which may be before its zero."""
     text = value.strip() if isinstance(value, str) else ""
-    if text[:1] in ("-", "−") and text:
+    if text[:1] in ("-", "−", "\u2013") and text:
         return -parse(text[1:], TIME_S)
     return _DURATION(value)
 
@@ -108,7 +112,7 @@ def _written(value: float, unit: str) -> str:
 
 def _schema(units: dict[str, float], bare: bool, sign: str = "") -> WithJsonSchema:
     """Return the JSON Schema of the accepted texts, for editors."""
-    unit_pattern = "|".join(sorted(units, key=len, reverse=True))
+    unit_pattern = "|".join(sorted(units, key=len, reverse=True)).replace("µ", "[µ\u03bc]")
     number_pattern = r"(\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+)(\s*/\s*\d+(\.\d+)?)?"
     text = {
         "type": "string",
@@ -164,7 +168,7 @@ DurationS = Annotated[
 ]
 #: Seconds of a clock, written with a unit of time; before its zero with a minus.
 TimeS = Annotated[
-    float, BeforeValidator(_time), _serializer("s"), _schema(TIME_S, bare=False, sign="[-−]?")
+    float, BeforeValidator(_time), _serializer("s"), _schema(TIME_S, bare=False, sign="[-−\u2013]?")
 ]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
 Fraction = Annotated[float, _validator(FRACTION, bare=True), _schema(FRACTION, bare=True)]

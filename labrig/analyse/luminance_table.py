@@ -18,7 +18,7 @@ from labrig.results import (
     read_described_series,
 )
 
-_UNIT = re.compile(r"[mµu]?cd\s*/\s*m(2|²|\^2)")
+_UNIT = re.compile(r"[mµμu]?cd\s*/\s*m(2|²|\^2)")
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,12 @@ def evaluate_luminance_table(
             f"{path}: expected one series with one column of luminances, got {len(parts)} series "
             f"of {', '.join(series.channels)}; choose a column with --column"
         )
-    named = _UNIT.search(series.channels[0]) or _UNIT.search(columns)
+    named = next(filter(None, map(_UNIT.search, (series.value_unit, *series.channels, columns))), None)
+    if named is None and options.unit is None and series.value_unit:
+        raise UsageError(
+            f"{path}: expected luminances in mcd/m2 or cd/m2, got '{series.value_unit}' in "
+            f"'{series.channels[0]}'; say '--unit mcd/m2', or which it is"
+        )
     unit = options.unit or (named[0] if named else "mcd/m2")
     factor = _factor(f"{path}: unit of {series.channels[0]}", unit)
     rows = np.flatnonzero(series.usable & (series.t_s > options.off_s))

@@ -51,7 +51,7 @@ def luminance_unit(unit: str) -> float:
     >>> luminance_unit("cd / m²")
     1000.0
     """
-    name = re.sub(r"\s", "", unit).replace("²", "2").replace("^2", "2")
+    name = re.sub(r"\s", "", unit).replace("²", "2").replace("^2", "2").replace("\u03bc", "µ")
     if name not in LUMINANCE_UNITS:
         raise ValueError(f"expected one of {', '.join(LUMINANCE_UNITS)}, got '{unit}'")
     return LUMINANCE_UNITS[name]
