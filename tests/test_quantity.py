@@ -18,6 +18,9 @@ from labrig.quantity import LENGTH_MM, MASS_PER_AREA_G_PER_M2, TIME_S, duration_
         ("2 h", 7200.0),
         ("1e3 ms", 1.0),
         (".5 s", 0.5),
+        ("5 \u03bcs", 5e-6),
+        ("5\u00a0\u00b5s", 5e-6),
+        ("5\u202fs", 5.0),
     ],
 )
 def test_durations(text: str, seconds: float) -> None:

@@ -99,7 +99,7 @@ def fit_charge_table(
     >>> options = ChargeTableOptions(on_s=0.0, off_s=99.0, order="first", stimulated="0")
     >>> fit, columns = fit_charge_table(table, options)
     >>> columns, abs(fit.states[0].decay_time_s.value - 1 / 0.03) < 1
-    ('time t_s; values counts; no σ', True)
+    ('time t_s (s, line 1); values counts; no σ', True)
     """
     parts, columns = read_described_series(path, layout or TableLayout())
     series = parts[0]

@@ -117,7 +117,9 @@ def evaluate_luminance_table(
             f"{path}: expected one series with one column of luminances, got {len(parts)} series "
             f"of {', '.join(series.channels)}; choose a column with --column"
         )
-    named = next(filter(None, map(_UNIT.search, (series.value_unit, *series.channels, columns))), None)
+    named = next(
+        filter(None, map(_UNIT.search, (series.value_unit, *series.channels, columns))), None
+    )
     if named is None and options.unit is None and series.value_unit:
         raise UsageError(
             f"{path}: expected luminances in mcd/m2 or cd/m2, got '{series.value_unit}' in "

@@ -73,14 +73,16 @@ def read_series(
 ) -> list[Series]:
     """Read the series in a table, one for each region and unit in it.
 
-    The columns are separated by tabs, semicolons, commas or blanks; numbers have a decimal point or
-    a decimal comma. `#` begins a comment, and lines above the table are skipped. Columns are
+    The columns are separated by tabs, semicolons, commas, bars or blanks; numbers have a decimal
+    point or a decimal comma. `#` begins a comment; of the lines above and below the table only what
+    they say of names, unit of the times and width of a channel is used. Columns are
     recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`; times
     of day, `12:00:05`, are counted from the first row),
     uncertainties (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
     and those of series.csv (region, unit, flag and the like). Every other column of numbers is a
     channel, except one that only the first row fills: some programs put the settings of a
-    measurement there. Without names the columns are time, value and perhaps sigma.
+    measurement there. Without names the columns are time, value and perhaps sigma. Rows that are
+    channels of a stated width become times.
 
     Parameters
     ----------
@@ -143,7 +145,7 @@ def read_described_series(
     --------
     >>> from labrig.results import read_described_series
     >>> read_described_series("series.csv")[1]
-    'time t_s; values R, G, B; σ R_sigma, G_sigma, B_sigma'
+    'time t_s (s, line 1); values R, G, B; σ R_sigma, G_sigma, B_sigma'
     """
     folder = Path(path)
     if folder.is_dir():

@@ -174,7 +174,7 @@ def _block(
     return Block(
         header.names,
         header.units,
-        tuple(_padded(row, width) for row in own),
+        tuple(_padded(row, width, style) for row in own),
         tuple(row.line.number for row in own),
         style.decimal,
         tuple(line for line in filled if limits[0] < line.number < first and line not in named),
@@ -184,12 +184,17 @@ def _block(
     )
 
 
-def _padded(row: _Row, columns: int) -> tuple[str, ...]:
+def _padded(row: _Row, columns: int, style: Style) -> tuple[str, ...]:
     """Return the cells of a row, as many as there are columns, empty ones added at its end."""
     if len(row.cells) > columns:
+        hint = (
+            "; are there decimal commas between commas? save it with ; between the columns"
+            if style.separator == ","
+            else ""
+        )
         raise UsageError(
             f"line {row.line.number}: expected {columns} columns as in the first line, got "
-            f"{len(row.cells)}"
+            f"{len(row.cells)}{hint}"
         )
     return (*row.cells, *[""] * (columns - len(row.cells)))
 

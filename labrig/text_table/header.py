@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from labrig.errors import UsageError
 from labrig.text_table.names import is_abscissa, is_abscissa_unit, is_time
-from labrig.text_table.numbers import is_clock
+from labrig.text_table.numbers import DECIMAL_MARKS, is_clock, parse_number
 from labrig.text_table.style import FEWEST, SEPARATORS, Line, Style
 
 COMMENT = "#"
@@ -79,7 +79,7 @@ def names_in(line: Line, width: int, style: Style) -> tuple[str, ...]:
     if bracketed := _IN_BRACKETS.fullmatch(line.text.strip()):
         return _split_by_blanks(bracketed[1], width)
     cells = style.cells(line)
-    if style.count_numbers(cells) or any(map(is_clock, cells)):
+    if any(map(_is_reading, cells)):
         return ()
     if style.separator is None:
         names = _split_by_blanks(line.text, width)
@@ -92,9 +92,19 @@ def names_in(line: Line, width: int, style: Style) -> tuple[str, ...]:
     for separator in SEPARATORS:
         other = Style(separator, style.decimal)
         names = other.cells(line) if separator else _split_by_blanks(line.text, width)
-        if len(names) == width and any(map(is_abscissa, names)) and not style.count_numbers(names):
+        if (
+            len(names) == width
+            and any(map(is_abscissa, names))
+            and not any(map(_is_reading, names))
+        ):
             return names
     return ()
+
+
+def _is_reading(cell: str) -> bool:
+    """Return whether a cell is a number with any decimal mark, or a time of day: no name."""
+    marks = DECIMAL_MARKS.values()
+    return is_clock(cell) or any(parse_number(cell, mark) is not None for mark in marks)
 
 
 def _split_by_blanks(line: str, width: int) -> tuple[str, ...]:

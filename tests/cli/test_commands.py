@@ -425,7 +425,9 @@ def test_the_columns_of_a_table_without_names_are_told(
     rows = [f"{t},{100 * np.exp(-t / 20)},{60 * np.exp(-t / 20)}" for t in range(0, 80, 2)]
     (tmp_path / "table.csv").write_text("\n".join(rows))
     ended = labrig("fit", "decay", tmp_path / "table.csv")
-    assert ended.out.splitlines()[0] == "columns  time column 1; values column 2; σ column 3"
+    assert ended.out.splitlines()[0] == (
+        "columns  time column 1 (s, as no line states another unit); values column 2; σ column 3"
+    )
     assert "σ is too large" in ended.out
     (tmp_path / "out").touch()
     refused = labrig("fit", "decay", tmp_path / "table.csv", "--out", tmp_path / "out")
