@@ -106,6 +106,11 @@ EXPORTS = [
     Export("range in the header", "Time range: 12 ns\nt,I\n" + rows(), refused="--time-unit ns"),
     Export("resolution in the header", "Resolution: 400 ps\nt,I\n" + rows(), refused="ns"),
     Export("contradiction", "X-axis: time [us]\nt (ns),I\n" + rows(), refused="--time-unit"),
+    Export("unit in words", "# all times in nanoseconds\nt,I\n" + rows()),
+    Export("unit of a column in words", "# column 1: time (ns)\n# column 2: I\n" + rows()),
+    Export("unit below the rows", "t,I\n" + rows() + "\nTime unit: ns\n"),
+    Export("unit after a dash", "Time - ns,I\n" + rows()),
+    Export("width in the name", "Channel (0.4 ns/ch)\tI\n" + CHANNELS),
     Export("unknown unit", "Time (fortnights),I\n" + rows(), refused="fortnights"),
     Export("a note between rows", "t (ns),I\n" + rows() + "lamp off\n" + rows(), refused="--block"),
     Export("values first, no names", rows("{n},{t:.2f}\n"), refused="names"),
@@ -131,7 +136,7 @@ def verdict(path: Path, export: Export) -> tuple[str, str]:
 
 Choose = Callable[[Sequence[str]], str]
 _ABOVE = (
-    "", "Sample: A\n", "Operator{0}X\n\nGain{0}5\n", "# made\n# by a script\n", "[Header]\nver=1.2\n",
+    "", "Sample: A\n", "Operator{0}X\n\nGain{0}5\n", "# made\n# by me\n", "[Header]\nver=1.2\n",
     "Date{0}28.11.2026\nTime{0}10:00:00\nName{0}5{0}7\n\n", "Laser pulse 5 ns\n>>>>>Begin<<<<<\n",
 )  # fmt: skip
 _BELOW = (
@@ -139,7 +144,8 @@ _BELOW = (
     "{0}{0}\n\x1a", "\nChi squared = 1.02\n[Gain (dB)] {0} 4\n",
 )  # fmt: skip
 _NAMES = (
-    "Time (ns)", "t / ns", "Zeit [ns]", "time_ns", "Time, ns", "Time", "time in ns", "\u00b5s", "us",
+    "Time (ns)", "t / ns", "Zeit [ns]", "time_ns", "Time, ns", "Time", "time in ns", "\u00b5s",
+    "us",
 )  # fmt: skip
 _ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1252")
 

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.results.table_layout import TableLayout
-from labrig.text_table import EXPECTED, Block
+from labrig.text_table import EXPECTED, Block, Line
 from labrig.text_table.names import (
     ABSCISSAS,
     is_channel,
@@ -70,17 +70,26 @@ def find_time_axis(
     UsageError
         The table does not say it, or says it in two ways.
     """
-    width = (
-        parse_width(layout.time_per_channel)
-        if layout.time_per_channel
-        else channel_width(table.above)
-    )
+    said = _lines_about(table)
+    width = parse_width(layout.time_per_channel) if layout.time_per_channel else channel_width(said)
+    if width and len(width.widths_s) == len(names) and layout.column in width.numbers:
+        width = replace(width, widths_s=(width.widths_s[int(layout.column or 1) - 1],))
     column = _time_column(table, names, in_use, layout)
     if column is None or (layout.time_unit is None and is_channel(names[column])):
         return _channels(table, names, in_use, column, width)
     if table.names or layout.time is not None:
         return _in_unit(table, names, column, width, layout)
     return _without_names(table, column, width, layout)
+
+
+def _lines_about(table: Block) -> tuple[Line, ...]:
+    """Return the lines that may state a unit or a width: above the rows, their names, below."""
+    named = () if table.names_line is None else (table.names_line,)
+    return (
+        *table.above,
+        *(line for line in named if any(map(is_channel, table.names))),
+        *table.below,
+    )
 
 
 def _time_column(
@@ -175,7 +184,10 @@ def _without_names(
                 "do; give the columns names, or, if rows are channels, say how long one is: "
                 "'--time-per-channel \"0.4 ns\"'"
             )
-    return _in_unit(table, ["t"], column, None, layout)
+    axis = _in_unit(table, ["t"], column, None, layout)
+    if axis.source == _UNSTATED and _counts_up(numbers):
+        return replace(axis, source=f"{_UNSTATED}; if it numbers channels, say --time-per-channel")
+    return axis
 
 
 def _in_unit(
@@ -202,7 +214,7 @@ def _in_unit(
     if below and not own:
         own, line = below, table.units_line
         _require_unit(own, names[column])
-    stated = axis_unit(table.above)
+    stated = axis_unit(_lines_about(table))
     if own and stated and time_unit_s(stated[0]) != time_unit_s(own):
         raise UsageError(
             f"expected one unit of the times, got '{own}' in '{names[column]}' and "
@@ -222,7 +234,7 @@ def _in_unit(
         return TimeAxis(column, unit_s, f"{own.strip(' ()[]')}, {where}")
     if stated:
         return TimeAxis(column, unit_s, f"{stated[0]}, from {quoted(stated[1])}")
-    for time_s, unit, about in axis_times_s(table.above):
+    for time_s, unit, about in axis_times_s(_lines_about(table)):
         if step_s > 0 and not _SHORTEST * step_s < time_s < _LONGEST * span_s:
             fitting = [
                 other

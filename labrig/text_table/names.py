@@ -8,7 +8,7 @@ _TIMES = frozenset(
         "t", "time", "times", "elapsed", "elapsed time", "decay time", "delay", "delay time",
         "zeit", "zeitpunkt", "messzeit", "verzögerung", "temps", "durée", "tempo", "tiempo",
         "t_s", "seconds", "second", "sec", "sekunden", "secondes", "minutes", "minuten", "hours",
-        "stunden", "milliseconds", "millisekunden",
+        "stunden", "milliseconds", "millisekunden", "microseconds", "nanoseconds", "picoseconds",
     }
 )  # fmt: skip
 #: Units that alone name a column of times; `min` may be a minimum, `d` a distance.
@@ -17,6 +17,7 @@ _TIMES_BY_UNIT = frozenset({"fs", "ps", "ns", "us", "ms", "nsec", "usec", "msec"
 ABSCISSAS = frozenset({"x", "x_value", "x-value", "x value"})
 #: Names of a column that counts channels of a memory, or bins of a histogram.
 _CHANNELS = frozenset({"chan", "channel", "channels", "ch", "ch.", "bin", "bins", "kanal", "canal"})
+_NUMBER_OF = re.compile(r"\s*(?:#|no\.?|nr\.?|numbers?|nummer)$")
 #: Names of other abscissas, and their units, which tell a header that is no table of times.
 _OTHER_ABSCISSAS = frozenset(
     {
@@ -66,7 +67,9 @@ _WITH_UNIT = tuple(
         r"(?P<name>.*\S)\s*,?\s+in\s+(?P<unit>\S+)",
     )
 )
-_TIME_WITH_UNIT = re.compile(r"(?P<name>.*[^\s_.,])[\s_.,]+(?P<unit>[^\s_.,]+)")
+_TIME_WITH_UNIT = re.compile(
+    r"(?P<name>.*[^\s_.,:|{<-])[\s_.,:|{<-]+(?P<unit>[^\s_.,:|{}<>-]+)[}>.]?"
+)
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -102,7 +105,7 @@ def is_time(name: str) -> bool:
 
 def is_channel(name: str) -> bool:
     """Return whether a column of that name counts channels."""
-    return split_unit(name)[0].lower() in _CHANNELS
+    return _NUMBER_OF.sub("", split_unit(name)[0].lower()) in _CHANNELS
 
 
 def is_abscissa(name: str) -> bool:

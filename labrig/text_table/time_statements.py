@@ -28,7 +28,8 @@ _UNIT_PER_CHANNEL = re.compile(
 #: `Resolution: 32 ps`, `Channel width (ns)	0.4`, `time_per_bin_ps = 16`.
 _WIDTH = re.compile(
     rf"""(?<![a-z])(?:(?:time[\s_-]*)?(?:channel|chan|bin)[\s_-]*(?:width|size|length|duration|time)
-    |time[\s_-]*(?:/|per)?[\s_-]*(?:channel|chan|ch|bin|point|pt|sample)
+    |(?:time|zeit|temps)[\s_-]*(?:/|per|pro|par)?[\s_-]*(?:channel|chan|kanal|canal|ch|bin|point|pt|sample)
+    |kanalbreite
     |(?:time[\s_-]*)?resolution|time[\s_-]*(?:calibration|increment|interval|step)|tcal
     |dwell(?:[\s_-]*time)?|sampl(?:e|ing)[\s_-]*(?:interval|period|time)
     |x[\s_-]*inc(?:rement)?|delta[\s_-]*[xt]|[dΔ]t)
@@ -43,6 +44,17 @@ _AXIS_UNIT = re.compile(
     (?:[\s_-]*(?:units?|labels?|title|of[\s_-]*(?:time|x)))*["']?
     \s*[\t,;:=|\s(\[]\s*(?P<value>.+)""",
     re.IGNORECASE | re.VERBOSE,
+)
+#: `all times in ns`, `column 1: time (ns)`, without a number that would make it another time.
+_IN_UNIT = re.compile(
+    rf"[^\d]*(?:\d+\s*:)?[^\d]*\b(?:times?|zeit(?:en)?|temps)\b[^\d]*?"
+    rf"(?:\bin\s+|[(\[]\s*)(?P<unit>{_WORD})\b[^\d]*",
+    re.IGNORECASE,
+)
+_OTHER_TIMES = re.compile(
+    r"integration|exposure|acqui|collect|delay|dwell|dead|gate|live|real|measure|rise|response|"
+    r"lifetime|per\b",
+    re.IGNORECASE,
 )
 #: Words of a line about the axis of times, and of one about other times of a measurement.
 _OF_AXIS = re.compile(
@@ -62,6 +74,11 @@ class ChannelWidth:
     widths_s: tuple[float, ...]
     unit: str
     line: Line | None
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of columns that have none: their numbers, from 1."""
+        return tuple(str(number) for number in range(1, len(self.widths_s) + 1))
 
     def __str__(self) -> str:
         """Return what says so."""
@@ -171,6 +188,9 @@ def axis_unit(above: Sequence[Line]) -> tuple[str, Line] | None:
             unit = text if time_unit_s(text) else (split_time(text) or split_unit(text))[1]
             if unit and time_unit_s(unit) is not None:
                 found.append((unit, line))
+        spoken = None if match or _OTHER_TIMES.search(line.text) else _IN_UNIT.fullmatch(line.text)
+        if spoken and time_unit_s(spoken["unit"]) is not None:
+            found.append((spoken["unit"], line))
     for unit, line in found[1:]:
         if time_unit_s(unit) != time_unit_s(found[0][0]):
             raise UsageError(

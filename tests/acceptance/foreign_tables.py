@@ -1,4 +1,4 @@
-"""Tables as instruments write them, beside their truth: `python -m tests.acceptance.foreign_tables`.
+"""Tables as instruments write them, beside their truth: `-m tests.acceptance.foreign_tables`.
 
 Made exports, then 200 ways to write one decay; with files as arguments, what is read of each.
 """
