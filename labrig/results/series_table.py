@@ -334,7 +334,7 @@ def _times_s(table: Block, columns: Columns) -> FloatArray:
     """Return the times in seconds; times of day from the first row."""
     time = columns.time
     if time.column is None:
-        return np.arange(len(table.rows)) * time.unit_s
+        return np.asarray(np.arange(len(table.rows)) * time.unit_s, dtype=np.float64)
     clock_s = seconds_from_first([row[time.column] for row in table.rows])
     if clock_s is not None:
         return clock_s
