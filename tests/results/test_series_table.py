@@ -158,9 +158,9 @@ def test_what_is_open_is_answered_by_the_layout() -> None:
     assert series.t_s == pytest.approx([1.5e-3, 2.5e-3])
     assert series.values.tolist() == [[4.5], [2.5]]
     assert series.sigma.tolist() == [[0.2], [0.2]]
-    with pytest.raises(UsageError, match="--time: expected one of .* got"):
+    with pytest.raises(UsageError, match=r"--time: expected one of .* got"):
         parse_series(table, "x", replace(layout, time="x"))
-    with pytest.raises(UsageError, match="--column: expected one of .* got"):
+    with pytest.raises(UsageError, match=r"--column: expected one of .* got"):
         parse_series(table, "x", replace(layout, column="C"))
     with pytest.raises(UsageError, match="--block: expected a number from 1 to 1"):
         parse_series(table, "x", replace(layout, block=2))
