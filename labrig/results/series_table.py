@@ -382,7 +382,9 @@ def _numbers(table: Block, columns: Columns, column: int, empty: float | None) -
             continue
         number = table.number(cell)
         if number is None:
-            remedy = "write all times as numbers, or all as hh:mm:ss" if ":" in cell else _DELETE
+            remedy = (
+                "write all times as numbers, or all as those of a clock" if ":" in cell else _DELETE
+            )
             raise UsageError(
                 f"line {line}: expected a number with a decimal {mark} for '{name}', got '{cell}'; "
                 f"{remedy}"

@@ -82,11 +82,9 @@ def find_time_axis(
     """
     said = _lines_about(table)
     width = parse_width(layout.time_per_channel) if layout.time_per_channel else channel_width(said)
-    if width and len(width.widths_s) == len(names) and layout.column in width.numbers:
-        width = replace(width, widths_s=(width.widths_s[int(layout.column or 1) - 1],))
     column = _time_column(table, names, in_use, layout)
     if column is None or (layout.time_unit is None and is_channel(names[column])):
-        return _channels(table, names, in_use, column, width)
+        return _channels(table, names, in_use, column, width, layout)
     if table.names or layout.time is not None:
         return _in_unit(table, names, column, width, layout)
     return _without_names(table, column, width, layout)
@@ -132,6 +130,7 @@ def _channels(
     in_use: Sequence[int],
     column: int | None,
     width: ChannelWidth | None,
+    layout: TableLayout,
 ) -> TimeAxis:
     """Return the times of a table whose rows are channels, with their numbers or without."""
     if column is None:
@@ -155,11 +154,15 @@ def _channels(
             f"{EXPECTED}, got {', '.join(names)}; if one of them is the time, name it: "
             "'--time NAME'"
         )
-    (width_s,) = set(width.widths_s[:1])
-    if len(set(width.widths_s)) > 1:
+    widths_s = width.widths_s
+    chosen = layout.column or ""
+    if column is None and chosen in width.numbers:
+        widths_s = (widths_s[width.numbers.index(chosen)],)
+    width_s = widths_s[0]
+    if len(set(widths_s)) > 1:
         raise UsageError(
-            f"expected one width of a channel for all curves, got {width}; say that of the curve "
-            "to read with '--time-per-channel'"
+            f"expected one width of a channel for all curves, got {width}; choose one with "
+            "'--column NUMBER'"
         )
     each = f"{width_s / (time_unit_s(width.unit) or 1.0):.6g} {width.unit} a channel"
     return TimeAxis(column, width_s, f"{each}, from {width}")
@@ -175,9 +178,9 @@ def _without_names(
         step = np.median(np.diff(numbers)) if len(numbers) > 1 else 0.0
         names = [str(number + 1) for number in range(len(table.rows[0]))]
         if len(width.widths_s) == len(table.rows[0]) or len(table.rows[0]) == 1:
-            return _channels(table, names, (), None, width)
+            return _channels(table, names, (), None, width, layout)
         if _counts_up(numbers) and not math.isclose(width.widths_s[0], unit_s):
-            return _channels(table, names, (), column, width)
+            return _channels(table, names, (), column, width, layout)
         if math.isclose(step * unit_s, width.widths_s[0], rel_tol=1e-3):
             return TimeAxis(column, unit_s, f"{width.unit}, whose steps are those of {width}")
         raise UsageError(

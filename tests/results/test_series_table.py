@@ -158,12 +158,22 @@ def test_what_is_open_is_answered_by_the_layout() -> None:
     assert series.t_s == pytest.approx([1.5e-3, 2.5e-3])
     assert series.values.tolist() == [[4.5], [2.5]]
     assert series.sigma.tolist() == [[0.2], [0.2]]
-    for wrong, option in (({"time": "x"}, "--time"), ({"column": "C"}, "--column")):
-        with pytest.raises(UsageError, match=f"{option}: expected one of .* got"):
-            parse_series(table, "x", replace(layout, **wrong))
-    for bad, option in (({"time_unit": "mile"}, "--time-unit"), ({"decimal": ";"}, "--decimal")):
-        with pytest.raises(UsageError, match=f"{option}: expected"):
-            TableLayout(**bad)
+    with pytest.raises(UsageError, match=r"--time: expected one of .* got"):
+        parse_series(table, "x", replace(layout, time="x"))
+    with pytest.raises(UsageError, match=r"--column: expected one of .* got"):
+        parse_series(table, "x", replace(layout, column="C"))
+    with pytest.raises(UsageError, match="--block: expected a number from 1 to 1"):
+        parse_series(table, "x", replace(layout, block=2))
+    with pytest.raises(UsageError, match="--time-unit: expected"):
+        TableLayout(time_unit="mile")
+    with pytest.raises(UsageError, match="--decimal: expected"):
+        TableLayout(decimal=";")
+
+
+@pytest.mark.parametrize("width", ["0.4", "0 ns", "0.4 nm", "1,000 ns", "-1 ns"])
+def test_a_width_of_a_channel_that_is_none_is_refused(width: str) -> None:
+    with pytest.raises(UsageError, match="--time-per-channel: expected"):
+        TableLayout(time_per_channel=width)
 
 
 def test_each_column_of_values_has_the_uncertainty_right_of_it() -> None:
