@@ -383,7 +383,7 @@ def _numbers(table: Block, columns: Columns, column: int, empty: float | None) -
         number = table.number(cell)
         if number is None:
             remedy = (
-                "write all times as numbers, or all as those of a clock" if ":" in cell else _DELETE
+                "write all times in one form" if ":" in cell else _DELETE
             )
             raise UsageError(
                 f"line {line}: expected a number with a decimal {mark} for '{name}', got '{cell}'; "
