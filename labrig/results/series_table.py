@@ -382,9 +382,7 @@ def _numbers(table: Block, columns: Columns, column: int, empty: float | None) -
             continue
         number = table.number(cell)
         if number is None:
-            remedy = (
-                "write all times in one form" if ":" in cell else _DELETE
-            )
+            remedy = "write all times in one form" if ":" in cell else _DELETE
             raise UsageError(
                 f"line {line}: expected a number with a decimal {mark} for '{name}', got '{cell}'; "
                 f"{remedy}"
