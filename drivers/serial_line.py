@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import serial
 
-from labrig.acquire import SerialPort
+from labrig.acquire import PORT_FAILURES, SerialPort, gone
 from labrig.clock import Clock
 from labrig.errors import DeviceLostError, UnclearAnswerError
 
@@ -60,7 +60,7 @@ class SerialLine:
             raise UnclearAnswerError(
                 f"{self._name} does not take what is sent to it; check its power, cable and address"
             ) from None
-        except (serial.SerialException, OSError) as error:
+        except PORT_FAILURES as error:
             raise self._lost_error(error) from None
 
     def read_until(self, end: bytes, timeout_s: float) -> bytes:
@@ -133,15 +133,14 @@ class SerialLine:
     def _read_byte(self) -> bytes:
         try:
             return self._port.read(1) if self._port.in_waiting else b""
-        except (serial.SerialException, OSError) as error:
+        except PORT_FAILURES as error:
             raise self._lost_error(error) from None
 
     def _waiting(self) -> bool:
         try:
             return self._port.in_waiting > 0
-        except (serial.SerialException, OSError) as error:
+        except PORT_FAILURES as error:
             raise self._lost_error(error) from None
 
     def _lost_error(self, error: Exception) -> DeviceLostError:
-        reason = " ".join(str(error).split())
-        return DeviceLostError(f"{self._name} is gone ({reason}); plug it in again")
+        return DeviceLostError(f"{self._name} is gone {gone(error, self._name)}")

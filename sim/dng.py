@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from fractions import Fraction
 from typing import Final
 
-from .sensor import BAYER_RGGB, BLACK_DN, WHITE_DN, Mosaic
+from .sensor import BAYER_RGGB, RECORDED, Levels, Mosaic
 
 MAKE = "labrig"
 MODEL = "simulated EOS 5D Mark II"
@@ -65,8 +65,18 @@ def exposure_label(exposure_s: float) -> Fraction:
     return DIAL[nearest]
 
 
-def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
-    """Return the file's bytes, of a 16-bit `mosaic` (height, width) and the metadata in `shot`."""
+def encode_dng(mosaic: Mosaic, shot: Shot, levels: Levels = RECORDED) -> bytes:
+    """Return the file's bytes.
+
+    Parameters
+    ----------
+    mosaic
+        Pixels of 16 bit, shape (height, width).
+    shot
+        Metadata of the exposure.
+    levels
+        Black and white of the mosaic.
+    """
     height, width = mosaic.shape
     pixels = mosaic.astype("<u2").tobytes()
     # Whole microseconds first: the clock's seconds must not tip over by rounding twice.
@@ -107,8 +117,8 @@ def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
         (50707, _BYTE, [1, 1, 0, 0]),
         (50708, _ASCII, f"{MAKE} {MODEL}"),
         (50713, _SHORT, [1, 1]),
-        (50714, _SHORT, [BLACK_DN]),
-        (50717, _LONG, [WHITE_DN]),
+        (50714, _SHORT, [levels.black_dn]),
+        (50717, _LONG, [levels.white_dn]),
         (50721, _SRATIONAL, [Fraction(n, 10_000) for n in COLOR_MATRIX]),
         (50728, _RATIONAL, AS_SHOT_NEUTRAL),
         (50778, _SHORT, [21]),  # D65, to which the colour matrix belongs

@@ -130,6 +130,7 @@ class Room:
             nonlinearity=sensor.nonlinearity,
             flicker_course=self._flicker_course(),
             black_course_dn=self._black_course_dn(),
+            subtracts_black=sensor.subtracts_black,
         )
         self._imaging = Imaging(simulation.imaging, simulation.seed)
         self._sensor_temperature = SensorTemperature()
@@ -250,7 +251,8 @@ class Room:
         )
         lens = self._simulation.lens
         lens_notes = None if lens is None else lens.notes
-        return encode_dng(mosaic, Shot(wall_s, exposure_s, iso, f_number, lens_notes))
+        shot = Shot(wall_s, exposure_s, iso, f_number, lens_notes)
+        return encode_dng(mosaic, shot, self._sensor.levels)
 
     def white_exposure(self, start_s: float, end_s: float) -> FloatArray:
         """Return ∫ irradiance dt at a white reference beside the samples, on `WAVELENGTH_NM`.

@@ -6,6 +6,7 @@ noise falls steeply up to ISO 1600. They are not a measurement of a specimen.
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -25,6 +26,19 @@ BLACK_DN = 1024
 WHITE_DN = 15_600
 SATURATION_DN = 15_760
 MAX_DN = 16_383
+
+
+class Levels(NamedTuple):
+    """Black and white as the file has them, and the highest number in it."""
+
+    black_dn: int
+    white_dn: int
+    highest_dn: int
+
+
+RECORDED = Levels(BLACK_DN, WHITE_DN, MAX_DN)
+#: Of a camera that subtracts its black level before it writes the file.
+SUBTRACTED = Levels(0, WHITE_DN - BLACK_DN, MAX_DN - BLACK_DN)
 
 #: Electrons a DN at ISO 100.
 GAIN_ISO_100 = 4.2
@@ -112,6 +126,9 @@ class Sensor:
         frame has one of its own.
     black_course_dn
         Function of a frame's time that returns the wander of its black level in DN.
+    subtracts_black
+        Whether the camera subtracts its black level before it writes the file, and cuts off at 0
+        what noise has below it, as a Nikon D700.
     """
 
     def __init__(
@@ -125,13 +142,15 @@ class Sensor:
         nonlinearity: float = 0.0,
         flicker_course: Course | None = None,
         black_course_dn: Course | None = None,
+        subtracts_black: bool = False,
     ) -> None:
         height, width = falloff.shape
         response = falloff * (1 + PRNU * rng.standard_normal((height, width)))
         self._response: Float32Array = response.astype(np.float32)
         offset = PIXEL_OFFSET_DN * rng.standard_normal((height, width))
         offset += COLUMN_OFFSET_DN * rng.standard_normal(width)
-        self._zero_dn: Float32Array = (BLACK_DN + offset).astype(np.float32)
+        self.levels = SUBTRACTED if subtracts_black else RECORDED
+        self._zero_dn: Float32Array = (self.levels.black_dn + offset).astype(np.float32)
         count = round(HOT_FRACTION * height * width)
         self.hot_pixels: NDArray[np.intp] = rng.choice(height * width, count, replace=False)
         self._hot = HOT_MEDIAN * np.exp(HOT_SIGMA * rng.standard_normal(count))
@@ -201,7 +220,7 @@ class Sensor:
         if self._black_course_dn is not None:
             electrons += np.float32(self._black_course_dn(at_s))
         electrons += np.float32(0.5)
-        return np.clip(electrons, 0, MAX_DN).astype(np.uint16)
+        return np.clip(electrons, 0, self.levels.highest_dn).astype(np.uint16)
 
 
 def _shared_with_neighbours(electrons: Float32Array, fraction: float) -> Float32Array:

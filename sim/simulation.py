@@ -166,6 +166,9 @@ class SensorSettings(Part):
         Standard deviation of the black level, which wanders slowly, in DN.
     black_wander_over
         Time in which the black level wanders to another value, for example `10 min`.
+    subtracts_black
+        Whether the camera subtracts its black level before it writes the file, and cuts off at 0
+        what noise has below it, as a Nikon D700.
     nonlinearity
         Fraction of the signal that is missing near saturation, for example `1 %`; of a smaller
         signal in proportion less.
@@ -182,6 +185,7 @@ class SensorSettings(Part):
     row_noise: Annotated[Fraction, Field(ge=0)] = 0.0
     black_wander_dn: Annotated[float, Field(ge=0, le=100)] = 0.0
     black_wander_over: Annotated[DurationS, Field(gt=0)] = 600.0
+    subtracts_black: bool = False
     nonlinearity: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
     curves: ShippedOrFile | None = None
 

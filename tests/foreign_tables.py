@@ -82,6 +82,7 @@ EXPORTS = [
     Export("channels, width said", "Channel\tCounts\n" + CHANNELS, WIDTH),
     Export("counts alone", "Counts\n" + ALONE, refused="--time-per-channel"),
     Export("counts alone, width said", "Counts\n" + ALONE, WIDTH),
+    Export("number of rows above", f"{len(COUNTS)}\n" + ALONE, WIDTH),
     Export("two widths", "0.4 ns/ch\n0.5 ns/ch\nChan\tI\n" + CHANNELS, refused="0.5 ns/ch"),
     Export("PicoQuant FluoFit", "Time [ns]\tDecay [Cnts]\tIRF [Cnts]\n"
            + rows("{t:.2f}\t{n}\t0\n"), TableLayout(column="Decay [Cnts]")),

@@ -1,5 +1,6 @@
 """Output in encodings that lack its characters, and names that are no text: nothing fails."""
 
+import json
 import os
 import subprocess
 import sys
@@ -100,6 +101,18 @@ def test_a_command_ends_well_where_all_is_ascii(tmp_path: Path) -> None:
     ended = command(["fit", "decay", "decay.csv"], tmp_path, PLAIN_C)
     assert ended.returncode == 0, ended.stderr
     assert "state  k / s^-1" in (ended.stdout + ended.stderr).decode("ascii")
+
+
+def test_what_programs_read_is_the_same_in_any_encoding(
+    labrig: Callable[..., Ended], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A spelled character would be no JSON, or another text."""
+    monkeypatch.chdir(tmp_path)
+    queue = "runs: [{protocol: decay, set: {sample.name: '样品 😀 σ'}}]"
+    Path("queue.yaml").write_text(queue, encoding="utf-8")
+    ended = labrig("queue", "list", "--json")
+    assert ended.out.isascii()
+    assert json.loads(ended.out)[0]["set"] == {"sample.name": "样品 😀 σ"}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of files are text elsewhere")

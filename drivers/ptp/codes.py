@@ -65,6 +65,7 @@ class Standard(IntEnum):
     GetDeviceInfo = 0x1001
     OpenSession = 0x1002
     CloseSession = 0x1003
+    GetStorageIDs = 0x1004
     GetObjectInfo = 0x1008
     GetObject = 0x1009
     DeleteObject = 0x100B

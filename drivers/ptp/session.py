@@ -1,6 +1,7 @@
 """One PTP session: transactions of command, data and response, each answered before the next."""
 
 import logging
+import struct
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -30,6 +31,9 @@ FIRST_BACK_OFF_S = 0.02
 LONGEST_BACK_OFF_S = 0.5
 #: More than any answer but a frame: an EOS lists its properties in some 20 kB.
 MAX_ANSWER_BYTES = 4 * 1024 * 1024
+
+#: Remedy for a camera that stays busy because it has nowhere to put a frame.
+NO_CARD = "no card is in it, and some cameras stay busy without: put one in, and leave its menus"
 
 _logger = logging.getLogger(__name__)
 
@@ -163,13 +167,27 @@ class Session:
             if response.code in SESSION_LOST:
                 self._lost_by = response.code
             if response.code != DEVICE_BUSY or answered_s >= deadline_s:
+                stays_busy = response.code == DEVICE_BUSY and timeouts.busy_s > 0
+                remedy = NO_CARD if stays_busy and self._lacks_card() else advice(response.code)
                 raise RefusedError(
                     f"expected 0x2001 OK from the camera to {operation_text(operation)}, "
-                    f"got {response_text(response.code)}: {advice(response.code)}",
+                    f"got {response_text(response.code)}: {remedy}",
                     response.code,
                 )
             self._clock.sleep(back_off_s)
             back_off_s = min(2 * back_off_s, LONGEST_BACK_OFF_S)
+
+    def _lacks_card(self) -> bool:
+        """Return whether a camera that stays busy says that no card is in it.
+
+        The lower half of a store's number is 0 where its medium is missing (PIMA 15740, 5.2.1).
+        """
+        try:
+            stores = self.transact(Standard.GetStorageIDs, timeouts=CURT).data
+        except DeviceError:
+            return False
+        numbers = struct.unpack(f"<{len(stores) // 4}I", stores[: len(stores) // 4 * 4])[1:]
+        return not any(number & 0xFFFF for number in numbers)
 
     def event(self, timeout_s: float) -> Container | None:
         """Return the camera's next event, None if there is none within `timeout_s`.

@@ -15,6 +15,7 @@ from labrig.acquire.loading import (
 from labrig.acquire.luminance_reading import LampType, LuminanceReading
 from labrig.acquire.plan import Plan, Step
 from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
+from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.rig import Rig, in_safe_order
@@ -27,6 +28,7 @@ from labrig.acquire.rig_file import (
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
 from labrig.acquire.roles.role import Finding, Severity
 from labrig.acquire.runner import RunObserver, run_units
+from labrig.acquire.running_programs import Program, linux_programs, running_programs
 from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import (
     TYPICAL_BYTES_PER_PIXEL,
@@ -40,6 +42,8 @@ from labrig.acquire.values import (
 
 __all__ = [
     "MAX_STEPS",
+    "PORT_FAILURES",
+    "SERVICES",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
     "CalibrationRules",
@@ -57,6 +61,7 @@ __all__ = [
     "Optics",
     "PartUnit",
     "Plan",
+    "Program",
     "ProtocolModel",
     "Rig",
     "RigFile",
@@ -73,16 +78,20 @@ __all__ = [
     "changes_with_absolute_paths",
     "driver_and_settings",
     "frame_bytes",
+    "gone",
     "illuminant_lights",
     "in_safe_order",
     "led_lights",
     "lights_that_read_back",
+    "linux_programs",
     "load_driver",
+    "not_opened",
     "plan",
     "planned_rig",
     "read_protocol",
     "read_rig_file",
     "run_units",
+    "running_programs",
     "shutter_text",
 ]
 __all__ += roles.__all__

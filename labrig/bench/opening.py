@@ -2,7 +2,14 @@
 
 import socket
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
+from contextlib import (
+    AbstractContextManager,
+    ExitStack,
+    closing,
+    contextmanager,
+    nullcontext,
+    suppress,
+)
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,6 +21,7 @@ import usb.core
 
 from labrig.acquire import (
     CAMERA,
+    PORT_FAILURES,
     Device,
     DeviceEntry,
     Rig,
@@ -22,6 +30,7 @@ from labrig.acquire import (
     driver_and_settings,
     in_safe_order,
     load_driver,
+    not_opened,
 )
 from labrig.bench.awake import kept_awake
 from labrig.bench.device_lock import held, network_devices, serial_devices, usb_device
@@ -341,13 +350,13 @@ class _Connections:
             if devices not in self._ports:
                 self._lock(devices, address)
                 port.open()
-                self._stack.callback(port.close)
+                self._stack.callback(_close, port)
                 self._ports[devices] = port
                 self._settings[devices] = baudrate, framing
-        except (serial.SerialException, OSError, ValueError) as error:
+        except (*PORT_FAILURES, ValueError) as error:
             raise DeviceError(
                 f"cannot open the serial port {address} ({' '.join(str(error).split())}); "
-                "check that it is plugged in and that no other program uses it"
+                f"{not_opened(error, address)}"
             ) from None
         if self._settings[devices] != (baudrate, framing):
             other_baudrate, other_framing = self._settings[devices]
@@ -429,6 +438,12 @@ class _Connections:
             if device not in self._locked and not address.startswith("sim://"):
                 self._stack.enter_context(held(device, address))
                 self._locked.add(device)
+
+
+def _close(port: SerialPort) -> None:
+    """Close a port, which may be gone: whatever failed for that has been told."""
+    with suppress(*PORT_FAILURES):
+        port.close()
 
 
 def _with_serial(

@@ -259,4 +259,4 @@ def _save_figures(section: "Section", folder: Path) -> None:
 def _print_json(content: dict[str, Any]) -> None:
     import json
 
-    typer.echo(json.dumps(content, ensure_ascii=False))
+    typer.echo(json.dumps(content))

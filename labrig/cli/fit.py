@@ -12,9 +12,11 @@ from labrig.cli.matrices import (
     LIGHTS,
     Corrected,
     Entry,
+    Excitation,
     File,
     Lights,
     Pixel,
+    Rows,
     checked,
     read_matrix,
 )
@@ -288,6 +290,8 @@ def mixture(
     ] = None,
     entry: Entry = None,
     pixel: Pixel = None,
+    rows: Rows = None,
+    excitation: Excitation = None,
     corrected: Corrected = False,
     light: Lights = None,
     out: Annotated[
@@ -311,7 +315,7 @@ def mixture(
         _require_folder(out)
     names = light or MIXTURE_LIGHTS
     lights = tuple(read_light(name) for name in names)
-    matrix = checked(file, read_matrix(file, entry, pixel), corrected)
+    matrix = checked(file, read_matrix(file, entry, pixel, rows, excitation), corrected)
     fitting = partial(
         fit_mixture,
         matrix,

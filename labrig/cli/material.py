@@ -10,9 +10,11 @@ from labrig.cli.matrices import (
     LIGHTS,
     Corrected,
     Entry,
+    Excitation,
     File,
     Lights,
     Pixel,
+    Rows,
     checked,
     read_any,
     read_fractions,
@@ -27,6 +29,8 @@ def show(
     file: File,
     entry: Entry = None,
     pixel: Pixel = None,
+    rows: Rows = None,
+    excitation: Excitation = None,
     corrected: Corrected = False,
     light: Lights = None,
     picture: Annotated[
@@ -43,7 +47,7 @@ def show(
         draw_reradiation,
     )
 
-    material = read_any(file, entry, pixel)
+    material = read_any(file, entry, pixel, rows, excitation)
     if isinstance(material, Material):
         typer.echo(describe_phosphor(material))
         if picture is not None:
@@ -70,12 +74,14 @@ def convert(
     ],
     entry: Entry = None,
     pixel: Pixel = None,
+    rows: Rows = None,
+    excitation: Excitation = None,
     corrected: Corrected = False,
 ) -> None:
     """Write a re-radiation matrix in another format."""
     from labrig.material import YAML, write_fluorescent, write_reradiation
 
-    matrix = read_matrix(file, entry, pixel)
+    matrix = read_matrix(file, entry, pixel, rows, excitation)
     with_sigma = checked(file, matrix, corrected)
     if corrected:
         matrix = with_sigma
@@ -144,6 +150,8 @@ def apply(
     ],
     entry: Entry = None,
     pixel: Pixel = None,
+    rows: Rows = None,
+    excitation: Excitation = None,
     corrected: Corrected = False,
     out: Annotated[Path | None, typer.Option("--out", help="CSV file to write.")] = None,
 ) -> None:
@@ -153,7 +161,7 @@ def apply(
     """
     from labrig.optics import read_light
 
-    matrix = checked(file, read_matrix(file, entry, pixel), corrected)
+    matrix = checked(file, read_matrix(file, entry, pixel, rows, excitation), corrected)
     returned = matrix.under(read_light(light))
     columns = {
         "wavelength_nm": returned.total.wavelength_nm,
@@ -163,8 +171,8 @@ def apply(
     }
     if returned.total.sigma is not None:
         columns["total_sigma"] = returned.total.sigma
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    numbers = zip(*(column.tolist() for column in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in numbers)]
     _write_lines(lines, out)
 
 

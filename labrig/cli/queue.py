@@ -77,7 +77,7 @@ def list_(
 
     listed = entries(read_queue(queue), runs)
     if json:
-        typer.echo(dumps([_content(entry) for entry in listed], indent=1, ensure_ascii=False))
+        typer.echo(dumps([_content(entry) for entry in listed], indent=1))
     elif not listed:
         typer.echo(f"nothing in {queue}")
     else:

@@ -42,7 +42,7 @@ def list_devices(
 
     discovery = discover(Host.of_this_pc(), plugins.names(plugins.DRIVERS))
     if json:
-        typer.echo(dumps(asdict(discovery), ensure_ascii=False))
+        typer.echo(dumps(asdict(discovery)))
     else:
         _print_discovery(discovery)
 
@@ -76,7 +76,7 @@ def check(
         with logging_to(handler, bench.clock) if verbose else nullcontext():
             report = check_rig(bench)
     if json:
-        typer.echo(dumps(report.to_json(), ensure_ascii=False))
+        typer.echo(dumps(report.to_json()))
     else:
         _print_table(report)
     _raise_failures(report, path)

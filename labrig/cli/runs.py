@@ -364,4 +364,4 @@ def _summary_json(run: "RunSummary") -> dict[str, object]:
 def _print_json(content: object) -> None:
     import json
 
-    typer.echo(json.dumps(content, ensure_ascii=False, default=str))
+    typer.echo(json.dumps(content, default=str))

@@ -13,4 +13,4 @@ def schema(
 
     from labrig.schema import schema as schema_of
 
-    typer.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))
+    typer.echo(json.dumps(schema_of(kind), indent=2))

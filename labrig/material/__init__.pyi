@@ -58,6 +58,7 @@ from .reradiation import (
     ColourPair as ColourPair,
     ConditionalDensity as ConditionalDensity,
     InstrumentNoise as InstrumentNoise,
+    MatrixLayout as MatrixLayout,
     ReradiationMatrix as ReradiationMatrix,
     ReradiationMixture as ReradiationMixture,
     SeenSpectrum as SeenSpectrum,

@@ -11,7 +11,7 @@ from labrig.yaml_file import read_yaml
 
 # SciPy, which matrices need, is slow to load.
 if TYPE_CHECKING:
-    from labrig.material.reradiation import ReradiationMatrix
+    from labrig.material.reradiation import MatrixLayout, ReradiationMatrix
 
 #: Endings of material files; all others are those of matrices.
 YAML = (".yaml", ".yml")
@@ -23,6 +23,7 @@ def read_any_material(
     entry: str | None = None,
     *,
     pixel: tuple[int, int] | None = None,
+    layout: "MatrixLayout | None" = None,
 ) -> "Material | ReradiationMatrix":
     """Read a phosphor, or the re-radiation matrix of a fluorescent material.
 
@@ -34,6 +35,8 @@ def read_any_material(
         `read_reradiation` reads.
     entry, pixel
         Matrix in a file of several, see `read_reradiation`.
+    layout
+        Answers to what the table of an excitation-emission matrix leaves open.
 
     Returns
     -------
@@ -43,8 +46,8 @@ def read_any_material(
     Raises
     ------
     UsageError, DataError
-        There is no such material, a file is malformed, or `entry` or `pixel` is given for a
-        material file.
+        There is no such material, a file is malformed, or `entry`, `pixel` or `layout` is given
+        for a material file.
 
     Examples
     --------
@@ -58,8 +61,8 @@ def read_any_material(
     if path.suffix and path.suffix.lower() not in YAML:
         from labrig.material.reradiation import read_reradiation
 
-        return read_reradiation(path, entry, pixel=pixel)
-    for option, value in (("entry", entry), ("pixel", pixel)):
+        return read_reradiation(path, entry, pixel=pixel, layout=layout)
+    for option, value in (("entry", entry), ("pixel", pixel), ("layout", layout)):
         if value is not None:
             raise UsageError(f"{path}: expected a file of matrices for '{option}', got a material")
     is_dye = str(name_or_path) in resources.names("config/fluorescent")

@@ -1,222 +1,54 @@
 """Files of measured curves in several formats: named curves over wavelength.
 
-Supported formats are JSON of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds), and
-text tables: `wavelength_nm` followed by one column per curve, and σ of the curve NAME in
-`NAME_sigma`; `name,wavelength_nm,value` in long form; and without a header wavelength and R, G, B
-(Jiang et al. 2013) or wavelength and value.
+Supported are tables of labrig's own form, the texts of spectrometers and their programs, and JSON
+of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds).
 """
 
-import csv
 import json
+import logging
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, field
+from itertools import starmap
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias, TypeVar
-
-import numpy as np
+from typing import NamedTuple, TypeVar
 
 from labrig.errors import UsageError
 from labrig.input_file import read_text
+from labrig.optics.curve_json import curves_from_json
+from labrig.optics.curve_table import Columns, NamedCurve, curves_from_table, is_own_table
+from labrig.optics.foreign_spectra import foreign_spectra
+from labrig.optics.ordinate import Quantity, read_ordinate
 from labrig.optics.piecewise import FloatArray
 from labrig.optics.spectrum import Spectrum, Transmittance
+from labrig.text_table import read_table_text
 from labrig.yaml_file import did_you_mean
 
-#: Wavelengths, values and σ of a curve.
-Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray | None]
-#: Columns by the name of the curve; the only curve of a file without names is called "".
-Curves: TypeAlias = dict[str, Columns]
-
-WAVELENGTH = "wavelength_nm"
-#: End of the name of the column with σ of another one.
-SIGMA = "_sigma"
-_UNNAMED = {2: ("",), 4: ("R", "G", "B")}
-_EXPECTED_TEXT = (
-    "expected a header that begins with wavelength_nm or name,wavelength_nm; or, without a header, "
-    "wavelength and value, or wavelength, R, G and B"
-)
-#: Range of wavelengths in nm, which excludes tables in µm or in Hz.
-PLAUSIBLE_NM = (100.0, 20_000.0)
-
-
-def curves_from_text(text: str) -> tuple[str, Curves]:
-    """Return the title, which may be empty, and the curves of a table by name.
-
-    Raises
-    ------
-    ValueError
-        The text is no such table.
-    """
-    lines = [line for line in text.splitlines() if line.strip()]
-    rows = _rows([line for line in lines if not line.startswith("#")])
-    title = next((line[8:].strip() for line in lines if line.startswith("#Camera:")), "")
-    header = rows[0]
-    if _is_number(header[0]):
-        if len(header) not in _UNNAMED:
-            raise ValueError(f"{_EXPECTED_TEXT}; got {len(header)} columns")
-        return title, _from_columns(_UNNAMED[len(header)], rows)
-    if header[0] == WAVELENGTH and len(header) > 1:
-        return title, _from_columns(tuple(header[1:]), rows[1:])
-    if header[:2] == ["name", WAVELENGTH] and len(header) == 3:
-        return title, _from_long_form(rows[1:])
-    raise ValueError(f"{_EXPECTED_TEXT}; got '{','.join(header[:3])}'")
-
-
-def sorted_columns(wavelength_nm: FloatArray, values: FloatArray) -> Columns:
-    """Return rows sorted by wavelength, without σ."""
-    order = np.argsort(wavelength_nm, kind="stable")
-    return wavelength_nm[order], values[order], None
-
-
-def _rows(lines: list[str]) -> list[list[str]]:
-    if not lines:
-        raise ValueError("there is nothing in it")
-    if ";" in lines[0]:
-        raise ValueError("it has semicolons; save it with commas between and points in numbers")
-    try:
-        rows = list(csv.reader(lines)) if "," in lines[0] else [line.split() for line in lines]
-    except csv.Error as error:
-        raise ValueError(f"not a table ({error})") from None
-    rows = [[cell.strip() for cell in row] for row in rows]
-    ragged = next((number for number, row in enumerate(rows) if len(row) != len(rows[0])), None)
-    if ragged is not None:
-        raise ValueError(
-            f"row {ragged + 1} has {len(rows[ragged])} columns, the first has {len(rows[0])}"
-        )
-    return rows
-
-
-def _from_columns(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
-    if len(set(names)) < len(names):
-        duplicate = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"the column '{duplicate}' stands twice")
-    table = _numbers(rows)
-    wavelength_nm, values, _ = sorted_columns(table[:, 0], table[:, 1:])
-    if names in (("value",), ("value", "sigma")):
-        sigma = values[:, 1] if len(names) == 2 else None
-        return {"": (wavelength_nm, values[:, 0], sigma)}
-    columns = dict(zip(names, values.T, strict=True))
-    return {
-        name: (wavelength_nm, column, columns.get(f"{name}{SIGMA}"))
-        for name, column in columns.items()
-        if name.removesuffix(SIGMA) == name or name.removesuffix(SIGMA) not in columns
-    }
-
-
-def _from_long_form(rows: list[list[str]]) -> Curves:
-    rows_by_name: dict[str, list[list[str]]] = {}
-    for row in rows:
-        rows_by_name.setdefault(row[0], []).append(row[1:])
-    tables = {name: _numbers(part) for name, part in rows_by_name.items()}
-    return {name: sorted_columns(table[:, 0], table[:, 1]) for name, table in tables.items()}
-
-
-def _numbers(rows: list[list[str]]) -> FloatArray:
-    try:
-        table = np.array(rows, dtype=np.float64)
-    except ValueError as error:
-        raise ValueError(f"something is not a number ({error})") from None
-    if table.ndim != 2:
-        raise ValueError("there are no rows of numbers")
-    low, high = PLAUSIBLE_NM
-    if not ((table[:, 0] >= low) & (table[:, 0] <= high)).all():
-        raise ValueError(f"{WAVELENGTH} is expected from {low:g} to {high:g} nm in every row")
-    return table
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-_EXPECTED_JSON = (
-    "; expected rawtoaces data, such as R, G and B under every wavelength in "
-    "spectral_data.data.main"
-)
-
-
-def curves_from_json(content: Any) -> tuple[str, Curves]:
-    """Return the title, which may be empty, and the curves of JSON content by name.
-
-    Raises
-    ------
-    ValueError
-        The content has none of the formats.
-    """
-    if isinstance(content, dict) and isinstance(content.get("spectraldata"), str):
-        return _lspdd(content)
-    if isinstance(content, dict) and isinstance(content.get("filters"), dict):
-        return "gel catalogue", _gels(content["filters"])
-    try:
-        return _rawtoaces(content)
-    except ValueError as error:
-        raise ValueError(f"{error}{_EXPECTED_JSON}") from None
-
-
-def _lspdd(content: dict[str, Any]) -> tuple[str, Curves]:
-    _, curves = curves_from_text(content["spectraldata"].replace("wavelength,", "wavelength_nm,"))
-    parts = (content.get(key) for key in ("brand", "category", "lamptype", "id"))
-    title = " ".join(str(part) for part in parts if part)
-    return title, {title or name: columns for name, columns in curves.items()}
-
-
-def _gels(filters: dict[str, Any]) -> Curves:
-    """Return the gels that have a spectrum."""
-    return {
-        name: _columns(gel["sd"])
-        for name, gel in filters.items()
-        if isinstance(gel, dict) and isinstance(gel.get("sd"), dict)
-    }
-
-
-def _rawtoaces(content: Any) -> tuple[str, Curves]:
-    table = content
-    for key in ("spectral_data", "data", "main"):
-        if not isinstance(table, dict) or key not in table:
-            raise ValueError(f"the key '{key}' is missing")
-        table = table[key]
-    if not isinstance(table, dict) or len(table) < 2:
-        raise ValueError("there are fewer than two wavelengths")
-    wavelength_nm, values, _ = _columns(table)
-    if values.ndim == 1:
-        values = values[:, np.newaxis]
-    names = _entry(content["spectral_data"], "index", "main")
-    if names is None:
-        names = ["R", "G", "B"]
-    if not isinstance(names, list) or values.shape[1] != len(names):
-        raise ValueError("some wavelength has not one value for every name in index.main")
-    title = " ".join(
-        str(part)
-        for part in (_entry(content, "header", key) for key in ("manufacturer", "model"))
-        if part
-    )
-    return title, {
-        str(name): (wavelength_nm, values[:, column], None) for column, name in enumerate(names)
-    }
-
-
-def _columns(table: dict[str, Any]) -> Columns:
-    try:
-        wavelength_nm = np.array([float(key) for key in table])
-        values = np.array(list(table.values()), dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError("something is not a number") from None
-    return sorted_columns(wavelength_nm, values)
-
-
-def _entry(content: dict[str, Any], section: str, key: str) -> Any:
-    """Return `content[section][key]`, or None if it is missing."""
-    part = content.get(section)
-    return part.get(key) if isinstance(part, dict) else None
-
+_logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
+_GOT = {
+    Quantity.LIGHT: "light, such as counts",
+    Quantity.TRANSMITTANCE: "a transmittance or absorbance",
+    Quantity.REFLECTANCE: "a reflectance",
+    Quantity.OTHER_DENSITY: "light over wavenumbers, energies or frequencies",
+    Quantity.UNKNOWN: "values whose meaning is not stated",
+}
+_OTHER = "give another file or column"
+_REMEDY = {
+    Quantity.LIGHT: _OTHER,
+    Quantity.TRANSMITTANCE: _OTHER,
+    Quantity.REFLECTANCE: _OTHER,
+    Quantity.OTHER_DENSITY: "whether it is per nm the file does not say: export it over wavelength",
+    Quantity.UNKNOWN: "write above the columns what they are, such as wavelength_nm,absorbance or, "
+    "for fractions, wavelength_nm,value",
+}
 #: Largest number of names listed in a message.
 LISTED = 8
+#: What a curve of a file may be where light, or a fraction of it, is wanted.
+_LIGHT = (None, Quantity.LIGHT, Quantity.UNKNOWN)
+_FRACTION = (None, Quantity.TRANSMITTANCE, Quantity.REFLECTANCE)
 
 
 class Curve(NamedTuple):
@@ -239,11 +71,18 @@ class CurveFile:
         Maker and model or another title in the file; else the file's name.
     curves
         Curves by name, in the file's order.
+    quantities
+        What the values of a curve are, where the file says so or leaves it open; labrig's own
+        tables leave it to their use.
+    notes
+        What was converted, taken or left out to read a curve, in words.
     """
 
     path: Path
     title: str
     curves: Mapping[str, Curve]
+    quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    notes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def pick(self, name: str | None) -> tuple[str, Curve]:
         """Return the name and the curve of that name, or of the only one.
@@ -303,17 +142,43 @@ def read_curve_file(path: str | os.PathLike[str]) -> CurveFile:
     [0.0, 0.2, 1.0]
     """
     file_path = Path(path)
-    text = read_text(file_path)
     if file_path.suffix.lower() == ".json":
         try:
-            content = json.loads(text)
+            content = json.loads(read_text(file_path))
         except (ValueError, RecursionError) as error:
             raise UsageError(f"{file_path}: not JSON ({' '.join(str(error).split())})") from None
         title, curves = checked(file_path, curves_from_json, content)
+        return CurveFile(file_path, title or file_path.stem, _named(curves, file_path))
+    text = read_table_text(file_path)
+    if is_own_table(text):
+        title, curves = checked(file_path, curves_from_table, text)
+        spectra = checked(file_path, lambda curves: list(starmap(_own, curves.items())), curves)
     else:
-        title, curves = checked(file_path, curves_from_text, text)
-    sorted_curves = {(name or file_path.stem): Curve(*columns) for name, columns in curves.items()}
-    return CurveFile(file_path, title or file_path.stem, sorted_curves)
+        ending = file_path.suffix.removeprefix(".").lower()
+        title, spectra = "", checked(file_path, lambda text: foreign_spectra(text, ending), text)
+    named = {spectrum.name or file_path.stem: spectrum for spectrum in spectra}
+    return CurveFile(
+        file_path,
+        title or file_path.stem,
+        {name: Curve(*spectrum.columns) for name, spectrum in named.items()},
+        {name: one.quantity for name, one in named.items() if one.quantity},
+        {name: spectrum.notes for name, spectrum in named.items() if spectrum.notes},
+    )
+
+
+def _own(name: str, columns: Columns) -> NamedCurve:
+    """Return a curve of labrig's own table, linear where its name is that of a quantity."""
+    ordinate = read_ordinate(name, whole_name=True)
+    if ordinate.quantity is Quantity.UNKNOWN:
+        return NamedCurve(name, columns)
+    wavelength_nm, values, sigma = columns
+    values, sigma, done = ordinate.linear(values, sigma)
+    notes = (f"column '{name}': {done}",) if done else ()
+    return NamedCurve(name, (wavelength_nm, values, sigma), ordinate.quantity, notes)
+
+
+def _named(curves: Mapping[str, Columns], path: Path) -> dict[str, Curve]:
+    return {name or path.stem: Curve(*columns) for name, columns in curves.items()}
 
 
 def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spectrum:
@@ -346,7 +211,7 @@ def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spec
     ('lamp', [0.75, 1.1, 0.0])
     """
     file = read_curve_file(path)
-    curve_name, curve = file.pick(name)
+    curve_name, curve = _wanted(file, name, _LIGHT, "a spectrum of light")
     return checked(f"{file.path}: {curve_name}", lambda c: Spectrum(curve_name, *c), curve)
 
 
@@ -380,8 +245,30 @@ def read_transmittance(path: str | os.PathLike[str], name: str | None = None) ->
     [0.175, 0.18]
     """
     file = read_curve_file(path)
-    curve_name, curve = file.pick(name)
+    curve_name, curve = _wanted(file, name, _FRACTION, "a transmittance or reflectance")
     return checked(f"{file.path}: {curve_name}", lambda c: Transmittance(curve_name, *c), curve)
+
+
+def _wanted(
+    file: CurveFile, name: str | None, quantities: Container[Quantity | None], expected: str
+) -> tuple[str, Curve]:
+    """Return the name and the curve of that name, or of the only one that can be what is expected.
+
+    What was done to read it is logged.
+    """
+    if name is None:
+        fitting = [name for name in file.curves if file.quantities.get(name) in quantities]
+        name = fitting[0] if len(fitting) == 1 else None
+    name, curve = file.pick(name)
+    quantity = file.quantities.get(name)
+    if quantity not in quantities:
+        assert quantity is not None
+        raise UsageError(
+            f"{file.path}: {name}: expected {expected}, got {_GOT[quantity]}; {_REMEDY[quantity]}"
+        )
+    for note in file.notes.get(name, ()):
+        _logger.warning("note: %s: %s: %s", file.path, name, note)
+    return name, curve
 
 
 ContentT = TypeVar("ContentT")

@@ -1,3 +1,7 @@
+from .black_cut_off import (
+    BlackCutOff as BlackCutOff,
+    find_cut_off as find_cut_off,
+)
 from .channels import (
     ChannelStats as ChannelStats,
     FrameMeasurement as FrameMeasurement,

@@ -1,13 +1,14 @@
 """Mean, noise and damage of each colour channel in a region of one frame."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import DataError, FrameError
+from labrig.reduce.black_cut_off import TOO_MANY, BlackCutOff
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
 from labrig.reduce.plane_noise import TILE, Floats, Mosaic, PlaneNoise, plane_noise
 from labrig.reduce.raw import RawFrame
@@ -157,6 +158,10 @@ class PlaneCount:
         Number of isolated outliers; None if they were not counted.
     noise
         Temporal noise of the pixels.
+    cut_off
+        Number of pixels at which the camera cut off noise below black.
+    cut_off_sigma
+        Standard uncertainty in DN of what the mean is corrected by for them.
     """
 
     colour: str
@@ -165,6 +170,8 @@ class PlaneCount:
     saturated: int
     hot: int | None
     noise: PlaneNoise
+    cut_off: int = 0
+    cut_off_sigma: float = 0.0
 
 
 def count_planes(
@@ -192,7 +199,11 @@ def count_planes(
         Counts of each area, for each CFA position row by row.
     """
     windows = [_Window.about(area, raw) for area in areas]
-    planes = [plane for window in windows for plane in window.planes()]
+    planes = [
+        plane if raw.cut_off is None else raw.levels_dn(plane)
+        for window in windows
+        for plane in window.planes()
+    ]
     noises = plane_noise(planes)
     positions = raw.cfa_side**2
     return [
@@ -265,17 +276,44 @@ def _count_region(
         level, pixels = count_levels(plane, None if hot is None else hot[slices])
         count = pixels.astype(np.float64)
         position = side * row + column
-        planes.append(
-            PlaneCount(
-                colour=raw.cfa[position],
-                value=np.asarray(level - raw.black[position], dtype=np.float64),
-                count=count,
-                saturated=int(count[level >= raw.white].sum()),
-                hot=hot_counts.get((row, column)),
-                noise=noise,
-            )
+        plane_count = PlaneCount(
+            colour=raw.cfa[position],
+            value=np.asarray(raw.levels_dn(level) - raw.black[position]),
+            count=count,
+            saturated=int(count[level >= raw.white].sum()),
+            hot=hot_counts.get((row, column)),
+            noise=noise,
         )
+        if raw.cut_off is not None:
+            lowest = float(count[level == raw.cut_off.lowest_dn].sum())
+            black_dn = raw.black[position] - raw.cut_off.lowest_dn
+            plane_count = _uncut(plane_count, raw.cut_off, black_dn, lowest)
+        planes.append(plane_count)
     return planes
+
+
+def _uncut(plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: float) -> PlaneCount:
+    """Return a count whose mean is right though `lowest` of its pixels are cut off.
+
+    `black_dn` is the black level above the number at which they are cut off.
+    """
+    n = float(plane.count.sum())
+    if lowest > TOO_MANY * n > 0:
+        raise FrameError(
+            f"{lowest / n:.1%} of the {plane.colour} pixels are cut off at black, so that their "
+            "level cannot be told: the camera subtracts more than its black level; raise its "
+            "black level (offset, brightness) if it has such a setting, or take another camera"
+        )
+    mean = float(plane.value @ plane.count) / max(n, 1.0) + black_dn
+    level = float(cut_off.level_dn(np.asarray(mean)))
+    variance = plane.noise.mean_variance * cut_off.sensitivity(mean) ** 2
+    return replace(
+        plane,
+        value=plane.value + (level - mean),
+        cut_off=int(lowest),
+        cut_off_sigma=cut_off.level_sigma_dn(mean),
+        noise=replace(plane.noise, mean_variance=variance),
+    )
 
 
 def _count_outliers(
@@ -332,6 +370,13 @@ class ChannelStats:
     hot
         Number of pixels that exceed their neighbours by more than 8 standard deviations; None if
         they were not counted.
+    cut_off
+        Number of pixels at which the camera cut off noise below black, for which `mean` is
+        corrected.
+    cut_off_sigma
+        Part of `sigma` by that correction, which all pixels of the frame have in common.
+    read_dn
+        Read noise in DN by which it is; None of a camera that cuts off none.
     """
 
     mean: float
@@ -341,6 +386,9 @@ class ChannelStats:
     n: int
     saturated: int
     hot: int | None
+    cut_off: int = 0
+    cut_off_sigma: float = 0.0
+    read_dn: float | None = None
 
     @property
     def clipped(self) -> bool:
@@ -395,6 +443,8 @@ class FrameMeasurement:
                     "n": stats.n,
                     "saturated": stats.saturated,
                     "hot": stats.hot,
+                    "cut_off": stats.cut_off,
+                    "read_noise": stats.read_dn,
                 }
                 for name, stats in self.channels.items()
             },
@@ -432,8 +482,23 @@ class FrameMeasurement:
                 f"white {self.white:g}",
                 f"    {'mean / DN':>12}{'σ':>10}{'std':>10}{'pixels':>11}{'clipped':>9}{'hot':>6}",
                 *rows,
+                *self._cut_off_lines(),
             ]
         )
+
+    def _cut_off_lines(self) -> list[str]:
+        """Return a sentence on noise below black that is missing; nothing if none is."""
+        cut = {name: stats for name, stats in self.channels.items() if stats.read_dn is not None}
+        if not cut:
+            return []
+        parts = ", ".join(
+            f"{name} {stats.cut_off / stats.n:.1%} (read noise {stats.read_dn:.3g} DN)"
+            for name, stats in cut.items()
+        )
+        return [
+            "The camera subtracts black and cuts off noise below it; pixels cut off: "
+            f"{parts}. The means are corrected for it."
+        ]
 
 
 def measure(
@@ -539,7 +604,10 @@ def measure_regions(
 def _measured(raw: RawFrame, planes: Sequence[PlaneCount]) -> FrameMeasurement:
     return FrameMeasurement(
         channels={
-            name: _channel(name, [plane for plane in planes if plane.colour == name])
+            name: replace(
+                _channel(name, [plane for plane in planes if plane.colour == name]),
+                read_dn=None if raw.cut_off is None else raw.cut_off.read_dn,
+            )
             for name in raw.channels
         },
         cfa=raw.cfa,
@@ -572,13 +640,17 @@ def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
     if min(plane.noise.mean_variance for plane in planes) < ROUNDING_VARIANCE:
         # Without noise to dither it, rounding is the same in every pixel and does not average out.
         variance = max(variance, ROUNDING_VARIANCE)
+    # One read noise for all pixels of the frame: its error does not average out.
+    cut_off_sigma = sum(plane.cut_off_sigma * float(plane.count.sum()) for plane in planes) / n
     outliers = [plane.hot for plane in planes if plane.hot is not None]
     return ChannelStats(
         mean=mean,
-        sigma=float(np.sqrt(variance)),
+        sigma=float(np.hypot(np.sqrt(variance), cut_off_sigma)),
         std=float(np.sqrt(spread / max(n - 1, 1))),
         peak=float(peak),
         n=int(n),
         saturated=sum(plane.saturated for plane in planes),
         hot=sum(outliers) if outliers else None,
+        cut_off=sum(plane.cut_off for plane in planes),
+        cut_off_sigma=cut_off_sigma,
     )

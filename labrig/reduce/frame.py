@@ -98,10 +98,12 @@ class LinearFrame:
 
     def value_dn(self, area: Area | None = None) -> Floats:
         """Return the signal in DN, vignetting divided out, shape (rows, columns)."""
-        light = self._window(self.raw.mosaic, area).astype(np.float64)
+        pixels = self._window(self.raw.mosaic, area)
+        light = np.empty(pixels.shape)
         dark = np.zeros(len(self.raw.channels)) if self.dark_dn is None else self.dark_dn
         for plane in self._planes(area):
-            light[plane.slices] -= plane.black + dark[plane.channel]
+            level = self.raw.levels_dn(pixels[plane.slices])
+            light[plane.slices] = level - (plane.black + dark[plane.channel])
             if self.flat is not None:
                 light[plane.slices] /= self._falloff(self.flat, plane, area)
         return light
@@ -200,7 +202,8 @@ def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
         letter, black = raw.cfa[position], np.float32(raw.black[position])
         fraction = np.float32(len(raw.cfa) / side**2 / raw.cfa.count(letter))
         plane = raw.mosaic[y : side * rows : side, x : side * columns : side]
-        picture[..., raw.channels.index(letter)] += (plane - black) * fraction
+        level = raw.levels_dn(plane).astype(np.float32)
+        picture[..., raw.channels.index(letter)] += (level - black) * fraction
     return picture
 
 

@@ -181,9 +181,14 @@ def _bright(dark: RawFrame) -> PixelMask:
             median = cv2.medianBlur(plane, 5)
             deviation = 1.4826 * _median(histogram(np.asarray(cv2.absdiff(plane, median))))
             # Whole numbers: a quiet sensor's median deviation may be 0 though it is not silent.
-            limit = int(OUTLIER_SIGMAS * max(deviation, 1.0))
+            limit = int(OUTLIER_SIGMAS * max(deviation, _uncut_noise(dark), 1.0))
             bright[position] = np.asarray(cv2.subtract(plane, median)) > limit
     return bright
+
+
+def _uncut_noise(dark: RawFrame) -> float:
+    """Return the read noise in DN that the median does not see where half of it is cut off."""
+    return 0.0 if dark.cut_off is None else dark.cut_off.read_dn
 
 
 def _median(counts: npt.NDArray[np.int64]) -> float:

@@ -70,6 +70,11 @@ class RegionMeasurement:
         measured = self.measured
         return (measured.width, measured.height, tuple(measured.channels))
 
+    @property
+    def is_cut_off(self) -> bool:
+        """Whether the camera cut off noise below black in this frame."""
+        return any(stats.read_dn is not None for stats in self.measured.channels.values())
+
 
 @dataclass(frozen=True)
 class MeasuredFrame:
@@ -206,6 +211,13 @@ def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:
     pairs = [[(c.mean, c.sigma) for c in view.measured.channels.values()] for view in views]
     mean, sigma = np.moveaxis(np.array(pairs), 2, 0)
     return mean, sigma
+
+
+def cut_off_sigmas(views: Sequence[RegionMeasurement]) -> Floats:
+    """Return σ of the means in DN by the correction for noise cut off below black, shape (n, C)."""
+    return np.array(
+        [[stats.cut_off_sigma for stats in view.measured.channels.values()] for view in views]
+    )
 
 
 def pixels(views: Sequence[RegionMeasurement]) -> Floats:

@@ -134,7 +134,11 @@ def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Fl
             continue
         kept = np.ones(plane.shape, bool) if hot is None else ~hot[slices]
         pixels = kept.sum(axis=1)
-        light = plane.sum(axis=1, dtype=np.int64, where=kept) - raw.black[position] * pixels
+        if raw.cut_off is None:
+            level = plane.sum(axis=1, dtype=np.int64, where=kept)
+        else:
+            level = raw.levels_dn(plane).sum(axis=1, where=kept)
+        light = level - raw.black[position] * pixels
         starts = np.arange(strips) * len(plane) // strips
         channel = raw.channels.index(letter)
         total[channel] += np.add.reduceat(light, starts)

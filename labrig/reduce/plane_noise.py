@@ -86,7 +86,7 @@ class PlaneNoise:
         return np.maximum(line.read_dn2 + rise, ROUNDING_VARIANCE)
 
 
-def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
+def plane_noise(planes: Sequence[Mosaic | Floats]) -> list[PlaneNoise]:
     """Estimate the noise of each of several colour planes.
 
     The planes are processed together: many small planes cost little more than one.
@@ -96,18 +96,18 @@ def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
     planes
         Pixels of one colour in DN, shape (rows, columns) ≥ (3, 3) each.
     """
-    tiles = [_tiles(plane) for plane in planes]
+    cut = [tiles(plane) for plane in planes]
     noises: dict[int, PlaneNoise] = {}
-    for shape in {plane_tiles.shape[1:] for plane_tiles in tiles}:
+    for shape in {plane_tiles.shape[1:] for plane_tiles in cut}:
         same_shape = [
-            index for index, plane_tiles in enumerate(tiles) if plane_tiles.shape[1:] == shape
+            index for index, plane_tiles in enumerate(cut) if plane_tiles.shape[1:] == shape
         ]
-        stacked = np.concatenate([tiles[index] for index in same_shape])
+        stacked = np.concatenate([cut[index] for index in same_shape])
         level, variance = stacked.mean(axis=(1, 2)), _second_difference_variance(stacked)
         covariances = _autocovariance(stacked) if shape == (TILE, TILE) else None
         end = 0
         for index in same_shape:
-            start, end = end, end + len(tiles[index])
+            start, end = end, end + len(cut[index])
             noises[index] = _noise_of_plane(
                 level[start:end],
                 variance[start:end],
@@ -160,33 +160,54 @@ def _noise_of_plane(
     return PlaneNoise(darkest, line, mean_variance, correlation)
 
 
-def _tiles(plane: Mosaic) -> Floats:
-    """Cut tiles of `plane`, shape (n, side, side), spread evenly from border to border."""
-    rows, columns = (_tile_pixels(side) for side in plane.shape)
-    tiles = plane[rows[:, np.newaxis, :, np.newaxis], columns[:, np.newaxis, :]]
-    return tiles.reshape(-1, rows.shape[1], columns.shape[1]).astype(np.float64)
+def tiles(plane: Mosaic | Floats, across: int = TILES_ACROSS) -> Floats:
+    """Cut tiles of a plane, spread evenly from border to border.
+
+    Parameters
+    ----------
+    plane
+        Pixels of one colour in DN, shape (rows, columns).
+    across
+        Most tiles in each direction.
+
+    Returns
+    -------
+    ndarray
+        The tiles, shape (n, side, side); lower or narrower of a plane that is.
+    """
+    rows, columns = (_tile_pixels(side, across) for side in plane.shape)
+    cut = plane[rows[:, np.newaxis, :, np.newaxis], columns[:, np.newaxis, :]]
+    return cut.reshape(-1, rows.shape[1], columns.shape[1]).astype(np.float64)
 
 
-def _brightness(plane: Mosaic) -> float:
+def _brightness(plane: Mosaic | Floats) -> float:
     """Return the mean of `plane` from evenly spread pixels."""
     down, right = (-(-side // _SAMPLES_ACROSS) for side in plane.shape)
     return float(plane[::down, ::right].mean())
 
 
 @cache
-def _tile_pixels(side: int) -> npt.NDArray[np.intp]:
+def _tile_pixels(side: int, across: int) -> npt.NDArray[np.intp]:
     """Return the indices of the pixels of each tile along a side, shape (tiles, pixels)."""
     pixels = min(TILE, side)
-    starts = np.linspace(0, side - pixels, min(TILES_ACROSS, side // pixels))
+    starts = np.linspace(0, side - pixels, min(across, side // pixels))
     return np.rint(starts).astype(np.intp)[:, np.newaxis] + np.arange(pixels)
 
 
-def _second_difference_variance(tiles: Floats) -> Floats:
+def variances_by_differences(cut: Floats) -> Floats:
+    """Return the variance of each tile's noise and outliers in DN², shape (n,)."""
+    return np.asarray(np.square(_second_differences(cut)).mean(axis=1))
+
+
+def _second_difference_variance(cut: Floats) -> Floats:
     """Return the variance of each tile's noise in DN², shape (n,)."""
-    across = tiles[:, :-2] - 2 * tiles[:, 1:-1] + tiles[:, 2:]
-    residual = np.abs(across[:, :, :-2] - 2 * across[:, :, 1:-1] + across[:, :, 2:]) / 6
-    residual = residual.reshape(len(tiles), -1)
-    return _trimmed_mean_square(residual, 4.0)
+    return _trimmed_mean_square(np.abs(_second_differences(cut)), 4.0)
+
+
+def _second_differences(cut: Floats) -> Floats:
+    across = cut[:, :-2] - 2 * cut[:, 1:-1] + cut[:, 2:]
+    both = (across[:, :, :-2] - 2 * across[:, :, 1:-1] + across[:, :, 2:]) / 6
+    return np.asarray(both.reshape(len(cut), -1))
 
 
 def _trimmed_mean_square(magnitude: Floats, sigmas: float) -> Floats:

@@ -9,13 +9,16 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from labrig.errors import FrameError
 from labrig.input_file import read_bytes
+from labrig.reduce.black_cut_off import BlackCutOff, find_cut_off
 from labrig.reduce.dng import (
     MONOCHROME,
     DngPattern,
@@ -318,6 +321,23 @@ class RawFrame:
     def channels(self) -> tuple[str, ...]:
         """Names of the channels: R, G and B, or L."""
         return channels_of(self.cfa)
+
+    @cached_property
+    def cut_off(self) -> BlackCutOff | None:
+        """Cut-off of noise below black; None where the camera keeps it, or none is seen."""
+        side = self.cfa_side
+        return find_cut_off(
+            [self.mosaic[row::side, column::side] for row, column in np.ndindex(side, side)]
+        )
+
+    def levels_dn(self, pixels: npt.NDArray[np.integer]) -> Floats:
+        """Return the values in DN that pixels stand for, black level in them.
+
+        They are the pixels' own numbers but near black, if noise below it is cut off.
+        """
+        if self.cut_off is None:
+            return pixels.astype(np.float64)
+        return self.cut_off.file_levels_dn(pixels)
 
 
 def read_raw(source: str | Path | bytes, name: str = "the frame") -> RawFrame:

@@ -16,6 +16,7 @@ from labrig.reduce.measured_frames import (
     MeasuredFrame,
     RegionMeasurement,
     SeriesFrame,
+    cut_off_sigmas,
     levels,
     measure_frames,
     pixels,
@@ -113,11 +114,14 @@ class _PatchDark:
         Dark level over exposure time.
     frames
         The patch in the dark frames.
+    is_cut_off
+        Whether noise below black is cut off in each of them.
     """
 
     kind: tuple[int, int, tuple[str, ...]]
     model: DarkModel
     frames: PatchFrames
+    is_cut_off: bool
 
 
 def reduce_series(
@@ -282,8 +286,13 @@ def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]
     level, sigma = levels(views)
     light = level - fit_dark(exposure_s, level, sigma).base
     frames = PatchFrames(exposure_s, strips(views), light, sigma, pixels(views))
-    frames = replace(frames, sigma=paired_dark_sigma(frames))
-    return _PatchDark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
+    frames = replace(frames, sigma=np.hypot(paired_dark_sigma(frames), cut_off_sigmas(views)))
+    return _PatchDark(
+        views[0].kind,
+        fit_dark(exposure_s, level, frames.sigma),
+        frames,
+        all(view.is_cut_off for view in views),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,6 +353,13 @@ def _patch_levels(
                 raise DataError(
                     f"{entry.frame.path}: expected dark frames at ISO {entry.iso:g} as this frame, "
                     "of the same sensor, got none; take some, or name a background region"
+                )
+            if view.is_cut_off and not patch_dark.is_cut_off:
+                raise DataError(
+                    f"{entry.frame.path}: the camera cuts off noise below black here, and the dark "
+                    "frames have none to tell their level by: it subtracts more than its black "
+                    "level, or they are of another camera; raise its black level (offset), or take "
+                    "the dark frames again"
                 )
             dark[row], model_sigma = patch_dark.model.dark_level(entry.frame.exposure_s)
             unexposed[row] = patch_dark.model.base
@@ -408,7 +424,7 @@ def _patch_series(
         return paired_noise(frames, t_s, unit, patch.usable, patch.darks, together)
 
     patch_noise = noise(patch.frames)
-    sigma = patch_noise.sigma
+    sigma = np.hypot(patch_noise.sigma, cut_off_sigmas(patch.views))
     if backgrounds := _backgrounds(measured):
         _, alone = levels(backgrounds)
         beside = replace(

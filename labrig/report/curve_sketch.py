@@ -38,7 +38,7 @@ def describe_curves(file: CurveFile) -> str:
     -------
     str
         Title, number of curves and path of the file; then the grid, range and peak of each of the
-        first 12 curves, and a line of bars with its shape.
+        first 12 curves, and a line of bars with its shape; then what was converted or left out.
 
     Examples
     --------
@@ -56,6 +56,8 @@ def describe_curves(file: CurveFile) -> str:
     lines += [_describe_curve(name.ljust(widest), curve) for name, curve in curves[:MAX_CURVES]]
     if len(curves) > MAX_CURVES:
         lines.append(f"and {len(curves) - MAX_CURVES} more; choose with --curve NAME")
+    noted = (note for name in file.curves for note in file.notes.get(name, ()))
+    lines += [f"note: {note}" for note in dict.fromkeys(noted)]
     return "\n".join(lines)
 
 

@@ -2,7 +2,7 @@
 
 from labrig.setup.check import DeviceReport, RigReport, check_rig
 from labrig.setup.discover import Discovery, FoundDevice, discover
-from labrig.setup.host import Host, Process
+from labrig.setup.host import Host
 from labrig.setup.view import view_rig
 
 __all__ = [
@@ -10,7 +10,6 @@ __all__ = [
     "Discovery",
     "FoundDevice",
     "Host",
-    "Process",
     "RigReport",
     "check_rig",
     "discover",

@@ -38,7 +38,7 @@ class Photographs:
         reduced = measure(read_raw(frame.data, "the dark frame"))
         return Exercised(
             tuple(_noise(reduced, frame)),
-            (_darkness(reduced), _orientation(frame.data)),
+            (_darkness(reduced), *_black(reduced), _orientation(frame.data)),
             (
                 Suggestion("frame_pixels", f"[{reduced.width}, {reduced.height}]"),
                 Suggestion("frame_size", size_text(len(frame.data))),
@@ -72,6 +72,19 @@ def _darkness(reduced: FrameMeasurement) -> Finding:
             "darken the room, cover displays, and let the samples fade",
         )
     return Finding("fine", "with the lamp off a frame is dark")
+
+
+def _black(reduced: FrameMeasurement) -> Iterator[Finding]:
+    """Yield that the camera cuts off noise below black; nothing of one that keeps it."""
+    read_dn = max(stats.read_dn or 0.0 for stats in reduced.channels.values())
+    if read_dn:
+        yield Finding(
+            "warn",
+            "the camera subtracts its black level and cuts off noise below it (read noise "
+            f"{read_dn:.1f} DN); means are corrected for it",
+            "raise its black level (offset) if it has such a setting; else expose faint glow for "
+            "longer, so that little of it lies within the read noise",
+        )
 
 
 def _orientation(content: bytes) -> Finding:

@@ -1,13 +1,14 @@
 """Discovery of serial ports, USB cameras and spectrometers, each with its rig file's entry."""
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import usb.core
 import usb.util
 
+from labrig.acquire import SERVICES
 from labrig.setup.host import Host, Port
 from labrig.setup.port_users import port_users, unreachable
 
@@ -189,6 +190,7 @@ def discover(host: Host, drivers: Collection[str]) -> Discovery:
         connected = list(host.usb_devices())
     except usb.core.NoBackendError:
         return Discovery(ports, (), (NO_LIBUSB,))
+    shown = {(port.vid, port.pid) for port in host.ports()}
     devices = [device for device in connected if _is_camera(device)]
     model_counts = Counter((device.idVendor, device.idProduct) for device in devices)
     return Discovery(
@@ -197,6 +199,7 @@ def discover(host: Host, drivers: Collection[str]) -> Discovery:
             _camera(device, host, drivers, model_counts[device.idVendor, device.idProduct] > 1)
             for device in devices
         ),
+        notes=tuple(_taken(connected, shown, host)),
         spectrometers=tuple(
             _spectrometer(device, host, drivers)
             for device in connected
@@ -224,6 +227,21 @@ def _serial(port: Port, drivers: Collection[str]) -> FoundDevice:
         f'{board.role}: {{driver: {board.driver}, address: "{port.device}"{board.keys}}}',
         board.hints,
     )
+
+
+def _taken(
+    connected: Iterable[Any], shown: Collection[tuple[int | None, int | None]], host: Host
+) -> Iterator[str]:
+    """Yield a note on each serial board whose port brltty has taken away."""
+    if host.platform != "linux" or not any(p.name == "brltty" for p in host.processes()):
+        return
+    for device in connected:
+        identity = device.idVendor, device.idProduct
+        if identity in _BOARDS and identity not in shown:
+            yield (
+                f"{_BOARDS[identity].name} ({identity[0]:04x}:{identity[1]:04x}) is plugged in "
+                f"and has no port: {SERVICES['brltty']}"
+            )
 
 
 def _is_camera(device: Any) -> bool:

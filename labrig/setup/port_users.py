@@ -9,7 +9,8 @@ from typing import Any
 import usb.core
 import usb.util
 
-from labrig.setup.host import Host, Process
+from labrig.acquire import Program
+from labrig.setup.host import Host
 
 #: Programs that open every camera, and how to make each release it.
 _REMEDIES = {
@@ -70,8 +71,8 @@ def _node(device: Any) -> str:
 
 
 def _suspects(
-    node: str, processes: Iterable[Process], platform: str
-) -> Iterable[tuple[Process, str]]:
+    node: str, processes: Iterable[Program], platform: str
+) -> Iterable[tuple[Program, str]]:
     remedies = _REMEDIES.get(platform, {})
     for process in processes:
         if node in process.open_files:

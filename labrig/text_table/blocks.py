@@ -255,7 +255,16 @@ def _spans_of_single_columns(rows: Sequence[_Row], style: Style) -> list[tuple[i
             spans[-1] = (spans[-1][0], index + 1)
         else:
             spans.append((index, index + 1))
-    return spans if all(end > first + 1 for first, end in spans) else []
+    if any(end == first + 1 for first, end in spans):
+        return []
+    # Some programs write the number of rows above them.
+    return [
+        (first + (_number_in(rows[first], style) == end - first - 1), end) for first, end in spans
+    ]
+
+
+def _number_in(row: _Row, style: Style) -> float | None:
+    return parse_number(row.cells[0], style.decimal)
 
 
 def _is_first(
@@ -320,6 +329,9 @@ def _end(rows: Sequence[_Row], first: int, style: Style) -> int:
         row, filled = rows[index], [cell for cell in rows[index].cells if cell]
         looks = [_looks_like_a_number(cell) for cell in filled]
         if not any(looks):
+            return index
+        # A word below a blank line that begins with a digit, as the name of a sample may.
+        if row.is_after_gap and width > 1 and len(filled) == 1 and not style.count_readings(filled):
             return index
         # A text where all rows before began with a number.
         if starts_as_number and row.cells[0] and not looks[0]:

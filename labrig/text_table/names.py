@@ -21,8 +21,9 @@ _NUMBER_OF = re.compile(r"\s*(?:#|no\.?|nr\.?|numbers?|nummer)$")
 #: Names of other abscissas, and their units, which tell a header that is no table of times.
 _OTHER_ABSCISSAS = frozenset(
     {
-        "wavelength", "wavelengths", "wl", "lambda", "λ", "nm", "wellenlänge", "longueur d'onde",
-        "wavelength_nm", "wavenumber", "raman shift", "energy", "photon energy", "frequency",
+        "wavelength", "wavelengths", "wave", "wave length", "wl", "lambda", "λ", "nm",
+        "wellenlänge", "longueur d'onde", "wavelength_nm", "wavenumber", "wave number",
+        "wellenzahl", "raman shift", "energy", "photon energy", "frequency",
     }
 )  # fmt: skip
 _OTHER_UNITS = frozenset({"nm", "nanometers", "nanometres", "um", "a", "å", "cm-1", "1/cm", "ev"})

@@ -19,7 +19,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -65,11 +65,13 @@ class Scenario:
     lamp: dict[str, Any] = field(default_factory=dict)
     protocol: dict[str, Any] = field(default_factory=dict)
     samples: tuple[str, ...] = EXPONENTIAL
+    brightness: float = 1.0
 
     @property
     def noise(self) -> Noise:
         """Return the sensor's noise, for the bound."""
-        told = {key: value for key, value in self.sensor.items() if key != "curves"}
+        known = {one.name for one in fields(Noise)}
+        told = {key: value for key, value in self.sensor.items() if key in known}
         return Noise(**SENSOR, **told)
 
     @property
@@ -97,6 +99,9 @@ SCENARIOS = [
     ),
     Scenario("another laboratory's curves", {"curves": str(OTHER_CURVES)}),
     Scenario("power law", samples=("power-law",)),
+    Scenario("faint", brightness=0.03),
+    Scenario("cut off at black", {"subtracts_black": True}),
+    Scenario("cut off at black, faint", {"subtracts_black": True}, brightness=0.03),
 ]
 
 
@@ -140,7 +145,7 @@ def _run(scenario: Scenario, seed: int, folder: Path) -> None:
     rig = shipped_rig(
         "sim",
         sample=[
-            {"material": sample, "region": list(place)}
+            {"material": sample, "region": list(place), "brightness": scenario.brightness}
             for sample, place in zip(scenario.samples, PLACES, strict=False)
         ],
         sensor=SENSOR | scenario.sensor,

@@ -9,10 +9,11 @@ import pytest
 import usb.core
 
 from labrig import plugins
+from labrig.acquire import Program, linux_programs
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
-from labrig.setup import Host, Process, discover, host as host_module
+from labrig.setup import Host, discover
 from labrig.sim import open_room
 from labrig.sim.camera import SimulatedCamera
 from labrig.yaml_file import parse_yaml, validate
@@ -50,7 +51,7 @@ def cameras(count: int = 1) -> list[Any]:
 def pc(
     ports: Iterable[Plugged] = (),
     usb_devices: Iterable[Any] = (),
-    processes: Iterable[Process] = (),
+    processes: Iterable[Program] = (),
     platform: str = "linux",
 ) -> Host:
     return Host(platform, lambda: ports, lambda: usb_devices, lambda: processes)
@@ -199,18 +200,18 @@ def test_twins_without_serial_numbers_cannot_be_distinguished() -> None:
 @pytest.mark.parametrize(
     ("platform", "process", "remedy"),
     [
-        ("linux", Process(7, "gvfsd-gphoto2"), "gio mount -s gphoto2"),
-        ("linux", Process(7, "gvfs-gphoto2-volume-monitor"), "systemctl --user mask"),
-        ("linux", Process(7, "odd", frozenset({"/dev/bus/usb/001/001"})), "close it"),
-        ("darwin", Process(7, "ptpcamerad"), "killall ptpcamerad"),
-        ("darwin", Process(7, "PTPCamera"), "killall PTPCamera"),
+        ("linux", Program(7, "gvfsd-gphoto2"), "gio mount -s gphoto2"),
+        ("linux", Program(7, "gvfs-gphoto2-volume-monitor"), "systemctl --user mask"),
+        ("linux", Program(7, "odd", frozenset({"/dev/bus/usb/001/001"})), "close it"),
+        ("darwin", Program(7, "ptpcamerad"), "killall ptpcamerad"),
+        ("darwin", Program(7, "PTPCamera"), "killall PTPCamera"),
     ],
-    ids=lambda value: value.name if isinstance(value, Process) else None,
+    ids=lambda value: value.name if isinstance(value, Program) else None,
 )
 def test_what_may_hold_the_camera_and_how_to_free_it(
-    platform: str, process: Process, remedy: str
+    platform: str, process: Program, remedy: str
 ) -> None:
-    around = pc(usb_devices=cameras(), processes=[Process(1, "init"), process], platform=platform)
+    around = pc(usb_devices=cameras(), processes=[Program(1, "init"), process], platform=platform)
     (found,) = discover(around, DRIVERS).cameras
     hint, _ = found.hints
     assert process.name in hint
@@ -246,7 +247,7 @@ def test_other_usb_devices_are_no_cameras() -> None:
     assert discover(pc(usb_devices=[Mouse()]), DRIVERS).cameras == ()
 
 
-def test_programs_are_read_from_proc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_programs_are_read_from_proc(tmp_path: Path) -> None:
     place = tmp_path / "42"
     (place / "fd").mkdir(parents=True)
     (place / "cmdline").write_bytes(b"/usr/libexec/gvfsd-gphoto2\0--spawner\0")
@@ -255,9 +256,8 @@ def test_programs_are_read_from_proc(tmp_path: Path, monkeypatch: pytest.MonkeyP
     except OSError:
         pytest.skip("this user may not make links")
     (tmp_path / "43").mkdir()
-    monkeypatch.setattr(host_module, "PROCESSES", tmp_path)
-    assert list(host_module._linux_processes()) == [
-        Process(42, "gvfsd-gphoto2", frozenset({"/dev/bus/usb/001/004"}))
+    assert list(linux_programs(tmp_path)) == [
+        Program(42, "gvfsd-gphoto2", frozenset({"/dev/bus/usb/001/004"}))
     ]
 
 

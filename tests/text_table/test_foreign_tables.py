@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from labrig.results import read_described_series
 from tests.foreign_tables import EXPORTS, Export, mutated, verdict
 
 
@@ -27,3 +29,12 @@ def test_however_it_is_written_it_is_read_right_or_refused(
     path.write_bytes(mutated(lambda options: data.draw(st.sampled_from(options))))
     how, said = verdict(path, Export("", ""))
     assert how != "wrong", said
+
+
+def test_a_real_export_of_a_photon_counter() -> None:
+    path = Path(__file__).parents[1] / "data" / "wrighttools" / "bh_spcm.asc"
+    (series,), said = read_described_series(path)
+    assert said.startswith("time Time[ns] (ns, from line 10 ")
+    assert len(series.t_s) == 1024
+    # Times are rounded to 1 fs.
+    assert np.diff(series.t_s) == pytest.approx(3.2571e-12, abs=1.1e-15)

@@ -95,8 +95,19 @@ def scatter(
         scale = first_level / second_level if is_lit else 1.0
         scaled_difference = first - scale * second
         difference[slices] = (scaled_difference - scaled_difference.mean()) / np.sqrt(1 + scale**2)
+        difference[slices] *= _uncut(first_frame, first_level + dark_dn)
         levels.append((first_level + second_level) / 2)
     return _difference_scatter(difference, float(np.mean(levels)))
+
+
+def _uncut(frame: RawFrame, level_dn: float) -> float:
+    """Return the noise of pixels at a level above black over that of what a camera left of it."""
+    cut_off = frame.cut_off
+    return (
+        1.0
+        if cut_off is None
+        else cut_off.noise_ratio(level_dn + min(frame.black) - cut_off.lowest_dn)
+    )
 
 
 def _central_area(area: tuple[int, int, int, int]) -> tuple[int, int, int, int]:

@@ -26,6 +26,7 @@ from labrig.material.reradiation.evidence import (
     reradiates,
 )
 from labrig.material.reradiation.formats import (
+    MatrixLayout,
     SpectralImage,
     matrix_files,
     read_reradiation,
@@ -62,6 +63,7 @@ __all__ = [
     "ColourPair",
     "ConditionalDensity",
     "InstrumentNoise",
+    "MatrixLayout",
     "ReradiationMatrix",
     "ReradiationMixture",
     "SeenSpectrum",

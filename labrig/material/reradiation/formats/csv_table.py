@@ -46,6 +46,17 @@ class _Table:
     entries: FloatArray
 
 
+def is_fraction_table(text: str) -> bool:
+    """Return whether a text is such a table, rather than one of a spectrofluorometer."""
+    lines = filled_lines(text)
+    comments = [line.text.lstrip("# ") for line in lines if line.text.startswith("#")]
+    if any(comment.startswith(key) for comment in comments for key in _KEYS):
+        return True
+    content = (line for line in lines if not line.text.startswith("#"))
+    header = next(content, None)
+    return header is None or header.text.lstrip('"').lower().startswith("out")
+
+
 def parse_csv(text: str) -> ReradiationMatrix:
     """Return the matrix in a table with commas; its name may be empty.
 

@@ -12,8 +12,8 @@ from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.material.reradiation.formats import ark, bfc
 from labrig.material.reradiation.formats.ark import ark_entries, ark_text, parse_ark_matrix
 from labrig.material.reradiation.formats.bfc import bfc_text, parse_bfc
-from labrig.material.reradiation.formats.csv_table import csv_text, parse_csv
-from labrig.material.reradiation.formats.eem import eem_text, parse_eem
+from labrig.material.reradiation.formats.csv_table import csv_text, is_fraction_table, parse_csv
+from labrig.material.reradiation.formats.eem import MatrixLayout, eem_text, parse_eem
 from labrig.material.reradiation.formats.spectral_exr import read_spectral_image, write_exr
 from labrig.material.reradiation.matrix import ReradiationMatrix
 from labrig.text_table import read_table_text
@@ -29,7 +29,9 @@ _TEXTS: dict[str, Callable[[ReradiationMatrix], bytes]] = {
     ".ark": lambda matrix: ark_text(matrix).encode("utf-8", "replace"),
     ".txt": lambda matrix: eem_text(matrix).encode("utf-8"),
 }
-_ENDINGS = "BFC, CSV, ARK, TXT (excitation-emission matrix) or EXR"
+#: Endings of tables: of fractions of light, or of spectrofluorometers.
+_TABLES = (".csv", ".txt", ".dat", ".asc", ".tsv")
+_ENDINGS = "BFC, CSV, ARK, EXR or, of an excitation-emission matrix, TXT, DAT, ASC or TSV"
 
 
 def read_reradiation(
@@ -37,22 +39,29 @@ def read_reradiation(
     entry: str | None = None,
     *,
     pixel: tuple[int, int] | None = None,
+    layout: MatrixLayout | None = None,
 ) -> ReradiationMatrix:
     r"""Read the re-radiation matrix of a surface from a file.
 
     Formats are Labsphere BFC, tables with commas (labrig's own and those of fractions per band),
-    text archives of ART, excitation-emission matrices as text, and bispectral OpenEXR images
-    (Fichet, Pacanowski and Wilkie, JCGT 2021; 32-bit numbers).
+    text archives of ART, excitation-emission matrices in the texts of spectrofluorometers and
+    spreadsheets, and bispectral OpenEXR images (Fichet, Pacanowski and Wilkie, JCGT 2021; 32-bit
+    numbers). Which axis of an excitation-emission matrix is which is told by names, else by the
+    side of the diagonal that has the light; lines of scattered light count as not measured. Both
+    is logged.
 
     Parameters
     ----------
     path
-        Path of the file; its ending is `.bfc`, `.csv`, `.ark`, `.txt` or `.exr`.
+        Path of the file; its ending is `.bfc`, `.ark`, `.exr`, or `.csv`, `.txt`, `.dat`, `.asc`
+        or `.tsv` of tables.
     entry
         Name of the matrix in the file; not needed where there is only one.
     pixel
         Column and row of a pixel of an image, from 0 at the upper left; not needed where all
         pixels are the same.
+    layout
+        Answers to what the table of an excitation-emission matrix leaves open.
 
     Returns
     -------
@@ -76,7 +85,7 @@ def read_reradiation(
     520.0
     """
     file_path = Path(path)
-    matrices = _matrices(file_path, pixel)
+    matrices = _matrices(file_path, pixel, layout)
     name = _picked(file_path, list(matrices), entry)
     return _checked(file_path, lambda read: read(), matrices[name])
 
@@ -127,18 +136,20 @@ def write_reradiation(path: str | os.PathLike[str], matrix: ReradiationMatrix) -
 
 
 def _matrices(
-    path: Path, pixel: tuple[int, int] | None
+    path: Path, pixel: tuple[int, int] | None, layout: MatrixLayout | None
 ) -> dict[str, Callable[[], ReradiationMatrix]]:
     """Return what reads each matrix of a file, by its name."""
     if path.suffix.lower() == ".exr":
+        _checked(path, _refuse_layout, layout)
         matrix = read_spectral_image(path).matrix(pixel)
         return {matrix.name: lambda: matrix}
     if pixel is not None:
         raise UsageError(f"{path}: expected an image (EXR) for a pixel, got another file")
     content = read_bytes(path, MAX_TEXT_BYTES)
     if content.startswith(ark.MARK.encode()) or path.suffix.lower() == ".ark":
+        _checked(path, _refuse_layout, layout)
         return _archived(path)
-    found = _checked(path, lambda path: _parsed(path, content), path)
+    found = _checked(path, lambda path: _parsed(path, content, layout), path)
     matrix = dataclasses.replace(found, name=found.name or path.stem)
     return {matrix.name: lambda: matrix}
 
@@ -156,14 +167,23 @@ def _archived(path: Path) -> dict[str, Callable[[], ReradiationMatrix]]:
     return {name: partial(read, name) for name in matrices}
 
 
-def _parsed(path: Path, content: bytes) -> ReradiationMatrix:
+def _parsed(path: Path, content: bytes, layout: MatrixLayout | None) -> ReradiationMatrix:
     ending = path.suffix.lower()
     if ending == ".bfc" or bfc.MARK.encode() in content[:100]:
+        _refuse_layout(layout)
         return parse_bfc(content.decode(bfc.ENCODING))
-    if ending in {".csv", ".txt"}:
-        parse = parse_csv if ending == ".csv" else parse_eem
-        return parse(read_table_text(path))
-    raise ValueError(f"expected the ending {_ENDINGS}")
+    if ending not in _TABLES:
+        raise ValueError(f"expected the ending {_ENDINGS}")
+    text = read_table_text(path)
+    if ending == ".csv" and is_fraction_table(text):
+        _refuse_layout(layout)
+        return parse_csv(text)
+    return parse_eem(text, layout or MatrixLayout(), str(path))
+
+
+def _refuse_layout(layout: MatrixLayout | None) -> None:
+    if layout is not None:
+        raise ValueError("expected an excitation-emission matrix where its axes are told")
 
 
 def _picked(path: Path, names: list[str], entry: str | None) -> str:
@@ -213,5 +233,5 @@ def matrix_files(folder: str | os.PathLike[str]) -> list[Path]:
     place = Path(folder)
     if not place.is_dir():
         raise UsageError(f"{place}: expected a folder of re-radiation matrices, got none")
-    endings = {*_TEXTS, ".exr"}
+    endings = {*_TEXTS, *_TABLES, ".exr"}
     return sorted(path for path in place.iterdir() if path.suffix.lower() in endings)

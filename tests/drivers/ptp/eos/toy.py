@@ -62,6 +62,7 @@ class ToyEos:
         self.exposing_until_s = -1.0
         self.frame_bytes = 3000
         self.announced_extra_bytes = 0
+        self.cards = [0x00010001]
         self.name = b"IMG_0001.CR2"
         self.never_delivers = False
         self.refuses_idle_let_go = False
@@ -188,6 +189,8 @@ class ToyEos:
             self.session_open = True
             return OK, (), None
         assert self.session_open
+        if operation == 0x1004:
+            return OK, (), struct.pack(f"<I{len(self.cards)}I", len(self.cards), *self.cards)
         assert operation in self.operations
         data: bytes | None = None
         result: tuple[int, ...] = ()
