@@ -1,6 +1,6 @@
 """Fit of a table with charge and decay, as `labrig fit charge` does it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -124,4 +124,4 @@ def fit_charge_table(
         )
     except FitError as error:
         raise FitError(f"{path}: {error}") from None
-    return fit, columns
+    return replace(fit, warnings=(*series.warnings, *fit.warnings)), columns

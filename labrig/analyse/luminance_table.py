@@ -1,7 +1,7 @@
 """Luminance meter's table, as `labrig fit luminance` evaluates it."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +143,7 @@ def evaluate_luminance_table(
         )
     except FitError as error:
         raise FitError(f"{path}: {error}") from None
+    decay = replace(decay, warnings=(*series.warnings, *decay.warnings))
     return decay, f"{columns}; luminances in {unit.replace('m2', 'm²')}"
 
 

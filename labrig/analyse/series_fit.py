@@ -1,6 +1,7 @@
 """The fit of one series: common to a run's processing and `labrig fit decay`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -95,7 +96,7 @@ def fit_series(
             f"{SEEN_SIGMA:g} σ; was the sample charged, is it its light that was measured, and for "
             "long enough?"
         )
-    return fit
+    return replace(fit, warnings=(*series.warnings, *fit.warnings)) if series.warnings else fit
 
 
 def _is_seen(fit: DecayFit, first_s: float) -> bool:

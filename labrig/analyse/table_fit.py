@@ -257,7 +257,8 @@ def _low_warnings(series: Series, options: TableFitOptions, low: LowStart | None
     if low is None:
         return []
     if low.is_ceiling:
-        rows = [row for row, flag in enumerate(series.flag) if CLIPPED in flag]
+        clipped = [row for row, flag in enumerate(series.flag) if CLIPPED in flag]
+        rows = sorted(clipped, key=lambda row: series.t_s[row])[: low.number]
         last_s = max(series.t_s[rows]) + options.origin_s
         return [
             f"the first {low.number} values, until {last_s:.4g} s, are equal, "

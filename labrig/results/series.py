@@ -59,6 +59,8 @@ class Series:
         unknown. Not a column of series.csv.
     value_unit
         Unit of `values`; empty if unknown. Not a column of series.csv.
+    warnings
+        What is to be said of the rows that were read, such as those left out. Not in series.csv.
     """
 
     t_s: FloatArray
@@ -76,6 +78,7 @@ class Series:
     correlation: FloatArray | None = None
     dark_correlation: FloatArray | None = None
     value_unit: str = "DN/s"
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _check_shapes(self)
@@ -105,6 +108,7 @@ class Series:
             correlation=self.correlation,
             dark_correlation=self.dark_correlation,
             value_unit=self.value_unit,
+            warnings=self.warnings,
         )
 
     def by_unit(self) -> list["Series"]:

@@ -18,9 +18,9 @@ from labrig.results.table_columns import (
     find_columns,
 )
 from labrig.results.table_layout import TableLayout
+from labrig.results.table_rows import independent_rows, measured_rows, with_limits
 from labrig.results.time_axis import TimeAxis
 from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block, read_blocks, read_table_text
-from labrig.text_table.clock_times import seconds_from_first
 from labrig.text_table.names import is_time
 
 
@@ -76,13 +76,15 @@ def read_series(
     The columns are separated by tabs, semicolons, commas, bars or blanks; numbers have a decimal
     point or a decimal comma. `#` begins a comment; of the lines above and below the table only what
     they say of names, unit of the times and width of a channel is used. Columns are
-    recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`; times
-    of day, `12:00:05`, are counted from the first row),
-    uncertainties (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
+    recognised by their names, which may have a unit: times (`t_s`, `time / min`, `Zeit [ms]`; a
+    clock, such as `24.10.2026 12:00:05`, is counted from the first row), uncertainties
+    (`<name>_sigma`, or `Error`, `±`, `σ`, `std`, … right of the values), exposures,
     and those of series.csv (region, unit, flag and the like). Every other column of numbers is a
     channel, except one that only the first row fills: some programs put the settings of a
     measurement there. Without names the columns are time, value and perhaps sigma. Rows that are
-    channels of a stated width become times.
+    channels of a stated width become times. Logarithms of light (`I/dB`, `ln(I)`) become light.
+    Rows that are no measurement (`OL`, 9.9e37, copies of the row before) are left out; `warnings`
+    of the series name them.
 
     Parameters
     ----------
@@ -197,14 +199,14 @@ def parse_series(text: str, source: str, layout: TableLayout = _FROM_THE_TABLE) 
 def _parse(text: str, source: str, layout: TableLayout) -> tuple[list[Series], str]:
     """Return the series in a text, and the roles of its columns in words."""
     try:
-        table = _own_table(text)
-        if table is not None:
-            columns = _own_columns(table)
-        else:
-            decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
-            table = choose_block(read_blocks(text, decimal), layout.block)
-            columns = find_columns(table, layout)
-        return _series(table, columns), str(columns)
+        own = _own_table(text)
+        if own is not None:
+            columns = _own_columns(own)
+            return _series(own, columns, _times_s(own, columns)), str(columns)
+        decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
+        table = choose_block(read_blocks(text, decimal), layout.block)
+        columns = find_columns(table, layout)
+        return _measured_series(table, columns), str(columns)
     except LabrigError as error:
         # In one line, though a cell may hold a form feed or another of Unicode's line ends.
         raise type(error)(f"{source}: {' '.join(str(error).split())}") from None
@@ -292,7 +294,31 @@ def _own_columns(table: Block) -> Columns:
     )
 
 
-def _series(table: Block, columns: Columns) -> list[Series]:
+def _measured_series(table: Block, columns: Columns) -> list[Series]:
+    """Return the series of another program's table, without rows that are no measurements."""
+    t_s, clock = _times_s(table, columns), columns.time.clock
+    used = [(channel.column, channel.sigma) for channel in columns.channels]
+    rows, warnings = measured_rows(
+        table, [column for pair in used for column in pair if column is not None]
+    )
+    measured = replace(
+        table,
+        rows=tuple(table.rows[row] for row in rows),
+        lines=tuple(table.lines[row] for row in rows),
+    )
+    parts = _series(measured, columns, t_s[rows])
+    warnings = [*(clock.warnings if clock else ()), *warnings]
+    if len(parts) == 1:
+        resolution_s = clock.resolution_s if clock else 0.0
+        independent, said = independent_rows(parts[0], measured.lines, resolution_s)
+        lines = [measured.lines[row] for row in independent]
+        part, limits = with_limits(parts[0].take(independent), lines)
+        parts = [part]
+        warnings += [*said, *limits]
+    return [replace(part, warnings=tuple(warnings)) for part in parts]
+
+
+def _series(table: Block, columns: Columns, t_s: FloatArray) -> list[Series]:
     """Return the series of a table by region and unit."""
     n_rows = len(table.rows)
 
@@ -306,15 +332,15 @@ def _series(table: Block, columns: Columns) -> list[Series]:
         return tuple("" if column is None else row[column] for row in table.rows)
 
     channels = columns.channels
-    values = np.stack([numbers(channel.column, None) for channel in channels], axis=1)
-    given = np.stack([numbers(channel.sigma, math.nan) for channel in channels], axis=1)
-    relative = np.array([channel.sigma_is_relative for channel in channels])
-    scale = np.array([channel.sigma_scale for channel in channels])
+    pairs = [
+        channel.light(numbers(channel.column, None), numbers(channel.sigma, math.nan))
+        for channel in channels
+    ]
     series = Series(
-        t_s=_times_s(table, columns),
+        t_s=t_s,
         exposure_s=numbers(columns.exposure, 0.0),
-        values=values,
-        sigma=given * scale * np.where(relative, np.abs(values), 1.0),
+        values=np.stack([values for values, _ in pairs], axis=1),
+        sigma=np.stack([sigma for _, sigma in pairs], axis=1),
         dark_sigma=np.full(len(channels), math.nan),
         channels=tuple(channel.name for channel in channels),
         iso=numbers(columns.reserved.get("iso"), math.nan),
@@ -331,13 +357,12 @@ def _series(table: Block, columns: Columns) -> list[Series]:
 
 
 def _times_s(table: Block, columns: Columns) -> FloatArray:
-    """Return the times in seconds; times of day from the first row."""
+    """Return the times in seconds; those of a clock from the first row."""
     time = columns.time
+    if time.clock is not None:
+        return time.clock.t_s
     if time.column is None:
-        return np.asarray(np.arange(len(table.rows)) * time.unit_s, dtype=np.float64)
-    clock_s = seconds_from_first([row[time.column] for row in table.rows])
-    if clock_s is not None:
-        return clock_s
+        return np.arange(len(table.rows), dtype=np.float64) * time.unit_s
     return _numbers(table, columns, time.column, None) * time.unit_s
 
 
@@ -357,7 +382,7 @@ def _numbers(table: Block, columns: Columns, column: int, empty: float | None) -
             continue
         number = table.number(cell)
         if number is None:
-            remedy = "write all times as numbers, or all as hh:mm:ss" if ":" in cell else _DELETE
+            remedy = "write all times in one form" if ":" in cell else _DELETE
             raise UsageError(
                 f"line {line}: expected a number with a decimal {mark} for '{name}', got '{cell}'; "
                 f"{remedy}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.errors import UsageError
+from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
 from labrig.results.sigma_unit import sigma_scale
 from labrig.results.table_layout import TableLayout
@@ -20,6 +21,7 @@ from labrig.text_table.names import (
     sigma_of,
     split_unit,
 )
+from labrig.text_table.value_units import LogScale, is_absorbance, log_scale
 
 _EXPOSURES = frozenset({EXPOSURE, "exposure"})
 
@@ -36,6 +38,8 @@ class Channel:
         Column of uncertainties; None without one.
     sigma_scale, sigma_is_relative
         Factor from that column to σ in the unit of the values, or to σ over the value.
+    scale
+        Logarithm of light that the column holds; None if it holds light.
     """
 
     name: str
@@ -43,6 +47,14 @@ class Channel:
     sigma: int | None
     sigma_scale: float = 1.0
     sigma_is_relative: bool = False
+    scale: LogScale | None = None
+
+    def light(self, values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return light and its σ by the numbers of the two columns (n,)."""
+        sigma = sigma * self.sigma_scale * (np.abs(values) if self.sigma_is_relative else 1.0)
+        if self.scale is None:
+            return values, sigma
+        return self.scale.light(values), self.scale.sigma(values, sigma)
 
 
 @dataclass(frozen=True)
@@ -79,9 +91,15 @@ class Columns:
             return ", ".join(" ".join(self.names[column].split()) for column in columns)
 
         sigmas = [channel.sigma for channel in self.channels if channel.sigma is not None]
-        values = text([channel.column for channel in self.channels])
+        values = ", ".join(
+            text([channel.column])
+            + (f", a logarithm: light is {channel.scale}" if channel.scale else "")
+            + (", an absorbance: fitted as it stands" if is_absorbance(channel.name) else "")
+            for channel in self.channels
+        )
         sigma = f"σ {text(sigmas)}" if sigmas else "no σ"
-        time = "row number" if self.time.column is None else text([self.time.column])
+        of_time = [column for column in (self.time.date, self.time.column) if column is not None]
+        time = text(of_time) or "row number"
         return f"time {time} ({self.time.source}); values {values}; {sigma}"
 
 
@@ -105,7 +123,7 @@ def find_columns(table: Block, layout: TableLayout) -> Columns:
     values = [
         column
         for column in in_use
-        if column not in {time.column, exposure} | set(reserved.values())
+        if column not in {time.column, time.date, exposure} | set(reserved.values())
     ]
     if layout.column is not None and layout.column not in [names[column] for column in values]:
         raise UsageError(
@@ -126,16 +144,20 @@ def find_columns(table: Block, layout: TableLayout) -> Columns:
             f"expected one curve, got {len(signals)} in one memory or file: {listed}; choose one "
             "with '--column NAME'"
         )
+    scales = {column: log_scale(names[column], _below(table, column)) for column in signals}
     channels = tuple(
         Channel(
-            _channel_name(names, column, signals),
+            _channel_name(names, column, signals, scales[column]),
             column,
             sigmas.get(column),
-            *_sigma_scale(table, names, column, sigmas.get(column)),
+            *_sigma_scale(table, names, column, sigmas.get(column), scales[column]),
+            scales[column],
         )
         for column in signals
     )
-    value_units = {_unit(table, names, column) for column in signals}
+    value_units = {
+        scale.unit if scale else _unit(table, names, column) for column, scale in scales.items()
+    }
     value_unit = value_units.pop() if len(value_units) == 1 else ""
     shown = names if table.names else [f"column {number + 1}" for number in range(len(names))]
     return Columns(tuple(shown), time, exposure, channels, reserved, value_unit)
@@ -197,10 +219,13 @@ def _sigmas(names: Sequence[str], values: Sequence[int], layout: TableLayout) ->
 
 
 def _sigma_scale(
-    table: Block, names: Sequence[str], column: int, sigma: int | None
+    table: Block, names: Sequence[str], column: int, sigma: int | None, scale: LogScale | None
 ) -> tuple[float, bool]:
     """Return the factor from a column of uncertainties to σ, and whether σ is relative."""
     if sigma is None:
+        return 1.0, False
+    if scale is not None:
+        scale.require_unit(_unit(table, names, sigma), names[sigma])
         return 1.0, False
     unit, value_unit = _unit(table, names, sigma), _unit(table, names, column)
     # The brackets of `σ (I)` hold the name of the values.
@@ -211,8 +236,11 @@ def _sigma_scale(
 
 def _unit(table: Block, names: Sequence[str], column: int) -> str:
     """Return the unit in the name of a column, or in a line of units below the names."""
-    below = table.units[column] if column < len(table.units) else ""
-    return split_unit(names[column])[1] or below
+    return split_unit(names[column])[1] or _below(table, column)
+
+
+def _below(table: Block, column: int) -> str:
+    return table.units[column] if column < len(table.units) else ""
 
 
 def _owner_left_of(
@@ -236,7 +264,9 @@ def _owner_left_of(
     return left
 
 
-def _channel_name(names: Sequence[str], column: int, signals: Sequence[int]) -> str:
+def _channel_name(
+    names: Sequence[str], column: int, signals: Sequence[int], scale: LogScale | None
+) -> str:
     """Return the name of a channel without its unit, if that still tells it from the others."""
     name = " ".join(names[column].split())
     if not name or [names[other] for other in signals].count(names[column]) > 1:
@@ -244,7 +274,7 @@ def _channel_name(names: Sequence[str], column: int, signals: Sequence[int]) -> 
             f"expected a name of its own for every column, got '{name}' for column {column + 1}; "
             "rename it"
         )
-    base = split_unit(name)[0]
+    base = scale.name if scale and scale.name else split_unit(name)[0]
     bases = [split_unit(names[other])[0] for other in signals]
     taken = bases.count(base) > 1 or base in (TIME, EXPOSURE, *RESERVED)
     return name if taken or base.endswith(SIGMA_SUFFIX) else base

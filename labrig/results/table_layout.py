@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from labrig.errors import UsageError
 from labrig.text_table import DECIMAL_MARKS
+from labrig.text_table.clock_times import is_clock_form
 from labrig.text_table.names import time_unit_s
 from labrig.text_table.time_statements import parse_width
 
@@ -19,7 +20,7 @@ class TableLayout:
     column
         Name of the column of values.
     time_unit
-        Unit of the times, such as `ms`.
+        Unit of the times, such as `ms`, or the form of a clock, such as `hh:mm` or `dd/mm/yyyy`.
     decimal
         Decimal mark of the numbers, `point` or `comma`.
     time_per_channel
@@ -37,9 +38,11 @@ class TableLayout:
     block: int | None = None
 
     def __post_init__(self) -> None:
-        if self.time_unit is not None and time_unit_s(self.time_unit) is None:
+        unit = self.time_unit
+        if unit is not None and time_unit_s(unit) is None and not is_clock_form(unit):
             raise UsageError(
-                f"--time-unit: expected a unit such as ns, ms, s, min or h, got '{self.time_unit}'"
+                "--time-unit: expected a unit such as ns, ms, s, min or h, or the form of a clock "
+                f"such as hh:mm or dd/mm/yyyy, got '{unit}'"
             )
         if self.decimal is not None and self.decimal not in DECIMAL_MARKS:
             raise UsageError(f"--decimal: expected 'point' or 'comma', got '{self.decimal}'")

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from labrig.errors import UsageError
 from labrig.results.table_layout import TableLayout
 from labrig.text_table import EXPECTED, Block, Line
+from labrig.text_table.clock_reading import parse_clock
+from labrig.text_table.clock_times import ClockTimes, read_clock
 from labrig.text_table.names import (
     ABSCISSAS,
     is_channel,
@@ -38,6 +40,8 @@ _OTHER_UNIT = 500.0
 _MOST_FALLS = 0.25
 #: Units that are proposed.
 _COMMON_UNITS = ("ps", "ns", "µs", "ms", "s", "min", "h")
+#: Names of a column with the dates of a clock.
+_DATES = frozenset({"date", "datum", "day", "tag", "jour", "fecha", "data"})
 _UNSTATED = "s, as no line states another unit"
 
 
@@ -53,11 +57,17 @@ class TimeAxis:
         Unit of that column in seconds, or the width of a channel.
     source
         Unit or width, and what states it, in words.
+    clock
+        Times by the clock in that column; None of plain numbers.
+    date
+        Column with the dates of the clock; None without one.
     """
 
     column: int | None
     unit_s: float
     source: str
+    clock: ClockTimes | None = None
+    date: int | None = None
 
 
 def find_time_axis(
@@ -107,6 +117,7 @@ def _time_column(
         ]
     else:
         matches = []
+    matches = matches or _clocks(table)
     if len(matches) > 1:
         several = ", ".join(names[column] for column in matches)
         raise UsageError(f"expected one of the columns {several}, got several; say '--time NAME'")
@@ -201,11 +212,17 @@ def _in_unit(
     layout: TableLayout,
 ) -> TimeAxis:
     """Return the times in a column, in the unit that the table states."""
+    clock = _by_clock(table, names, column, layout)
+    if clock is not None:
+        return clock
     if layout.time_unit is not None:
-        unit_s = time_unit_s(layout.time_unit) or 1.0
+        unit_s = time_unit_s(layout.time_unit)
+        if unit_s is None:
+            raise UsageError(
+                f"--time-unit: expected a unit such as s or ms for '{names[column]}', which holds "
+                f"no clock, got '{layout.time_unit}'"
+            )
         return TimeAxis(column, unit_s, f"{layout.time_unit}, from --time-unit")
-    if is_clock(table.rows[0][column]):
-        return TimeAxis(column, 1.0, "times of day")
     own, line = (split_time(names[column]) or split_unit(names[column]))[1], table.names_line
     below = table.units[column] if column < len(table.units) else ""
     _require_unit(own, names[column])
@@ -249,6 +266,39 @@ def _in_unit(
                 f"{quoted(about)}; say '--time-unit {(*fitting, unit)[0]}', or which it is"
             )
     return TimeAxis(column, 1.0, _UNSTATED)
+
+
+def _clocks(table: Block) -> list[int]:
+    """Return the columns that hold clocks, or those with dates if none does."""
+    readings = [parse_clock(cell) for cell in table.rows[0]]
+    clocks = [column for column, reading in enumerate(readings) if reading and reading.parts]
+    return clocks or [column for column, reading in enumerate(readings) if reading]
+
+
+def _by_clock(
+    table: Block, names: Sequence[str], column: int, layout: TableLayout
+) -> TimeAxis | None:
+    """Return the times by a clock, whose dates may be in a column beside it; None without one."""
+    first = table.rows[0]
+    clock, date = parse_clock(first[column]), None
+    if clock is None:
+        return None
+    cells = [row[column] for row in table.rows]
+    if clock.parts and not clock.date:
+        dates = [
+            other
+            for other, name in enumerate(names)
+            if split_unit(name)[0].lower() in _DATES
+            and (both := parse_clock(f"{first[other]} {first[column]}")) is not None
+            and both.date
+        ]
+        if len(dates) == 1:
+            (date,) = dates
+            cells = [f"{row[date]} {row[column]}" for row in table.rows]
+    below = table.units[column] if column < len(table.units) else ""
+    said = [names[column], below, *([names[date]] if date is not None else ())]
+    times = read_clock(cells, table.lines, layout.time_unit or " ".join(said))
+    return TimeAxis(column, 1.0, times.form, times, date) if times else None
 
 
 def _require_unit(unit: str, name: str) -> None:

@@ -19,11 +19,13 @@ _WORDS = re.compile(
     r"|BAD|ERR|ERROR|FEHLER|#[A-Z/0!?]+[!?]?|-+|\*+|#+|\?+|[.]{2,}|[=_~]+|[–—]+"
 )
 #: Nines, perhaps with zeros behind, that mark missing data: 9999, -999.9, 9.99999e9.
-_NINES = re.compile(r"9{3,}0*")
+_NINES = re.compile(r"9{3,10}0*")
 #: A power of ten, which some meters show for overload: 1e9.
 _POWER = re.compile(r"10*")
 #: How far beyond every other value a number of nines, or a power of ten from 1e6 on, is a mark.
 _BEYOND_NINES, _BEYOND_POWERS, _LEAST_NINES, _LEAST_POWER = 10.0, 1e4, 999, 1e6
+#: Fewest other values that tell so of either.
+_FEWEST_NINES, _FEWEST_POWERS = 3, 8
 
 
 def no_measurements(cells: Sequence[str], number: Callable[[str], float | None]) -> dict[int, str]:
@@ -51,8 +53,8 @@ def no_measurements(cells: Sequence[str], number: Callable[[str], float | None])
     ...         return None
     >>> no_measurements(["9.9e37", "OL", "860.2", "819.1", "nan", "0"], number)
     {0: '9.9e37', 1: 'OL', 4: 'nan'}
-    >>> no_measurements(["-9999", "3", "2", "-9999"], number)
-    {0: '-9999', 3: '-9999'}
+    >>> no_measurements(["-9999", "3", "2", "2", "-9999"], number)
+    {0: '-9999', 4: '-9999'}
     """
     values = [number(cell) for cell in cells]
     marks = {
@@ -75,20 +77,21 @@ def _is_mark(cell: str, value: float | None) -> bool:
 
 def _far_marks(values: dict[int, float]) -> set[int]:
     """Return the rows whose numbers are of nines or a power of ten, and far from all others."""
-    candidates: dict[float, float] = {}
+    candidates: dict[float, tuple[float, int]] = {}
     for value in set(values.values()):
         digits = repr(abs(value)).split("e")[0].replace(".", "")
         if abs(value) >= _LEAST_NINES and _NINES.fullmatch(digits):
-            candidates[value] = _BEYOND_NINES
+            candidates[value] = _BEYOND_NINES, _FEWEST_NINES
         elif abs(value) >= _LEAST_POWER and _POWER.fullmatch(digits):
-            candidates[value] = _BEYOND_POWERS
+            candidates[value] = _BEYOND_POWERS, _FEWEST_POWERS
     found: set[int] = set()
     # From the farthest on, since a mark may hide another: 9.99999e9 beside -9999.
     for value in sorted(candidates, key=abs, reverse=True):
+        beyond, fewest = candidates[value]
         rows = {row for row, other in values.items() if other == value}
         others = [other for row, other in values.items() if row not in rows | found]
         # Light that decays is not negative by more than noise, which other values would show.
         near = others if value > 0 else [other for other in others if other < 0] or [0.0]
-        if others and abs(value) > candidates[value] * max(map(abs, near)):
+        if len(others) >= fewest and abs(value) > beyond * max(map(abs, near)):
             found |= rows
     return found

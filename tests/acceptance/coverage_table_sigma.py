@@ -224,7 +224,7 @@ def ceiling(level: float, states: tuple[tuple[float, float], ...]) -> Broken:
         return t_s, np.minimum(rng.poisson(signal), np.round(1e4 * level)).astype(np.float64), None
 
     name = f"ceiling at {100 * level:g} %, {len(states)} state(s)"
-    said = "law of the others" if level < 1 else ""
+    said = "saturated" if level < 1 else ""
     return Broken(name, tuple(rate for rate, _ in states), table, said)
 
 

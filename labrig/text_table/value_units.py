@@ -1,0 +1,191 @@
+"""Columns of values that hold a logarithm of light: dB, `ln(I)`, `log10(counts)`, magnitudes.
+
+A decay is one of light itself. Which function of it a column holds is said by its name or unit;
+where that leaves two readings, the column is refused.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from labrig.errors import UsageError
+from labrig.text_table.names import split_unit, time_unit_s
+
+FloatArray = npt.NDArray[np.float64]
+
+_DECIBEL = re.compile(
+    r"(?:(?P<name>.+?)[\s_/]+)?(?P<unit>d[Bb][\s(]*(?P<to>[mnuµμ]?W|m|c|FS|[muµμ]?V|u|[muµμ]?A)?\)?)"
+    r"(?:\s*re\.?\s*(?:1\s*)?(?P<re>\S+))?"
+)
+#: References of decibels of a power, with the unit, and of an amplitude.
+_OF_POWER = {"m": "mW", "mW": "mW", "W": "W", "µW": "µW", "uW": "µW", "nW": "nW", "c": ""}
+_OF_AMPLITUDE = {"V": "V", "mV": "mV", "µV": "µV", "uV": "µV", "u": "", "FS": ""}
+#: Words in names of quantities whose decibels are those of a power, and of an amplitude.
+_POWERS = frozenset(
+    {
+        "i", "p", "pl", "el", "intensity", "intensität", "intensité", "power", "leistung", "light",
+        "licht", "radiance", "irradiance", "luminance", "leuchtdichte", "flux", "brightness",
+        "counts", "emission", "luminescence", "phosphorescence", "fluorescence", "afterglow",
+        "optical", "photons",
+    }
+)  # fmt: skip
+_AMPLITUDES = frozenset(
+    {"u", "v", "volt", "volts", "voltage", "spannung", "tension", "amplitude", "current", "strom"}
+)
+_BASES = {
+    "ln": math.e, "loge": math.e, "log10": 10.0, "lg": 10.0, "log2": 2.0, "ld": 2.0, "lb": 2.0,
+}  # fmt: skip
+_LOG = r"(?P<log>ln|lg|ld|lb|log(?:[\s_]?(?:e|10|2))?)"
+_LOGARITHM = re.compile(
+    rf"(?P<sign>[-+]?)\s*{_LOG}"
+    r"(?:\s*[(\[{]\s*(?P<in>.+?)\s*[)\]}]?|[\s_]+(?:of\s+)?(?P<after>[^\W\d].*?)|)"
+    r"(?:\s*[(\[](?:a\.?\s?u\.?|arb.*|1|-)?[)\]])?",
+    re.IGNORECASE,
+)
+#: A light divided into that at the begin: its logarithm grows.
+_INVERSE = re.compile(r"[_\s(]*(?:0|max|t\s*=\s*0)\)?\s*/")
+_MAGNITUDE = re.compile(r"(?P<milli>m?)mag(?:\b.*)?")
+#: The same without a blank: `lnI`, but not `Login`.
+_GLUED = re.compile(r"(?P<log>ln|lg|log(?:10|2)?)(?P<of>[A-Z].*)")
+_OTHER_FUNCTION = re.compile(r"1\s*/\s*\(?(?P<of>[^\W\d].*)|(?:sqrt|exp)\s*\(.*|√.*", re.IGNORECASE)
+_ABSORBANCE = frozenset({"absorbance", "abs", "od", "mod", "extinction", "extinktion", "absorbanz"})
+
+
+@dataclass(frozen=True)
+class LogScale:
+    """Logarithm of light: light = base^(x / divisor).
+
+    Attributes
+    ----------
+    name, unit
+        Name and unit of the light; either may be empty.
+    unit_of_x
+        Unit of the logarithm.
+    base, divisor
+        Numbers of the formula.
+    """
+
+    name: str
+    unit: str
+    unit_of_x: str
+    base: float
+    divisor: float
+
+    def light(self, x: FloatArray) -> FloatArray:
+        """Return the light at logarithms of it; infinite where it is too large for a number."""
+        with np.errstate(over="ignore"):
+            return np.asarray(self.base ** (x / self.divisor), dtype=np.float64)
+
+    def sigma(self, x: FloatArray, sigma: FloatArray) -> FloatArray:
+        """Return σ of the light by σ of its logarithm, to first order."""
+        return self.light(x) * abs(math.log(self.base) / self.divisor) * sigma
+
+    def require_unit(self, unit: str, name: str) -> None:
+        """Refuse uncertainties `name` whose unit is not that of the logarithm.
+
+        Raises
+        ------
+        UsageError
+            The unit is another one, as that of the light or %.
+        """
+        if unit.strip() not in ("", self.unit_of_x, "dB" if self.unit_of_x else ""):
+            own = f" in {self.unit_of_x}" if self.unit_of_x else ""
+            raise UsageError(
+                f"expected uncertainties of the logarithm{own}, got '{unit}' in '{name}'; convert "
+                "them, or delete the column: σ is then taken from the scatter"
+            )
+
+    def __str__(self) -> str:
+        """Return the formula, with x for the values of the column."""
+        base = "e" if self.base == math.e else f"{self.base:g}"
+        if self.divisor == 1:
+            return f"{base}^x"
+        sign = "−" if self.divisor < 0 else ""
+        return f"{base}^({sign}x/{abs(self.divisor):g})"
+
+
+def log_scale(name: str, unit: str = "") -> LogScale | None:
+    """Return of which light a column holds the logarithm, by its name; None if it holds light.
+
+    Parameters
+    ----------
+    name
+        Name of the column as it stands in the table, perhaps with a unit.
+    unit
+        Its unit, if a line of units has it.
+
+    Raises
+    ------
+    UsageError
+        The name has two readings, such as `log(I)`, or is that of another function of light.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.text_table.value_units import log_scale
+    >>> scale = log_scale("I/dB")
+    >>> scale.name, str(scale), scale.light(np.array([0.0, 30.0])).tolist()
+    ('I', '10^(x/10)', [1.0, 1000.0])
+    >>> str(log_scale("ln(I)")), log_scale("I / mV") is None
+    ('e^x', True)
+    """
+    name = " ".join(name.replace("\N{MINUS SIGN}", "-").split())
+    base, own_unit = split_unit(name)
+    unit = (own_unit or unit).strip()
+    # A unit below the name, or in its brackets, says more than the name.
+    if match := _DECIBEL.fullmatch(unit):
+        return _decibel(base, match, name)
+    if match := _DECIBEL.fullmatch(name):
+        return _decibel(match["name"] or "", match, name)
+    if match := _MAGNITUDE.fullmatch(unit):
+        return LogScale(base, "", unit, 10.0, -2500.0 if match["milli"] else -2.5)
+    if unit.lower().replace("_", "") in {*_BASES, "log"}:
+        return _logarithm(unit, base, name)
+    if match := _LOGARITHM.fullmatch(name):
+        return _logarithm(match["log"], match["in"] or match["after"] or "", name, match["sign"])
+    if match := _GLUED.fullmatch(name):
+        return _logarithm(match["log"], match["of"], name)
+    other = _OTHER_FUNCTION.fullmatch(name)
+    if other and not (other["of"] and time_unit_s(other["of"]) is not None):
+        raise UsageError(
+            f"expected light, got a function of it, '{name}'; write the light itself, or its "
+            "logarithm as ln(I), log10(I) or I/dB"
+        )
+    return None
+
+
+def is_absorbance(name: str) -> bool:
+    """Return whether a column of that name holds absorbances, which are logarithms by nature.
+
+    Over time they are what decays, since they are proportional to what absorbs.
+    """
+    return split_unit(name)[0].lower().strip("δ∆ ") in _ABSORBANCE
+
+
+def _decibel(name: str, said: re.Match[str], column: str) -> LogScale:
+    reference = (said["to"] or said["re"] or "").replace("μ", "µ")
+    words = set(re.findall(r"[^\W\d_]+", name.lower()))
+    is_power = reference in _OF_POWER or (not reference and bool(words & _POWERS))
+    is_amplitude = reference in _OF_AMPLITUDE or (not reference and bool(words & _AMPLITUDES))
+    if is_power == is_amplitude:
+        raise UsageError(
+            f"expected decibels of a power (10 lg) or of a voltage (20 lg), got '{column}', which "
+            "may be either; call the column 'power/dB' or 'voltage/dB'"
+        )
+    light_unit = _OF_POWER.get(reference) or _OF_AMPLITUDE.get(reference) or ""
+    return LogScale(name.strip(" _"), light_unit, said["unit"], 10.0, 10.0 if is_power else 20.0)
+
+
+def _logarithm(log: str, of: str, column: str, sign: str = "") -> LogScale:
+    base = _BASES.get(re.sub(r"[\s_]", "", log.lower()))
+    if base is None or sign == "-" or _INVERSE.search(of):
+        raise UsageError(
+            f"expected light, or a logarithm of it that can be read in one way, got '{column}'; "
+            "call it ln(I) if it is natural, log10(I) if it is decimal, or write the light itself"
+        )
+    light, unit = split_unit(of)
+    is_ratio = re.search(r"/.*0\)?$", of.strip()) is not None
+    return LogScale(of if is_ratio else light, "" if is_ratio else unit, "", base, 1.0)
