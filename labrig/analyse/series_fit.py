@@ -1,13 +1,14 @@
 """The fit of one series: common to a run's processing and `labrig fit decay`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.results import AUTO, Series
+from labrig.results import AUTO, DecayReference, Series, TableClock
 
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
@@ -95,7 +96,16 @@ def fit_series(
             f"{SEEN_SIGMA:g} σ; was the sample charged, is it its light that was measured, and for "
             "long enough?"
         )
-    return fit
+    return replace(fit, reference=_by_clock(fit.reference, series.clock))
+
+
+def _by_clock(reference: DecayReference, clock: TableClock) -> DecayReference:
+    """Return the reference of a fit to a series with the time by its table's clock."""
+    return DecayReference(
+        is_lamp_off=reference.is_lamp_off and clock.is_lamp_off,
+        t_s=reference.t_s,
+        clock_s=float(clock.zero_s) + reference.t_s,
+    )
 
 
 def _is_seen(fit: DecayFit, first_s: float) -> bool:

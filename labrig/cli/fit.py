@@ -78,10 +78,16 @@ def decay(
         typer.Option("--weights", help="'given' σ, or 'counts' (σ² = those expected, ≥ 5)."),
     ] = "given",
     origin: Annotated[
-        float, typer.Option("--origin", help="Time at which the light went off, in seconds.")
-    ] = 0.0,
+        str | None,
+        typer.Option(
+            "--origin", help="When the light went off, in the table's unit or as '5.5 min'."
+        ),
+    ] = None,
     start: Annotated[
-        float | None, typer.Option("--from", help="Use points from this time on, in seconds.")
+        str | None,
+        typer.Option(
+            "--from", help="Use points from this time on, in the table's unit or as '2 ns'."
+        ),
     ] = None,
     column: Column = None,
     time: Time = None,
@@ -115,7 +121,11 @@ def decay(
             continue
         typer.echo(f"{part.region}\n{fit}".strip())
         if times_s:
-            typer.echo(str(fit.forecast(times_s)))
+            # Without a known lamp off, times count from the first row, as the amplitudes do.
+            after_s = 0.0 if origin is None else part.series.clock.after_zero_s(origin)
+            if origin is None and not fit.reference.is_lamp_off:
+                typer.echo(f"times count from {fit.reference}")
+            typer.echo(str(fit.forecast(times_s, after_s=after_s)))
     if out is not None:
         from labrig.process import report_table
 
@@ -131,8 +141,13 @@ def charge(
     table: Annotated[
         Path, typer.Argument(help="Table of times and one value, through charge and decay.")
     ],
-    on: Annotated[float, typer.Option("--on", help="When the lamp was switched on, in seconds.")],
-    off: Annotated[float, typer.Option("--off", help="When it was switched off, in seconds.")],
+    on: Annotated[
+        str,
+        typer.Option(
+            "--on", help="When the lamp was switched on, in the table's unit or as '5.5 min'."
+        ),
+    ],
+    off: Annotated[str, typer.Option("--off", help="When it was switched off, likewise.")],
     states: Annotated[
         int | None,
         typer.Option("--states", min=1, max=2, help="Number of states; chosen by default."),
@@ -197,8 +212,11 @@ def luminance(
         Path, typer.Argument(help="Table of times and luminances of an afterglow, with σ or not.")
     ],
     off: Annotated[
-        float, typer.Option("--off", help="Time at which the light went off, in seconds.")
-    ] = 0.0,
+        str | None,
+        typer.Option(
+            "--off", help="When the light went off, in the table's unit or as '5.5 min'; else at 0."
+        ),
+    ] = None,
     unit: Annotated[
         str | None,
         typer.Option("--unit", help="Unit of the luminances, where the column's name has none."),

@@ -43,6 +43,7 @@ from .decay import (
     DecayResult as DecayResult,
     NoiseBudget as NoiseBudget,
 )
+from .decay_reference import DecayReference as DecayReference, first_row_at as first_row_at
 from .direct_bispectral import (
     DirectBispectralResult as DirectBispectralResult,
     DirectColumns as DirectColumns,
@@ -222,6 +223,7 @@ from .summary import (
     read_summary as read_summary,
     write_summary as write_summary,
 )
+from .table_clock import TableClock as TableClock
 from .table_columns import (
     TableLayout as TableLayout,
 )

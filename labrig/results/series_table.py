@@ -5,6 +5,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from labrig.input_file import read_table_text
 from labrig.results.clock_times import seconds_from_first
 from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
+from labrig.results.table_clock import TableClock, is_far
 from labrig.results.table_columns import (
     Channel,
     Columns,
@@ -271,8 +273,9 @@ def _series(table: Table, columns: Columns) -> list[Series]:
     given = np.stack([numbers(channel.sigma, math.nan) for channel in channels], axis=1)
     relative = np.array([channel.sigma_is_relative for channel in channels])
     scale = np.array([channel.sigma_scale for channel in channels])
+    t_s, clock = _times_s(table, columns)
     series = Series(
-        t_s=_times_s(table, columns),
+        t_s=t_s,
         exposure_s=numbers(columns.exposure, 0.0),
         values=values,
         sigma=given * scale * np.where(relative, np.abs(values), 1.0),
@@ -284,6 +287,7 @@ def _series(table: Table, columns: Columns) -> list[Series]:
         unit=texts("unit"),
         flag=texts("flag"),
         value_unit=columns.value_unit,
+        clock=clock,
     )
     groups: dict[tuple[str, str], list[int]] = {}
     for row, key in enumerate(zip(texts("region"), series.unit, strict=True)):
@@ -291,12 +295,30 @@ def _series(table: Table, columns: Columns) -> list[Series]:
     return [series.take(np.array(rows), region) for (region, _), rows in groups.items()]
 
 
-def _times_s(table: Table, columns: Columns) -> FloatArray:
-    """Return the times in seconds; times of day from the first row."""
+def _times_s(table: Table, columns: Columns) -> tuple[FloatArray, TableClock]:
+    """Return the times in seconds, and their clock; times of day from the first row.
+
+    So are those of a clock whose zero is far from all rows, to the last digit in the table.
+    """
     clock_s = seconds_from_first([row[columns.time] for row in table.rows])
     if clock_s is not None:
-        return clock_s
-    return _numbers(table, columns.time, None) * columns.unit_s
+        return clock_s, TableClock()
+    times = _numbers(table, columns.time, None)
+    clock = TableClock(unit_s=Decimal(repr(columns.unit_s)))
+    if not is_far(times):
+        return times * columns.unit_s, clock
+    exact = [_exact(table, row[columns.time]) for row in table.rows]
+    first = min(exact)
+    after = np.array([float(time - first) for time in exact])
+    return after * columns.unit_s, replace(clock, zero_s=first * clock.unit_s, is_lamp_off=False)
+
+
+def _exact(table: Table, cell: str) -> Decimal:
+    """Return the number in a cell with all its digits."""
+    try:
+        return Decimal(cell.strip().replace(table.decimal, "."))
+    except InvalidOperation:
+        return Decimal(repr(table.number(cell)))
 
 
 def _numbers(table: Table, column: int, empty: float | None) -> FloatArray:

@@ -35,6 +35,9 @@ from labrig.results import (
 REWEIGHTINGS = 8
 REWEIGHTED_ENOUGH = 1e-6
 FEWEST_FOR_FLICKER = 6
+#: Lifetimes of the fastest state before the first frame from which its light at lamp off, more than
+#: e^5 times as bright, is not told: amplitudes are those at the first frame.
+MOST_LIFETIMES = 5.0
 MAX_STATES = 8
 
 
@@ -67,7 +70,10 @@ def fit_decay(
     Parameters
     ----------
     t_s
-        Begin of each exposure in seconds after lamp off, shape (n,), ≥ 0, in any order.
+        Begin of each exposure in seconds, shape (n,), in any order. 0 is lamp off, where the
+        amplitudes are told, unless the fastest state lives less than a fifth of the time from
+        there to the first frame: then the clock tells nothing of lamp off, amplitudes are those at
+        the first frame, and laws with a shape begin there. So they do where all times are negative.
     values
         Signals linear in light with the dark level subtracted, shape (n,) or (n, C), in any unit.
     sigma
@@ -160,6 +166,8 @@ def fit_decay(
     noise_dof = estimated.dof if estimated else smooth.dof if flicker is None else np.inf
     likelihood = NoiseLikelihood.of(data, smooth)
     chosen, tried = _supported_states(likelihood, numbers, fixed, smooth)
+    data = referred(data, chosen)
+    likelihood = replace(likelihood, data=data)
     weights, offsets = chosen.joint.weights, chosen.joint.offsets
     student = student_factor(estimated.dof if estimated else np.inf)
     added_square = smooth.added_square(smooth.typical_flicker)
@@ -195,6 +203,14 @@ def fit_decay(
     if not is_choice:
         return result
     return replace(result, warnings=(*result.warnings, *tie_warnings(result)))
+
+
+def referred(data: WhitenedSeries, fit: StatesFit) -> WhitenedSeries:
+    """Return the data with the time at which amplitudes are told: lamp off, or the first frame."""
+    series = data.series
+    if float(np.exp(fit.log_rates.max())) * series.start <= MOST_LIFETIMES:
+        return data
+    return replace(data, series=series.from_first_frame())
 
 
 def _log_rates(rates_per_s: Sequence[float], span_s: float) -> FloatArray:

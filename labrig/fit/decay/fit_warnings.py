@@ -309,7 +309,7 @@ def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence, bent: Ben
     if bent is not None and bent.is_evident:
         colour_chi2 = bent.rest_chi2
     return Misfit(
-        t_s=(series.t + series.start) * series.span_s,
+        t_s=series.t_s,
         frames=frames,
         frame_dof=n_frames - along,
         colour_chi2=colour_chi2,

@@ -16,7 +16,7 @@ from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import DecayState, FittedDecay, UnseenState
+from labrig.results import DecayReference, DecayState, FittedDecay, UnseenState, first_row_at
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,10 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         law=evidence.law,
         laws=tuple(each.fitted for each in laws),
         rate_spectrum=evidence.rate_spectrum,
-        measured_until_s=float((series.t + series.exposure + series.start).max()) * series.span_s,
+        measured_until_s=series.first_s + float((series.t + series.exposure).max()) * series.span_s,
+        reference=(
+            DecayReference() if series.reference_s == 0 else first_row_at(series.reference_s)
+        ),
         scatter=evidence.scatter,
         sigma_factor=evidence.sigma_scale.factor if evidence.sigma_scale else 1.0,
         # A likely one is told, and is in σ.
@@ -232,7 +235,7 @@ def _to_units(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, FloatAr
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates)
     b = fit.amplitudes
-    # Amplitudes are fitted at the first frame, given at lamp off: a = b e^(k t₀).
+    # Amplitudes are fitted at the first frame, given at the reference: a = b e^(k t₀).
     growth = np.exp(rates * series.start) * series.peak
     transform = np.zeros((2 * n_states + len(series.channels), n_parameters))
     to_log_rates = np.zeros((n_states, n_parameters))
