@@ -31,6 +31,9 @@ from labrig.results import (
 REWEIGHTINGS = 2
 #: Part of the span of the rows within which times are the same.
 ROUNDING_SPANS = 1e-9
+#: How values are weighed, the last one by one σ for all.
+WEIGHTS = ("given", "counts", "equal")
+EQUAL = WEIGHTS[-1]
 #: Flag of values at a detector's ceiling.
 CLIPPED = "clipped"
 #: Rise to the maximum, in σ of the scatter of neighbours and as a fraction of the maximum, from
@@ -56,7 +59,8 @@ class TableFitOptions:
     flicker
         Relative scatter common to the channels of a frame: `auto`, a percentage, or a fraction.
     weights
-        Uncertainties of the values: `given` in the table, or those of `counts` (Poisson).
+        Uncertainties of the values: `given` in the table, those of `counts` (Poisson), or `equal`
+        for all, that of the residuals.
     origin
         Time of lamp off by the table's clock, in its unit or with one such as `5.5 min`; None if it
         is not known or at 0.
@@ -75,8 +79,15 @@ class TableFitOptions:
     law: str = AUTO
 
     def __post_init__(self) -> None:
-        if self.weights not in ("given", "counts"):
-            raise UsageError(f"--weights: expected 'given' or 'counts', got '{self.weights}'")
+        if self.weights not in WEIGHTS:
+            raise UsageError(
+                f"--weights: expected 'given', 'counts' or 'equal', got '{self.weights}'"
+            )
+        if self.weights == EQUAL and self.flicker not in ("auto", "0"):
+            raise UsageError(
+                f"--flicker: expected none beside '--weights equal', got '{self.flicker}'; the "
+                "scatter of the residuals is all noise together"
+            )
         require_law(self.law)
 
     @property
@@ -198,11 +209,20 @@ def _fit(series: Series, options: TableFitOptions) -> DecayFit:
     # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
     if np.isnan(series.sigma).all() and options.flicker == "auto":
         flicker = 0.0
-    return fit_series(series, options.states, options.offset_sigma, flicker, law=options.law)
+    return fit_series(
+        series,
+        options.states,
+        options.offset_sigma,
+        flicker,
+        law=options.law,
+        equal_weights=options.weights == EQUAL,
+    )
 
 
 def _variances(series: Series, options: TableFitOptions) -> list[VarianceOfValue | None]:
     """Return how the σ of each channel follow from its values, where they do."""
+    if options.weights == EQUAL:
+        return [None] * len(series.channels)
     if options.weights == "counts":
         return [COUNTS] * len(series.channels)
     usable = series.usable
@@ -294,7 +314,8 @@ def _join_regions(parts: Sequence[Series]) -> list[Series]:
 def _require_sigma_or_one_channel(path: Path, series: Series, options: TableFitOptions) -> None:
     """Refuse columns that cannot be weighed against each other."""
     unknown = np.isnan(series.sigma).all(axis=0)
-    if len(series.channels) > 1 and unknown.any() and options.weights != "counts":
+    weighed = not unknown.any() or options.weights == "counts"
+    if len(series.channels) > 1 and (options.weights == EQUAL or not weighed):
         columns = ", ".join(series.channels)
         raise UsageError(
             f"{path}: expected one column of values, or σ for each, got {columns}; choose one: "

@@ -75,7 +75,10 @@ def decay(
     ] = "auto",
     weights: Annotated[
         str,
-        typer.Option("--weights", help="'given' σ, or 'counts' (σ² = those expected, ≥ 5)."),
+        typer.Option(
+            "--weights",
+            help="'given' σ, 'counts' (σ² = those expected, ≥ 5), or 'equal' (that of residuals).",
+        ),
     ] = "given",
     origin: Annotated[
         str | None,

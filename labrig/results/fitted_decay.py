@@ -120,6 +120,9 @@ class ScatterSigma:
         σ of the brightest and of the faintest value, in their unit.
     dof
         Degrees of freedom of the estimate: values less those that the curve took.
+    is_of_residuals
+        Whether it is the standard deviation of the residuals, the same for all values: that of
+        unweighted least squares.
     """
 
     constant: float
@@ -128,9 +131,12 @@ class ScatterSigma:
     at_brightest: float
     at_faintest: float
     dof: float
+    is_of_residuals: bool = False
 
     def __str__(self) -> str:
         """Return where σ came from, and σ of the brightest and the faintest value."""
+        if self.is_of_residuals:
+            return f"the same for all values, {self.constant:.3g}, from the residuals"
         values = (
             f"{self.at_brightest:.3g} for all values"
             if abs(self.at_brightest - self.at_faintest) < _SAME_SIGMA * self.at_faintest

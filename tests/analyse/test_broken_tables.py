@@ -149,5 +149,5 @@ def test_a_rising_edge_of_an_instrument_is_refused(tmp_path: Path, counts: float
     edge = np.exp(-(((number - 12) / 4) ** 2))
     signal = np.convolve(edge / edge.sum(), np.exp(-0.02 * number))[:300]
     values = np.random.default_rng(41).poisson(counts * signal + 2).astype(float)
-    with pytest.raises(FitError, match="rises until (?:1[2-9]|2[0-9]|3[0-4])"):
+    with pytest.raises(FitError, match=r"rises until (?:1[2-9]|2[0-9]|3[0-4])"):
         fitted(tmp_path, number * 1.0, values, weights="counts", flicker="0")

@@ -46,11 +46,13 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
     fitted_covariance = _fitted_covariance(fit, data, evidence)
-    fast = fast_states(data, fit)
+    # Unweighted least squares: σ is that of the curvature, as every program's.
+    is_plain = evidence.scatter is not None and evidence.scatter.is_of_residuals
+    fast = None if is_plain else fast_states(data, fit)
     hidden = None if fast is None else hidden_state(data, fit, fast)
     if hidden is not None:
         fitted_covariance = fitted_covariance + hidden.covariance
-    correlation = _noise_correlation(data, fit, evidence)
+    correlation = None if is_plain else _noise_correlation(data, fit, evidence)
     laws = evidence.laws
     if correlation is not None:
         fitted_covariance = fitted_covariance + correlation.added_covariance(
@@ -194,6 +196,8 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     There a misfit of the model is allowed for, too.
     """
     covariance, noise = fit.joint.least_squares.covariance, evidence.noise
+    if evidence.scatter is not None and evidence.scatter.is_of_residuals:
+        return covariance
     if evidence.scatter is not None:
         return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter.dof)
     if evidence.sigma_scale is not None:
