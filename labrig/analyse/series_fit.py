@@ -107,10 +107,10 @@ def fit_series(
             f"{SEEN_SIGMA:g} σ; was the sample charged, is it its light that was measured, and for "
             "long enough?"
         )
-    return replace(fit, reference=_by_clock(fit.reference, series.clock))
+    return replace(fit, reference=by_clock(fit.reference, series.clock))
 
 
-def _by_clock(reference: DecayReference, clock: TableClock) -> DecayReference:
+def by_clock(reference: DecayReference, clock: TableClock) -> DecayReference:
     """Return the reference of a fit to a series with the time by its table's clock."""
     return DecayReference(
         is_lamp_off=reference.is_lamp_off and clock.is_lamp_off,

@@ -4,7 +4,7 @@ import shlex
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -19,6 +19,10 @@ from labrig.cli.matrices import (
     read_matrix,
 )
 from labrig.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    from labrig.analyse import TableFitOptions
+    from labrig.results import TableLayout
 
 #: Lights under which a mixture's colours are judged: near ultraviolet asks most of it.
 MIXTURE_LIGHTS = (*LIGHTS, "395nm")
@@ -45,10 +49,11 @@ def fits() -> None:
 
 @app.command("decay")
 def decay(
-    table: Annotated[
-        Path,
+    tables: Annotated[
+        list[Path],
         typer.Argument(
-            help="series.csv of a run, or any table of times and values, with σ or not."
+            help="series.csv of a run, or any table of times and values, with σ or not; several "
+            "with --share."
         ),
     ],
     states: Annotated[
@@ -92,6 +97,10 @@ def decay(
             "--from", help="Use points from this time on, in the table's unit or as '2 ns'."
         ),
     ] = None,
+    share: Annotated[
+        str | None,
+        typer.Option("--share", help="'rates': all tables have the same, each its amplitudes."),
+    ] = None,
     column: Column = None,
     time: Time = None,
     time_unit: TimeUnit = None,
@@ -114,7 +123,19 @@ def decay(
         _require_folder(out)
     times_s = [_time_s(text) for text in at or ()]
     options = TableFitOptions(states, offset, flicker, weights, origin, start, law)
-    fitted = fit_table(table, options, TableLayout(time, column, time_unit, decimal))
+    layout = TableLayout(time, column, time_unit, decimal)
+    if share is not None:
+        _require_one_of("--share", share, ("rates",))
+        if at:
+            raise UsageError("--at: not with --share; fit a table by itself to tell its signal")
+        _fit_shared(tables, options, layout, out, json)
+        return
+    if len(tables) > 1:
+        raise UsageError(
+            f"expected one table, got {len(tables)}; with '--share rates' all have the same rates"
+        )
+    (table,) = tables
+    fitted = fit_table(table, options, layout)
     if not json:
         typer.echo(f"columns  {fitted[0].columns}")
     for part in fitted:
@@ -137,6 +158,48 @@ def decay(
             for line in processed.changes:
                 typer.echo(line)
             typer.echo(f"report: {processed.report}")
+
+
+def _fit_shared(
+    tables: list[Path],
+    options: "TableFitOptions",
+    layout: "TableLayout",
+    out: Path | None,
+    json: bool,
+) -> None:
+    """Fit tables with shared rates, and print or write the result."""
+    from labrig.analyse import fit_shared_tables
+
+    shared, fitted = fit_shared_tables(tables, options, layout)
+    if json:
+        typer.echo(shared.to_json())
+    else:
+        for table, part in zip(shared.tables, fitted, strict=True):
+            typer.echo(f"{table.name}  {part.columns}")
+        typer.echo(str(shared))
+    if out is None:
+        return
+    from labrig.process import report_shared_decay
+
+    command = ["labrig", "fit", "decay", *map(str, tables), "--share", "rates"]
+    given = {
+        "--states": options.states,
+        "--offset": options.offset,
+        "--flicker": options.flicker,
+        "--weights": options.weights,
+        "--origin": options.origin,
+        "--from": options.start,
+        "--time": layout.time,
+        "--column": layout.column,
+        "--time-unit": layout.time_unit,
+        "--decimal": layout.decimal,
+    }
+    for option, value in given.items():
+        command += [] if value is None else [option, str(value)]
+    series = [part.series for part in fitted]
+    report = report_shared_decay(tables, shared, series, shlex.join(command), out)
+    if not json:
+        typer.echo(f"report: {report}")
 
 
 @app.command("charge")

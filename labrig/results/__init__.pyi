@@ -218,6 +218,7 @@ from .series_table import (
     read_described_series as read_described_series,
     read_series as read_series,
 )
+from .shared_decay import SharedDecay as SharedDecay, TableDecay as TableDecay
 from .summary import (
     SUMMARY as SUMMARY,
     read_summary as read_summary,
