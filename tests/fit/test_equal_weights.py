@@ -76,4 +76,4 @@ def test_sigma_of_residuals_covers_the_truth() -> None:
 
 def test_another_word_for_sigma_is_refused() -> None:
     with pytest.raises(FitError, match="'equal'"):
-        labrig.fit_decay(X, Y, "same")  # type: ignore[arg-type]
+        labrig.fit_decay(X, Y, "same")
