@@ -7,6 +7,7 @@ from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.luminance_table import LuminanceTableOptions, evaluate_luminance_table
 from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.series_fit import fit_series
+from labrig.analyse.shared_tables import fit_shared_tables
 from labrig.analyse.table_fit import FittedTable, TableFitOptions, fit_table
 from labrig.analyse.temperature import temperature_warnings
 
@@ -22,6 +23,7 @@ __all__ = [
     "evaluate_luminance_table",
     "fit_charge_table",
     "fit_series",
+    "fit_shared_tables",
     "fit_table",
     "matrix_from_cubes",
     "read_run_protocol",

@@ -8,8 +8,10 @@ import numpy as np
 
 from labrig.errors import FitError, UsageError
 from labrig.fit import ChargeFit, fit_charge_and_decay
-from labrig.results import TableLayout, read_described_series
+from labrig.results import Series, TableLayout, read_described_series
 
+#: Spans of the rows from them beyond which a switching of the lamp is by another clock.
+MOST_SPANS_AWAY = 10.0
 ORDERS = ("auto", "first", "general")
 
 
@@ -19,8 +21,9 @@ class ChargeTableOptions:
 
     Attributes
     ----------
-    on_s, off_s
-        When the lamp was switched on and off, in the table's seconds.
+    on, off
+        When the lamp was switched on and off by the table's clock, in its unit or with one such as
+        `5.5 min`.
     states
         Number of states; None chooses it.
     order
@@ -29,8 +32,8 @@ class ChargeTableOptions:
         Fraction η of the carriers that find their trap filled and recombine at once, or `free`.
     """
 
-    on_s: float
-    off_s: float
+    on: str
+    off: str
     states: int | None = None
     order: str = "auto"
     stimulated: str = "1"
@@ -96,7 +99,7 @@ def fit_charge_table(
     >>> counts = np.random.default_rng(1).poisson(light)
     >>> table = Path("charge.csv")
     >>> np.savetxt(table, np.transpose([t_s, counts]), header="t_s counts", comments="")
-    >>> options = ChargeTableOptions(on_s=0.0, off_s=99.0, order="first", stimulated="0")
+    >>> options = ChargeTableOptions(on="0", off="99", order="first", stimulated="0")
     >>> fit, columns = fit_charge_table(table, options)
     >>> columns, abs(fit.states[0].decay_time_s.value - 1 / 0.03) < 1
     ('time t_s (s, line 1); values counts; no σ', True)
@@ -108,6 +111,10 @@ def fit_charge_table(
             f"{path}: expected one series with one column of values, got {len(parts)} series of "
             f"{', '.join(series.channels)}; choose a column with --column"
         )
+    on_s, off_s = (
+        _lamp_s(path, option, text, series)
+        for option, text in (("--on", options.on), ("--off", options.off))
+    )
     sigma = series.sigma[:, 0]
     usable = series.usable
     try:
@@ -115,8 +122,8 @@ def fit_charge_table(
             series.t_s[usable],
             series.values[usable, 0],
             None if np.isnan(sigma).all() else sigma[usable],
-            light_on_s=options.on_s,
-            light_off_s=options.off_s,
+            light_on_s=on_s,
+            light_off_s=off_s,
             exposure_s=series.exposure_s[usable],
             states=options.states or "auto",
             order=cast(Literal["auto", "first", "general"], options.order),
@@ -125,3 +132,20 @@ def fit_charge_table(
     except FitError as error:
         raise FitError(f"{path}: {error}") from None
     return replace(fit, warnings=(*series.warnings, *fit.warnings)), columns
+
+
+def _lamp_s(path: Path, option: str, text: str, series: Series) -> float:
+    """Return when the lamp was switched, as the times of the series count."""
+    try:
+        at_s = series.clock.after_zero_s(text)
+    except ValueError as error:
+        raise UsageError(f"{path}: {option}: {error}") from None
+    first_s, last_s = float(series.t_s.min()), float(series.t_s.max())
+    span_s = last_s - first_s
+    if not first_s - MOST_SPANS_AWAY * span_s <= at_s <= last_s + MOST_SPANS_AWAY * span_s:
+        begin, end = (series.clock.text(t_s) for t_s in (first_s, last_s))
+        raise UsageError(
+            f"{path}: {option}: expected a time by the table's clock, whose rows are from {begin} "
+            f"to {end}, got '{text}'"
+        )
+    return at_s

@@ -22,6 +22,8 @@ FEWEST_LEFT = 8
 #: Distance below the law of the others from which a value is too low, in σ; of values that are
 #: equal, which is evidence, too.
 LOW_SIGMAS, LOW_SIGMAS_IF_EQUAL = 4.5, 1.5
+#: Residuals over the value below which they are those of numbers' last digits.
+ROUNDING = 1e-6
 #: Largest chance of noise to make values equal after rounding.
 EQUAL_CHANCE = 0.02
 
@@ -98,6 +100,8 @@ def _sigmas_below(
     own = float(series.sigma[first[0], 0])
     if law.scatter is not None:
         scatter = law.scatter
+        if scatter.is_of_residuals and scatter.constant < ROUNDING * signal:
+            return 0.0
         own = np.sqrt(
             scatter.constant**2 + scatter.counting * signal + (scatter.proportional * signal) ** 2
         )

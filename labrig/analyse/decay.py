@@ -1,5 +1,6 @@
 """Analysis of a decay, from its frames to a fit of every patch."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from importlib.metadata import version
@@ -232,10 +233,10 @@ def _material(
             State(
                 k_r_per_s=state.k_r_per_s,
                 k_r_per_s_sigma=state.k_r_sigma_per_s,
-                amplitude=state.amplitude,
+                amplitude=state.amplitude if math.isfinite(state.amplitude) else None,
                 amplitude_sigma=state.amplitude_sigma,
             )
-            for state in fit.states
+            for state in fit.states_at_lamp_off
         ),
         provenance=Provenance(
             source="decay measured with labrig; amplitudes in DN/s of the brightest channel",

@@ -12,6 +12,7 @@ from labrig.quantity import FRACTION, parse
 from labrig.results import (
     LuminanceDecay,
     LuminanceRequirement,
+    Series,
     TableLayout,
     luminance_requirement,
     luminance_unit,
@@ -29,8 +30,9 @@ class LuminanceTableOptions:
     ----------
     unit
         Unit of the luminances; None takes it from the column's name, and mcd/m² without one there.
-    off_s
-        Time of lamp off in the table's seconds.
+    off
+        Time of lamp off by the table's clock, in its unit or with one such as `5.5 min`; None if it
+        is at 0.
     scale_sigma
         Relative σ of the meter's scale, such as `4 %`.
     require
@@ -42,7 +44,7 @@ class LuminanceTableOptions:
     """
 
     unit: str | None = None
-    off_s: float = 0.0
+    off: str | None = None
     scale_sigma: str = "0 %"
     require: tuple[str, ...] = ()
     colours: str = ""
@@ -127,12 +129,13 @@ def evaluate_luminance_table(
         )
     unit = options.unit or (named[0] if named else "mcd/m2")
     factor = _factor(f"{path}: unit of {series.channels[0]}", unit)
-    rows = np.flatnonzero(series.usable & (series.t_s > options.off_s))
+    off_s = _off_s(path, options.off, series)
+    rows = np.flatnonzero(series.usable & (series.t_s > off_s))
     rows = rows[np.argsort(series.t_s[rows], kind="stable")]
     sigma = factor * series.sigma[rows, 0]
     try:
         decay = fit_luminance(
-            series.t_s[rows] - options.off_s,
+            series.t_s[rows] - off_s,
             factor * series.values[rows, 0],
             None if np.isnan(sigma).all() else sigma,
             scale_sigma=options.scale_fraction,
@@ -145,6 +148,23 @@ def evaluate_luminance_table(
         raise FitError(f"{path}: {error}") from None
     decay = replace(decay, warnings=(*series.warnings, *decay.warnings))
     return decay, f"{columns}; luminances in {unit.replace('m2', 'm²')}"
+
+
+def _off_s(path: Path, text: str | None, series: Series) -> float:
+    """Return the time of lamp off as those of the series count."""
+    if text is None:
+        first_s, last_s = float(series.t_s.min()), float(series.t_s.max())
+        if not series.clock.is_lamp_off or last_s < 0:
+            begin, end = (series.clock.text(t_s) for t_s in (first_s, last_s))
+            raise UsageError(
+                f"{path}: expected times after the light went off, got a clock from {begin} to "
+                f"{end}, which does not tell when that was; say it with --off"
+            )
+        return 0.0
+    try:
+        return series.clock.after_zero_s(text)
+    except ValueError as error:
+        raise UsageError(f"{path}: --off: {error}") from None
 
 
 def _factor(place: str, unit: str) -> float:

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.results import AUTO, Series
+from labrig.results import AUTO, DecayReference, FloatArray, Series, TableClock
 
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
@@ -25,6 +26,8 @@ def fit_series(
     flicker: float | None = None,
     fixed_rates_per_s: Sequence[float] = (),
     law: str = AUTO,
+    *,
+    equal_weights: bool = False,
 ) -> DecayFit:
     """Fit a sum of exponentials to the usable rows of a series.
 
@@ -44,6 +47,9 @@ def fit_series(
         Rates in 1/s that take part and are held; they count as states.
     law
         Law that describes the decay, as in `fit_decay`.
+    equal_weights
+        Whether all values have one σ, that of the residuals: unweighted least squares, whatever σ
+        the series has.
 
     Returns
     -------
@@ -73,12 +79,17 @@ def fit_series(
     usable = series.take(np.flatnonzero(series.usable))
     if offset_sigma is None:
         offset_sigma = np.where(np.isnan(series.dark_sigma), 0.0, series.dark_sigma)
+    sigma: FloatArray | Literal["equal"] | None = usable.sigma
+    if equal_weights:
+        sigma, flicker = "equal", 0.0
+    elif np.isnan(usable.sigma).all():
+        sigma = None
     if flicker is None and len(usable.t_s) < FRAMES_FOR_FLICKER:
         flicker = TYPICAL_FLICKER
     fit = fit_decay(
         usable.t_s,
         usable.values,
-        None if np.isnan(usable.sigma).all() else usable.sigma,
+        sigma,
         exposure_s=usable.exposure_s,
         channels=usable.channels,
         n_states=states,
@@ -96,7 +107,20 @@ def fit_series(
             f"{SEEN_SIGMA:g} σ; was the sample charged, is it its light that was measured, and for "
             "long enough?"
         )
-    return replace(fit, warnings=(*series.warnings, *fit.warnings)) if series.warnings else fit
+    return replace(
+        fit,
+        reference=by_clock(fit.reference, series.clock),
+        warnings=(*series.warnings, *fit.warnings),
+    )
+
+
+def by_clock(reference: DecayReference, clock: TableClock) -> DecayReference:
+    """Return the reference of a fit to a series with the time by its table's clock."""
+    return DecayReference(
+        is_lamp_off=reference.is_lamp_off and clock.is_lamp_off,
+        t_s=reference.t_s,
+        clock_s=float(clock.zero_s) + reference.t_s,
+    )
 
 
 def _is_seen(fit: DecayFit, first_s: float) -> bool:

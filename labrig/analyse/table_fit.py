@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from functools import partial
 from pathlib import Path
 
@@ -28,14 +29,21 @@ from labrig.results import (
 
 #: Fits in which σ that follows from the values is that of the values that the last fit expects.
 REWEIGHTINGS = 2
+#: Part of the span of the rows within which times are the same.
+ROUNDING_SPANS = 1e-9
+#: How values are weighed, the last one by one σ for all.
+WEIGHTS = ("given", "counts", "equal")
+EQUAL = WEIGHTS[-1]
 #: Flag of values at a detector's ceiling.
 CLIPPED = "clipped"
 #: Rise to the maximum, in σ of the scatter of neighbours and as a fraction of the maximum, from
 #: which a table does not begin with its decay.
-RISE_SIGMAS = 10.0
+RISE_SIGMAS = 8.0
 RISE_FRACTION = 0.1
-#: Number of neighbours in the medians from which a rise is found.
+#: Number of neighbours in the medians from which a rise is found, and of first values that tell
+#: their noise: fewer may agree by chance, and a noisy first value would be a rise.
 NEIGHBOURS = 5
+TELL_NOISE = 30
 
 
 @dataclass(frozen=True)
@@ -51,11 +59,13 @@ class TableFitOptions:
     flicker
         Relative scatter common to the channels of a frame: `auto`, a percentage, or a fraction.
     weights
-        Uncertainties of the values: `given` in the table, or those of `counts` (Poisson).
-    origin_s
-        Time of lamp off in the table's seconds.
-    from_s
-        Time in the table's seconds from which points are fitted; None takes all.
+        Uncertainties of the values: `given` in the table, those of `counts` (Poisson), or `equal`
+        for all, that of the residuals.
+    origin
+        Time of lamp off by the table's clock, in its unit or with one such as `5.5 min`; None if it
+        is not known or at 0.
+    start
+        Time from which points are fitted, as `origin`; None takes all.
     law
         Law that describes the decay, or `auto`.
     """
@@ -64,13 +74,20 @@ class TableFitOptions:
     offset: str = "zero"
     flicker: str = "auto"
     weights: str = "given"
-    origin_s: float = 0.0
-    from_s: float | None = None
+    origin: str | None = None
+    start: str | None = None
     law: str = AUTO
 
     def __post_init__(self) -> None:
-        if self.weights not in ("given", "counts"):
-            raise UsageError(f"--weights: expected 'given' or 'counts', got '{self.weights}'")
+        if self.weights not in WEIGHTS:
+            raise UsageError(
+                f"--weights: expected 'given', 'counts' or 'equal', got '{self.weights}'"
+            )
+        if self.weights == EQUAL and self.flicker not in ("auto", "0"):
+            raise UsageError(
+                f"--flicker: expected none beside '--weights equal', got '{self.flicker}'; the "
+                "scatter of the residuals is all noise together"
+            )
         require_law(self.law)
 
     @property
@@ -94,7 +111,8 @@ class FittedTable:
     region
         Name of the region; empty if the table names none.
     series
-        Fitted rows, their times counted from lamp off, with the σ that the fit used.
+        Fitted rows with the σ that the fit used, their times counted from lamp off, or from the
+        first row if amplitudes are those there.
     fit
         Fitted decay.
     columns
@@ -152,11 +170,12 @@ def fit_table(
     for series in _join_regions(parts):
         _require_sigma_or_one_channel(path, series, options)
         part = _from_origin(path, series, options)
-        _refuse_rise(path, part, options)
+        _refuse_rise(path, part)
         try:
             part, fit = _fitted(part, options)
         except FitError as error:
             raise FitError(f"{path}: {error}") from None
+        part, fit = _from_reference(part, fit)
         fits.append(FittedTable(part.region, part, fit, columns))
     return fits
 
@@ -180,7 +199,7 @@ def _fitted(series: Series, options: TableFitOptions) -> tuple[Series, DecayFit]
     fit = replace(
         fit,
         sigma_origin=_origin(fit, variances, options),
-        warnings=(*_low_warnings(series, options, low), *fit.warnings),
+        warnings=(*_low_warnings(series, low), *fit.warnings),
     )
     return replace(series, sigma=sigma), fit
 
@@ -190,11 +209,20 @@ def _fit(series: Series, options: TableFitOptions) -> DecayFit:
     # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
     if np.isnan(series.sigma).all() and options.flicker == "auto":
         flicker = 0.0
-    return fit_series(series, options.states, options.offset_sigma, flicker, law=options.law)
+    return fit_series(
+        series,
+        options.states,
+        options.offset_sigma,
+        flicker,
+        law=options.law,
+        equal_weights=options.weights == EQUAL,
+    )
 
 
 def _variances(series: Series, options: TableFitOptions) -> list[VarianceOfValue | None]:
     """Return how the σ of each channel follow from its values, where they do."""
+    if options.weights == EQUAL:
+        return [None] * len(series.channels)
     if options.weights == "counts":
         return [COUNTS] * len(series.channels)
     usable = series.usable
@@ -252,27 +280,27 @@ def _first_rows(series: Series, number: int) -> NDArray[np.intp]:
     return rows[np.argsort(series.t_s[rows], kind="stable")][:number]
 
 
-def _low_warnings(series: Series, options: TableFitOptions, low: LowStart | None) -> list[str]:
+def _low_warnings(series: Series, low: LowStart | None) -> list[str]:
     """Return what is said of first values that lie below the law of the others."""
     if low is None:
         return []
     if low.is_ceiling:
         clipped = [row for row, flag in enumerate(series.flag) if CLIPPED in flag]
         rows = sorted(clipped, key=lambda row: series.t_s[row])[: low.number]
-        last_s = max(series.t_s[rows]) + options.origin_s
+        last = _clock_time(series, max(series.t_s[rows]))
         return [
-            f"the first {low.number} values, until {last_s:.4g} s, are equal, "
+            f"the first {low.number} values, until {last}, are equal, "
             f"{series.values[rows[0], 0]:.6g}, and lie below the law of the others: the detector "
             "was saturated, and they were left out; measure them with less light or gain"
         ]
     first = _first_rows(series, low.number + 1)
     which = "value lies" if low.number == 1 else f"{low.number} values lie"
     until = "at" if low.number == 1 else "until"
-    last_s, next_s = (series.t_s[row] + options.origin_s for row in first[-2:])
+    last_s, next_s = series.t_s[first[-2:]]
     return [
-        f"the first {which}, {until} {last_s:.4g} s, below the law of the others, by "
-        f"{low.sigmas:.0f} σ: was the detector saturated, or the lamp not off yet? Leave out what "
-        f"is wrong with '--from {next_s:.6g}'"
+        f"the first {which}, {until} {_clock_time(series, last_s)}, below the law of the others, "
+        f"by {low.sigmas:.0f} σ: was the detector saturated, or the lamp not off yet? Leave out "
+        f"what is wrong with '--from {series.clock.text(next_s)}'"
     ]
 
 
@@ -287,7 +315,8 @@ def _join_regions(parts: Sequence[Series]) -> list[Series]:
 def _require_sigma_or_one_channel(path: Path, series: Series, options: TableFitOptions) -> None:
     """Refuse columns that cannot be weighed against each other."""
     unknown = np.isnan(series.sigma).all(axis=0)
-    if len(series.channels) > 1 and unknown.any() and options.weights != "counts":
+    weighed = not unknown.any() or options.weights == "counts"
+    if len(series.channels) > 1 and (options.weights == EQUAL or not weighed):
         columns = ", ".join(series.channels)
         raise UsageError(
             f"{path}: expected one column of values, or σ for each, got {columns}; choose one: "
@@ -300,23 +329,66 @@ def _quoted(name: str) -> str:
 
 
 def _from_origin(path: Path, series: Series, options: TableFitOptions) -> Series:
-    """Return the rows to fit, their times counted from lamp off."""
-    first_s = -np.inf if options.from_s is None else options.from_s
-    rows = np.flatnonzero(series.t_s >= first_s)
-    if not len(rows):
-        raise UsageError(f"{path}: no point at {first_s:g} s or later; give an earlier --from")
-    part = series.take(rows)
-    earliest_s = float(part.t_s.min())
-    if earliest_s < options.origin_s:
+    """Return the rows to fit, their times counted from lamp off where that is known."""
+    clock = series.clock
+    # Where numbers are rounded, the row at which a user begins is still the first.
+    rounding_s = ROUNDING_SPANS * float(np.ptp(series.t_s))
+    if options.start is not None:
+        first_s = _time(path, "--from", options.start, series)
+        rows = np.flatnonzero(series.t_s >= first_s - rounding_s)
+        if not len(rows):
+            last = clock.text(float(series.t_s.max()))
+            raise UsageError(
+                f"{path}: no point at {options.start} or later, the last is at {last}; give an "
+                "earlier --from"
+            )
+        series = series.take(rows)
+    if options.origin is not None:
+        origin_s = _time(path, "--origin", options.origin, series)
+        after_s = series.t_s - origin_s
+        clock = clock.from_lamp_off(clock.seconds(options.origin))
+        is_rounded = (-rounding_s <= after_s) & (after_s < 0)
+        series = replace(series, t_s=np.where(is_rounded, 0.0, after_s), clock=clock)
+    earliest_s, latest_s = float(series.t_s.min()), float(series.t_s.max())
+    # A clock whose zero is after all rows tells nothing of lamp off.
+    if earliest_s < 0 and (options.origin is not None or latest_s >= 0):
         raise UsageError(
-            f"{path}: expected times after the light went off at {options.origin_s:g} s, got "
-            f"{earliest_s:g} s; leave the earlier rows out with '--from {options.origin_s:g}', or "
-            "say when it went off with --origin"
+            f"{path}: expected times after the light went off at {clock.text(0.0)}, got "
+            f"{clock.text(earliest_s)}; leave the earlier rows out with '--from "
+            f"{clock.text(0.0)}', or say when it went off with --origin"
         )
-    return replace(part, t_s=part.t_s - options.origin_s)
+    return series
 
 
-def _refuse_rise(path: Path, series: Series, options: TableFitOptions) -> None:
+def _from_reference(series: Series, fit: DecayFit) -> tuple[Series, DecayFit]:
+    """Return series and fit with times from lamp off, or from the first row if amplitudes are."""
+    reference = fit.reference
+    if reference.is_lamp_off or reference.t_s == 0:
+        return series, fit
+    first_s = series.clock.zero_s + Decimal(repr(reference.t_s))
+    return (
+        replace(
+            series,
+            t_s=series.t_s - reference.t_s,
+            clock=replace(series.clock, zero_s=first_s, is_lamp_off=False),
+        ),
+        replace(
+            fit,
+            measured_until_s=fit.measured_until_s - reference.t_s,
+            reference=replace(reference, t_s=0.0),
+        ),
+    )
+
+
+def _time(path: Path, option: str, text: str, series: Series) -> float:
+    """Return a time by the table's clock as those of the series count."""
+    try:
+        return series.clock.after_zero_s(text)
+    except ValueError as error:
+        raise UsageError(f"{path}: {option}: {error}") from None
+
+
+def _refuse_rise(path: Path, series: Series) -> None:
     """Refuse a table that begins before its decay: with darkness, a charge, or a transient."""
     if len(series.channels) > 1 or len(set(series.unit)) > 1:
         return
@@ -329,21 +401,29 @@ def _refuse_rise(path: Path, series: Series, options: TableFitOptions) -> None:
     smooth = np.median(windows, axis=1)
     highest = int(np.argmax(smooth))
     rise = float(smooth[highest] - smooth[: highest + 1].min())
-    noise = _scatter_of_neighbours(values[: highest + NEIGHBOURS])
+    noise = _scatter_of_neighbours(values[: max(highest + NEIGHBOURS, TELL_NOISE)])
     falls = smooth[highest] - smooth[-1] > RISE_FRACTION * rise
     if falls and rise > max(RISE_SIGMAS * noise, RISE_FRACTION * float(smooth[highest])):
         peak = highest + int(np.argmax(values[highest : highest + NEIGHBOURS]))
-        start_s = t_s[peak] + options.origin_s
+        start = series.clock.text(t_s[peak])
         raise FitError(
-            f"{path}: expected a signal that decays, got one that rises until {start_s:g} s; fit "
-            f"what follows with '--from {start_s:g}', and say with --origin when the light went off"
+            f"{path}: expected a signal that decays, got one that rises until "
+            f"{_clock_time(series, t_s[peak])}; fit what follows with '--from {start}', and say "
+            "with --origin when the light went off"
         )
+
+
+def _clock_time(series: Series, t_s: float) -> str:
+    """Return a time by the table's clock, for messages."""
+    return f"{float(series.clock.zero_s) + t_s:.12g} s"
 
 
 def _scatter_of_neighbours(values: FloatArray) -> float:
     """Return the standard deviation of values about a smooth course, outliers apart."""
     second = values[2:] - 2 * values[1:-1] + values[:-2]
-    return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6))
+    typical = 1.4826 * np.median(np.abs(second))
+    # Few counts are equal more often than not.
+    return float((typical or np.sqrt(np.mean(second**2))) / np.sqrt(6))
 
 
 def _parse_sigma(text: str) -> float:

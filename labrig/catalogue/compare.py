@@ -214,7 +214,10 @@ def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> Pat
         return PatchComparison(name, laws, counts, (), math.nan, gain_b)
     law_a, law_b = a.chosen_law, b.chosen_law
     if law_a is not None and law_b is not None:
+        both = a.reference.is_lamp_off and b.reference.is_lamp_off
         differences, p_value = _differences_of_laws(law_a, law_b, a.brightest_channel, gain_b)
+        # Amplitudes at different times are not to be compared.
+        differences = differences if both else differences[:-1]
         return PatchComparison(name, laws, counts, differences, p_value, gain_b)
     if counts[0] != counts[1]:
         return PatchComparison(name, laws, counts, (), math.nan, gain_b)

@@ -4,7 +4,7 @@ import shlex
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -21,6 +21,10 @@ from labrig.cli.matrices import (
     read_matrix,
 )
 from labrig.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    from labrig.analyse import TableFitOptions
+    from labrig.results import TableLayout
 
 #: Lights under which a mixture's colours are judged: near ultraviolet asks most of it.
 MIXTURE_LIGHTS = (*LIGHTS, "395nm")
@@ -54,10 +58,11 @@ def fits() -> None:
 
 @app.command("decay")
 def decay(
-    table: Annotated[
-        Path,
+    tables: Annotated[
+        list[Path],
         typer.Argument(
-            help="series.csv of a run, or any table of times and values, with σ or not."
+            help="series.csv of a run, or any table of times and values, with σ or not; several "
+            "with --share."
         ),
     ],
     states: Annotated[
@@ -84,13 +89,26 @@ def decay(
     ] = "auto",
     weights: Annotated[
         str,
-        typer.Option("--weights", help="'given' σ, or 'counts' (σ² = those expected, ≥ 5)."),
+        typer.Option(
+            "--weights",
+            help="'given' σ, 'counts' (σ² = those expected, ≥ 5), or 'equal' (that of residuals).",
+        ),
     ] = "given",
     origin: Annotated[
-        float, typer.Option("--origin", help="Time at which the light went off, in seconds.")
-    ] = 0.0,
+        str | None,
+        typer.Option(
+            "--origin", help="When the light went off, in the table's unit or as '5.5 min'."
+        ),
+    ] = None,
     start: Annotated[
-        float | None, typer.Option("--from", help="Use points from this time on, in seconds.")
+        str | None,
+        typer.Option(
+            "--from", help="Use points from this time on, in the table's unit or as '2 ns'."
+        ),
+    ] = None,
+    share: Annotated[
+        str | None,
+        typer.Option("--share", help="'rates': all tables have the same, each its amplitudes."),
     ] = None,
     column: Column = None,
     time: Time = None,
@@ -116,9 +134,19 @@ def decay(
         _require_folder(out)
     times_s = [_time_s(text) for text in at or ()]
     options = TableFitOptions(states, offset, flicker, weights, origin, start, law)
-    fitted = fit_table(
-        table, options, TableLayout(time, column, time_unit, decimal, time_per_channel, block)
-    )
+    layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
+    if share is not None:
+        _require_one_of("--share", share, ("rates",))
+        if at:
+            raise UsageError("--at: not with --share; fit a table by itself to tell its signal")
+        _fit_shared(tables, options, layout, out, json)
+        return
+    if len(tables) > 1:
+        raise UsageError(
+            f"expected one table, got {len(tables)}; with '--share rates' all have the same rates"
+        )
+    (table,) = tables
+    fitted = fit_table(table, options, layout)
     if not json:
         typer.echo(f"columns  {fitted[0].columns}")
     for part in fitted:
@@ -128,7 +156,11 @@ def decay(
             continue
         typer.echo(f"{part.region}\n{fit}".strip())
         if times_s:
-            typer.echo(str(fit.forecast(times_s)))
+            # Without a known lamp off, times count from the first row, as the amplitudes do.
+            after_s = 0.0 if origin is None else part.series.clock.after_zero_s(origin)
+            if origin is None and not fit.reference.is_lamp_off:
+                typer.echo(f"times count from {fit.reference}")
+            typer.echo(str(fit.forecast(times_s, after_s=after_s)))
     if out is not None:
         from labrig.process import report_table
 
@@ -139,13 +171,62 @@ def decay(
             typer.echo(f"report: {processed.report}")
 
 
+def _fit_shared(
+    tables: list[Path],
+    options: "TableFitOptions",
+    layout: "TableLayout",
+    out: Path | None,
+    json: bool,
+) -> None:
+    """Fit tables with shared rates, and print or write the result."""
+    from labrig.analyse import fit_shared_tables
+
+    shared, fitted = fit_shared_tables(tables, options, layout)
+    if json:
+        typer.echo(shared.to_json())
+    else:
+        for table, part in zip(shared.tables, fitted, strict=True):
+            typer.echo(f"{table.name}  {part.columns}")
+        typer.echo(str(shared))
+    if out is None:
+        return
+    from labrig.process import report_shared_decay
+
+    command = ["labrig", "fit", "decay", *map(str, tables), "--share", "rates"]
+    given = {
+        "--states": options.states,
+        "--offset": options.offset,
+        "--flicker": options.flicker,
+        "--weights": options.weights,
+        "--origin": options.origin,
+        "--from": options.start,
+        "--time": layout.time,
+        "--column": layout.column,
+        "--time-unit": layout.time_unit,
+        "--decimal": layout.decimal,
+        "--time-per-channel": layout.time_per_channel,
+        "--block": layout.block,
+    }
+    for option, value in given.items():
+        command += [] if value is None else [option, str(value)]
+    series = [part.series for part in fitted]
+    report = report_shared_decay(tables, shared, series, shlex.join(command), out)
+    if not json:
+        typer.echo(f"report: {report}")
+
+
 @app.command("charge")
 def charge(
     table: Annotated[
         Path, typer.Argument(help="Table of times and one value, through charge and decay.")
     ],
-    on: Annotated[float, typer.Option("--on", help="When the lamp was switched on, in seconds.")],
-    off: Annotated[float, typer.Option("--off", help="When it was switched off, in seconds.")],
+    on: Annotated[
+        str,
+        typer.Option(
+            "--on", help="When the lamp was switched on, in the table's unit or as '5.5 min'."
+        ),
+    ],
+    off: Annotated[str, typer.Option("--off", help="When it was switched off, likewise.")],
     states: Annotated[
         int | None,
         typer.Option("--states", min=1, max=2, help="Number of states; chosen by default."),
@@ -212,8 +293,11 @@ def luminance(
         Path, typer.Argument(help="Table of times and luminances of an afterglow, with σ or not.")
     ],
     off: Annotated[
-        float, typer.Option("--off", help="Time at which the light went off, in seconds.")
-    ] = 0.0,
+        str | None,
+        typer.Option(
+            "--off", help="When the light went off, in the table's unit or as '5.5 min'; else at 0."
+        ),
+    ] = None,
     unit: Annotated[
         str | None,
         typer.Option("--unit", help="Unit of the luminances, where the column's name has none."),

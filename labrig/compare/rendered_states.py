@@ -128,11 +128,12 @@ class RenderedBench:
                 continue
             states = tuple(
                 _full_state(patch.material, state.amplitude, state.k_r_per_s)
-                for state in fit.states
+                for state in fit.states_at_lamp_off
             )
             each[predicted_by(number)] = (states, fit.signal(series.t_s, series.exposure_s))
         becquerel = next((law for law in fits[1].laws if law.name == "becquerel"), None)
-        if becquerel is not None and 0 < becquerel.shape <= 1 - 1 / MAX_ORDER:
+        from_lamp_off = fits[1].reference.is_lamp_off
+        if becquerel is not None and from_lamp_off and 0 < becquerel.shape <= 1 - 1 / MAX_ORDER:
             order = 1 / (1 - becquerel.shape)
             state = _full_state(
                 patch.material, becquerel.amplitude, becquerel.rate_per_s / order, order
@@ -163,7 +164,7 @@ class RenderedBench:
         for law in (*fits[1].laws, *(() if spectrum is None else (spectrum,))):
             if law.name in STATELESS:
                 name = STATELESS[law.name]
-                signals[name] = law.signal(series.t_s, series.exposure_s)
+                signals[name] = fits[1].signal(series.t_s, series.exposure_s, law.name)
                 glow[name] = np.multiply.outer(signals[name][0], colour)
         return FittedGlow(
             glow,

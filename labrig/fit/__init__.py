@@ -8,7 +8,7 @@ from labrig.fit.bispectral import (
     separate_columns,
 )
 from labrig.fit.charge import ChargeCandidate, ChargeFit, OrderState, fit_charge_and_decay
-from labrig.fit.decay import DecayFit, fit_decay
+from labrig.fit.decay import DecayFit, DecayTable, fit_decay, fit_shared_rates
 from labrig.fit.least_squares import (
     EPSILON,
     Ending,
@@ -35,6 +35,7 @@ __all__ = [
     "ChargeCandidate",
     "ChargeFit",
     "DecayFit",
+    "DecayTable",
     "Ending",
     "FloatArray",
     "HeldOutError",
@@ -54,6 +55,7 @@ __all__ = [
     "fit_mixture",
     "fit_mixture_texture",
     "fit_power_law",
+    "fit_shared_rates",
     "fit_trap_depth",
     "least_squares",
     "separate_columns",

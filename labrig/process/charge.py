@@ -77,7 +77,7 @@ def report_charge(
     >>> counts = np.random.default_rng(1).poisson(1e4 * light)
     >>> table = Path("glow.csv")
     >>> np.savetxt(table, np.transpose([t_s, counts]), header="t_s counts", comments="")
-    >>> options = ChargeTableOptions(on_s=0, off_s=100, states=1, order="first", stimulated="0")
+    >>> options = ChargeTableOptions(on="0", off="100", states=1, order="first", stimulated="0")
     >>> fit, _ = fit_charge_table(table, options)
     >>> reported = report_charge(table, fit, options, Path("glow"))
     >>> sorted(path.name for path in reported.report.parent.iterdir())  # doctest: +ELLIPSIS
@@ -91,7 +91,7 @@ def report_charge(
         sha256=checksum,
         options={name: str(value) for name, value in asdict(options).items() if value is not None},
     )
-    lamp = f"on at {options.on_s:g} s, off at {options.off_s:g} s"
+    lamp = f"on at {options.on}, off at {options.off} by the table's clock"
     about = describe_without_run(
         table.stem, "charge", table.name, [("SHA-256", checksum), ("Lamp", lamp)]
     )

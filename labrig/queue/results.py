@@ -93,7 +93,7 @@ class QueueEntry:
             return
         for patch in self.summary.parameters:
             fit = read_fitted_decay(self.summary.folder / "result" / patch / "fit.json")
-            for number, state in enumerate(fit.states, 1):
+            for number, state in enumerate(fit.states_at_lamp_off, 1):
                 yield FoundState(
                     patch,
                     number,

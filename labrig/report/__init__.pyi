@@ -104,6 +104,7 @@ from .sections import (
     Source as Source,
     Table as Table,
 )
+from .shared_decay import shared_decay_report as shared_decay_report
 from .sweep import (
     SweptPoint as SweptPoint,
     sweep_chart as sweep_chart,

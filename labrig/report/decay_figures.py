@@ -236,8 +236,13 @@ def _decay(axis: Axis, series: Series, fit: FittedDecay | None, more: Sequence[M
         marks += channel_points(series, number, series.values[:, number])
     if not usable.all():
         legend.append(LEFT_OUT)
-    panel = Panel(time_axis(t_s), axis, (*marks, *more))
+    panel = Panel(time_axis(t_s, fit), axis, (*marks, *more))
     return Chart((panel,), HEIGHT_PT, legend=tuple(legend))
+
+
+def time_label(fit: FittedDecay) -> str:
+    """Return the label of an axis of the times that a fit counts."""
+    return f"Time after {fit.reference.name} / s"
 
 
 def channel_styles(series: Series) -> list[tuple[str, str, str]]:
@@ -261,10 +266,11 @@ def channel_points(
     ]
 
 
-def time_axis(t_s: FloatArray) -> Axis:
-    """Return the axis of time after lamp off that shows all of some times."""
+def time_axis(t_s: FloatArray, fit: FittedDecay | None = None) -> Axis:
+    """Return the axis that shows all of some times, after lamp off or what a fit counts from."""
     last = float(t_s.max())
-    return linear_axis(TIME_LABEL, -0.02 * last if last else -1.0, 1.03 * last or 1.0)
+    label = TIME_LABEL if fit is None else time_label(fit)
+    return linear_axis(label, -0.02 * last if last else -1.0, 1.03 * last or 1.0)
 
 
 NOISE_HEIGHT_PT = 268.0

@@ -3,7 +3,6 @@
 import numpy as np
 
 from labrig.report.chart import (
-    Axis,
     Band,
     Chart,
     Line,
@@ -13,6 +12,7 @@ from labrig.report.chart import (
     Points,
     logarithmic_axis,
 )
+from labrig.report.decay_figures import time_label
 from labrig.report.figure_style import (
     DASH_DOTTED,
     DASHED,
@@ -92,13 +92,10 @@ def law_figure(series: Series, fit: FittedDecay) -> Chart:
         marks.append(Line(MUTED, np.full(2, at_s), ends, 0.7, DOTTED))
     unit = f" / ({series.value_unit})" if series.value_unit else ""
     axis = logarithmic_axis(f"Signal{unit}", low, ABOVE * brightest)
-    panel = Panel(_time_axis(t_s), axis, tuple(marks), Margins(top=46.0))
+    time = logarithmic_axis(time_label(fit), float(t_s[0]) / 1.1, float(t_s[-1]) * 1.1)
+    panel = Panel(time, axis, tuple(marks), Margins(top=46.0))
     return Chart((panel,), HEIGHT_PT, legend=tuple(legend), columns=3)
 
 
 def _curve(fit: FittedDecay, law: str, t_s: FloatArray) -> FloatArray:
     return fit.signal(t_s, np.zeros_like(t_s), law)[0]
-
-
-def _time_axis(t_s: FloatArray) -> Axis:
-    return logarithmic_axis("Time after lamp off / s", float(t_s[0]) / 1.1, float(t_s[-1]) * 1.1)

@@ -46,8 +46,16 @@ def _table(report: DecayReport) -> Iterator[str]:
     t_s = np.concatenate([patch.series.t_s for patch in report.patches])
     yield (
         f"The decay was read from the table {report.about.run}: {sum(counts)} values from "
-        f"{rounded(float(t_s.min()), 3)} s to {rounded(float(t_s.max()), 3)} s after lamp off."
+        f"{rounded(float(t_s.min()), 3)} s to {rounded(float(t_s.max()), 3)} s after "
+        f"{_zero(report)}."
     )
+
+
+def _zero(report: DecayReport) -> str:
+    """Return the time from which the times of a decay count, in words."""
+    fits = (patch.fit for patch in report.patches)
+    references = (str(fit.reference) for fit in fits if isinstance(fit, FittedDecay))
+    return next(references, "lamp off")
 
 
 def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
@@ -268,13 +276,14 @@ def methods(report: DecayReport, sensor: Sensor | None, late: LatenessStatistics
 def _model(report: DecayReport) -> str:
     """Return the sentence on the decay model."""
     channel = "" if len(report.patches[0].series.channels) == 1 else " in channel c"
+    zero = _zero(report)
     if not any(patch.series.exposure_s.any() for patch in report.patches):
         return (
-            f"The signal{channel} at the time t after lamp off was modelled, after Nalbach et al. "
+            f"The signal{channel} at the time t after {zero} was modelled, after Nalbach et al. "
             "[1], as a sum of n exponential decays of momentary values, T → 0:"
         )
     return (
-        f"The signal{channel} of an exposure from t to t + T after lamp off was modelled, after "
+        f"The signal{channel} of an exposure from t to t + T after {zero} was modelled, after "
         "Nalbach et al. [1], as a sum of n exponential decays, each averaged over the exposure:"
     )
 

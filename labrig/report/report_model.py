@@ -24,7 +24,9 @@ DECAY_ASSUMPTIONS = (
 
 #: Assumptions of a decay from another program's table.
 TABLE_ASSUMPTIONS = (
-    "The amplitudes aᵢ are the signal at lamp off in the unit of the table, extrapolated.",
+    "The amplitudes aᵢ are the signal at lamp off in the unit of the table, extrapolated. Where "
+    "the table's clock tells nothing of lamp off, they are those at the first row, from which all "
+    "times count here, and laws that are no sum of exponentials are taken to begin there.",
     "Times and values are as they stand in the table; where it has no exposures, a value is taken "
     "to be momentary.",
     "Uncertainties are standard uncertainties (1 σ). They do not cover a wrong model, temperature "

@@ -77,7 +77,7 @@ def residual_figure(series: Series, fit: FittedDecay) -> Chart:
     deviations = residuals(series, fit)
     channels = channel_styles(series)
     several = len(channels) > 1
-    time, usable = time_axis(exposure_middles_s(series)), series.usable
+    time, usable = time_axis(exposure_middles_s(series), fit), series.usable
     clipped = np.clip(deviations.normalised, -FARTHEST, FARTHEST)
     marks = _shaded_zero(time, BAND)
     for number in range(len(channels)):

@@ -43,6 +43,7 @@ from .decay import (
     DecayResult as DecayResult,
     NoiseBudget as NoiseBudget,
 )
+from .decay_reference import DecayReference as DecayReference, first_row_at as first_row_at
 from .direct_bispectral import (
     DirectBispectralResult as DirectBispectralResult,
     DirectColumns as DirectColumns,
@@ -217,11 +218,13 @@ from .series_table import (
     read_described_series as read_described_series,
     read_series as read_series,
 )
+from .shared_decay import SharedDecay as SharedDecay, TableDecay as TableDecay
 from .summary import (
     SUMMARY as SUMMARY,
     read_summary as read_summary,
     write_summary as write_summary,
 )
+from .table_clock import TableClock as TableClock
 from .table_layout import (
     TableLayout as TableLayout,
 )

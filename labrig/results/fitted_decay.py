@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from textwrap import wrap
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from labrig.errors import DataError, FitError
 from labrig.material import exponential_means_and_slopes
 from labrig.number_format import aligned, rounded
+from labrig.results.decay_reference import DecayReference
 from labrig.results.fitted_law import (
     EXPONENTIALS,
     LAW_LABELS,
@@ -34,7 +35,7 @@ _SAME_SIGMA = 0.05
 #: Change of a rate in σ from which what it would be due to is worth a word.
 WORTH_A_WORD = 0.3
 #: Version of `fit.json`: another number means renamed keys or other meanings.
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class DecayState:
     k_r_per_s, k_r_sigma_per_s
         Rate k in 1/s; σ is 0 if it was held.
     amplitude, amplitude_sigma
-        Amplitude a at lamp off in the brightest channel, in the unit of the values.
+        Amplitude a at lamp off, or another `reference`, in the brightest channel, in the unit of
+        the values.
     """
 
     k_r_per_s: float
@@ -118,6 +120,9 @@ class ScatterSigma:
         σ of the brightest and of the faintest value, in their unit.
     dof
         Degrees of freedom of the estimate: values less those that the curve took.
+    is_of_residuals
+        Whether it is the standard deviation of the residuals, the same for all values: that of
+        unweighted least squares.
     """
 
     constant: float
@@ -126,9 +131,12 @@ class ScatterSigma:
     at_brightest: float
     at_faintest: float
     dof: float
+    is_of_residuals: bool = False
 
     def __str__(self) -> str:
         """Return where σ came from, and σ of the brightest and the faintest value."""
+        if self.is_of_residuals:
+            return f"the same for all values, {self.constant:.3g}, from the residuals"
         values = (
             f"{self.at_brightest:.3g} for all values"
             if abs(self.at_brightest - self.at_faintest) < _SAME_SIGMA * self.at_faintest
@@ -150,7 +158,8 @@ class UnseenState:
     lifetime_s
         Its lifetime in seconds.
     share
-        Its share of all light at lamp off, which is not larger with a probability of 95 %.
+        Its share of all light at lamp off, or another `reference`, which is not larger with a
+        probability of 95 %.
     rate_changes, amplitude_changes
         Relative changes of rate and amplitude of every fitted state, by falling rate, if it had
         that share.
@@ -226,7 +235,10 @@ class FittedDecay:
     rate_spectrum
         Smooth spectrum of rates, fitted to the same data; None without a signal.
     measured_until_s
-        End of the last exposure in seconds after lamp off.
+        End of the last exposure in seconds, as the fitted times count.
+    reference
+        Time at which amplitudes hold and from which laws count: lamp off, t = 0, or the first row
+        where the clock tells nothing of lamp off.
     scatter
         Uncertainties of the values from their scatter; None if they were given.
     sigma_origin
@@ -259,6 +271,7 @@ class FittedDecay:
     laws: tuple[FittedLaw, ...]
     rate_spectrum: FittedRateSpectrum | None
     measured_until_s: float
+    reference: DecayReference = field(default=DecayReference(), kw_only=True)
     scatter: ScatterSigma | None = field(default=None, kw_only=True)
     sigma_origin: str = field(default="", kw_only=True)
     sigma_factor: float = field(default=1.0, kw_only=True)
@@ -302,7 +315,7 @@ class FittedDecay:
         return self.channels[self.brightest]
 
     def amplitudes_in(self, channel: str) -> tuple[Measured, ...]:
-        """Return the amplitude of every state in the DN/s of a channel.
+        """Return the amplitude of every state at lamp off in the DN/s of a channel.
 
         Raises
         ------
@@ -317,8 +330,31 @@ class FittedDecay:
         index = self.channels.index(channel)
         weight = Measured(self.channel_weights[index], self.channel_weights_sigma[index])
         return tuple(
-            Measured(s.amplitude, s.amplitude_sigma, "DN/s").times(weight) for s in self.states
+            Measured(s.amplitude, s.amplitude_sigma, "DN/s").times(weight)
+            for s in self.states_at_lamp_off
         )
+
+    @property
+    def states_at_lamp_off(self) -> tuple[DecayState, ...]:
+        """States with their amplitudes at t = 0; infinite where numbers do not hold them."""
+        earlier_s = self.reference.t_s
+        if earlier_s == 0:
+            return self.states
+        states = []
+        with np.errstate(over="ignore", invalid="ignore"):
+            for number, state in enumerate(self.states):
+                growth = float(np.exp(state.k_r_per_s * earlier_s))
+                own = self.covariance[2 * number : 2 * number + 2, 2 * number : 2 * number + 2]
+                by_both = growth * np.array([state.amplitude * earlier_s, 1.0])
+                sigma = float(np.sqrt(by_both @ own @ by_both))
+                states.append(
+                    replace(
+                        state,
+                        amplitude=state.amplitude * growth,
+                        amplitude_sigma=sigma if math.isfinite(sigma) else math.inf,
+                    )
+                )
+        return tuple(states)
 
     @property
     def n_states(self) -> int:
@@ -351,7 +387,7 @@ class FittedDecay:
         Parameters
         ----------
         t_s
-            Begin of each exposure in seconds after lamp off, ≥ 0, shape (n,).
+            Begin of each exposure in seconds, as the fitted times count, shape (n,).
         exposure_s
             Exposure time in seconds, ≥ 0, one for all or shape (n,).
 
@@ -399,7 +435,7 @@ class FittedDecay:
         Parameters
         ----------
         t_s, exposure_s
-            Begin after lamp off and length of the exposures in seconds, shape (n,).
+            Begin, as the fitted times count, and length of the exposures in seconds, shape (n,).
         law
             Name of the law; None is the one that describes the decay.
         with_offset
@@ -411,6 +447,7 @@ class FittedDecay:
             The law was not fitted.
         """
         other = self._law(law or self.law)
+        t_s = t_s - self.reference.t_s
         if other is not None:
             return other.signal(t_s, exposure_s, with_offset=with_offset)
         rates = np.array([state.k_r_per_s for state in self.states])
@@ -425,7 +462,11 @@ class FittedDecay:
     @property
     def compared_laws(self) -> tuple[ComparedLaw, ...]:
         """Laws that were fitted, the best first."""
-        others = [(law.name, law.formula, law.reduced_chi2, law.bic) for law in self.other_laws]
+        begin = self.reference.name
+        others = [
+            (law.name, law.formula.replace("lamp off", begin), law.reduced_chi2, law.bic)
+            for law in self.other_laws
+        ]
         own: tuple[Candidate | FittedDecay, ...] = self.candidates or (self,)
         best = min(own, key=lambda each: each.bic)
         number = f"{self.n_states} state{'' if self.n_states == 1 else 's'}"
@@ -444,8 +485,10 @@ class FittedDecay:
         bics = [candidate.bic for candidate in self.candidates] or [self.bic]
         return min([*bics, *(law.bic for law in self.other_laws)])
 
-    def forecast(self, t_s: ArrayLike, exposure_s: float = 0.0) -> DecayForecast:
-        """Return the signal at any times after lamp off, averaged over the laws by probability.
+    def forecast(
+        self, t_s: ArrayLike, exposure_s: float = 0.0, after_s: float = 0.0
+    ) -> DecayForecast:
+        """Return the signal at any times, averaged over the laws by probability.
 
         A law that describes what was measured may be wrong by a large factor later: beyond three
         times the last measured time there is no value with σ, only the bracket of all laws that
@@ -454,11 +497,14 @@ class FittedDecay:
         Parameters
         ----------
         t_s
-            Begin of each exposure in seconds after lamp off, ≥ 0, shape (n,).
+            Begin of each exposure in seconds after `after_s`, shape (n,).
         exposure_s
             Exposure time in seconds, ≥ 0.
+        after_s
+            Time from which `t_s` count, as the fitted times do: 0 is lamp off.
         """
-        t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
+        after = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
+        t = after + after_s
         exposure = np.full_like(t, exposure_s)
         compared = self.compared_laws
         curves = [self.signal(t, exposure, law.name) for law in compared]
@@ -470,14 +516,20 @@ class FittedDecay:
         sigma = np.sqrt((weights * np.where(weights > 0, spread, 0.0)).sum(axis=0))
         chi2 = np.array([law.reduced_chi2 for law in compared])
         describes = chi2 <= BRACKET_CHI2 * np.nanmin(chi2) if np.isfinite(chi2).any() else chi2 != 0
-        is_far = t > FORECAST_SPANS * self.measured_until_s
+        is_far = t > self.forecast_until_s
         return DecayForecast(
-            t_s=t,
+            t_s=after,
             value=np.where(is_far, np.nan, value),
             sigma=np.where(is_far, np.nan, sigma),
             low=values[describes].min(axis=0),
             high=values[describes].max(axis=0),
         )
+
+    @property
+    def forecast_until_s(self) -> float:
+        """Time up to which a signal is predicted with σ, as the fitted times count."""
+        begin_s = self.reference.t_s
+        return begin_s + FORECAST_SPANS * (self.measured_until_s - begin_s)
 
     @property
     def outside_sigma(self) -> str:
@@ -490,8 +542,8 @@ class FittedDecay:
             return ""
         return (
             f"a state that lives {rounded(unseen.lifetime_s, 2)} s would go unseen up to "
-            f"{rounded(100 * unseen.share, 2)} % of the light at lamp off; it would change "
-            f"{changes}; {unseen.remedy} would show it"
+            f"{rounded(100 * unseen.share, 2)} % of the light at {self.reference.name}; it would "
+            f"change {changes}; {unseen.remedy} would show it"
         )
 
     def describe_changes(
@@ -551,6 +603,7 @@ class FittedDecay:
             "rate_spectrum": self.rate_spectrum.to_dict() if self.rate_spectrum else None,
             "law_comparison": [asdict(law) for law in self.compared_laws],
             "measured_until_s": self.measured_until_s,
+            "reference": asdict(self.reference),
             "sigma_from_scatter": asdict(self.scatter) if self.scatter else None,
             "sigma_origin": self.sigma_origin,
             "sigma_factor": self.sigma_factor,
@@ -575,6 +628,8 @@ class FittedDecay:
             for number, state in enumerate(self.states, start=1)
         ]
         lines = aligned([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
+        if not self.reference.is_lamp_off:
+            lines.append(f"amplitudes are those at {self.reference}, where laws begin")
         lines.append(
             f"weights  {self._values_text(self.channel_weights, self.channel_weights_sigma)}"
         )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from labrig.errors import DataError
+from labrig.results.decay_reference import DecayReference
 from labrig.results.fitted_decay import (
     SCHEMA_VERSION,
     Candidate,
@@ -215,6 +216,7 @@ def _from_dict(content: Any) -> FittedDecay:
         laws=tuple(fitted_law(law) for law in content["laws"]),
         rate_spectrum=None if spectrum is None else fitted_rate_spectrum(spectrum),
         measured_until_s=float(content["measured_until_s"]),
+        reference=DecayReference(**content["reference"]),
         scatter=None if scatter is None else ScatterSigma(**scatter),
         sigma_origin=content["sigma_origin"],
         sigma_factor=float(content["sigma_factor"]),

@@ -166,10 +166,12 @@ class FittedLaw:
         Parameters
         ----------
         t_s, exposure_s
-            Begin after lamp off and length of the exposures in seconds, shape (n,).
+            Begin after the law's and length of the exposures in seconds, shape (n,); before it, the
+            signal is taken to be that at its begin.
         with_offset
             Whether the offset of the channel is a part of it.
         """
+        t_s = np.maximum(t_s, 0.0)
         means, slopes = DECAY_LAWS[self.name].means(self.rate_per_s, self.shape, t_s, exposure_s)
         by_rate = self.amplitude * slopes[:, 0] / self.rate_per_s
         jacobian = np.stack([means, by_rate, self.amplitude * slopes[:, 1]], axis=1)

@@ -1,7 +1,7 @@
 """Time series of one patch of the sample, frame by frame."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from labrig.errors import DataError
 from labrig.results.measured import FloatArray
+from labrig.results.table_clock import TableClock
 from labrig.results.text_files import write_csv
 
 #: Columns of series.csv that are not channels.
@@ -26,7 +27,7 @@ class Series:
     Parameters
     ----------
     t_s
-        Begin of each exposure in seconds after lamp off, shape (n,).
+        Begin of each exposure in seconds after lamp off, or by another `clock`, shape (n,).
     exposure_s
         Exposure times in seconds, shape (n,); 0 if unknown.
     values
@@ -61,6 +62,8 @@ class Series:
         Unit of `values`; empty if unknown. Not a column of series.csv.
     warnings
         What is to be said of the rows that were read, such as those left out. Not in series.csv.
+    clock
+        Clock by which the table counts that was read. Not a column of series.csv.
     """
 
     t_s: FloatArray
@@ -79,6 +82,7 @@ class Series:
     dark_correlation: FloatArray | None = None
     value_unit: str = "DN/s"
     warnings: tuple[str, ...] = ()
+    clock: TableClock = field(default=TableClock())
 
     def __post_init__(self) -> None:
         _check_shapes(self)
@@ -109,6 +113,7 @@ class Series:
             dark_correlation=self.dark_correlation,
             value_unit=self.value_unit,
             warnings=self.warnings,
+            clock=self.clock,
         )
 
     def by_unit(self) -> list["Series"]:

@@ -5,6 +5,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
+from labrig.results.table_clock import TableClock, is_far
 from labrig.results.table_columns import (
     Channel,
     Columns,
@@ -22,6 +24,7 @@ from labrig.results.table_rows import independent_rows, measured_rows, with_limi
 from labrig.results.time_axis import TimeAxis
 from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block, read_blocks, read_table_text
 from labrig.text_table.names import is_time
+from labrig.text_table.numbers import exact_number
 
 
 def join_series(parts: Sequence[Series]) -> Series:
@@ -202,7 +205,7 @@ def _parse(text: str, source: str, layout: TableLayout) -> tuple[list[Series], s
         own = _own_table(text)
         if own is not None:
             columns = _own_columns(own)
-            return _series(own, columns, _times_s(own, columns)), str(columns)
+            return _series(own, columns, *_times_s(own, columns)), str(columns)
         decimal = DECIMAL_MARKS[layout.decimal] if layout.decimal else None
         table = choose_block(read_blocks(text, decimal), layout.block)
         columns = find_columns(table, layout)
@@ -296,7 +299,7 @@ def _own_columns(table: Block) -> Columns:
 
 def _measured_series(table: Block, columns: Columns) -> list[Series]:
     """Return the series of another program's table, without rows that are no measurements."""
-    t_s, clock = _times_s(table, columns), columns.time.clock
+    (t_s, table_clock), clock = _times_s(table, columns), columns.time.clock
     used = [(channel.column, channel.sigma) for channel in columns.channels]
     rows, warnings = measured_rows(
         table, [column for pair in used for column in pair if column is not None]
@@ -306,7 +309,7 @@ def _measured_series(table: Block, columns: Columns) -> list[Series]:
         rows=tuple(table.rows[row] for row in rows),
         lines=tuple(table.lines[row] for row in rows),
     )
-    parts = _series(measured, columns, t_s[rows])
+    parts = _series(measured, columns, t_s[rows], table_clock)
     warnings = [*(clock.warnings if clock else ()), *warnings]
     if len(parts) == 1:
         resolution_s = clock.resolution_s if clock else 0.0
@@ -318,7 +321,7 @@ def _measured_series(table: Block, columns: Columns) -> list[Series]:
     return [replace(part, warnings=tuple(warnings)) for part in parts]
 
 
-def _series(table: Block, columns: Columns, t_s: FloatArray) -> list[Series]:
+def _series(table: Block, columns: Columns, t_s: FloatArray, clock: TableClock) -> list[Series]:
     """Return the series of a table by region and unit."""
     n_rows = len(table.rows)
 
@@ -349,6 +352,7 @@ def _series(table: Block, columns: Columns, t_s: FloatArray) -> list[Series]:
         unit=texts("unit"),
         flag=texts("flag"),
         value_unit=columns.value_unit,
+        clock=clock,
     )
     groups: dict[tuple[str, str], list[int]] = {}
     for row, key in enumerate(zip(texts("region"), series.unit, strict=True)):
@@ -356,14 +360,24 @@ def _series(table: Block, columns: Columns, t_s: FloatArray) -> list[Series]:
     return [series.take(np.array(rows), region) for (region, _), rows in groups.items()]
 
 
-def _times_s(table: Block, columns: Columns) -> FloatArray:
-    """Return the times in seconds; those of a clock from the first row."""
+def _times_s(table: Block, columns: Columns) -> tuple[FloatArray, TableClock]:
+    """Return the times in seconds, and their clock; times of day from the first row.
+
+    So are those of a clock whose zero is far from all rows, to the last digit in the table.
+    """
     time = columns.time
     if time.clock is not None:
-        return time.clock.t_s
+        return time.clock.t_s, TableClock()
+    clock = TableClock(unit_s=Decimal(repr(time.unit_s)))
     if time.column is None:
-        return np.arange(len(table.rows), dtype=np.float64) * time.unit_s
-    return _numbers(table, columns, time.column, None) * time.unit_s
+        return np.arange(len(table.rows), dtype=np.float64) * time.unit_s, clock
+    times = _numbers(table, columns, time.column, None)
+    if not is_far(times):
+        return times * time.unit_s, clock
+    exact = [exact_number(row[time.column], table.decimal) or Decimal(0) for row in table.rows]
+    first = min(exact)
+    after = np.array([float(each - first) for each in exact])
+    return after * time.unit_s, replace(clock, zero_s=first * clock.unit_s, is_lamp_off=False)
 
 
 def _numbers(table: Block, columns: Columns, column: int, empty: float | None) -> FloatArray:

@@ -1,6 +1,7 @@
 """Numbers in the cells of a table."""
 
 import re
+from decimal import Decimal, InvalidOperation
 
 #: Decimal marks by the name that the option `--decimal` has for them.
 DECIMAL_MARKS = {"point": ".", "comma": ","}
@@ -17,20 +18,33 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}|\d{1,4}([./-])\d{1,2}\1\d{1,4}(?:\D|$)")
 
 def parse_number(cell: str, decimal: str) -> float | None:
     """Return the number in a cell, whose decimal mark is `decimal`; None if there is none."""
+    try:
+        return float(_plain(cell, decimal))
+    except ValueError:
+        return None
+
+
+def exact_number(cell: str, decimal: str) -> Decimal | None:
+    """Return the number in a cell with all its digits; None if there is none."""
+    try:
+        return Decimal(_plain(cell, decimal))
+    except InvalidOperation:
+        return None
+
+
+def _plain(cell: str, decimal: str) -> str:
+    """Return a cell in the form that Python reads, or as one that it does not."""
     text = cell.strip().translate(_MINUS)
     if _GROUPED.fullmatch(text):
         text = _GROUPING.sub("", text)
     if decimal == ",":
         if "." in text:
-            return None
+            return ""
         text = text.replace(",", ".")
     if fortran := _FORTRAN.fullmatch(text):
         text = f"{fortran[1]}e{fortran[2]}"
-    try:
-        # Python takes an underscore for a thousands separator.
-        return None if "_" in text else float(text)
-    except ValueError:
-        return None
+    # Python takes an underscore for a thousands separator.
+    return "" if "_" in text else text
 
 
 def is_clock(cell: str) -> bool:

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.analyse import TableFitOptions, fit_table
+from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
 from labrig.process import report_table
 from tests.acceptance.coverage_table_sigma import (
@@ -78,7 +79,7 @@ def test_a_first_value_that_is_too_low_is_named_and_kept(tmp_path: Path) -> None
     t_s = np.linspace(0.5, 150, 60)
     values = np.exp(-0.03 * t_s) + 0.003 * np.random.default_rng(1).normal(size=60)
     values[0] = 0.94
-    fit = fitted(tmp_path, t_s, values, states=1, origin_s=-10.0)
+    fit = fitted(tmp_path, t_s, values, states=1, origin="-10")
     (warning,) = [text for text in fit.warnings if "law of the others" in text]
     assert "at 0.5 s" in warning
     assert "'--from 3.03" in warning
@@ -130,3 +131,23 @@ def test_the_factor_of_sigma_is_that_of_the_scatter(seed: int, factor: float) ->
     unscaled = fit_decay(t_s, values, 0.01 * fit.sigma_factor / factor, n_states=1)
     assert unscaled.states[0].k_r_per_s == pytest.approx(fit.states[0].k_r_per_s, rel=1e-6)
     assert json.loads(fit.to_json())["sigma_factor"] == fit.sigma_factor
+
+
+@pytest.mark.parametrize(("counts", "seed"), [(20.0, 3), (2000.0, 23)])
+def test_a_maximum_by_noise_is_no_rise(tmp_path: Path, counts: float, seed: int) -> None:
+    # A slow decay of counted photons: its largest value is not its first one.
+    t_s = np.arange(120) * 0.4
+    values = np.random.default_rng([41, seed]).poisson(counts * np.exp(-0.02 * t_s))
+    assert values.argmax() > 3
+    fit = fitted(tmp_path, t_s, values.astype(float), states=1, weights="counts", flicker="0")
+    assert abs(fit.rates[0].value - 0.02) < 4 * fit.rates[0].sigma
+
+
+@pytest.mark.parametrize("counts", [100.0, 10_000.0])
+def test_a_rising_edge_of_an_instrument_is_refused(tmp_path: Path, counts: float) -> None:
+    number = np.arange(300)
+    edge = np.exp(-(((number - 12) / 4) ** 2))
+    signal = np.convolve(edge / edge.sum(), np.exp(-0.02 * number))[:300]
+    values = np.random.default_rng(41).poisson(counts * signal + 2).astype(float)
+    with pytest.raises(FitError, match=r"rises until (?:1[2-9]|2[0-9]|3[0-4])"):
+        fitted(tmp_path, number * 1.0, values, weights="counts", flicker="0")

@@ -414,8 +414,8 @@ def test_a_table_has_page_figures_and_result_as_a_run_has(
     assert "from the scatter about the best monotone curve" in page
     again = labrig("fit", "decay", table, "--out", tmp_path / "out")
     assert "the same result as before" in again.out
-    other = labrig("fit", "decay", table, "--out", tmp_path / "out", "--from", "6")
-    assert "options from_s" in other.out
+    other = labrig("fit", "decay", table, "--out", tmp_path / "out", "--from", "6 s")
+    assert "options start" in other.out
     assert (tmp_path / "out" / "result-1" / "fit.json").is_file()
 
 

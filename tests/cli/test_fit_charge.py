@@ -43,7 +43,8 @@ def test_text_and_json_tell_the_order(labrig: Labrig, table: Path) -> None:
     ("options", "said"),
     [
         (("--on", "30", "--off", "20"), "expected the lamp off after it was on at 30 s"),
-        (("--on", "nan", "--off", "20"), "expected the lamp off after it was on"),
+        (("--on", "nan", "--off", "20"), "--on: expected a time such as"),
+        (("--on", "9030", "--off", "9200"), "whose rows are from"),
         (("--on", "30", "--off", "900"), "as many later, got"),
         (("--on", "30", "--off", "200", "--order", "third"), "--order: expected one of auto,"),
         (("--on", "30", "--off", "200", "--stimulated", "2"), "--stimulated: expected 'free' or"),

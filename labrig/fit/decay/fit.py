@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,12 @@ from labrig.fit.decay.laws import LawFit, fit_laws
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
 from labrig.fit.decay.result import DecayFit, assemble, student_factor
-from labrig.fit.decay.scatter import with_scatter_sigma
+from labrig.fit.decay.scatter import (
+    residual_sigma,
+    scaled_sigma,
+    with_equal_sigma,
+    with_scatter_sigma,
+)
 from labrig.fit.decay.selection import CLEAR_BIC, choose_states, is_needed, law_margin
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.sigma_scale import sigma_scale
@@ -34,14 +40,20 @@ from labrig.results import (
 #: Iterations in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
 REWEIGHTED_ENOUGH = 1e-6
+#: First fits that tell the σ of residuals, and its factor below which another one follows.
+RESCALINGS = 4
+RESCALED_ENOUGH = 0.3
 FEWEST_FOR_FLICKER = 6
+#: Lifetimes of the fastest state before the first frame from which its light at lamp off, more than
+#: e^5 times as bright, is not told: amplitudes are those at the first frame.
+MOST_LIFETIMES = 5.0
 MAX_STATES = 8
 
 
 def fit_decay(
     t_s: ArrayLike,
     values: ArrayLike,
-    sigma: ArrayLike | None,
+    sigma: ArrayLike | Literal["equal"] | None,
     *,
     exposure_s: ArrayLike = 0.0,
     channels: Sequence[str] = ("value",),
@@ -67,7 +79,10 @@ def fit_decay(
     Parameters
     ----------
     t_s
-        Begin of each exposure in seconds after lamp off, shape (n,), ≥ 0, in any order.
+        Begin of each exposure in seconds, shape (n,), in any order. 0 is lamp off, where the
+        amplitudes are told, unless the fastest state lives less than a fifth of the time from
+        there to the first frame: then the clock tells nothing of lamp off, amplitudes are those at
+        the first frame, and laws with a shape begin there. So they do where all times are negative.
     values
         Signals linear in light with the dark level subtracted, shape (n,) or (n, C), in any unit.
     sigma
@@ -75,7 +90,9 @@ def fit_decay(
         excludes a value. Of a single channel they are multiplied by the factor by which its scatter
         exceeds them, if it is not by chance and no flicker. None, for a single channel only,
         estimates them from the scatter about the best monotone curve, whatever the number of
-        states; flicker is part of it and must be 0.
+        states; flicker is part of it and must be 0. "equal" is unweighted least squares of a single
+        channel: all values have one σ, that of the residuals, √(Σ residual²/dof), and variances are
+        those of the curvature alone.
     exposure_s
         Length of the exposures in seconds, ≥ 0, a scalar or of shape (n,).
     channels
@@ -131,10 +148,13 @@ def fit_decay(
     """
     if law not in LAW_CHOICES:
         raise FitError(f"expected one of the laws {', '.join(LAW_CHOICES)}, got '{law}'")
+    is_equal = isinstance(sigma, str)
+    if isinstance(sigma, str) and sigma != "equal":
+        raise FitError(f"expected σ, None or 'equal', got '{sigma}'")
     series = decay_series(
         t_s,
         values,
-        sigma,
+        None if isinstance(sigma, str) else sigma,
         exposure_s,
         channels,
         offset_sigma,
@@ -146,7 +166,9 @@ def fit_decay(
     numbers = _numbers_of_states(series, n_states, max_states, len(fixed))
     _check_flicker(series, flicker)
     scatter: ScatterSigma | None = None
-    if not series.sigma_given:
+    if is_equal:
+        series = _with_residual_sigma(with_equal_sigma(series), numbers, fixed)
+    elif not series.sigma_given:
         series, scatter = with_scatter_sigma(series)
     scale = sigma_scale(series, flicker)
     if scale is not None:
@@ -160,6 +182,8 @@ def fit_decay(
     noise_dof = estimated.dof if estimated else smooth.dof if flicker is None else np.inf
     likelihood = NoiseLikelihood.of(data, smooth)
     chosen, tried = _supported_states(likelihood, numbers, fixed, smooth)
+    data = referred(data, chosen)
+    likelihood = replace(likelihood, data=data)
     weights, offsets = chosen.joint.weights, chosen.joint.offsets
     student = student_factor(estimated.dof if estimated else np.inf)
     added_square = smooth.added_square(smooth.typical_flicker)
@@ -172,6 +196,10 @@ def fit_decay(
     all_needed = is_needed(likelihood, chosen, tried)
     envelope_data = data
     data, chosen = _reweighted(data, chosen, smooth.flicker)
+    if is_equal and chosen.dof(data) > 0:
+        data, chosen = _rescaled(data, chosen)
+        scatter = residual_sigma(data.series, chosen.dof(data))
+        noise_dof = scatter.dof
     refuse_if_constant(chosen, data)
     result = assemble(
         data,
@@ -195,6 +223,14 @@ def fit_decay(
     if not is_choice:
         return result
     return replace(result, warnings=(*result.warnings, *tie_warnings(result)))
+
+
+def referred(data: WhitenedSeries, fit: StatesFit) -> WhitenedSeries:
+    """Return the data with the time at which amplitudes are told: lamp off, or the first frame."""
+    series = data.series
+    if float(np.exp(fit.log_rates.max())) * series.start <= MOST_LIFETIMES:
+        return data
+    return replace(data, series=series.from_first_frame())
 
 
 def _log_rates(rates_per_s: Sequence[float], span_s: float) -> FloatArray:
@@ -286,6 +322,36 @@ def _chosen_law(
     if law not in bics:
         raise FitError(f"expected a signal that decays by the law '{law}', got none")
     return law
+
+
+def _with_residual_sigma(series: DecaySeries, numbers: range, fixed: FloatArray) -> DecaySeries:
+    """Return the series with one σ for all values, that of the residuals of a first fit.
+
+    The scatter about a monotone curve is no better than the curve's grid of rates: data that are
+    exact to many digits would be fitted to a part of them, and their states not told apart.
+    """
+    for _ in range(RESCALINGS):
+        smooth = envelope(series, 0.0)
+        data = whitened(series, smooth.signal, 0.0)
+        likelihood = NoiseLikelihood.of(data, smooth)
+        chosen, _ = _supported_states(likelihood, numbers, fixed, smooth)
+        chosen = refit(data, chosen)
+        dof = chosen.dof(data)
+        if dof <= 0 or chosen.joint.chi2 == 0:
+            return series
+        factor = float(np.sqrt(chosen.joint.chi2 / dof))
+        series = scaled_sigma(series, factor)
+        if factor > RESCALED_ENOUGH:
+            return series
+    return series
+
+
+def _rescaled(data: WhitenedSeries, fit: StatesFit) -> tuple[WhitenedSeries, StatesFit]:
+    """Return data with the σ of the residuals, and the same fit to them."""
+    factor = float(np.sqrt(fit.joint.chi2 / fit.dof(data)))
+    series = scaled_sigma(data.series, factor)
+    data = whitened(series, fit.signal(series), 0.0)
+    return data, refit(data, fit)
 
 
 def _reweighted(

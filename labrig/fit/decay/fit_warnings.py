@@ -39,6 +39,9 @@ from labrig.results import (
 )
 
 RISING_SIGMAS = 5.0
+#: Residuals over the largest value below which they are those of numbers' last digits, which are
+#: finer for small numbers than for large ones.
+ROUNDING = 1e-6
 #: Degrees of freedom of an estimated flicker below which its prior makes σ: Student's t then has no
 #: variance. Above, the flicker's own uncertainty is in σ.
 FEWEST_FLICKER_DOF = 2.0
@@ -214,7 +217,9 @@ def warnings_about(
     closer = small_chi2_warnings(joint.chi2, fit.dof(data), evidence.scatter is not None)
     warnings += closer
     # The order of residuals that are far smaller than any scatter is that of rounding errors.
-    is_rounding = bool(closer) and evidence.scatter is not None
+    of_residuals = evidence.scatter is not None and evidence.scatter.is_of_residuals
+    is_exact = of_residuals and float(series.inverse_sigma.max()) * ROUNDING > 1
+    is_rounding = (bool(closer) and evidence.scatter is not None) or is_exact
     if not is_rounding and evidence.law != RATE_SPECTRUM:
         law = evidence.chosen_law
         judged = (data, joint) if law is None else (evidence.data, law.joint)
@@ -309,7 +314,7 @@ def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence, bent: Ben
     if bent is not None and bent.is_evident:
         colour_chi2 = bent.rest_chi2
     return Misfit(
-        t_s=(series.t + series.start) * series.span_s,
+        t_s=series.t_s,
         frames=frames,
         frame_dof=n_frames - along,
         colour_chi2=colour_chi2,

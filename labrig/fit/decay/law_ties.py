@@ -8,7 +8,6 @@ from labrig.fit.decay.selection import CLEAR_BIC
 from labrig.number_format import rounded
 from labrig.results import (
     EXPONENTIALS,
-    FORECAST_SPANS,
     LAW_LABELS,
     RATE_SPECTRUM,
     ComparedLaw,
@@ -22,7 +21,7 @@ SUPPORTED_BIC = 4.0
 #: Difference of two laws at the end of a forecast, in their σ, from which it matters which holds.
 #: A law that contains the other one, as one trap does the exponential, differs by less.
 MATTERS_SIGMAS = 3.0
-#: Part of the signal at lamp off below which it does not matter whether rates are spread.
+#: Part of the signal where amplitudes hold below which it does not matter whether rates are spread.
 DARKNESS = 1e-4
 #: Relative difference of a spectrum's forecast from which it matters: two states that are close
 #: together differ from it by less.
@@ -38,7 +37,7 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
     ]
     if not ties:
         return []
-    at_s = FORECAST_SPANS * fit.measured_until_s
+    at_s = fit.forecast_until_s - fit.reference.t_s
     signals = [_signal(fit, law.name)[0] for law in (taken, *ties)]
     lowest = max(min(signals), np.finfo(float).tiny)
     return [
@@ -55,7 +54,7 @@ def _is_close(fit: FittedDecay, taken: ComparedLaw, other: ComparedLaw) -> bool:
 
 
 def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:
-    return _signal_at(FORECAST_SPANS * fit.measured_until_s, fit, law)
+    return _signal_at(fit.forecast_until_s, fit, law)
 
 
 def _signal_at(t_s: float, fit: FittedDecay, law: str) -> tuple[float, float]:
@@ -68,7 +67,7 @@ def _differs(fit: FittedDecay, law: str) -> bool:
     other, variance = _signal(fit, law)
     if law == RATE_SPECTRUM:
         # What it has beyond the record hardly constrains: the law taken would have to hold it.
-        variance = (DARKNESS * _signal_at(0.0, fit, fit.law)[0]) ** 2
+        variance = (DARKNESS * _signal_at(fit.reference.t_s, fit, fit.law)[0]) ** 2
         if abs(own - other) < SPREAD_MATTERS * min(own, other):
             return False
     return bool(abs(own - other) > MATTERS_SIGMAS * np.sqrt(own_variance + variance))

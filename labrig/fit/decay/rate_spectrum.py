@@ -24,6 +24,8 @@ RATES = 28
 #: Logarithm of the slowest rate, in 1/spans, beside a free offset. Slower ones and a negative
 #: offset cancel: the signal would be as uncertain as one likes.
 SLOWEST_BESIDE_OFFSET = -float(np.log(3.0))
+#: Largest decay exponent k t from lamp off to the first frame: squares overflow beyond e^300.
+LARGEST_PHASE = 300.0
 #: Strengths of the penalty relative to the data's own information on an amplitude. Below, a
 #: spectrum is no longer smooth: it is a few exponentials.
 STRENGTHS = 10.0 ** np.arange(-6.0, 0.1, 0.5)
@@ -66,6 +68,8 @@ def fit_rate_spectrum(
     series = data.series
     problem = projection(data, weights)
     low, high = series.log_rate_bounds
+    if series.start > 0:
+        high = min(high, float(np.log(LARGEST_PHASE / series.start)))
     if np.isinf(series.offset_sigma).any():
         low = max(low, SLOWEST_BESIDE_OFFSET)
     rates = np.exp(np.linspace(low, high, RATES))
@@ -87,7 +91,7 @@ def fit_rate_spectrum(
     if not best.amplitudes.any():
         return None
     deviance = likelihood.deviance(problem.target - columns @ best.amplitudes)
-    # Amplitudes are fitted at the first frame, given at lamp off.
+    # Amplitudes are fitted at the first frame, given at the reference.
     growth = np.append(np.exp(rates * series.start), 1.0) * series.peak
     kept = data.signal_design(problem.unit, means[:, best.kept])
     offsets = data.offsets_of(data.target - kept @ best.amplitudes[best.kept])

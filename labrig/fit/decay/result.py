@@ -16,7 +16,7 @@ from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import DecayState, FittedDecay, UnseenState
+from labrig.results import DecayReference, DecayState, FittedDecay, UnseenState, first_row_at
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,13 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
     fitted_covariance = _fitted_covariance(fit, data, evidence)
-    fast = fast_states(data, fit)
+    # Unweighted least squares: σ is that of the curvature, as every program's.
+    is_plain = evidence.scatter is not None and evidence.scatter.is_of_residuals
+    fast = None if is_plain else fast_states(data, fit)
     hidden = None if fast is None else hidden_state(data, fit, fast)
     if hidden is not None:
         fitted_covariance = fitted_covariance + hidden.covariance
-    correlation = _noise_correlation(data, fit, evidence)
+    correlation = None if is_plain else _noise_correlation(data, fit, evidence)
     laws = evidence.laws
     if correlation is not None:
         fitted_covariance = fitted_covariance + correlation.added_covariance(
@@ -114,7 +116,10 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         law=evidence.law,
         laws=tuple(each.fitted for each in laws),
         rate_spectrum=evidence.rate_spectrum,
-        measured_until_s=float((series.t + series.exposure + series.start).max()) * series.span_s,
+        measured_until_s=series.first_s + float((series.t + series.exposure).max()) * series.span_s,
+        reference=(
+            DecayReference() if series.reference_s == 0 else first_row_at(series.reference_s)
+        ),
         scatter=evidence.scatter,
         sigma_factor=evidence.sigma_scale.factor if evidence.sigma_scale else 1.0,
         # A likely one is told, and is in σ.
@@ -191,6 +196,8 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     There a misfit of the model is allowed for, too.
     """
     covariance, noise = fit.joint.least_squares.covariance, evidence.noise
+    if evidence.scatter is not None and evidence.scatter.is_of_residuals:
+        return covariance
     if evidence.scatter is not None:
         return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter.dof)
     if evidence.sigma_scale is not None:
@@ -232,7 +239,7 @@ def _to_units(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, FloatAr
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates)
     b = fit.amplitudes
-    # Amplitudes are fitted at the first frame, given at lamp off: a = b e^(k t₀).
+    # Amplitudes are fitted at the first frame, given at the reference: a = b e^(k t₀).
     growth = np.exp(rates * series.start) * series.peak
     transform = np.zeros((2 * n_states + len(series.channels), n_parameters))
     to_log_rates = np.zeros((n_states, n_parameters))

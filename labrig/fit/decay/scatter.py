@@ -19,7 +19,7 @@ import numpy as np
 from labrig.fit.decay.envelope import envelope, monotone_curve
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import whitened
-from labrig.fit.least_squares import FloatArray
+from labrig.fit.least_squares import EPSILON, FloatArray
 from labrig.results import ScatterSigma
 
 #: Iterations in which the weights of the curve follow σ; the third changes σ by less than 1 %.
@@ -67,6 +67,36 @@ def with_scatter_sigma(series: DecaySeries) -> tuple[DecaySeries, ScatterSigma]:
         at_faintest=float(sigma[np.argmin(curve)]) * series.peak,
         dof=law.dof,
     )
+
+
+def with_equal_sigma(series: DecaySeries) -> DecaySeries:
+    """Return a series without σ with one for all values, that of their scatter.
+
+    Raises
+    ------
+    FitError
+        The signal does not decay.
+    """
+    if len(series.repeats) > 1:
+        series = envelope(series, 0.0).series
+    data = whitened(series, np.zeros_like(series.values), 0.0)
+    curve, offsets, leverage, _ = monotone_curve(data, np.ones(1))
+    residual = series.values[:, 0] - curve - offsets[0]
+    dof = max(len(residual) - float(leverage.sum()), 1.0)
+    return scaled_sigma(series, float(np.sqrt(residual @ residual / dof)))
+
+
+def scaled_sigma(series: DecaySeries, factor: float) -> DecaySeries:
+    """Return the series with its σ times a factor, as far as numbers have digits."""
+    smallest = float(np.min(1 / series.inverse_sigma[series.inverse_sigma > 0]))
+    factor = max(factor, EPSILON / smallest)
+    return replace(series, inverse_sigma=series.inverse_sigma / factor)
+
+
+def residual_sigma(series: DecaySeries, dof: int) -> ScatterSigma:
+    """Return the σ of a series that is the same for all values, that of residuals."""
+    sigma = series.peak / float(series.inverse_sigma.max())
+    return ScatterSigma(sigma, 0.0, 0.0, sigma, sigma, float(dof), is_of_residuals=True)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from labrig.fit.least_squares import FloatArray
 SLOWEST_SPANS = 50.0
 #: Fastest rate searched: this many decays within the shortest step between frames.
 FASTEST_DECAYS = 10.0
-#: Largest decay exponent k t before the first frame: squares overflow beyond e^300.
-LARGEST_PHASE = 300.0
 
 NO_DECAY = (
     "expected a signal that decays, got none that a positive exponential describes; "
@@ -31,8 +29,6 @@ class DecaySeries:
     ----------
     t, exposure
         Begin since that of the first frame, and length of the exposures, in spans, shape (n,).
-    start
-        Time of the first frame in spans.
     values, inverse_sigma
         Values and inverse σ, shape (n, C); an inverse σ of 0 marks a missing value.
     correlation
@@ -43,6 +39,9 @@ class DecaySeries:
         Correlation of the offsets' priors, shape (C, C).
     span_s, peak
         Units of the times, in s, and of the values.
+    first_s, reference_s
+        Times as given, in s, of the first frame, and at which amplitudes are told and laws begin:
+        0, which is lamp off, or that of the first frame.
     order
         Indices that sort the frames as given by time, shape (n,).
     repeat, levels
@@ -56,7 +55,6 @@ class DecaySeries:
 
     t: FloatArray
     exposure: FloatArray
-    start: float
     values: FloatArray
     inverse_sigma: FloatArray
     correlation: FloatArray
@@ -64,6 +62,8 @@ class DecaySeries:
     offset_correlation: FloatArray
     span_s: float
     peak: float
+    first_s: float
+    reference_s: float
     order: NDArray[np.intp]
     repeat: NDArray[np.intp]
     levels: FloatArray
@@ -75,6 +75,20 @@ class DecaySeries:
     def n_frames(self) -> int:
         """Number of frames."""
         return len(self.t)
+
+    def from_first_frame(self) -> "DecaySeries":
+        """Return the series with its first frame as the reference of amplitudes and laws."""
+        return replace(self, reference_s=self.first_s)
+
+    @property
+    def start(self) -> float:
+        """Time of the first frame after the reference, in spans."""
+        return (self.first_s - self.reference_s) / self.span_s
+
+    @property
+    def t_s(self) -> FloatArray:
+        """Begin of the exposures in s, as given, shape (n,)."""
+        return np.asarray(self.first_s + self.t * self.span_s)
 
     @cached_property
     def n_values(self) -> int:
@@ -132,10 +146,7 @@ class DecaySeries:
         """Logarithms of the slowest and the fastest rate that the times resolve, in 1/spans."""
         steps = np.diff(self.t)
         shortest = float(steps[steps > 0].min())
-        fastest = FASTEST_DECAYS / shortest
-        if self.start > 0:
-            fastest = min(fastest, LARGEST_PHASE / self.start)
-        return float(-np.log(SLOWEST_SPANS)), float(np.log(fastest))
+        return float(-np.log(SLOWEST_SPANS)), float(np.log(FASTEST_DECAYS / shortest))
 
 
 def decay_series(
@@ -183,11 +194,12 @@ def decay_series(
     _refuse_unless_finite("times", t)
     _refuse_unless_finite("values", y[measured])
     _refuse_unless_finite("exposures", exposure)
-    if t.min() < 0 or exposure.min() < 0:
-        earliest = min(t.min(), exposure.min())
+    if exposure.min() < 0:
+        raise FitError(f"expected exposures ≥ 0, got {exposure.min():g} s; give their lengths")
+    if t.min() < 0 <= t.max():
         raise FitError(
-            f"expected times after lamp off and exposures ≥ 0, got {earliest:g} s; "
-            "count the time from when the lamp went off"
+            f"expected all times after lamp off, at 0 s, got {t.min():g} s; leave out what was "
+            "before it, or count the time from when the lamp went off"
         )
     order = np.argsort(t, kind="stable")
     span = float(t.max() - t.min())
@@ -203,7 +215,6 @@ def decay_series(
     return DecaySeries(
         t=(t[order] - t.min()) / span,
         exposure=exposure[order] / span,
-        start=float(t.min()) / span,
         values=y[order] / peak,
         inverse_sigma=inverse_sigma[order] * (peak if sigma is not None else 1.0),
         correlation=_correlation(correlation, len(names)),
@@ -212,6 +223,9 @@ def decay_series(
         offset_correlation=_correlation(offset_correlation, len(names)),
         span_s=span,
         peak=peak,
+        first_s=float(t.min()),
+        # A clock whose zero is after all frames tells nothing of lamp off.
+        reference_s=min(float(t.min()), 0.0),
         order=order,
         repeat=np.array([repeat_names.index(name) for name in frame_repeats])[order],
         levels=np.ones(len(repeat_names)),
