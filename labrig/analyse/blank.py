@@ -155,7 +155,7 @@ def analyse(part: Part) -> BlankResult:
     return BlankResult(
         calibration=file,
         stray_light=light,
-        warnings=(*timing_warnings(run, "blank"), *_warnings(file, light)),
+        warnings=(*timing_warnings(run, "blank"), *series.warnings, *_warnings(file, light)),
     )
 
 

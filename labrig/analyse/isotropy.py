@@ -59,7 +59,7 @@ def analyse(part: Part) -> IsotropyResult:
             *(
                 f"{name}: {line}" if len(patches) > 1 else line
                 for name, glow in patches.items()
-                for line in _warnings(glow)
+                for line in (*series[name].warnings, *_warnings(glow))
             ),
         ),
     )

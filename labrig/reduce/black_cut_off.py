@@ -12,8 +12,8 @@ Two steps undo it, both by the noise of the camera alone, s² = r² + g μ (read
   themselves. What is then done with pixels may ignore the cut-off;
 - the rest of M is undone in the mean over a region, whose pixels are nearly alike.
 
-The noise is that of each frame's small tiles: their means and variances lie on a curve that r and g
-determine, with light or without.
+The noise is that of each frame's small tiles: their means, variances and fractions of pixels that
+are cut off lie on a curve that r and g determine, with light or without.
 
 References
 ----------
@@ -45,8 +45,11 @@ _ROUGH = 4.0
 _NEAR_BLACK = 12.0
 #: Fraction of its pixels at the lowest number from which a group is near black.
 _NEAR_FRACTION = 0.05
-#: Relative variance of a variance of n pixels by differences, times n.
-_VARIANCE_OF_VARIANCE = 3.0
+#: Relative variance of a variance of n pixels by differences along halves of tiles, times n; those
+#: of noise that is cut off scatter by more than those of normal noise.
+_VARIANCE_OF_VARIANCE = 10.0
+#: σ of a fraction at the lowest number by structure within tiles.
+_STRUCTURE = 0.01
 #: Read noise in photo-electrons where the frame does not tell it, and its σ in logarithms.
 _USUAL_ELECTRONS, _LOG_SIGMA = 5.0, 1.0
 #: Read noise in steps of the camera's numbers below which there is none to be seen.
@@ -257,12 +260,23 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
 
     def misfit(logarithms: Floats) -> Floats:
         noise = _noise(logarithms)
-        expected = np.interp(groups.mean, *_moments(noise, groups.mean.max())[:2])
+        mean, variance, at_lowest = _moments(noise, groups.mean.max())
         relative = np.sqrt(_VARIANCE_OF_VARIANCE / groups.pixels)
+        # A mean too large by chance comes with too few pixels at the lowest number.
+        slope = np.gradient(at_lowest) / np.gradient(mean)
+        scatter = at_lowest * (1 - at_lowest) + slope * (slope * variance + 2 * at_lowest * mean)
+        fraction_sigma = np.hypot(
+            np.sqrt(np.interp(groups.mean, mean, np.maximum(scatter, 0.0)) / groups.pixels),
+            np.hypot(1 / groups.pixels, _STRUCTURE),
+        )
         # The logarithm of a measured variance is too small by half of its own variance on average.
-        return np.append(
-            np.log(groups.variance / expected) / relative + relative / 2,
-            (logarithms[1] + np.log(_USUAL_ELECTRONS)) / _LOG_SIGMA,
+        log_ratio = np.log(groups.variance / np.interp(groups.mean, mean, variance))
+        return np.concatenate(
+            [
+                log_ratio / relative + relative / 2,
+                (groups.at_lowest - np.interp(groups.mean, mean, at_lowest)) / fraction_sigma,
+                [(logarithms[1] + np.log(_USUAL_ELECTRONS)) / _LOG_SIGMA],
+            ]
         )
 
     bounds = (np.log(start) - 1.5, np.log(1e-3)), (np.log(start) + 1.5, np.log(10.0))

@@ -160,8 +160,8 @@ class PlaneCount:
         Temporal noise of the pixels.
     cut_off
         Number of pixels at which the camera cut off noise below black.
-    cut_off_sigma
-        Standard uncertainty in DN of what the mean is corrected by for them.
+    cut_off_dn, cut_off_sigma
+        What the mean is lowered by for them in DN, and its standard uncertainty.
     """
 
     colour: str
@@ -171,6 +171,7 @@ class PlaneCount:
     hot: int | None
     noise: PlaneNoise
     cut_off: int = 0
+    cut_off_dn: float = 0.0
     cut_off_sigma: float = 0.0
 
 
@@ -288,6 +289,10 @@ def _count_region(
             lowest = float(count[level == raw.cut_off.lowest_dn].sum())
             black_dn = raw.black[position] - raw.cut_off.lowest_dn
             plane_count = _uncut(plane_count, raw.cut_off, black_dn, lowest)
+            raised = level - raw.black[position] - plane_count.value
+            plane_count = replace(
+                plane_count, cut_off_dn=float(raised @ count) / max(float(count.sum()), 1.0)
+            )
         planes.append(plane_count)
     return planes
 
@@ -373,6 +378,8 @@ class ChannelStats:
     cut_off
         Number of pixels at which the camera cut off noise below black, for which `mean` is
         corrected.
+    cut_off_dn
+        What `mean` is lowered by in that correction.
     cut_off_sigma
         Part of `sigma` by that correction, which all pixels of the frame have in common.
     read_dn
@@ -387,6 +394,7 @@ class ChannelStats:
     saturated: int
     hot: int | None
     cut_off: int = 0
+    cut_off_dn: float = 0.0
     cut_off_sigma: float = 0.0
     read_dn: float | None = None
 
@@ -652,5 +660,6 @@ def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
         saturated=sum(plane.saturated for plane in planes),
         hot=sum(outliers) if outliers else None,
         cut_off=sum(plane.cut_off for plane in planes),
+        cut_off_dn=sum(plane.cut_off_dn * float(plane.count.sum()) for plane in planes) / n,
         cut_off_sigma=cut_off_sigma,
     )

@@ -220,6 +220,13 @@ def cut_off_sigmas(views: Sequence[RegionMeasurement]) -> Floats:
     )
 
 
+def cut_off_levels(views: Sequence[RegionMeasurement]) -> Floats:
+    """Return what the means are lowered by for noise cut off below black in DN, shape (n, C)."""
+    return np.array(
+        [[stats.cut_off_dn for stats in view.measured.channels.values()] for view in views]
+    )
+
+
 def pixels(views: Sequence[RegionMeasurement]) -> Floats:
     """Return the number of pixels of each channel, shape (C,)."""
     return np.array([stats.n for stats in views[0].measured.channels.values()], dtype=np.float64)

@@ -16,6 +16,7 @@ from labrig.reduce.measured_frames import (
     MeasuredFrame,
     RegionMeasurement,
     SeriesFrame,
+    cut_off_levels,
     cut_off_sigmas,
     levels,
     measure_frames,
@@ -116,12 +117,15 @@ class _PatchDark:
         The patch in the dark frames.
     is_cut_off
         Whether noise below black is cut off in each of them.
+    cut_off
+        What the level is lowered by for that in DN, shape (C,).
     """
 
     kind: tuple[int, int, tuple[str, ...]]
     model: DarkModel
     frames: PatchFrames
     is_cut_off: bool
+    cut_off: Floats
 
 
 def reduce_series(
@@ -292,6 +296,7 @@ def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]
         fit_dark(exposure_s, level, frames.sigma),
         frames,
         all(view.is_cut_off for view in views),
+        cut_off_levels(views).mean(axis=0),
     )
 
 
@@ -315,6 +320,9 @@ class _PatchLevels:
         Part of `dark_sigma` by a sensor that warms, shape (n, C).
     darks
         The patch in the dark frames at the ISO of each unit, where there are any.
+    cut_off
+        What the correction for noise cut off below black adds to the patch above its dark level in
+        DN, shape (n, C).
     """
 
     name: str
@@ -325,6 +333,7 @@ class _PatchLevels:
     dark_sigma: Floats
     drift: Floats
     darks: Mapping[str, PatchFrames]
+    cut_off: Floats
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
@@ -342,10 +351,12 @@ def _patch_levels(
     drift = np.zeros_like(level)
     unexposed = np.zeros_like(level)
     dark_of_unit: dict[str, PatchFrames] = {}
+    cut_off = -cut_off_levels(views)
     backgrounds = _backgrounds(measured)
     if backgrounds:
         dark = unexposed = levels(backgrounds)[0]
         dark_sigma = np.zeros_like(level)
+        cut_off += cut_off_levels(backgrounds)
     elif darks:
         for row, (entry, view) in enumerate(zip(measured, views, strict=True)):
             patch_dark = darks.get((name, _setting_key(entry.iso)))
@@ -363,6 +374,7 @@ def _patch_levels(
                 )
             dark[row], model_sigma = patch_dark.model.dark_level(entry.frame.exposure_s)
             unexposed[row] = patch_dark.model.base
+            cut_off[row] += patch_dark.cut_off
             drift[row] = TWO_DEGREES * np.abs(patch_dark.model.current(entry.frame.exposure_s))
             dark_sigma[row] = np.hypot(model_sigma, drift[row])
             dark_of_unit[entry.frame.unit] = patch_dark.frames
@@ -375,6 +387,7 @@ def _patch_levels(
         dark_sigma,
         drift,
         dark_of_unit,
+        cut_off,
     )
 
 
@@ -456,6 +469,26 @@ def _patch_series(
         region=patch.name,
         correlation=patch_noise.correlation,
         dark_correlation=_dark_correlation(dark_sigma, drift_sigma, patch_noise.correlation),
+        warnings=_cut_off_warning(patch, patch.cut_off / per_second, sigma),
+    )
+
+
+def _cut_off_warning(patch: _PatchLevels, added: Floats, sigma: Floats) -> tuple[str, ...]:
+    """Return one line on the correction for noise cut off below black; empty without one.
+
+    `added` is what it adds to the values, in their unit as `sigma`, shape (n, C).
+    """
+    usable = patch.usable
+    if not patch.cut_off[usable].any():
+        return ()
+    sigmas = (np.abs(added) / sigma)[usable].max(axis=1)
+    begin = "the camera subtracts black and cuts off noise below it, for which values are corrected"
+    if sigmas.max() <= 1:
+        return (f"{begin} by less than their σ",)
+    return (
+        f"{begin} by up to {np.abs(added[usable]).max():.2g} DN/s, in "
+        f"{np.count_nonzero(sigmas > 1)} of {len(sigmas)} frames by more than their σ: what is "
+        "faint rests on it; if the camera can keep its black level (offset, brightness), let it",
     )
 
 
