@@ -39,8 +39,9 @@ _STANDS_OUT, _LEVELS_ABOVE = 2.0, 3
 _TILES_ACROSS = 64
 #: Tiles of similar brightness that are taken together, and the most groups of them.
 _GROUP_TILES, _MOST_GROUPS = 3, 16
-#: Multiple of the median variance from which a tile has structure or a hot pixel.
-_ROUGH = 4.0
+#: Multiple of the median variance from which a tile has structure or a hot pixel, and of the
+#: variance by differences from which its pixels are not about one level: an edge lies in it.
+_ROUGH, _UNEVEN = 4.0, 2.0
 #: Multiple of the read noise up to which a level tells the noise near black.
 _NEAR_BLACK = 12.0
 #: Fraction of its pixels at the lowest number from which a group is near black.
@@ -250,8 +251,10 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
     """Return the cut-off at a number; None if tiles near it show no noise that is cut off."""
     cut = np.concatenate([tiles(plane, _TILES_ACROSS) - lowest for plane in planes])
     step = float(np.gcd.reduce(cut.astype(np.int64), axis=None))
-    if not step:
+    even = cut.var(axis=(1, 2)) <= _UNEVEN * variances_by_differences(cut)
+    if not step or not even.any():
         return None
+    cut = cut[even]
     groups = _Groups.of(cut / step)
     start = np.sqrt(np.quantile(groups.variance[groups.at_lowest >= _some(groups.at_lowest)], 0.75))
     groups = groups.below(_NEAR_BLACK * start)
