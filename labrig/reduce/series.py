@@ -99,6 +99,8 @@ def apply_calibration(
 TWO_DEGREES = 2 ** (2 / 6) - 1
 #: Multiple of the smallest patch's pixels up to which patches are taken together for their noise.
 ALIKE = 4.0
+#: Multiple of the read noise up to which a mean is too large where noise below black is cut off.
+NEAR_BLACK = 3.0
 #: Largest correlation of the errors of different channels.
 MAX_COMMON = 0.99
 
@@ -119,6 +121,8 @@ class _PatchDark:
         Whether noise below black is cut off in each of them.
     cut_off
         What the level is lowered by for that in DN, shape (C,).
+    read_dn
+        Read noise in DN by which it is; 0 if none is cut off.
     """
 
     kind: tuple[int, int, tuple[str, ...]]
@@ -126,6 +130,7 @@ class _PatchDark:
     frames: PatchFrames
     is_cut_off: bool
     cut_off: Floats
+    read_dn: float
 
 
 def reduce_series(
@@ -297,6 +302,7 @@ def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]
         frames,
         all(view.is_cut_off for view in views),
         cut_off_levels(views).mean(axis=0),
+        max(stats.read_dn or 0.0 for view in views for stats in view.measured.channels.values()),
     )
 
 
@@ -323,6 +329,9 @@ class _PatchLevels:
     cut_off
         What the correction for noise cut off below black adds to the patch above its dark level in
         DN, shape (n, C).
+    untold
+        Whether the patch is within the noise of black in a frame that does not tell this noise,
+        though the camera cuts it off: its mean is not corrected, shape (n,).
     """
 
     name: str
@@ -334,6 +343,7 @@ class _PatchLevels:
     drift: Floats
     darks: Mapping[str, PatchFrames]
     cut_off: Floats
+    untold: npt.NDArray[np.bool_]
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
@@ -352,6 +362,7 @@ def _patch_levels(
     unexposed = np.zeros_like(level)
     dark_of_unit: dict[str, PatchFrames] = {}
     cut_off = -cut_off_levels(views)
+    untold = np.zeros(len(views), np.bool_)
     backgrounds = _backgrounds(measured)
     if backgrounds:
         dark = unexposed = levels(backgrounds)[0]
@@ -375,6 +386,8 @@ def _patch_levels(
             dark[row], model_sigma = patch_dark.model.dark_level(entry.frame.exposure_s)
             unexposed[row] = patch_dark.model.base
             cut_off[row] += patch_dark.cut_off
+            near_black = level[row] - dark[row] < NEAR_BLACK * patch_dark.read_dn
+            untold[row] = patch_dark.is_cut_off and not view.is_cut_off and near_black.any()
             drift[row] = TWO_DEGREES * np.abs(patch_dark.model.current(entry.frame.exposure_s))
             dark_sigma[row] = np.hypot(model_sigma, drift[row])
             dark_of_unit[entry.frame.unit] = patch_dark.frames
@@ -388,6 +401,7 @@ def _patch_levels(
         drift,
         dark_of_unit,
         cut_off,
+        untold,
     )
 
 
@@ -481,6 +495,13 @@ def _cut_off_warning(patch: _PatchLevels, added: Floats, sigma: Floats) -> tuple
     usable = patch.usable
     if not patch.cut_off[usable].any():
         return ()
+    if patch.untold.any():
+        return (
+            f"the camera subtracts black and cuts off noise below it; {patch.untold.sum()} of "
+            f"{len(usable)} frames are near black and too uneven to tell this noise, so that their "
+            "values are too large by up to 0.4 of it: leave these frames out, photograph an even "
+            "surface, or let the camera keep its black level (offset, brightness)",
+        )
     sigmas = (np.abs(added) / sigma)[usable].max(axis=1)
     begin = "the camera subtracts black and cuts off noise below it, for which values are corrected"
     if sigmas.max() <= 1:

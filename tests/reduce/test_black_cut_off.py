@@ -76,6 +76,15 @@ def test_light_and_dark_in_one_region() -> None:
     assert frame.mosaic.mean() > 6.8
 
 
+def test_edges_are_not_noise() -> None:
+    """The noise is that of the even third, though dark lines cross the rest everywhere."""
+    light = np.where(np.arange(288) % 16 < 2, 0.0, 60.0) * np.ones((192, 1))
+    light[:64] = 2.0
+    cut_off = photograph(light, 5).cut_off
+    assert cut_off is not None
+    assert cut_off.read_dn == pytest.approx(READ_DN, rel=0.1)
+
+
 def test_hot_pixels_are_not_noise() -> None:
     darks = [photograph(0.0, seed) for seed in (1, 2, 3)]
     for dark in darks:
