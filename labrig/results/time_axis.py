@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.results.table_layout import TableLayout
-from labrig.text_table import EXPECTED, Block, Line
-from labrig.text_table.clock_reading import parse_clock
-from labrig.text_table.clock_times import ClockTimes, read_clock
+from labrig.text_table import EXPECTED, Block, Line, is_clock
 from labrig.text_table.names import (
     ABSCISSAS,
     is_channel,
@@ -21,14 +19,16 @@ from labrig.text_table.names import (
     split_unit,
     time_unit_s,
 )
-from labrig.text_table.numbers import is_clock
-from labrig.text_table.time_statements import (
+from labrig.text_table.times import (
     ChannelWidth,
+    ClockTimes,
     axis_times_s,
     axis_unit,
     channel_width,
+    parse_clock,
     parse_width,
     quoted,
+    read_clock,
 )
 
 #: A time in a line about the axis belongs to another unit where it is shorter than the step of the
