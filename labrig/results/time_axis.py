@@ -190,7 +190,7 @@ def _without_names(
     if layout.time_unit is None and not is_clock(table.rows[0][column]):
         falls = np.diff(numbers) < 0
         beside = [_numbers(table, other) for other in range(1, len(table.rows[0]))]
-        if _MOST_FALLS < np.mean(falls) < 1 or (
+        if _MOST_FALLS < falls.sum() / max(len(falls), 1) < 1 or (
             falls.any() and any(np.all(np.diff(other) > 0) for other in beside)
         ):
             raise UsageError(
