@@ -17,7 +17,26 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}|\d{1,4}([./-])\d{1,2}\1\d{1,4}(?:\D|$)")
 
 
 def parse_number(cell: str, decimal: str) -> float | None:
-    """Return the number in a cell, whose decimal mark is `decimal`; None if there is none."""
+    """Return the number in a cell.
+
+    Parameters
+    ----------
+    cell
+        Text of the cell.
+    decimal
+        Decimal mark, `.` or `,`.
+
+    Returns
+    -------
+    float or None
+        The number, which may be infinite or NaN; None if there is none.
+
+    Examples
+    --------
+    >>> from labrig.text_table import parse_number
+    >>> parse_number("\N{MINUS SIGN}1,5", ","), parse_number("1,5", "."), parse_number("OVER", ".")
+    (-1.5, None, None)
+    """
     try:
         return float(_plain(cell, decimal))
     except ValueError:
@@ -25,7 +44,26 @@ def parse_number(cell: str, decimal: str) -> float | None:
 
 
 def exact_number(cell: str, decimal: str) -> Decimal | None:
-    """Return the number in a cell with all its digits; None if there is none."""
+    """Return the number in a cell with all its digits.
+
+    Parameters
+    ----------
+    cell
+        Text of the cell.
+    decimal
+        Decimal mark, `.` or `,`.
+
+    Returns
+    -------
+    Decimal or None
+        The number, which may be infinite or NaN; None if there is none.
+
+    Examples
+    --------
+    >>> from labrig.text_table import exact_number
+    >>> exact_number("1764288000,2500000001", ",")
+    Decimal('1764288000.2500000001')
+    """
     try:
         return Decimal(_plain(cell, decimal))
     except InvalidOperation:
@@ -48,5 +86,22 @@ def _plain(cell: str, decimal: str) -> str:
 
 
 def is_clock(cell: str) -> bool:
-    """Return whether a cell begins with a time of day or a date."""
+    """Return whether a cell begins with a time of day or a date.
+
+    Parameters
+    ----------
+    cell
+        Text of the cell.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+
+    Examples
+    --------
+    >>> from labrig.text_table import is_clock
+    >>> is_clock("24.10.2026 23:59:30"), is_clock("23.5")
+    (True, False)
+    """
     return _CLOCK.match(cell.strip()) is not None

@@ -7,7 +7,7 @@ _TIMES = frozenset(
     {
         "t", "time", "times", "elapsed", "elapsed time", "decay time", "delay", "delay time",
         "zeit", "zeitpunkt", "messzeit", "verzögerung", "temps", "durée", "tempo", "tiempo",
-        "t_s", "seconds", "second", "sec", "sekunden", "secondes", "minutes", "minuten", "hours",
+        "seconds", "second", "sec", "sekunden", "secondes", "minutes", "minuten", "hours",
         "stunden", "milliseconds", "millisekunden", "microseconds", "nanoseconds", "picoseconds",
     }
 )  # fmt: skip
