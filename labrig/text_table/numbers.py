@@ -3,6 +3,8 @@
 import re
 from decimal import Decimal, InvalidOperation
 
+from labrig.text_table.clock_reading import parse_clock
+
 #: Decimal marks by the name that the option `--decimal` has for them.
 DECIMAL_MARKS = {"point": ".", "comma": ","}
 #: Characters that typesetters, word processors and East Asian input methods put for a minus.
@@ -34,7 +36,9 @@ def exact_number(cell: str, decimal: str) -> Decimal | None:
 
 def _plain(cell: str, decimal: str) -> str:
     """Return a cell in the form that Python reads, or as one that it does not."""
-    text = cell.strip().translate(_MINUS)
+    text = cell.strip()
+    if not text.isascii():
+        text = text.translate(_MINUS)
     if _GROUPED.fullmatch(text):
         text = _GROUPING.sub("", text)
     if decimal == ",":
@@ -48,5 +52,6 @@ def _plain(cell: str, decimal: str) -> str:
 
 
 def is_clock(cell: str) -> bool:
-    """Return whether a cell begins with a time of day or a date."""
-    return _CLOCK.match(cell.strip()) is not None
+    """Return whether a cell begins with a time of day or a date, or with a weekday or month."""
+    text = cell.strip()
+    return _CLOCK.match(text) is not None or (":" in text and parse_clock(text) is not None)
