@@ -56,6 +56,11 @@ def not_opened(
     programs
         Function that lists the programs on this PC.
 
+    Returns
+    -------
+    str
+        The cause as far as it can be seen, and what to do.
+
     Examples
     --------
     >>> from labrig.acquire import Program, not_opened
@@ -91,6 +96,18 @@ def gone(
         Name of the device in messages, with its address.
     programs
         Function that lists the programs on this PC.
+
+    Returns
+    -------
+    str
+        The system's words, and the cause or what to do.
+
+    Examples
+    --------
+    >>> from labrig.acquire import Program, gone
+    >>> displays = [Program(407, "brltty")]
+    >>> gone(OSError(5, "Input/output error"), "the relay at /dev/ttyUSB0", lambda: displays)[:44]
+    '([Errno 5] Input/output error); brltty, the '
     """
     reason = " ".join(str(error).split())
     return f"({reason}); {_taken(name, programs) or 'plug it in again'}"

@@ -31,7 +31,19 @@ class Program:
 
 
 def running_programs() -> Iterable[Program]:
-    """List the programs that run on this PC; none where the platform does not tell."""
+    """List the programs that run on this PC.
+
+    Returns
+    -------
+    iterable of Program
+        The programs; none where the platform does not tell.
+
+    Examples
+    --------
+    >>> from labrig.acquire import running_programs
+    >>> all(program.pid > 0 for program in running_programs())
+    True
+    """
     listings: dict[str, Callable[[], Iterable[Program]]] = {
         "linux": partial(linux_programs, PROCESSES),
         "darwin": _mac_programs,
@@ -40,7 +52,28 @@ def running_programs() -> Iterable[Program]:
 
 
 def linux_programs(processes: Path) -> Iterable[Program]:
-    """List the programs in a folder such as `/proc`."""
+    r"""List the programs in a folder such as `/proc`.
+
+    Parameters
+    ----------
+    processes
+        The folder.
+
+    Yields
+    ------
+    Program
+        One program after the other.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.acquire import linux_programs
+    >>> process = Path("processes/612")
+    >>> process.mkdir(parents=True)
+    >>> _ = (process / "cmdline").write_bytes(b"/usr/sbin/ModemManager\0--debug\0")
+    >>> list(linux_programs(Path("processes")))
+    [Program(pid=612, name='ModemManager', open_files=frozenset())]
+    """
     for place in processes.glob("[0-9]*"):
         try:
             command = (place / "cmdline").read_bytes().split(b"\0")[0].decode(errors="replace")

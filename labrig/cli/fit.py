@@ -164,7 +164,7 @@ def decay(
     if out is not None:
         from labrig.process import report_table
 
-        processed = report_table(table, fitted, options, out)
+        processed = report_table(table, fitted, options, out, layout)
         if not json:
             for line in processed.changes:
                 typer.echo(line)
@@ -273,7 +273,7 @@ def charge(
         return
     from labrig.process import report_charge
 
-    reported = report_charge(table, fit, options, out)
+    reported = report_charge(table, fit, options, out, layout)
     if json:
         return
     for line in reported.changes:

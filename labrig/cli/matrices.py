@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
     from labrig.material import Material, MatrixLayout, ReradiationMatrix
-    from labrig.optics.piecewise import FloatArray
 
 #: Most wavelengths that an option states, and how far the last may be from a step, in nm.
 _MOST_STEPS, _ROUNDING_NM = 10_000, 1e-6
@@ -125,7 +127,7 @@ def _layout(rows: str | None, excitation: str | None) -> "MatrixLayout | None":
     return MatrixLayout(rows, excitation_nm)  # type: ignore[arg-type]
 
 
-def _steps_nm(text: str) -> "FloatArray":
+def _steps_nm(text: str) -> "npt.NDArray[np.float64]":
     import numpy as np
 
     from labrig.errors import UsageError

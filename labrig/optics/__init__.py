@@ -35,6 +35,7 @@ from labrig.optics.curve_file import (
     read_spectrum,
     read_transmittance,
 )
+from labrig.optics.foreign_spectra import foreign_spectra
 from labrig.optics.hyperspectral import HyperspectralCube, read_hyperspectral_cube
 from labrig.optics.lights import is_narrow, read_light
 from labrig.optics.lvf import (
@@ -46,6 +47,7 @@ from labrig.optics.lvf import (
     peak_shape,
     signal_through,
 )
+from labrig.optics.ordinate import Quantity
 from labrig.optics.photometry import (
     mesopic_adaptation,
     mesopic_ratio,
@@ -91,6 +93,7 @@ __all__ = [
     "Lvf",
     "MeasuredSpectrum",
     "Observer",
+    "Quantity",
     "ShippedCamera",
     "SpectrometerReading",
     "Spectrum",
@@ -103,6 +106,7 @@ __all__ = [
     "delta_e",
     "edges_from_centres",
     "f_number_text",
+    "foreign_spectra",
     "hat_functions",
     "illuminant",
     "is_narrow",

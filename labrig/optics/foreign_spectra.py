@@ -16,10 +16,9 @@ from labrig.errors import LabrigError
 from labrig.optics.curve_table import NamedCurve, sorted_columns
 from labrig.optics.ordinate import UNKNOWN, Ordinate, Quantity, read_ordinate
 from labrig.optics.spectral_axis import AxisUnit, axis_unit, plain, read_axis, wavelengths_nm
-from labrig.text_table import Block, Line, read_blocks
+from labrig.text_table import SEPARATORS, Block, Line, Style, read_blocks
 from labrig.text_table.names import is_row_number, is_sigma, sigma_of
-from labrig.text_table.no_measurement import no_measurements
-from labrig.text_table.style import SEPARATORS, Style
+from labrig.text_table.rows import no_measurements
 
 #: Names of a first column that say nothing.
 _NAMELESS = frozenset({"", "x", "x-axis", "x value"})
@@ -55,7 +54,7 @@ class _Axis:
 
 
 def foreign_spectra(text: str, ending: str = "") -> list[NamedCurve]:
-    """Return the spectra in the text of another program.
+    r"""Return the spectra in the text of another program.
 
     Parameters
     ----------
@@ -64,10 +63,22 @@ def foreign_spectra(text: str, ending: str = "") -> list[NamedCurve]:
     ending
         Ending of the file's name without a point, which some programs let say what the values are.
 
+    Returns
+    -------
+    list of NamedCurve
+        The spectra in the order of the text, over wavelengths in nm.
+
     Raises
     ------
     ValueError
         The text holds no spectra, is cut, or can be read in two ways.
+
+    Examples
+    --------
+    >>> from labrig.optics import foreign_spectra
+    >>> (paint,) = foreign_spectra("Wavelength (nm),%R\n400,12\n500,40\n600,80\n")
+    >>> paint.columns[1].tolist()
+    [0.12, 0.4, 0.8]
     """
     if _PACKED.search(text):
         raise ValueError("JCAMP-DX with packed rows (X++(Y..Y)); export it as columns of X and Y")

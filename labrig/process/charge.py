@@ -1,7 +1,7 @@
 """Result, page and material file of a fit to charge and decay of another program's table."""
 
 import hashlib
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -13,9 +13,10 @@ from labrig.fit import ChargeFit, OrderState
 from labrig.material import Material, Provenance, State, write_material
 from labrig.process.provenance import library_versions
 from labrig.process.run import new_result, put_in_place
-from labrig.process.table import TableProvenance
+from labrig.process.table import TableProvenance, stated
 from labrig.process.without_run import describe_without_run
 from labrig.report import charge_report, write_report
+from labrig.results import TableLayout
 from labrig.yaml_file import write_yaml
 
 
@@ -39,7 +40,11 @@ class ReportedCharge:
 
 
 def report_charge(
-    table: Path, fit: ChargeFit, options: ChargeTableOptions, folder: Path
+    table: Path,
+    fit: ChargeFit,
+    options: ChargeTableOptions,
+    folder: Path,
+    layout: TableLayout | None = None,
 ) -> ReportedCharge:
     """Write the result and the report of charge and decay to the folder `result` in `folder`.
 
@@ -55,6 +60,8 @@ def report_charge(
         Options of the fit.
     folder
         Folder, made if there is none.
+    layout
+        Answers to what the table leaves open, as it was read with.
 
     Returns
     -------
@@ -89,7 +96,7 @@ def report_charge(
         libraries=library_versions(),
         table=table.name,
         sha256=checksum,
-        options={name: str(value) for name, value in asdict(options).items() if value is not None},
+        options=stated(options, layout),
     )
     lamp = f"on at {options.on}, off at {options.off} by the table's clock"
     about = describe_without_run(

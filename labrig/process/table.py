@@ -8,13 +8,13 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from labrig.analyse import FittedTable, TableFitOptions
+from labrig.analyse import ChargeTableOptions, FittedTable, TableFitOptions
 from labrig.errors import DiskError
 from labrig.process.provenance import library_versions
 from labrig.process.run import Processed, new_result, put_in_place
 from labrig.process.without_run import describe_without_run
 from labrig.report import Report, table_sections, write_report
-from labrig.results import DecayPatch, DecayResult, write_result
+from labrig.results import DecayPatch, DecayResult, TableLayout, write_result
 from labrig.yaml_file import write_yaml
 
 
@@ -30,7 +30,7 @@ class TableProvenance(BaseModel):
     table, sha256
         File name and checksum of the table.
     options
-        Options of the fit.
+        Options of the fit and of the reading.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,8 +42,20 @@ class TableProvenance(BaseModel):
     options: dict[str, str]
 
 
+def stated(
+    options: TableFitOptions | ChargeTableOptions, layout: TableLayout | None
+) -> dict[str, str]:
+    """Return what a person said of a fit and of its table, by name."""
+    said = asdict(options) | (asdict(layout) if layout is not None else {})
+    return {name: str(value) for name, value in said.items() if value is not None}
+
+
 def report_table(
-    table: Path, fitted: Sequence[FittedTable], options: TableFitOptions, folder: Path
+    table: Path,
+    fitted: Sequence[FittedTable],
+    options: TableFitOptions,
+    folder: Path,
+    layout: TableLayout | None = None,
 ) -> Processed:
     """Write the result and the report of a table to the folder `result` in `folder`.
 
@@ -59,6 +71,8 @@ def report_table(
         Options of the fit.
     folder
         Folder, made if there is none.
+    layout
+        Answers to what the table leaves open, as it was read with.
 
     Returns
     -------
@@ -102,7 +116,7 @@ def report_table(
         libraries=library_versions(),
         table=table.name,
         sha256=hashlib.sha256(table.read_bytes()).hexdigest(),
-        options={name: str(value) for name, value in asdict(options).items() if value is not None},
+        options=stated(options, layout),
     )
     sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted)]
     about = describe_without_run(table.stem, "decay", table.name, sample)

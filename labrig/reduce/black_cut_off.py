@@ -26,8 +26,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
-from scipy.special import ndtr
 
 from labrig.reduce.plane_noise import TILE, Floats, Mosaic, tiles, variances_by_differences
 
@@ -85,6 +83,9 @@ class Noise:
 
     def probabilities(self, level: Floats) -> Floats:
         """Return how probable each number is at n levels, shape (n, numbers)."""
+        # Not above: it takes longer to load than a plan to be printed.
+        from scipy.special import ndtr
+
         sigma = self.sigma(level)
         numbers = np.arange(int(level.max() + 6 * self.sigma(level.max())) + 3)
         up_to = ndtr((numbers + 0.5 - level[:, np.newaxis]) / sigma[:, np.newaxis])
@@ -264,6 +265,8 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
             np.log(groups.variance / expected) / relative + relative / 2,
             (logarithms[1] + np.log(_USUAL_ELECTRONS)) / _LOG_SIGMA,
         )
+
+    from scipy.optimize import least_squares
 
     bounds = (np.log(start) - 1.5, np.log(1e-3)), (np.log(start) + 1.5, np.log(10.0))
     fit = least_squares(

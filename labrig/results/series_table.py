@@ -22,9 +22,15 @@ from labrig.results.table_columns import (
 from labrig.results.table_layout import TableLayout
 from labrig.results.table_rows import independent_rows, measured_rows, with_limits
 from labrig.results.time_axis import TimeAxis
-from labrig.text_table import DECIMAL_MARKS, EXPECTED, Block, read_blocks, read_table_text
+from labrig.text_table import (
+    DECIMAL_MARKS,
+    EXPECTED,
+    Block,
+    exact_number,
+    read_blocks,
+    read_table_text,
+)
 from labrig.text_table.names import is_time
-from labrig.text_table.numbers import exact_number
 
 
 def join_series(parts: Sequence[Series]) -> Series:

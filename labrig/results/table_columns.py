@@ -11,17 +11,18 @@ from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
 from labrig.results.sigma_unit import sigma_scale
 from labrig.results.table_layout import TableLayout
 from labrig.results.time_axis import TimeAxis, find_time_axis
-from labrig.text_table import EXPECTED, Block
-from labrig.text_table.header import is_axis_line
+from labrig.text_table import EXPECTED, Block, is_axis_line
 from labrig.text_table.names import (
+    LogScale,
+    is_absorbance,
     is_channel,
     is_row_number,
     is_sigma,
     is_time,
+    log_scale,
     sigma_of,
     split_unit,
 )
-from labrig.text_table.value_units import LogScale, is_absorbance, log_scale
 
 _EXPOSURES = frozenset({EXPOSURE, "exposure"})
 

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 from labrig.errors import UsageError
 from labrig.text_table import DECIMAL_MARKS
-from labrig.text_table.clock_times import is_clock_form
 from labrig.text_table.names import time_unit_s
-from labrig.text_table.time_statements import parse_width
+from labrig.text_table.times import is_clock_form, parse_width
 
 
 @dataclass(frozen=True)

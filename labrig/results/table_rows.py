@@ -9,10 +9,16 @@ import numpy.typing as npt
 from labrig.errors import UsageError
 from labrig.results.series import Series, add_flag
 from labrig.text_table import Block
-from labrig.text_table.detector_limits import at_ceiling, at_floor
-from labrig.text_table.no_measurement import no_measurements
-from labrig.text_table.repeated_readings import held_readings, repeated_rows
-from labrig.text_table.time_order import backward_rows, light_goes_on, starts_again
+from labrig.text_table.rows import (
+    at_ceiling,
+    at_floor,
+    backward_rows,
+    held_readings,
+    light_goes_on,
+    no_measurements,
+    repeated_rows,
+    starts_again,
+)
 
 Rows = npt.NDArray[np.intp]
 #: Flag of values at a detector's ceiling or floor.

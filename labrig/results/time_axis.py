@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.results.table_layout import TableLayout
-from labrig.text_table import EXPECTED, Block, Line
-from labrig.text_table.clock_reading import parse_clock
-from labrig.text_table.clock_times import ClockTimes, read_clock
+from labrig.text_table import EXPECTED, Block, Line, is_clock
 from labrig.text_table.names import (
     ABSCISSAS,
     is_channel,
@@ -21,14 +19,16 @@ from labrig.text_table.names import (
     split_unit,
     time_unit_s,
 )
-from labrig.text_table.numbers import is_clock
-from labrig.text_table.time_statements import (
+from labrig.text_table.times import (
     ChannelWidth,
+    ClockTimes,
     axis_times_s,
     axis_unit,
     channel_width,
+    parse_clock,
     parse_width,
     quoted,
+    read_clock,
 )
 
 #: A time in a line about the axis belongs to another unit where it is shorter than the step of the
@@ -194,7 +194,7 @@ def _without_names(
     if layout.time_unit is None and not is_clock(table.rows[0][column]):
         falls = np.diff(numbers) < 0
         beside = [_numbers(table, other) for other in range(1, len(table.rows[0]))]
-        if _MOST_FALLS * len(falls) < falls.sum() < len(falls) or (
+        if _MOST_FALLS < falls.sum() / max(len(falls), 1) < 1 or (
             falls.any() and any(np.all(np.diff(other) > 0) for other in beside)
         ):
             raise UsageError(

@@ -6,14 +6,20 @@ the columns are is for those to say who know the quantity: decays, curves, matri
 
 from labrig.text_table.blocks import EXPECTED, Block, read_blocks
 from labrig.text_table.encoding import read_table_text
-from labrig.text_table.numbers import DECIMAL_MARKS, parse_number
-from labrig.text_table.style import Line
+from labrig.text_table.header import is_axis_line
+from labrig.text_table.numbers import DECIMAL_MARKS, exact_number, is_clock, parse_number
+from labrig.text_table.style import SEPARATORS, Line, Style
 
 __all__ = [
     "DECIMAL_MARKS",
     "EXPECTED",
+    "SEPARATORS",
     "Block",
     "Line",
+    "Style",
+    "exact_number",
+    "is_axis_line",
+    "is_clock",
     "parse_number",
     "read_blocks",
     "read_table_text",

@@ -98,6 +98,11 @@ def read_blocks(text: str, decimal: str | None = None) -> tuple[Block, ...]:
     decimal
         Decimal mark of the numbers; None finds it.
 
+    Returns
+    -------
+    tuple of Block
+        The tables, at least one, in the order of the text.
+
     Raises
     ------
     DataError

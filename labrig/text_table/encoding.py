@@ -16,12 +16,30 @@ _END = b"\x1a\x00"
 
 
 def read_table_text(path: Path) -> str:
-    """Read the text of another program's table, in UTF-8, UTF-16, Windows-1252 or Latin-1.
+    r"""Read the text of another program's table, in UTF-8, UTF-16, Windows-1252 or Latin-1.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    str
+        The text, without a byte-order mark.
 
     Raises
     ------
     UsageError, DiskError
         The file is refused by `read_bytes`, is a workbook, or is no text.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.text_table import read_table_text
+    >>> _ = Path("decay.txt").write_bytes("t/µs\tI\n0\t5\n".encode("utf-16"))
+    >>> read_table_text(Path("decay.txt"))
+    't/µs\tI\n0\t5\n'
     """
     content = read_bytes(path, MAX_TEXT_BYTES)
     if content.startswith(_WORKBOOKS):

@@ -139,7 +139,24 @@ def _split_by_blanks(line: str, width: int) -> tuple[str, ...]:
 
 
 def is_axis_line(line: Line | None) -> bool:
-    """Return whether a line says what an axis is, or what curves are called."""
+    """Return whether a line says what an axis is, or what curves are called.
+
+    Parameters
+    ----------
+    line
+        A line above a table, or None.
+
+    Returns
+    -------
+    bool
+        Whether it does, as `Xaxis,Time(ns)`.
+
+    Examples
+    --------
+    >>> from labrig.text_table import Line, is_axis_line
+    >>> is_axis_line(Line(6, "Xaxis,Time(ns)")), is_axis_line(Line(7, "Operator,Ada"))
+    (True, False)
+    """
     match = _AXIS.match(line.text) if line is not None else None
     return match is not None and _AXIS_WORD.search(match.string[: match.start("value")]) is not None
 

@@ -3,8 +3,6 @@
 import re
 from decimal import Decimal, InvalidOperation
 
-from labrig.text_table.clock_reading import parse_clock
-
 #: Decimal marks by the name that the option `--decimal` has for them.
 DECIMAL_MARKS = {"point": ".", "comma": ","}
 #: Characters that typesetters, word processors and East Asian input methods put for a minus.
@@ -14,12 +12,35 @@ _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[\u00a0\u2007\u2009\u202f'’]\d{3})+(?:[
 _GROUPING = re.compile(r"[\u00a0\u2007\u2009\u202f'’]")
 #: Exponent of double precision as Fortran writes it: `1.5D-03`.
 _FORTRAN = re.compile(r"([+-]?\d*\.\d*)[dD]([+-]?\d+)")
-#: Time of day or date, or what begins with one.
-_CLOCK = re.compile(r"\d{1,2}:\d{2}|\d{1,4}([./-])\d{1,2}\1\d{1,4}(?:\D|$)")
+#: Time of day or date, or what begins with one, perhaps with names of weekday and month.
+_CLOCK = re.compile(
+    r"\d{1,2}:\d{2}|\d{1,4}([./-])\d{1,2}\1\d{1,4}(?:\D|$)"
+    r"|(?:[^\W\d_]{2,4}\.?,?\s+)?(?:[^\W\d_]{3,9}\.?\s+\d{1,2}|\d{1,2}\.?\s*[^\W\d_]{3,9}\.?"
+    r"|\d{1,2}[./]\d{1,2}[./]\d{2,4}),?\s.*\d{1,2}:\d{2}"
+)
 
 
 def parse_number(cell: str, decimal: str) -> float | None:
-    """Return the number in a cell, whose decimal mark is `decimal`; None if there is none."""
+    """Return the number in a cell.
+
+    Parameters
+    ----------
+    cell
+        Text of the cell.
+    decimal
+        Decimal mark, `.` or `,`.
+
+    Returns
+    -------
+    float or None
+        The number, which may be infinite or NaN; None if there is none.
+
+    Examples
+    --------
+    >>> from labrig.text_table import parse_number
+    >>> parse_number("\N{MINUS SIGN}1,5", ","), parse_number("1,5", "."), parse_number("OVER", ".")
+    (-1.5, None, None)
+    """
     try:
         return float(_plain(cell, decimal))
     except ValueError:
@@ -27,7 +48,26 @@ def parse_number(cell: str, decimal: str) -> float | None:
 
 
 def exact_number(cell: str, decimal: str) -> Decimal | None:
-    """Return the number in a cell with all its digits; None if there is none."""
+    """Return the number in a cell with all its digits.
+
+    Parameters
+    ----------
+    cell
+        Text of the cell.
+    decimal
+        Decimal mark, `.` or `,`.
+
+    Returns
+    -------
+    Decimal or None
+        The number, which may be infinite or NaN; None if there is none.
+
+    Examples
+    --------
+    >>> from labrig.text_table import exact_number
+    >>> exact_number("1764288000,2500000001", ",")
+    Decimal('1764288000.2500000001')
+    """
     try:
         return Decimal(_plain(cell, decimal))
     except InvalidOperation:
@@ -52,6 +92,22 @@ def _plain(cell: str, decimal: str) -> str:
 
 
 def is_clock(cell: str) -> bool:
-    """Return whether a cell begins with a time of day or a date, or with a weekday or month."""
-    text = cell.strip()
-    return _CLOCK.match(text) is not None or (":" in text and parse_clock(text) is not None)
+    """Return whether a cell begins with a time of day or a date, or a weekday or month before one.
+
+    Parameters
+    ----------
+    cell
+        Text of the cell.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+
+    Examples
+    --------
+    >>> from labrig.text_table import is_clock
+    >>> is_clock("24.10.2026 23:59:30"), is_clock("23.5")
+    (True, False)
+    """
+    return _CLOCK.match(cell.strip()) is not None

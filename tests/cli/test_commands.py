@@ -295,7 +295,7 @@ def test_what_cannot_be_reduced_is_exit_code_4(labrig: Labrig, tmp_path: Path) -
     (tmp_path / "photo.cr2").write_bytes(b"no photo at all")
     one_line(labrig("frame", tmp_path / "photo.cr2"), 4, "photo.cr2")
     one_line(labrig("frame", tmp_path / "none.cr2"), 2, "none.cr2")
-    (tmp_path / "series.csv").write_text("t_s,G\n0,1\n1,nan\n2,3\n")
+    (tmp_path / "series.csv").write_text("t_s,G\n0,1\n1,what\n2,3\n")
     one_line(labrig("fit", "decay", tmp_path / "series.csv"), 2, "series.csv", "delete the row")
     (tmp_path / "short.csv").write_text("t_s,G\n0,1\n")
     one_line(labrig("fit", "decay", tmp_path / "short.csv"), 4)

@@ -53,11 +53,11 @@ REFUSED = [
     Case(
         "one moment", DECAY, 1.0, "expected values at several times, got all at 5 s", (), 0 * T + 5
     ),
-    Case("NaN", with_frame(5, np.nan), 1.0, "line 7: expected a finite number for 'value'"),
-    Case("infinity", with_frame(5, np.inf), 1.0, "line 7: expected a finite number for 'value'"),
     Case("NaN in time", DECAY, 1.0, "finite number for 't_s'", (), np.where(T > 60, np.nan, T)),
 ]
 WARNED = [
+    Case("NaN", with_frame(5, np.nan), 0.3, "line 7: 'nan' is no measurement"),
+    Case("infinity", with_frame(5, np.inf), 0.3, "line 7: 'inf' is no measurement"),
     Case(
         "two rates as good as one",
         100 * np.exp(-0.022 * T) + 100 * np.exp(-0.018 * T) + 0.3 * NOISE,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.errors import UsageError
-from labrig.text_table.clock_times import ClockTimes, is_clock_form, read_clock
+from labrig.text_table.times import ClockTimes, is_clock_form, read_clock
 
 
 def read(*cells: str, hint: str = "") -> ClockTimes:

@@ -5,7 +5,7 @@ import pytest
 
 from labrig.errors import UsageError
 from labrig.results import parse_series
-from labrig.text_table.value_units import log_scale
+from labrig.text_table.names import log_scale
 
 
 @pytest.mark.parametrize(

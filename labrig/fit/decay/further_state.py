@@ -26,6 +26,9 @@ ANY_RATES, FASTER_RATES = 24, 12
 PRIOR_ODDS = 0.2
 #: Scale of its amplitude, relative to all others' sum.
 USUAL_SHARE = 0.4
+#: Lifetimes before the first frame beyond which a state was all of the light at lamp off: e^300 is
+#: near the largest number.
+LARGEST_PHASE = 300.0
 #: Ratio to the fastest rate found from which a further state is a fast one.
 FASTER = 2.0
 #: Chance from which a hidden state counts: below, the data do not support it, and a σ that covered
@@ -141,7 +144,8 @@ class FastStates:
     def share(self, amplitude: FloatArray, data: WhitenedSeries, fit: StatesFit) -> FloatArray:
         """Return the shares of amplitudes at the first frame in all light at lamp off, (m,)."""
         start = data.series.start
-        at_lamp_off = amplitude * np.exp(np.exp(self.further.log_rates) * start)
+        phases = np.minimum(np.exp(self.further.log_rates) * start, LARGEST_PHASE)
+        at_lamp_off = amplitude * np.exp(phases)
         others = float(fit.amplitudes @ np.exp(np.exp(fit.log_rates) * start))
         return np.asarray(at_lamp_off / (at_lamp_off + others))
 

@@ -144,9 +144,7 @@ def fit_laws(
 
 
 def _log_rate_bounds(series: DecaySeries) -> tuple[float, float]:
-    steps = np.diff(series.t)
-    fastest = FASTEST_STEPS / float(steps[steps > 0].min())
-    return -float(np.log(SLOWEST_SPANS)), float(np.log(fastest))
+    return -float(np.log(SLOWEST_SPANS)), float(np.log(FASTEST_STEPS / series.shortest_step))
 
 
 def _shape(series: DecaySeries, law: DecayLaw) -> Shape:

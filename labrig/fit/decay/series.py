@@ -144,9 +144,18 @@ class DecaySeries:
     @cached_property
     def log_rate_bounds(self) -> tuple[float, float]:
         """Logarithms of the slowest and the fastest rate that the times resolve, in 1/spans."""
-        steps = np.diff(self.t)
-        shortest = float(steps[steps > 0].min())
-        return float(-np.log(SLOWEST_SPANS)), float(np.log(FASTEST_DECAYS / shortest))
+        return float(-np.log(SLOWEST_SPANS)), float(np.log(FASTEST_DECAYS / self.shortest_step))
+
+    @cached_property
+    def shortest_step(self) -> float:
+        """Shortest step between frames of one repeat, in spans.
+
+        Frames of two repeats are as far apart as the clock is uncertain.
+        """
+        steps = np.concatenate([np.diff(self.t[self.repeat == one]) for one in set(self.repeat)])
+        if not (steps > 0).any():
+            steps = np.diff(self.t)
+        return float(steps[steps > 0].min())
 
 
 def decay_series(

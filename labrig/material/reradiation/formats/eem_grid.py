@@ -15,11 +15,9 @@ import numpy as np
 from labrig.errors import LabrigError
 from labrig.material.reradiation.formats.text_rows import PLAUSIBLE_NM, shown
 from labrig.material.reradiation.matrix import FloatArray
-from labrig.optics.foreign_spectra import foreign_spectra
-from labrig.optics.ordinate import Quantity
-from labrig.text_table import Block, Line, parse_number, read_blocks
-from labrig.text_table.no_measurement import no_measurements
-from labrig.text_table.style import SEPARATORS, Style
+from labrig.optics import Quantity, foreign_spectra
+from labrig.text_table import SEPARATORS, Block, Line, Style, parse_number, read_blocks
+from labrig.text_table.rows import no_measurements
 
 Axis: TypeAlias = Literal["emission", "excitation"]
 #: Name of the upper left cell of labrig's own tables of curves, which are no matrices.

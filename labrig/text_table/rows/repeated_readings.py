@@ -46,7 +46,7 @@ def repeated_rows(t_s: FloatArray, values: FloatArray) -> BoolArray:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.text_table.repeated_readings import repeated_rows
+    >>> from labrig.text_table.rows.repeated_readings import repeated_rows
     >>> repeated_rows(np.array([0.0, 1, 1, 2]), np.array([[5.0], [4], [4], [3]])).tolist()
     [False, False, True, False]
     """
@@ -72,7 +72,7 @@ def held_readings(values: FloatArray) -> BoolArray:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.text_table.repeated_readings import held_readings
+    >>> from labrig.text_table.rows.repeated_readings import held_readings
     >>> held = np.repeat([101.3, 87.2, 75.9, 66.4, 57.1], 3)
     >>> held_readings(held).sum()
     np.int64(10)
@@ -120,7 +120,7 @@ def last_digit(values: FloatArray, level: float) -> float:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.text_table.repeated_readings import last_digit
+    >>> from labrig.text_table.rows.repeated_readings import last_digit
     >>> last_digit(np.array([0.75, 1.0, 2.0]), 1.0)
     0.25
     >>> last_digit(np.array([997.0, 999.0, 1010.0]), 1010.0)

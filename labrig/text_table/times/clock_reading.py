@@ -88,7 +88,7 @@ def parse_clock(cell: str) -> ClockReading | None:
 
     Examples
     --------
-    >>> from labrig.text_table.clock_reading import parse_clock
+    >>> from labrig.text_table.times.clock_reading import parse_clock
     >>> reading = parse_clock("24.10.2026 11:59:30,5 PM")
     >>> reading.date, reading.parts, reading.fraction, reading.half
     (('24', '10', '2026'), (11, 59, 30), '5', 'p')

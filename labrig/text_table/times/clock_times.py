@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import UsageError
-from labrig.text_table.clock_jumps import Clock, continuous
-from labrig.text_table.clock_reading import ClockReading, full_year, parse_clock
+from labrig.text_table.times.clock_jumps import Clock, continuous
+from labrig.text_table.times.clock_reading import ClockReading, full_year, parse_clock
 
 SECONDS_A_DAY = 86400
 _HALF_DAY_H, _DAY_H = 12, 24
@@ -76,7 +76,7 @@ def is_clock_form(text: str) -> bool:
 
     Examples
     --------
-    >>> from labrig.text_table.clock_times import is_clock_form
+    >>> from labrig.text_table.times.clock_times import is_clock_form
     >>> is_clock_form("mm:ss"), is_clock_form("dd/mm/yyyy"), is_clock_form("ms")
     (True, True, False)
     """
@@ -111,7 +111,7 @@ def read_clock(cells: Sequence[str], lines: Sequence[int], hint: str = "") -> Cl
 
     Examples
     --------
-    >>> from labrig.text_table.clock_times import read_clock
+    >>> from labrig.text_table.times.clock_times import read_clock
     >>> clock = read_clock(["24.10.2026 23:59:59,5", "25.10.2026 00:00:01"], [2, 3])
     >>> clock.t_s.tolist(), clock.form
     ([0.0, 1.5], 'clock, day.month.year, counted from the first row, 24.10.2026 23:59:59,5')

@@ -30,7 +30,7 @@ def backward_rows(t_s: FloatArray) -> npt.NDArray[np.intp]:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.text_table.time_order import backward_rows
+    >>> from labrig.text_table.rows.time_order import backward_rows
     >>> t_s = np.arange(30.0)
     >>> t_s[12:] -= 1.5
     >>> backward_rows(t_s).tolist(), backward_rows(t_s[::-1]).tolist()

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import UsageError
-from labrig.text_table.names import split_unit, time_unit_s
+from labrig.text_table.names.columns import split_unit, time_unit_s
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -138,7 +138,7 @@ def log_scale(name: str, unit: str = "") -> LogScale | None:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.text_table.value_units import log_scale
+    >>> from labrig.text_table.names.value_units import log_scale
     >>> scale = log_scale("I/dB")
     >>> scale.name, str(scale), scale.light(np.array([0.0, 30.0])).tolist()
     ('I', '10^(x/10)', [1.0, 1000.0])

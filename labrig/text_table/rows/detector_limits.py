@@ -7,7 +7,7 @@ neighbours by little more than the last digit: a slow change repeats them, too.
 import numpy as np
 import numpy.typing as npt
 
-from labrig.text_table.repeated_readings import last_digit
+from labrig.text_table.rows.repeated_readings import last_digit
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -37,7 +37,7 @@ def at_ceiling(values: FloatArray) -> BoolArray:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.text_table.detector_limits import at_ceiling
+    >>> from labrig.text_table.rows.detector_limits import at_ceiling
     >>> at_ceiling(np.array([4095.0, 4095, 4094, 4095, 4095, 3702, 3333])).tolist()
     [True, True, True, True, True, False, False]
     """
@@ -69,7 +69,7 @@ def at_floor(values: FloatArray) -> BoolArray:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.text_table.detector_limits import at_floor
+    >>> from labrig.text_table.rows.detector_limits import at_floor
     >>> at_floor(np.array([9.31, 6.24, 4.19, 2.81, 1.88, 0, 0, 0, 0, 0])).sum()
     np.int64(5)
     >>> counts = np.array([9.0, 6, 3, 2, 1, 0, 0, 0, 0, 0])

@@ -45,7 +45,7 @@ def no_measurements(cells: Sequence[str], number: Callable[[str], float | None])
 
     Examples
     --------
-    >>> from labrig.text_table.no_measurement import no_measurements
+    >>> from labrig.text_table.rows.no_measurement import no_measurements
     >>> def number(cell):
     ...     try:
     ...         return float(cell)
