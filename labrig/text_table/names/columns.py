@@ -70,8 +70,11 @@ _SIGMA_BEFORE = re.compile(
 )
 _SIGMA_OF = re.compile(rf"(?:{_SIGMA})\s*\((?P<of>.+)\)")
 _ROW_NUMBERS = frozenset(
-    {"", "#", "no", "no.", "nr", "nr.", "n", "index", "point", "row", "id", "sample", "frame"}
-)
+    {
+        "", "#", "no", "no.", "nr", "nr.", "n", "index", "point", "row", "id", "sample", "frame",
+        "record",
+    }
+)  # fmt: skip
 #: Forms of a name with its unit: `time (s)`, `I [a.u.]`, `t / s`, `Zeit in s`, `time_ms`.
 _WITH_UNIT = tuple(
     re.compile(pattern)
