@@ -185,7 +185,11 @@ def _spectra(
     samples = _samples(block, above)
     for number, axis in enumerate(axes):
         end = axes[number + 1].column if number + 1 < len(axes) else len(block.rows[0])
-        values = [column for column in range(axis.column + 1, end) if column not in all_axes]
+        values = [
+            column
+            for column in range(axis.column + 1, end)
+            if column not in all_axes and not _is_index(block, column)
+        ]
         if number == 0 and axis.column:
             values = [
                 *[c for c in range(axis.column) if c not in all_axes and not _is_index(block, c)],
@@ -215,7 +219,12 @@ def _all_axes(block: Block) -> Iterator[_Axis]:
 
 
 def _is_index(block: Block, column: int) -> bool:
-    return bool(block.names) and is_row_number(_name(block, column))
+    """Return whether a column numbers rows or frames; a sample's values are no such numbers."""
+    numbers = [block.number(row[column]) for row in block.rows]
+    if not block.names or not is_row_number(_name(block, column)) or None in numbers:
+        return False
+    steps = np.diff(np.array(numbers, dtype=np.float64))
+    return bool(np.isin(steps, (0, 1)).all())
 
 
 def _sigmas(block: Block, values: Sequence[int]) -> dict[int, int]:

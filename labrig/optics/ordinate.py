@@ -117,7 +117,8 @@ _REFUSED = {
         (r"\b(kubelka|k/s|f\(r\))", "is a Kubelka-Munk function"),
         (r"deriv|d\(abs|\bd[ay]/d", "is a derivative"),
         (
-            r"absorptance|absorptivity|molar|coeff|koeff|cross.?section|absorption.*%|%.*absorption|"
+            r"absorptance|absorptivity|molar|(absor|extin|atten)\w* ?[ck]oeff|"
+            r"cross.?section|absorption.*%|%.*absorption|"
             r"^ε|^epsilon|^1 ?- ?[rt]\b",
             "is neither transmittance nor absorbance",
         ),
