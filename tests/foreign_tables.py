@@ -115,6 +115,21 @@ EXPORTS = [
     Export("unknown unit", "Time (fortnights),I\n" + rows(), refused="fortnights"),
     Export("a note between rows", "t (ns),I\n" + rows() + "lamp off\n" + rows(), refused="--block"),
     Export("values first, no names", rows("{n},{t:.2f}\n"), refused="names"),
+    Export("power of ten as unit", "Time (10^-9 s),I\n" + rows()),
+    Export("power of ten, signs", "t / ×10⁻⁹ s;I\n" + rows("{t:.2f};{n}\n")),
+    Export("lifetime", "Lifetime (ns)\tI\n" + rows("{t:.2f}\t{n}\n")),
+    Export("oscilloscope, XINCR", "XINCR;4.0E-10\nXUNIT;s\nNR_PT;30\n" + ALONE),
+    Export("sample rate", "Sampling rate (MHz): 2500\nSample\tI\n" + CHANNELS),
+    Export("units above the names", "ns,V\nTime,I\n" + rows()),
+    Export("names in a comment of MATLAB", "% Time (ns)  I\n" + rows("{t:.2f} {n}\n")),
+    Export("Russian", "Время (нс);I\n" + rows("{t:.2f};{n}\n").replace(".", ",")),
+    Export("ms since 1970", "Time,I\n"
+           + "".join(f"{1764288000000 + 30 * k},{n}\n" for k, n in enumerate(COUNTS)),
+           refused="--time-unit ms"),
+    Export("hours, minutes, seconds in digits", "Time,I\n"
+           + "".join(f"{10000 + 100 * (k // 2) + 30 * (k % 2)},{n}\n"
+                     for k, n in enumerate(COUNTS)),
+           refused="hh:mm:ss"),
     Export("an exposure in the header", "Integration Time (msec): 8\nt,I\n"
            + rows("{t:.3e},{n}\n", 1e-9)),
 ]  # fmt: skip

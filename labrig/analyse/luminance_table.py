@@ -19,7 +19,7 @@ from labrig.results import (
     read_described_series,
 )
 
-_UNIT = re.compile(r"[mµμu]?cd\s*/\s*m(2|²|\^2)")
+_UNIT = re.compile(r"[mµμu]?cd(\s*/\s*m(2|²|\^2)|[\s·*]*m(\^?[-−]2|⁻²))|\bnits?\b")
 
 
 @dataclass(frozen=True)

@@ -188,7 +188,7 @@ def _spectra(
         values = [
             column
             for column in range(axis.column + 1, end)
-            if column not in all_axes and not (_name(block, column) and _is_index(block, column))
+            if column not in all_axes and not _is_index(block, column)
         ]
         if number == 0 and axis.column:
             values = [
@@ -219,7 +219,12 @@ def _all_axes(block: Block) -> Iterator[_Axis]:
 
 
 def _is_index(block: Block, column: int) -> bool:
-    return bool(block.names) and is_row_number(_name(block, column)) and column == 0
+    """Return whether a column numbers rows or frames; a sample's values are no such numbers."""
+    numbers = [block.number(row[column]) for row in block.rows]
+    if not block.names or not is_row_number(_name(block, column)) or None in numbers:
+        return False
+    steps = np.diff(np.array(numbers, dtype=np.float64))
+    return bool(np.isin(steps, (0, 1)).all())
 
 
 def _sigmas(block: Block, values: Sequence[int]) -> dict[int, int]:
@@ -290,6 +295,14 @@ def _spectrum(
     order = np.argsort(nm, kind="stable")
     wavelength_nm, sorted_values, _ = sorted_columns(nm, values)
     sorted_sigma = None if sigma is None else sigma[order]
+    same_nm = np.append(False, np.diff(wavelength_nm) == 0)
+    repeated = same_nm & np.append(False, np.diff(sorted_values) == 0)
+    if repeated.any():
+        notes.append(f"{repeated.sum()} row(s) that repeat another one left out")
+        wavelength_nm, sorted_values = wavelength_nm[~repeated], sorted_values[~repeated]
+        sorted_sigma = None if sorted_sigma is None else sorted_sigma[~repeated]
+    if others := int((same_nm & ~repeated).sum()):
+        notes.append(f"{others} wavelength(s) have more than one value: a scan was repeated")
     return NamedCurve("", (wavelength_nm, sorted_values, sorted_sigma), quantity, tuple(notes))
 
 

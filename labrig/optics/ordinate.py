@@ -116,8 +116,14 @@ _REFUSED = {
         (r"\bdbm?\b", "is in decibels"),
         (r"\b(kubelka|k/s|f\(r\))", "is a Kubelka-Munk function"),
         (r"deriv|d\(abs|\bd[ay]/d", "is a derivative"),
-        (r"absorptance|absorptivity|molar", "is neither transmittance nor absorbance"),
-        (r"\b(ln|log|log10|lg)\b(?! *\( *1 */ *[rt]\b)", "is a logarithm"),
+        (
+            r"absorptance|absorptivity|molar|(absor|extin|atten)\w* ?[ck]oeff|"
+            r"cross.?section|absorption.*%|%.*absorption|"
+            r"^ε|^epsilon|^1 ?- ?[rt]\b",
+            "is neither transmittance nor absorbance",
+        ),
+        (r"\b(ln|lg)\b|\b(log|log10)\b(?! *\( *1 */ *[rt]\b)", "is a logarithm"),
+        (r"[‰‱]|\bpp[mb]\b|\bper ?mille\b|\bpromille\b", "is in other parts than per cent"),
         (r"\b[µμu]?mol\b|photons? ?(/|per|s-1)|quanta", "counts photons, not energy"),
     )
 }
@@ -126,7 +132,8 @@ _ABSORBANCE = re.compile(
     r"optische dichte|densité optique|m?au|log10 ?\(1/[rt]\)|log ?\(1/[rt]\)"
 )
 _TRANSMITTANCE = re.compile(
-    r"t|trans|transm|transmittance|transmission|transmissivity|transmissionsgrad|transmisson"
+    r"t|trans|transm|transmittance|transmission|transmissivity|transmissionsgrad|transmisson|"
+    r"transmisión|transmissão|trasmissione|trasmittanza|transmitancia|durchlässigkeit|durchlass"
 )
 _REFLECTANCE = re.compile(
     r"r|refl|reflectance|reflection|reflectivity|reflexion|reflexionsgrad|remission|réflectance|"

@@ -23,7 +23,9 @@ VISIBLE_MCD_PER_M2 = 0.3
 #: Probability from which a requirement counts as met, and its complement as missed.
 CONFIDENT = 0.95
 #: Units of luminance by their names, in mcd/m².
-LUMINANCE_UNITS = {"mcd/m2": 1.0, "cd/m2": 1000.0, "µcd/m2": 1e-3, "ucd/m2": 1e-3}
+LUMINANCE_UNITS = {
+    "mcd/m2": 1.0, "cd/m2": 1000.0, "µcd/m2": 1e-3, "ucd/m2": 1e-3, "nit": 1000.0, "nits": 1000.0,
+}  # fmt: skip
 _REQUIREMENT = re.compile(r"\s*(?P<light>.*?)\s+at\s+(?P<time>.*?)\s*")
 
 
@@ -52,6 +54,7 @@ def luminance_unit(unit: str) -> float:
     1000.0
     """
     name = re.sub(r"\s", "", unit).replace("²", "2").replace("^2", "2").replace("\u03bc", "µ")
+    name = re.sub(r"cd[·*]?m(?:\^?[-−]2|⁻2)$", "cd/m2", name)
     if name not in LUMINANCE_UNITS:
         raise ValueError(f"expected one of {', '.join(LUMINANCE_UNITS)}, got '{unit}'")
     return LUMINANCE_UNITS[name]

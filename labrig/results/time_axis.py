@@ -42,6 +42,10 @@ _MOST_FALLS = 0.25
 _COMMON_UNITS = ("ps", "ns", "µs", "ms", "s", "min", "h")
 #: Names of a column with the dates of a clock.
 _DATES = frozenset({"date", "datum", "day", "tag", "jour", "fecha", "data"})
+#: Seconds since 1970, or 1904, that no clock shows: such a number counts a smaller unit.
+_NO_SECONDS = 1e11
+#: Fewest rows that tell hours, minutes and seconds, written together, from seconds.
+_FEWEST_DIGITAL = 5
 _UNSTATED = "s, as no line states another unit"
 
 
@@ -265,7 +269,32 @@ def _in_unit(
                 f"expected a unit for '{names[column]}', got none, and times of {unit} in "
                 f"{quoted(about)}; say '--time-unit {(*fitting, unit)[0]}', or which it is"
             )
+    _refuse_no_seconds(table, column, names[column])
     return TimeAxis(column, 1.0, _UNSTATED)
+
+
+def _refuse_no_seconds(table: Block, column: int, name: str) -> None:
+    """Refuse numbers without a unit that must be something else than seconds."""
+    times = _numbers(table, column)
+    times = times[np.isfinite(times)]
+    if len(times) and np.abs(times).min() > _NO_SECONDS:
+        raise UsageError(
+            f"expected a unit for '{name}', got none, and {times[0]:.0f}, which as seconds is "
+            "thousands of years: say '--time-unit ms', or which it is"
+        )
+    hours, minutes, seconds = times // 10_000, times // 100 % 100, times % 100
+    if len(times) < _FEWEST_DIGITAL or not (
+        np.all((hours < 24) & (minutes < 60) & (seconds < 60)) and np.all(times >= 0)
+    ):
+        return
+    as_numbers = np.diff(times)
+    as_clock = np.diff(3600 * hours + 60 * minutes + seconds)
+    if as_clock.min() > 0 and np.ptp(as_clock) == 0 and np.ptp(as_numbers) > 0:
+        raise UsageError(
+            f"expected seconds in '{name}', got numbers such as {table.rows[0][column]} whose "
+            "steps are equal if they are hours, minutes and seconds: write them as hh:mm:ss, or "
+            "say '--time-unit s'"
+        )
 
 
 def _clocks(table: Block) -> list[int]:

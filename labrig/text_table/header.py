@@ -24,6 +24,8 @@ _AXIS = re.compile(
     re.VERBOSE | re.IGNORECASE,
 )
 _AXIS_WORD = re.compile(r"axis|unit|label|title|dimension|abscissa|ordinate", re.IGNORECASE)
+#: Marks of a comment in other programs, above or before the names.
+_COMMENTED = re.compile(r"\s*(?:%+|//+|!+|--)\s*(.*)")
 _BETWEEN_VALUES = re.compile(r"[\t;,|]")
 
 
@@ -60,6 +62,8 @@ def find_header(above: Sequence[Line], width: int, style: Style) -> Header:
         below = named[index - 1] if index else ()
         if any(map(is_abscissa_unit, below)):
             return Header(names, near[index], below, near[index - 1])
+        if len(above_them) == len(names) and is_abscissa_unit(above_them[_first_abscissa(names)]):
+            return Header(names, near[index], above_them, near[index + 1])
         return Header(names, near[index])
     if axes is not None:
         return axes
@@ -74,10 +78,16 @@ def find_header(above: Sequence[Line], width: int, style: Style) -> Header:
     return Header()
 
 
+def _first_abscissa(names: Sequence[str]) -> int:
+    return next(column for column, name in enumerate(names) if is_abscissa(name))
+
+
 def names_in(line: Line, width: int, style: Style) -> tuple[str, ...]:
     """Return the names in a line above a table of `width` columns; nothing if it has none."""
     if bracketed := _IN_BRACKETS.fullmatch(line.text.strip()):
         return _split_by_blanks(bracketed[1], width)
+    if (commented := _COMMENTED.match(line.text)) and is_abscissa(_first_name(commented[1], style)):
+        line = Line(line.number, commented[1])
     cells = style.cells(line)
     if any(map(_is_reading, cells)):
         return ()
@@ -99,6 +109,13 @@ def names_in(line: Line, width: int, style: Style) -> tuple[str, ...]:
         ):
             return names
     return ()
+
+
+def _first_name(text: str, style: Style) -> str:
+    """Return the first of the names in a text, which may be separated by blanks."""
+    if style.separator is not None and style.separator in text:
+        return text.split(style.separator)[0].strip()
+    return (_SLASH.sub("/", _BEFORE_UNIT.sub("", text)).split() or [""])[0]
 
 
 def _is_reading(cell: str) -> bool:

@@ -12,8 +12,12 @@ _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[\u00a0\u2007\u2009\u202f'’]\d{3})+(?:[
 _GROUPING = re.compile(r"[\u00a0\u2007\u2009\u202f'’]")
 #: Exponent of double precision as Fortran writes it: `1.5D-03`.
 _FORTRAN = re.compile(r"([+-]?\d*\.\d*)[dD]([+-]?\d+)")
-#: Time of day or date, or what begins with one.
-_CLOCK = re.compile(r"\d{1,2}:\d{2}|\d{1,4}([./-])\d{1,2}\1\d{1,4}(?:\D|$)")
+#: Time of day or date, or what begins with one, perhaps with names of weekday and month.
+_CLOCK = re.compile(
+    r"\d{1,2}:\d{2}|\d{1,4}([./-])\d{1,2}\1\d{1,4}(?:\D|$)"
+    r"|(?:[^\W\d_]{2,4}\.?,?\s+)?(?:[^\W\d_]{3,9}\.?\s+\d{1,2}|\d{1,2}\.?\s*[^\W\d_]{3,9}\.?"
+    r"|\d{1,2}[./]\d{1,2}[./]\d{2,4}),?\s.*\d{1,2}:\d{2}"
+)
 
 
 def parse_number(cell: str, decimal: str) -> float | None:
@@ -72,7 +76,9 @@ def exact_number(cell: str, decimal: str) -> Decimal | None:
 
 def _plain(cell: str, decimal: str) -> str:
     """Return a cell in the form that Python reads, or as one that it does not."""
-    text = cell.strip().translate(_MINUS)
+    text = cell.strip()
+    if not text.isascii():
+        text = text.translate(_MINUS)
     if _GROUPED.fullmatch(text):
         text = _GROUPING.sub("", text)
     if decimal == ",":
@@ -86,7 +92,7 @@ def _plain(cell: str, decimal: str) -> str:
 
 
 def is_clock(cell: str) -> bool:
-    """Return whether a cell begins with a time of day or a date.
+    """Return whether a cell begins with a time of day or a date, or a weekday or month before one.
 
     Parameters
     ----------

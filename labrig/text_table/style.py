@@ -79,7 +79,10 @@ def find_style(lines: Sequence[Line], decimal: str | None) -> Style:
     def quality(style: Style) -> tuple[int, int, int]:
         rows = [style.cells(line) for line in sample]
         readings = [style.count_readings(row) for row in rows]
-        whole = sum(style.is_all_readings(row) for row in rows)
+        whole = sum(
+            count >= FEWEST and count == sum(1 for cell in row if cell)
+            for count, row in zip(readings, rows, strict=True)
+        )
         # Without any row of numbers, the separator that divides the lines.
         divided = 0 if whole else sum(len(row) > 1 for row in rows)
         return whole, sum(count >= FEWEST for count in readings), divided

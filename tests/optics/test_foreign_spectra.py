@@ -101,6 +101,14 @@ def test_sigma_goes_along(tmp_path: Path) -> None:
     assert_allclose(sigma, np.log(10) * np.array([0.1 * 0.01, 0.01 * 0.02]))
 
 
+def test_rows_that_repeat_another_are_left_out_and_named(tmp_path: Path) -> None:
+    path = write(tmp_path, "Frame,Row,nm,Counts\n" + "1,1,400,1\n1,1,500,2\n" * 2)
+    file = read_curve_file(path)
+    (curve,) = file.curves.values()
+    assert curve.wavelength_nm.tolist() == [400, 500]
+    assert "2 row(s)" in next(iter(file.notes.values()))[0]
+
+
 def test_marks_of_no_measurement_are_left_out_and_named(tmp_path: Path) -> None:
     path = write(tmp_path, "nm,Counts\n400,1\n401,9.9e37\n402,OVER\n403,3\n")
     file = read_curve_file(path)
@@ -120,6 +128,10 @@ def test_marks_of_no_measurement_are_left_out_and_named(tmp_path: Path) -> None:
         ("4000 1\n3000 2\n400 3\n", "expected the unit of the first column"),
         ("nm,Power (dBm)\n400,-1\n500,-2\n", "is in decibels"),
         ("nm,ln I\n400,1\n500,2\n", "is a logarithm"),
+        ("nm,ln(1/T)\n400,1\n500,2\n", "is a logarithm"),
+        ("nm,Transmittance (‰)\n400,900\n500,200\n", "other parts than per cent"),
+        ("nm,Absorption coefficient (cm-1)\n400,1\n500,2\n", "neither transmittance"),
+        ("nm,Absorption (%)\n400,1\n500,2\n", "neither transmittance"),
         ("nm,K/S\n400,1\n500,2\n", "Kubelka-Munk"),
         ("eV,Counts\n2,1\n3,2\n", "whether it is per nm"),
         ("nm,Transmittance\n400,1.3\n500,0.2\n", "in per cent or as a fraction"),

@@ -90,6 +90,12 @@ def test_readings_that_a_logger_holds_count_once() -> None:
     assert "120 rows are left out" in series.warnings[0]
 
 
+def test_three_values_are_a_ceiling() -> None:
+    light = 1000 * np.exp(-0.2 * T_S)
+    series = read([f"{min(value, 600):.1f}" for value in light])
+    assert series.usable.tolist() == (light < 600).tolist()
+
+
 @pytest.mark.parametrize("begin", [0, 20])
 def test_a_ceiling_is_found_wherever_it_is(begin: int) -> None:
     """Also with noise of the limit, and below the charge of a sample."""

@@ -35,6 +35,7 @@ FORMS: dict[str, Callable[[datetime], str]] = {
     "month's name": lambda at: f"{at:%d-%b-%Y %H:%M:%S}",
     "C": lambda at: f"{at:%a %b %d %H:%M:%S} CET {at:%Y}",
     "time first": lambda at: f"{at:%H:%M:%S %Y-%m-%d}",
+    "digits": lambda at: f"{at:%Y%m%d%H%M%S}",
     "basic": lambda at: f"{at:%Y%m%dT%H%M%S}",
     "no date": lambda at: f"{at:%H:%M:%S}.{at.microsecond // 1000:03d}",
     "no date, 12 hours": lambda at: _twelve(at).upper().replace(" ", "").replace(".", ""),
@@ -74,6 +75,14 @@ def test_any_clock_gives_its_differences_or_is_refused(
         return  # Two times of day do not tell which is the earlier one.
     assert clock.t_s.tolist() == pytest.approx(true_s.tolist(), abs=1e-12)
     assert "hour" not in " ".join(clock.warnings) or regular
+
+
+def test_summer_time_between_hourly_rows() -> None:
+    cells = [f"2026-10-24 {hour}:45" for hour in range(18, 24)]
+    cells += [f"2026-10-25 {hour:02}:45" for hour in (0, 1, 2, 2, 3, 4, 5)]
+    clock = read(*cells)
+    assert clock.t_s.tolist() == list(range(0, 3600 * len(cells), 3600))
+    assert "summer time" in clock.warnings[0]
 
 
 @pytest.mark.parametrize(

@@ -38,3 +38,12 @@ def test_a_real_export_of_a_photon_counter() -> None:
     assert len(series.t_s) == 1024
     # Times are rounded to 1 fs.
     assert np.diff(series.t_s) == pytest.approx(3.2571e-12, abs=1.1e-15)
+
+
+def test_a_logger_with_numbers_of_records(tmp_path: Path) -> None:
+    path = tmp_path / "logger.dat"
+    rows = "".join(f'"2026-11-28 10:00:{k:02}",{k},{90 - k}\n' for k in range(30))
+    path.write_text(f'"TOA5","CR1000"\n"TIMESTAMP","RECORD","E"\n"TS","RN","lx"\n{rows}')
+    (series,) = read_described_series(path)[0]
+    assert series.channels == ("E",)
+    assert series.t_s.tolist() == list(range(30))

@@ -23,6 +23,9 @@ from labrig.text_table.names import log_scale
         ("log10(counts)", 3.0, 1000.0),
         ("lg(I/cps)", 3.0, 1000.0),
         ("I [log10]", 2.0, 100.0),
+        ("Natural log of intensity", 1.0, np.e),
+        ("Intensity, log10", 2.0, 100.0),
+        ("E (ln(lx))", 1.0, np.e),
         ("log2(I)", 3.0, 8.0),
         ("V/mag", 5.0, 0.01),
     ],
@@ -38,7 +41,20 @@ def test_a_logarithm_becomes_light(name: str, number: float, light: float) -> No
 
 
 @pytest.mark.parametrize(
-    "name", ["y/dB", "dB", "log(I)", "log counts", "logI", "ln(I0/I)", "-ln(I)", "1/I", "sqrt(I)"]
+    "name",
+    [
+        "y/dB",
+        "dB",
+        "log(I)",
+        "log counts",
+        "logI",
+        "ln(I0/I)",
+        "-ln(I)",
+        "1/I",
+        "sqrt(I)",
+        "I_log",
+        "log-transformed I",
+    ],
 )
 def test_what_has_two_readings_is_refused(name: str) -> None:
     with pytest.raises(UsageError, match=r"expected (light|decibels)"):

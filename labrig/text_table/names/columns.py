@@ -7,6 +7,7 @@ _TIMES = frozenset(
     {
         "t", "time", "times", "elapsed", "elapsed time", "decay time", "delay", "delay time",
         "zeit", "zeitpunkt", "messzeit", "verzögerung", "temps", "durée", "tempo", "tiempo",
+        "tijd", "tid", "aika", "czas", "čas", "время", "時間", "时间",
         "seconds", "second", "sec", "sekunden", "secondes", "minutes", "minuten", "hours",
         "stunden", "milliseconds", "millisekunden", "microseconds", "nanoseconds", "picoseconds",
     }
@@ -14,7 +15,7 @@ _TIMES = frozenset(
 #: Units that alone name a column of times; `min` may be a minimum, `d` a distance.
 _TIMES_BY_UNIT = frozenset({"fs", "ps", "ns", "us", "ms", "nsec", "usec", "msec"})
 #: Names of the abscissa, if no column is called a time.
-ABSCISSAS = frozenset({"x", "x_value", "x-value", "x value"})
+ABSCISSAS = frozenset({"x", "x_value", "x-value", "x value", "lifetime", "timestamp"})
 #: Names of a column that counts channels of a memory, or bins of a histogram.
 _CHANNELS = frozenset({"chan", "channel", "channels", "ch", "ch.", "bin", "bins", "kanal", "canal"})
 _NUMBER_OF = re.compile(r"\s*(?:#|no\.?|nr\.?|numbers?|nummer)$")
@@ -32,19 +33,30 @@ _UNITS_S = {
     unit: seconds
     for seconds, units in (
         (1e-15, ("fs", "fsec", "femtosecond", "femtoseconds")),
-        (1e-12, ("ps", "psec", "picosecond", "picoseconds", "pikosekunden")),
-        (1e-9, ("ns", "nsec", "nanosecond", "nanoseconds", "nanosekunden", "nanosecondes")),
-        (1e-6, ("us", "usec", "microsecond", "microseconds", "mikrosekunden", "microsecondes")),
-        (1e-3, ("ms", "msec", "millisecond", "milliseconds", "millisekunden", "millisecondes")),
-        (1.0, ("s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "secondes")),
-        (60.0, ("min", "mins", "minute", "minutes", "minuten")),
-        (3600.0, ("h", "hr", "hrs", "hour", "hours", "std", "stunde", "stunden", "heures")),
-        (86400.0, ("d", "day", "days", "tag", "tage", "jours")),
+        (1e-12, ("ps", "psec", "picosec", "picosecond", "picoseconds", "pikosekunden")),
+        (1e-9, ("ns", "nsec", "nanosec", "nanosecond", "nanoseconds", "nanosekunden",
+                "nanosecondes", "nanosegundos", "нс")),
+        (1e-6, ("us", "usec", "microsec", "microsecond", "microseconds", "mikrosekunden",
+                "microsecondes", "microsegundos", "мкс")),
+        (1e-3, ("ms", "msec", "millisec", "millisecond", "milliseconds", "millisekunden",
+                "millisecondes", "milisegundos", "мс")),
+        (1.0, ("s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "secondes",
+               "segundos", "secondi", "с", "秒")),
+        (60.0, ("min", "mins", "minute", "minutes", "minuten", "minutos", "minuti", "мин", "分")),
+        (3600.0, ("h", "hr", "hrs", "hour", "hours", "std", "stunde", "stunden", "heures",
+                  "horas", "ore", "ч")),
+        (86400.0, ("d", "day", "days", "tag", "tage", "jours", "días", "dias")),
     )
     for unit in units
-}
+}  # fmt: skip
+#: Unit with a power of ten before it: `10^-9 s`, `x10⁻⁶ s`, `1E-3 sec`.
+_POWER_OF_TEN = re.compile(
+    r"(?:[x×*·]\s*)?(?:10\s*\^?\s*\(?(?P<power>[+-]?\d+)\)?|1(?:\.0*)?e(?P<e>[+-]?\d+))"
+    r"[\s*·x×]*(?P<unit>[^\W\d_]+)"
+)
 #: Letters that look alike, and blanks that do not break a line, as units are written with them.
 _TYPOGRAPHY = str.maketrans({"µ": "u", "μ": "u", "\u00a0": " ", "⁻": "-", "−": "-", "¹": "1"})
+_POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺", "0123456789+")
 #: Names of an uncertainty, in lower case.
 _SIGMA = (
     r"sigma|σ|±|\+/-|\+-|errors?|err|std|std\.? ?dev\.?|stdev|standard deviation|standard error|"
@@ -57,7 +69,12 @@ _SIGMA_BEFORE = re.compile(
     rf"(?:(?:{_SIGMA})[\s_.\-]+(?:(?:of|in|von|de)\s+)?|[±σδ]\s*|d_)(?P<of>.+)"
 )
 _SIGMA_OF = re.compile(rf"(?:{_SIGMA})\s*\((?P<of>.+)\)")
-_ROW_NUMBERS = frozenset({"", "#", "no", "no.", "nr", "nr.", "n", "index", "point", "row", "id"})
+_ROW_NUMBERS = frozenset(
+    {
+        "", "#", "no", "no.", "nr", "nr.", "n", "index", "point", "row", "id", "sample", "frame",
+        "record",
+    }
+)  # fmt: skip
 #: Forms of a name with its unit: `time (s)`, `I [a.u.]`, `t / s`, `Zeit in s`, `time_ms`.
 _WITH_UNIT = tuple(
     re.compile(pattern)
@@ -84,7 +101,11 @@ def split_unit(name: str) -> tuple[str, str]:
 
 def time_unit_s(unit: str) -> float | None:
     """Return a unit of time in seconds; None if it is none."""
-    return _UNITS_S.get(unit.translate(_TYPOGRAPHY).strip(" ()[]/.").lower())
+    plain = unit.translate(_TYPOGRAPHY).strip(" ()[]/.").lower()
+    if match := _POWER_OF_TEN.fullmatch(plain.translate(_POWERS)):
+        seconds = _UNITS_S.get(match["unit"])
+        return None if seconds is None else seconds * 10.0 ** int(match["power"] or match["e"])
+    return _UNITS_S.get(plain)
 
 
 def split_time(name: str) -> tuple[str, str] | None:

@@ -6,7 +6,7 @@ where that leaves two readings, the column is refused.
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +50,19 @@ _INVERSE = re.compile(r"[_\s(]*(?:0|max|t\s*=\s*0)\)?\s*/")
 _MAGNITUDE = re.compile(r"(?P<milli>m?)mag(?:\b.*)?")
 #: The same without a blank: `lnI`, but not `Login`.
 _GLUED = re.compile(r"(?P<log>ln|lg|log(?:10|2)?)(?P<of>[A-Z].*)")
+#: Words for a logarithm: `natural log of I`, `I_log`, `Intensity, ln`, `log-transformed signal`.
+_WORDED = re.compile(
+    r"(?P<kind>natural|decadic|common|decimal)[\s_-]*log(?:arithm)?\s*(?:\(?of\b)?\s*\(?(?P<in>.*?)\)?"
+    r"|(?P<before>.+?)[\s_,;:-]+(?P<log>ln|lg|log(?:[\s_]?(?:e|10|2))?)"
+    r"(?P<scale>[\s_-]*(?:scale|units?|transformed|values?))?"
+    r"|log[\s_-]*(?:arithm(?:ic|us)?|transformed|scaled?)\b.*",
+    re.IGNORECASE,
+)
+#: `E (ln(lx))`: a unit that is a logarithm.
+_NESTED = re.compile(
+    rf"(?P<name>.+?)\s*[(\[]\s*(?P<unit>{_LOG}\s*[(\[].+[)\]])\s*[)\]]", re.IGNORECASE
+)
+_KINDS = {"natural": "ln", "decadic": "log10", "common": "log10", "decimal": "log10"}
 _OTHER_FUNCTION = re.compile(r"1\s*/\s*\(?(?P<of>[^\W\d].*)|(?:sqrt|exp)\s*\(.*|√.*", re.IGNORECASE)
 _ABSORBANCE = frozenset({"absorbance", "abs", "od", "mod", "extinction", "extinktion", "absorbanz"})
 
@@ -133,7 +146,8 @@ def log_scale(name: str, unit: str = "") -> LogScale | None:
     ('e^x', True)
     """
     name = " ".join(name.replace("\N{MINUS SIGN}", "-").split())
-    base, own_unit = split_unit(name)
+    nested = _NESTED.fullmatch(name)
+    base, own_unit = (nested["name"], nested["unit"]) if nested else split_unit(name)
     unit = (own_unit or unit).strip()
     # A unit below the name, or in its brackets, says more than the name.
     if match := _DECIBEL.fullmatch(unit):
@@ -144,8 +158,19 @@ def log_scale(name: str, unit: str = "") -> LogScale | None:
         return LogScale(base, "", unit, 10.0, -2500.0 if match["milli"] else -2.5)
     if unit.lower().replace("_", "") in {*_BASES, "log"}:
         return _logarithm(unit, base, name)
+    if match := _LOGARITHM.fullmatch(unit):
+        # `E` above `ln(lx)`, or `E [ln(lx)]`.
+        scale = _logarithm(match["log"], base, name, match["sign"])
+        return replace(scale, unit=match["in"] or match["after"] or "")
     if match := _LOGARITHM.fullmatch(name):
         return _logarithm(match["log"], match["in"] or match["after"] or "", name, match["sign"])
+    match = _WORDED.fullmatch(base)
+    # Of a lamp's or a sensor's log nobody knows that it is logarithmic; of an intensity's one does.
+    if match and (
+        (match["log"] or "").lower() != "log" or match["scale"] or _is_light(match["before"])
+    ):
+        log = _KINDS.get((match["kind"] or "").lower()) or match["log"] or "log"
+        return _logarithm(log, match["in"] or match["before"] or "", name)
     if match := _GLUED.fullmatch(name):
         return _logarithm(match["log"], match["of"], name)
     other = _OTHER_FUNCTION.fullmatch(name)
@@ -163,6 +188,10 @@ def is_absorbance(name: str) -> bool:
     Over time they are what decays, since they are proportional to what absorbs.
     """
     return split_unit(name)[0].lower().strip("δ∆ ") in _ABSORBANCE
+
+
+def _is_light(name: str) -> bool:
+    return len(name) == 1 or name.lower() in {*_POWERS, *_AMPLITUDES, "signal", "value"}
 
 
 def _decibel(name: str, said: re.Match[str], column: str) -> LogScale:

@@ -16,7 +16,7 @@ BoolArray = npt.NDArray[np.bool_]
 #: Photons that get rare go to zero from some counts at once.
 _STEPS_BELOW_CEILING, _STEPS_ABOVE_FLOOR = 10.0, 50.0
 #: Fewest equal values, and fraction of the values from the first to the last of them.
-_FEWEST_AT_CEILING, _FEWEST_AT_FLOOR, _FRACTION = 4, 5, 0.5
+_FEWEST_AT_CEILING, _FEWEST_AT_FLOOR, _FRACTION = 3, 5, 0.5
 #: Values beside those at the limit from which the last digit is found.
 _NEAR = 20
 

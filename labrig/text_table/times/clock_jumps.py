@@ -16,7 +16,7 @@ _HOUR_S, _HALF_DAY_S, _DAY_S = 3600, 43200, 86400
 #: Rows before and after a jump whose spacing proves it, and the fewest of them.
 _NEIGHBOURS, _FEWEST = 10, 4
 #: Longest row spacing from which a jump of an hour stands out.
-_LONGEST_SPACING_S = 1800
+_LONGEST_SPACING_S = 3600
 #: Largest spacing over the smallest one of regular rows.
 _REGULAR = 3.0
 #: Hours that are left out, or counted twice, in some country, and the months of it.
@@ -116,10 +116,11 @@ def _without_summer_time(clock: Clock) -> Clock:
     shift, shifts, warnings = 0, [0], []
     for row, step in enumerate(steps):
         from_to = (
-            f"line {clock.lines[row + 1]}: the clock goes {'back' if step < 0 else 'ahead'} from "
+            f"line {clock.lines[row + 1]}: the clock goes {'ahead' if step > 0 else 'back'} from "
             f"{clock.cells[row].strip()} to {clock.cells[row + 1].strip()}"
         )
-        if step < 0 and _is_regular(clock, steps, row, step + hour):
+        is_repeated_hour = step == 0 and clock.has_dates and _is_night_of_change(clock, row + 1)
+        if (step < 0 or is_repeated_hour) and _is_regular(clock, steps, row, step + hour):
             shift += hour
             warnings.append(
                 f"{from_to}, by an hour as at the end of summer time: the spacing of the rows "

@@ -34,6 +34,10 @@ _NAMED_MONTH = re.compile(
     r"|(?P<m2>[^\W\d_]{3,9})\.?\s+(?P<d2>\d{1,2}),?\s+)(?P<y>\d{4}|\d\d(?!:))(?!\d)"
 )
 _BASIC = re.compile(r"(\d{8})[T_](\d\d)(\d\d)(\d\d)")
+#: `20261024235930`, which no count of seconds reaches.
+_DIGITS = re.compile(
+    r"((?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01]))([01]\d|2[0-3])([0-5]\d)([0-5]\d)"
+)
 _DATE = r"(?P<d1>\d{4}|\d\d?)(?P<mark>[-/.])(?P<d2>\d\d?)(?P=mark)(?P<d3>\d{4}|\d\d?)\.?"
 _ANY_DATE = rf"(?:{_DATE}|(?P<compact>\d{{8}}))"
 _TIME = (
@@ -92,6 +96,8 @@ def parse_clock(cell: str) -> ClockReading | None:
     True
     """
     text = " ".join(cell.replace("\N{MINUS SIGN}", "-").split())
+    if digits := _DIGITS.fullmatch(text):
+        text = "{} {}:{}:{}".format(*digits.groups())
     text = _YEAR_LAST.sub(r"\1, \3 \2", _BASIC.sub(r"\1 \2:\3:\4", text))
     text = _WEEKDAY.sub("", _NAMED_MONTH.sub(_as_iso, text, count=1), count=1)
     for form in _FORMS:

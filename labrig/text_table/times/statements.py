@@ -15,6 +15,7 @@ from labrig.text_table.style import Line
 
 _WORD = r"[a-zµμ]+"
 _NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
+_PER_SECOND = r"[kmg]?(?:hz|s/s|sa/s|samples?/s(?:ec)?|sps)\b|fps\b|frames/s|1/s|s\^?-1"
 _CHANNEL = r"(?:channels?|chan|chs?|bins?|points?|pts?|samples?|rows?|steps?|kanal|canal|canaux)\b"
 _PER = r"\s*(?:/|\b(?:per|pro|par|each)\b)\s*"
 #: `4.0E-10 sec/ch`, `0.4 ns per channel`.
@@ -32,11 +33,20 @@ _WIDTH = re.compile(
     |kanalbreite
     |(?:time[\s_-]*)?resolution|time[\s_-]*(?:calibration|increment|interval|step)|tcal
     |dwell(?:[\s_-]*time)?|sampl(?:e|ing)[\s_-]*(?:interval|period|time)
-    |x[\s_-]*inc(?:rement)?|delta[\s_-]*[xt]|[dΔ]t)
+    |x[\s_-]*inc(?:r(?:ement)?)?|delta[\s_-]*[xt]|[dΔ]t)
     (?:[\s_]*[(\[]?(?P<before>{_WORD})[)\]]?)?\s*["']?[\s:=,;|]*["']?
     (?P<number>{_NUMBER})\s*[,;"']?\s*(?:[(\[]?(?P<after>{_WORD})\b)?""",
     re.IGNORECASE | re.VERBOSE,
 )
+#: `Sample rate: 2500 Hz`, `Sampling frequency (kHz) = 2.5`, `Frame rate 25 fps`.
+_RATE = re.compile(
+    rf"""(?<![a-z])(?:(?:sampl\w*|acquisition|scan|frame|data|abtast|bild)[\s_-]*(?:rate|frequency|frequenz|freq)
+    |abtastrate|abtastfrequenz|bildrate)
+    (?:[\s_]*[(\[]?(?P<before>{_PER_SECOND})[)\]]?)?\s*["']?[\s:=,;|]*["']?
+    (?P<number>{_NUMBER})\s*[,;"']?\s*(?:[(\[]?(?P<after>{_PER_SECOND}))?""",
+    re.IGNORECASE | re.VERBOSE,
+)
+_PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 #: `Time unit: ns`, `X-axis (ns)`, `Xaxis,Time(ns)`, `Units = ns`.
 _AXIS_UNIT = re.compile(
     r"""[\#\s"'*]*(?:(?:x|t|time|horizontal|abscissa|zeit|temps)[\s_-]*)?
@@ -110,9 +120,10 @@ def channel_width(above: Sequence[Line]) -> ChannelWidth | None:
         Two lines contradict each other.
     """
     found: list[ChannelWidth] = []
+    stated = axis_unit(above)
     for index, line in enumerate(above):
         below = above[index + 1] if index + 1 < len(above) else None
-        if width := _width_in(line, below):
+        if width := _width_in(line, below, stated):
             found.append(width)
     for other in found[1:]:
         if other.widths_s != found[0].widths_s[: len(other.widths_s)] and not _are_alike(
@@ -129,8 +140,13 @@ def _are_alike(a: float, b: float) -> bool:
     return abs(a - b) <= 1e-3 * max(abs(a), abs(b))
 
 
-def _width_in(line: Line, below: Line | None) -> ChannelWidth | None:
-    """Return the width that a line states, or that it names and the line below states."""
+def _width_in(
+    line: Line, below: Line | None, stated: tuple[str, Line] | None
+) -> ChannelWidth | None:
+    """Return the width that a line states, or that it names and the line below states.
+
+    One without a unit, such as `XINCR 4E-10`, is in that which another line states for the axis.
+    """
     text = line.text
     for match in _NUMBER_PER_CHANNEL.finditer(text):
         unit_s = time_unit_s(match["unit"])
@@ -147,10 +163,16 @@ def _width_in(line: Line, below: Line | None) -> ChannelWidth | None:
             widths_s = tuple(_number(cell, line) * unit_s for cell in numbers)
             return _checked(widths_s, match["unit"], line)
     for match in _WIDTH.finditer(text):
-        unit = match["before"] or match["after"] or ""
+        unit = match["before"] or match["after"] or (stated[0] if stated else "")
         unit_s = time_unit_s(unit)
         if unit and unit_s is not None:
             return _checked((_number(match["number"], line) * unit_s,), unit, line)
+    for match in _RATE.finditer(text):
+        unit = match["before"] or match["after"] or ""
+        rate = _number(match["number"], line)
+        prefix = unit[:1] if re.match(r"[kKMG](?:hz|s)", unit, re.IGNORECASE) else ""
+        if unit and rate > 0 and not re.match(r"m(?:hz|s)", unit):
+            return _checked((1 / (rate * _PREFIXES[prefix.upper().replace("K", "k")]),), "s", line)
     return None
 
 

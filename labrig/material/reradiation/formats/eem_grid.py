@@ -261,15 +261,20 @@ def _listed(block: Block) -> Grid | None:
     column_nm, column = np.unique(table[:, 1], return_inverse=True)
     low, high = PLAUSIBLE_NM
     both = np.concatenate([row_nm, column_nm])
-    is_grid = len(row_nm) * len(column_nm) == len(table) and min(len(row_nm), len(column_nm)) > 1
+    names = block.names or ("", "", "")
+    rows = _axis_of(names[0]) or _other(_axis_of(names[1]))
+    # Without names a full grid shows that these are wavelengths; with them pairs may be missing.
+    is_grid = min(len(row_nm), len(column_nm)) > 1 and (
+        len(row_nm) * len(column_nm) == len(table)
+        or (rows is not None and _axis_of(names[1]) == _other(rows))
+    )
     if not is_grid or not ((both >= low) & (both <= high)).all():
         return None
     intensity = np.full((len(row_nm), len(column_nm)), np.nan)
     if len(set(zip(row.tolist(), column.tolist(), strict=True))) < len(table):
         raise ValueError("expected each pair of wavelengths once, got some of them twice")
     intensity[row, column] = table[:, 2]
-    names = block.names or ("", "", "")
-    return Grid(row_nm, column_nm, intensity, _axis_of(names[0]) or _other(_axis_of(names[1])))
+    return Grid(row_nm, column_nm, intensity, rows)
 
 
 def _named_spectra(text: str) -> Grid:
