@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from labrig.errors import FitError
+from labrig.fit.decay.fit import MOST_LIFETIMES
 from labrig.fit.decay.search import LOG_RATE_TOLERANCE, MAX_EVALUATIONS, grid_size
 from labrig.fit.decay.selection import F_TEST_LEVEL, REFUTING_BIC
 from labrig.fit.decay.series import FASTEST_DECAYS, NO_DECAY, SLOWEST_SPANS
@@ -30,8 +31,6 @@ from labrig.results import (
     first_row_at,
 )
 
-#: Lifetimes of the fastest state before the first row from which its light at lamp off is not told.
-MOST_LIFETIMES = 5.0
 #: Chance below which tables differ in their rates by more than their noise.
 DIFFERENT_LEVEL = 1e-3
 #: Fits after each of which σ of residuals are those of the fit, where all values have one.

@@ -121,9 +121,9 @@ def fit_mixture(
             f"expected 1 to {most} components for {kept} entries above the threshold, "
             f"got {components}"
         )
-    best = fits[_preferred(table, selection)]
+    chosen = _preferred(table, selection)
+    best = fits[chosen]
     mixture = best.mixture
-    least_chi2 = chi2(entries, mixture)
     if scaling != "least-squares":
         mixture = with_integral(entries, mixture, light_sigma(matrix, entries))
     if scaling == "colour":
@@ -138,7 +138,7 @@ def fit_mixture(
         kept_entries=kept,
         entries=len(entries.value),
         light_kept=light_kept(matrix, entries, mixture),
-        reduced_chi2=_reduced(least_chi2, entries, best, parameters),
+        reduced_chi2=table[chosen].reduced_chi2,
         masked_mse=masked_mse(entries, mixture),
         likelihood_mse=best.likelihood_mse,
         band_nm=float(widths_nm[0]) if np.allclose(widths_nm, widths_nm[0]) else 1.0,
@@ -175,21 +175,12 @@ def _scored(
     components = len(fit.mixture.weights)
     mse = masked_mse(entries, fit.mixture)
     misfit, number = chi2(entries, fit.mixture), len(entries.value)
-    reduced = _reduced(misfit, entries, fit, parameters)
+    reduced = None if misfit is None else misfit / max(number - parameters * components, 1)
     if misfit is None:
         number = int(entries.is_kept.sum())
         misfit = number * float(np.log(max(mse, np.finfo(np.float64).tiny)))
     bic = misfit + parameters * components * float(np.log(number))
     return MixtureCandidate(components, mse, bic, reduced, held_out)
-
-
-def _reduced(
-    misfit: float | None, entries: StokesEntries, fit: Candidate, parameters: int
-) -> float | None:
-    """Return χ² over the degrees of freedom."""
-    if misfit is None:
-        return None
-    return misfit / max(len(entries.value) - parameters * len(fit.mixture.weights), 1)
 
 
 def _preferred(table: Sequence[MixtureCandidate], selection: Selection) -> int:
