@@ -22,7 +22,7 @@ _SURELY_PER_CENT = 2.0
 
 
 class Quantity(Enum):
-    """What the values of a curve are."""
+    """Quantity that the values of a curve are."""
 
     LIGHT = "light"
     TRANSMITTANCE = "transmittance"
@@ -40,7 +40,7 @@ class _Form(Enum):
 
 @dataclass(frozen=True)
 class Ordinate:
-    """What the values of a column are, and how they become linear.
+    """Quantity in a column, and the form in which it is written.
 
     Attributes
     ----------

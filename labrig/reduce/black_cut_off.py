@@ -99,7 +99,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class BlackCutOff:
-    """What the numbers of a frame stand for whose noise is cut off at the lowest of them.
+    """Values for which the numbers of a frame stand whose noise is cut off at the lowest of them.
 
     Levels, means and values are in DN above that number.
 

@@ -51,7 +51,7 @@ _UNSTATED = "s, as no line states another unit"
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """Where the times of the rows come from.
+    """Source of the times of the rows.
 
     Attributes
     ----------

@@ -59,7 +59,7 @@ class SparseIndices(GltfPart):
 
 
 class SparseValues(GltfPart):
-    """What replaces them."""
+    """Numbers that replace those of an accessor."""
 
     buffer_view: Index
     byte_offset: Index = 0
@@ -88,7 +88,7 @@ class Accessor(GltfPart):
 
 
 class TextureTransform(GltfPart):
-    """How a picture lies on texture coordinates, by KHR_texture_transform."""
+    """Place of a picture on texture coordinates, by KHR_texture_transform."""
 
     offset: tuple[Finite, Finite] = (0.0, 0.0)
     rotation: Finite = 0.0
@@ -187,7 +187,7 @@ class GltfScene(GltfPart):
 
 
 class AnimationTarget(Extended):
-    """What is moved."""
+    """Part of a node that an animation moves."""
 
     node: Index | None = None
     path: str
@@ -222,7 +222,7 @@ class GltfDocument(GltfPart):
 
 
 class GltfNeeds(GltfPart):
-    """What a reader has to know before it reads the rest."""
+    """Head of a document, which a reader has to know before it reads the rest."""
 
     asset: Asset
     extensions_required: tuple[str, ...] = ()

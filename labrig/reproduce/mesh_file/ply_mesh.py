@@ -30,7 +30,7 @@ END_OF_STRIP = -1
 
 @dataclass
 class _Element:
-    """What the head says of an element: its name, how many there are, and their properties."""
+    """Element as the head describes it: its name, how many there are, and their properties."""
 
     name: str
     count: int

@@ -57,7 +57,7 @@ _FORMS = (
 
 @dataclass(frozen=True)
 class ClockReading:
-    """What a cell with a clock says, before it is known which number is which.
+    """Content of a cell with a clock, before it is known which number is which.
 
     Attributes
     ----------
