@@ -12,6 +12,10 @@ from .blank import (
     BlankResult as BlankResult,
     StrayLight as StrayLight,
 )
+from .budget import (
+    CAUSES as CAUSES,
+    Budget as Budget,
+)
 from .calibration import CalibrationResult as CalibrationResult
 from .calibration_check import (
     CalibrationCheckResult as CalibrationCheckResult,
@@ -123,6 +127,12 @@ from .isotropy import (
     AngularGlow as AngularGlow,
     IsotropyResult as IsotropyResult,
     is_within_paper as is_within_paper,
+)
+from .layer_effect import (
+    PRIOR_DENSITY as PRIOR_DENSITY,
+    THICKNESS as THICKNESS,
+    DensityBasis as DensityBasis,
+    LayerEffect as LayerEffect,
 )
 from .led_brightness import (
     LedBrightnessResult as LedBrightnessResult,

@@ -12,6 +12,7 @@ from labrig.material import Material, write_material
 from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_excitation import BandTests, FittedExcitation
+from labrig.results.layer_effect import LayerEffect
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
@@ -209,6 +210,7 @@ class ExcitationResult(RunResult):
             "schema_version": self.schema_version,
             "bands_nm": self.irradiance.bands_nm,
             "irradiance_vector_length": self.irradiance.vector_length,
+            "thickness": None if fit.layer is None else _layer(fit.layer),
             "states": [
                 {
                     "k_r_per_s": state.k_r_per_s,
@@ -218,6 +220,7 @@ class ExcitationResult(RunResult):
                     "amplitude_at_full_charge": state.amplitude,
                     "amplitude_at_full_charge_sigma": state.amplitude_sigma,
                     "k_e_per_s": state.k_e_per_s.tolist(),
+                    "k_e_range_per_s": fit.k_e_range(number).tolist(),
                     "k_e_sigma_per_s": state.k_e_sigma_per_s.tolist(),
                     "k_e_upper_per_s": state.k_e_upper_per_s.tolist(),
                     "r0": float(level_at_off.r0[number]),
@@ -246,6 +249,16 @@ class ExcitationResult(RunResult):
             "models": [vars(model) for model in fit.models],
             "warnings": list(fit.warnings),
         }
+
+
+def _layer(layer: LayerEffect) -> dict[str, Any]:
+    """Return the effect of thickness as content of a file."""
+    return {
+        "optical_density": list(layer.optical_density),
+        "basis": str(layer.basis),
+        "k_e_factor": layer.k_e_factor.tolist(),
+        "reradiation_factor": layer.reradiation_factor.tolist(),
+    }
 
 
 def _by_band(tests: BandTests) -> dict[str, Any]:
