@@ -309,8 +309,8 @@ def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
             (f"{low:.0f}–{high:.0f}", *(column[band] for column in columns))
             for band, (low, high) in enumerate(pairwise(bands_nm))
         ),
-        "Range by the thickness of the sample, then value as of a surface ± 1 σ, or the upper limit "
-        "with 95 % probability and at that thickness.",
+        "Range by the thickness of the sample, then value as of a surface ± 1 σ, or the upper "
+        "limit with 95 % probability and at that thickness.",
     )
 
 

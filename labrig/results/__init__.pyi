@@ -13,7 +13,7 @@ from .blank import (
     StrayLight as StrayLight,
 )
 from .budget import (
-    CAUSES as CAUSES,
+    UNDIVIDED as UNDIVIDED,
     Budget as Budget,
 )
 from .calibration import CalibrationResult as CalibrationResult

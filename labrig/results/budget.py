@@ -8,8 +8,8 @@ from typing import Any, Self
 from labrig.number_format import plus_minus, rounded
 from labrig.results.measured import Measured
 
-#: Causes of uncertainty that a budget has a component of.
-CAUSES = ("noise", "calibration", "model")
+#: Name of noise and calibration where a result has their sum only.
+UNDIVIDED = "noise and calibration"
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class Budget:
         By the scatter of what was measured: photons, read noise, flicker, repetition.
     calibration
         By the calibrations and references that all readings share.
+    undivided
+        By noise and calibration together, where the result does not keep them apart.
     model
         By the choice among models that describe the readings.
     model_range
@@ -53,6 +55,7 @@ class Budget:
     unit: str = ""
     noise: float | None = None
     calibration: float | None = None
+    undivided: float | None = None
     model: float | None = None
     model_range: tuple[float, float] | None = None
     model_of: str = ""
@@ -68,23 +71,24 @@ class Budget:
         model_of: str = "",
         left_out: Sequence[str] = (),
     ) -> Self:
-        """Return the budget of a value whose σ has the noise and, where given, a calibration in it.
+        """Return the budget of a value whose stated σ is noise and, where given, a calibration.
+
+        The noise is the part of σ that the calibration leaves, so that nothing counts twice.
 
         Parameters
         ----------
         stated
             Value and σ as they are stated.
         calibration
-            The part of that σ which is the calibration's; None if it has none.
+            The part of that σ which is the calibration's, at most all of it; None if none is.
         model_range, model_of, left_out
             As the attributes.
         """
-        sigma = stated.sigma
+        noise = stated.sigma
         if calibration is not None:
-            calibration = min(calibration, sigma)
-        noise = sigma
-        if calibration is not None and math.isfinite(sigma):
-            noise = math.sqrt(max(sigma**2 - calibration**2, 0.0))
+            calibration = min(calibration, stated.sigma)
+            if math.isfinite(stated.sigma):
+                noise = math.sqrt(stated.sigma**2 - calibration**2)
         return cls(
             stated.value,
             stated.unit,
@@ -98,8 +102,13 @@ class Budget:
     @property
     def components(self) -> Mapping[str, float]:
         """Standard uncertainties by cause, of those that are included."""
-        parts = zip(CAUSES, (self.noise, self.calibration, self.model), strict=True)
-        return {cause: sigma for cause, sigma in parts if sigma is not None}
+        parts = {
+            "noise": self.noise,
+            "calibration": self.calibration,
+            UNDIVIDED: self.undivided,
+            "model": self.model,
+        }
+        return {cause: sigma for cause, sigma in parts.items() if sigma is not None}
 
     @property
     def sigma(self) -> float:
@@ -110,10 +119,9 @@ class Budget:
     @property
     def not_included(self) -> tuple[str, ...]:
         """Names of the causes that are in no component."""
-        missing = [cause for cause in CAUSES if cause not in self.components]
-        if self.model_range is not None:
-            missing = [cause for cause in missing if cause != "model"]
-        return (*missing, *self.left_out)
+        missing = [] if self.undivided is not None else ["noise", "calibration"]
+        missing += ["model"] if self.model_range is None else []
+        return (*(cause for cause in missing if cause not in self.components), *self.left_out)
 
     @property
     def trusted(self) -> tuple[float, float]:
@@ -121,8 +129,8 @@ class Budget:
         low, high = self.model_range or (self.value, self.value)
         return min(low, self.value) - self.sigma, max(high, self.value) + self.sigma
 
-    def relative(self, sigma: float) -> str:
-        """Return a component in per cent of the value, or in its unit where the value is within it.
+    def size_text(self, sigma: float) -> str:
+        """Return a component in per cent of the value, or in its unit where it exceeds the value.
 
         Parameters
         ----------
@@ -136,39 +144,43 @@ class Budget:
         return f"{rounded(sigma, 2)} {self.unit}".strip()
 
     @property
+    def value_text(self) -> str:
+        """Value, σ and unit as text."""
+        return " ".join(filter(None, (plus_minus(self.value, self.sigma), self.unit)))
+
+    @property
     def model_text(self) -> str:
         """The range by the choice of model as text; empty without one."""
         if self.model_range is None:
             return ""
         low, high = (rounded(end, 3) for end in self.model_range)
-        return f"{low} to {high} by {self.model_of or 'model'}"
-
-    @property
-    def causes_text(self) -> str:
-        """Components of σ, and the causes that are not included, as text."""
-        parts = [f"{cause} {self.relative(sigma)}" for cause, sigma in self.components.items()]
-        text = ", ".join(parts)
-        if self.not_included:
-            text = "; ".join(filter(None, (text, f"not included: {', '.join(self.not_included)}")))
-        return text
+        return " ".join(filter(None, (f"{low} to {high}", self.unit, f"by {self.model_of}")))
 
     def __str__(self) -> str:
-        """Return the range by the model first, if there is one, then value, σ and its causes."""
-        text = plus_minus(self.value, self.sigma)
-        text = " ".join(filter(None, (text, self.unit)))
-        before = f"{self.model_text}; " if self.model_range is not None else ""
-        return f"{before}{text} ({self.causes_text})"
+        """Return the range by the model, if there is one, then value, σ and its causes."""
+        causes = ", ".join(
+            f"{name} {self.size_text(part)}" for name, part in self.components.items()
+        )
+        missing = f"not included: {', '.join(self.not_included)}" if self.not_included else ""
+        inside = "; ".join(filter(None, (causes, missing)))
+        return "; ".join(filter(None, (self.model_text, f"{self.value_text} ({inside})")))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for a file, the range by the model before σ."""
         return {
             "value": self.value,
             "unit": self.unit,
-            "model_range": None if self.model_range is None else list(self.model_range),
+            "model_range": self.model_range and list(self.model_range),
             "model_of": self.model_of,
             "sigma": self.sigma,
             "noise": self.noise,
             "calibration": self.calibration,
+            "undivided": self.undivided,
             "model": self.model,
             "not_included": list(self.not_included),
         }
+
+
+def named(patch: str, quantity: str) -> str:
+    """Return the name of a patch's headline value; the only patch may have no name."""
+    return f"{patch}: {quantity}" if patch else quantity

@@ -1,6 +1,6 @@
 """Result of an excitation run: excitation rates by band, and the material from them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -9,11 +9,12 @@ import numpy as np
 
 from labrig.calibration import IrradianceFile
 from labrig.material import Material, write_material
+from labrig.results.budget import Budget, named
 from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_excitation import BandTests, FittedExcitation
-from labrig.results.layer_effect import LayerEffect
-from labrig.results.measured import FloatArray
+from labrig.results.layer_effect import THICKNESS, LayerEffect
+from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 from labrig.results.text_files import finite, write_json
@@ -194,6 +195,59 @@ class ExcitationResult(RunResult):
     def provides(self) -> Mapping[str, Any]:
         """Return the materials by patch."""
         return {"materials": {name: patch.material for name, patch in self.patches.items()}}
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of k_r, of k_e in the bands that are seen to excite, and of Λ."""
+        return {
+            named(name, quantity): budget
+            for name, patch in self.patches.items()
+            for quantity, budget in self._patch_budgets(patch)
+        }
+
+    def _patch_budgets(self, patch: PatchExcitation) -> Iterator[tuple[str, Budget]]:
+        fit, layer = patch.fit, patch.fit.layer
+        edges = self.irradiance.bands_nm
+        direct = np.maximum(np.array(self.irradiance.direct), 1e-300)
+        light = np.array(self.irradiance.direct_sigma) / direct
+        by = THICKNESS if layer is not None else ""
+        beside = () if layer is not None else (THICKNESS,)
+        for number, state in enumerate(fit.states):
+            if not state.is_apart:
+                continue
+            of = f"of state {number + 1}"
+            k_r = Measured(state.k_r_per_s, state.k_r_sigma_per_s, "1/s")
+            yield f"k_r {of}", Budget.of(k_r)
+            for band in np.flatnonzero(state.seen):
+                k_e = Measured(state.k_e_per_s[band], state.k_e_sigma_per_s[band], "1/s")
+                least, largest = fit.k_e_range(number)[:, band].tolist()
+                yield (
+                    f"k_e {of}, {edges[band]:.0f}-{edges[band + 1]:.0f} nm",
+                    Budget.of(
+                        Measured(float(k_e.value), float(k_e.sigma), "1/s"),
+                        float(light[band] * k_e.value),
+                        model_range=None if layer is None else (least, largest),
+                        model_of=by,
+                        left_out=beside,
+                    ),
+                )
+            material = patch.material.states[number]
+            if material.reradiation is None or material.reradiation_sigma is None:
+                continue
+            peak = int(np.argmax(material.reradiation))
+            ends = material.reradiation_range
+            factors = patch.material.scale_factors
+            scale = np.linalg.norm([(factor.sigma or 0.0) / factor.value for factor in factors])
+            value = material.reradiation[peak]
+            yield (
+                f"Λ {of}, {edges[peak]:.0f}-{edges[peak + 1]:.0f} nm",
+                Budget.of(
+                    Measured(value, material.reradiation_sigma[peak], ""),
+                    float(scale * value) if factors else None,
+                    model_range=None if ends is None else (ends[0][peak], ends[1][peak]),
+                    model_of=by,
+                    left_out=beside,
+                ),
+            )
 
     def write_files(self, folder: Path) -> None:
         """Write `material.yaml` and `excitation.json` of each patch, in a folder of its name."""

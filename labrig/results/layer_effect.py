@@ -54,7 +54,7 @@ class LayerEffect:
         low, high = (rounded(end, 2) for end in self.optical_density)
         shown = "by the charges themselves" if self.is_shown else self.basis
         k_e, whole = (_times(factor) for factor in (self.k_e_factor, self.reradiation_factor))
-        return f"optical density {low} to {high} ({shown}): true k_e {k_e}, true Λ {whole} those stated"
+        return f"optical density {low} to {high} ({shown}): true k_e {k_e}, Λ {whole} those stated"
 
 
 def _times(factor: FloatArray) -> str:

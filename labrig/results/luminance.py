@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
 from scipy.special import ndtr
 
 from labrig.number_format import aligned
 from labrig.quantity import TIME_S, duration_text, parse
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.text_files import finite, json_text
 
@@ -217,6 +219,26 @@ class LuminanceDecay:
         parts += [self.colours] if self.colours else []
         return "-".join(parts)
 
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of luminances, of the light sum, and of the time until 0.3 mcd/m².
+
+        The scale is the calibration; in σ of the time it is together with the noise.
+        """
+        has_scale, budgets = self.scale_sigma > 0, {}
+        for entry in self.at:
+            if (light := entry.luminance) is not None:
+                budgets[f"luminance at {duration_text(entry.t_s)}"] = Budget.of(
+                    light, self.scale_sigma * light.value if has_scale else None
+                )
+        # The sum of trapezia, as in σ of the light sum.
+        common = self.scale_sigma * float(np.trapezoid(self.luminance_mcd_per_m2, self.t_s))
+        budgets["light sum"] = Budget.of(self.light_sum, common if has_scale else None)
+        if self.visible_s is not None:
+            name = f"time until {VISIBLE_MCD_PER_M2:g} {MCD_PER_M2}"
+            until = self.visible_s
+            budgets[name] = Budget(until.value, until.unit, undivided=until.sigma)
+        return budgets
+
     def __str__(self) -> str:
         """Return a table for people."""
         marking = self.marking or "none: luminances at 10 and 60 min are missing"
@@ -258,6 +280,7 @@ class LuminanceDecay:
             {
                 "schema_version": 1,
                 "origin": self.origin,
+                "budgets": {name: budget.to_dict() for name, budget in self.budgets().items()},
                 "at": [
                     {"t_s": entry.t_s, "luminance_mcd_per_m2": _number(entry.luminance)}
                     for entry in self.at

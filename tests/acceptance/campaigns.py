@@ -147,6 +147,7 @@ CAMPAIGNS = {
         ),
         _module("sao_charge_and_decay"),
         _module("excitation_light"),
+        _module("layer_range"),
         _module("trap_models"),
         _module("lightlogger"),
         _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),

@@ -222,7 +222,7 @@ def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
 
 def _layer_warnings(fit: FittedExcitation) -> Iterator[str]:
     if fit.layer is not None and fit.layer.is_shown:
-        yield f"the charges are those of a layer, not of a surface: {fit.layer}; measure a thinner one"
+        yield f"the charges are those of a layer, not a surface: {fit.layer}; measure a thinner one"
 
 
 def _closure_warnings(closure: Closure | None) -> Iterator[str]:

@@ -82,9 +82,9 @@ def _reradiation(
     spectrum: EmissionSpectrum | None,
     bands_nm: FloatArray,
 ) -> dict[str, Any]:
-    """Return Λ, its range by thickness and its σ by band: A_i / k_r,i times the spectrum's mean, with all their errors.
+    """Return Λ, its range by thickness and σ: A_i / k_r,i times the spectrum's mean by band.
 
-    Of an order other than 1 Λ is only known where the charge is.
+    σ has all their errors. Of an order other than 1 Λ is only known where the charge is.
     """
     if spectrum is None or not state.is_apart:
         return {}

@@ -88,8 +88,11 @@ def levels_and_slopes(
     """
     if series.arriving is not None:
         each = [levels_and_slopes(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()]
-        level, by_light, by_start = zip(*each, strict=True)
-        return mean_levels(level), np.mean(by_light, axis=0), np.mean(by_start, axis=0)
+        return (
+            mean_levels([level for level, _, _ in each]),
+            np.mean([by_light for _, by_light, _ in each], axis=0),
+            np.mean([by_start for _, _, by_start in each], axis=0),
+        )
     if series.across is not None:
         places = len(series.across)
         level, by_light, by_start = levels_and_slopes(series.spread(), k_r_per_s, k_e_per_s, order)
