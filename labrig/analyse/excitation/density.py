@@ -26,15 +26,17 @@ def largest_density(
     bands_nm
         Edges of the bands in nm.
     stated
-        Largest optical density in any band, as the protocol states it.
+        Largest optical density in any band, as the protocol states it; it goes before a
+        reflectance, from which that of a scattering sample does not follow.
     reflectance
         Reflectance of the sample.
     """
-    largest = PRIOR_DENSITY if stated is None else stated
-    basis = DensityBasis.PRIOR if stated is None else DensityBasis.STATED
-    of_bands = np.full(len(bands_nm) - 1, largest)
+    bands = len(bands_nm) - 1
+    if stated is not None:
+        return np.full(bands, stated), DensityBasis.STATED
+    of_bands = np.full(bands, PRIOR_DENSITY)
     if reflectance is None:
-        return of_bands, basis
+        return of_bands, DensityBasis.PRIOR
     nm, albedo = np.array(reflectance.wavelength_nm), np.array(reflectance.albedo)
     least = albedo - SIGMAS * np.array(reflectance.albedo_sigma)
     for band, (low, high) in enumerate(pairwise(bands_nm)):
@@ -42,6 +44,7 @@ def largest_density(
         if not len(inside) and nm[0] <= (low + high) / 2 <= nm[-1]:
             inside = np.array([np.interp((low + high) / 2, nm, least)])
         if len(inside):
-            back = float(np.clip(inside.min(), 10.0**-largest, 1.0))
+            back = float(np.clip(inside.min(), 10.0**-PRIOR_DENSITY, 1.0))
             of_bands[band] = -np.log10(back)
-    return of_bands, basis if of_bands.max() >= largest else DensityBasis.REFLECTANCE
+    is_bound = of_bands.max() < PRIOR_DENSITY
+    return of_bands, DensityBasis.REFLECTANCE if is_bound else DensityBasis.PRIOR
