@@ -215,6 +215,16 @@ def light_errors(printed: str) -> str:
     return f"rms of error over σ {span(pulls, 2)}"
 
 
+def layer_range(printed: str) -> str:
+    rows = columns(
+        r"^(?:optical|held out, all|thin).*: of +\d+ k_e +(\d+) % within 2 σ of the fit, +(\d+) %",
+        printed,
+    )
+    return ", ".join(
+        f"{before:.0f} % and {after:.0f} %" for before, after in zip(*rows, strict=True)
+    )
+
+
 def trap_models(order: str) -> Extract:
     """Return the extract of how many materials were predicted how, processed with an order."""
 

@@ -7,8 +7,8 @@ Samples are charged, fitted as surfaces and looked at as layers, as a run of `ex
 - the layers of optical density 1 of `excitation_light`, the same seeds;
 - held-out layers of optical density 0 to 2, a fifth of them thin, of seven materials, under three
   lamps, photographed with much and little noise. They absorb as they excite, alike in all bands,
-  half as each, by a host of the short-wave half, or by a pigment about 540 nm: of these the ranges
-  assume only the first two;
+  half as each, by a host up to 470 nm, or by a pigment about 540 nm, too: half and pigment are none
+  of the courses that are tried;
 - thin layers of optical density up to 0.05 whose reflectance 10^(−D) is measured within 0.005.
 
 Per group: rates above 0.002 /s and Λ within 2 σ of the fit (before), and within the range widened

@@ -317,6 +317,13 @@ FIGURES = (
         figure.light_errors,
     ),
     Figure(
+        "Excitation rates k_e ≥ 0.002 /s of layers that are fitted as surfaces: 60 of optical density "
+        "1, 60 drawn from 0 to 2 with five courses of absorption, and 20 thin ones whose reflectance "
+        "was measured: within 2 σ of the fit, and within the range that thickness leaves",
+        "layer_range",
+        figure.layer_range,
+    ),
+    Figure(
         "Charging by the white lamp and decay predicted from an excitation of traps of first and "
         "general order, with retrapping, and with depths that scatter, the order chosen by the "
         "data: within 2 % or 3 σ (good; doubted: and warned), worse and warned (told), not warned "

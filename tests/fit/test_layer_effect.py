@@ -12,7 +12,7 @@ from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.phosphor import phosphor
 from tests.fit.charged_samples import Bench, lvf_windows
 
-WINDOWS = lvf_windows(np.linspace(405, 560, 12))
+WINDOWS = lvf_windows(np.linspace(405, 560, 8))
 SIGMAS = RelativeSigmas(0.002, 0.002)
 
 
@@ -35,8 +35,8 @@ class Deep(Bench):
 
 
 def measured(bench: Bench, largest: float = 2.0) -> tuple[FittedExcitation, LayerEffect]:
-    through = bench.series("through the filter", WINDOWS, (8, 32, 128), shots=3, every_s=15.0)
-    bare = bench.series("bare", np.ones((1, len(WAVELENGTH_NM))), (3, 10, 60, 900), shots=3)
+    through = bench.series("through the filter", WINDOWS, (8, 32, 128), shots=2, every_s=15.0)
+    bare = bench.series("bare", np.ones((1, len(WAVELENGTH_NM))), (3, 10, 60, 900), shots=2)
     series = [through, bare]
     fit = fit_excitation(series, [0.03], [1.0], SIGMAS)
     limit = np.full(len(bench.material.bands_nm or ()) - 1, largest)
@@ -47,7 +47,9 @@ def bench(seed: int, **more: object) -> Deep:
     return Deep(read_material("blue-paint"), flicker=0.002, photons=50.0, seed=seed, **more)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("is_grey", "density"), [(False, 1.0), (True, 0.7)])
+@pytest.mark.parametrize(
+    ("is_grey", "density"), [(False, 1.0), pytest.param(True, 0.7, marks=pytest.mark.campaign)]
+)
 def test_the_range_of_a_layer_has_the_true_rates_and_the_fit_has_not(
     is_grey: bool, density: float
 ) -> None:
@@ -77,6 +79,7 @@ def test_a_layer_that_is_known_to_be_thin_has_a_small_range() -> None:
     assert np.isfinite(fit.reduced_chi2)
 
 
+@pytest.mark.campaign
 def test_charges_of_a_thin_sample_exclude_a_thick_one() -> None:
     _, effect = measured(bench(6, density=0.0))
     assert effect.optical_density[0] == 0.0

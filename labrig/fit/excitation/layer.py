@@ -7,9 +7,10 @@ full sample less than all of it: by how much depends on D_b and on how far each 
 the same charges are fitted with the light of layers of rising density. Their rates over those of
 the surface are what depth makes of k_e and Λ, and χ² is how far the charges speak for a density.
 
-How light is absorbed from band to band is not known. Two courses are tried, between which most
-layers lie: as k_e has it, or alike in all bands, as by a grey binder. Charges tell the density
-better than that course, so that the range is that of both courses at all densities left.
+How light is absorbed from band to band is not known. Three courses are tried, between which most
+layers lie: as k_e has it; as k_e has it beyond its peak and fully at all shorter waves, as by a
+host; and alike in all bands, as by a grey binder. Charges tell the density better than its course,
+so that the range is that of all courses at all densities left.
 """
 
 from collections.abc import Sequence
@@ -55,6 +56,23 @@ class _Layer:
         return by_band / max(float(by_band.max()), 1e-300)
 
 
+def _grey(layer: _Layer) -> FloatArray:
+    return np.ones(layer.k_e_per_s.shape[1])
+
+
+def _exciting(layer: _Layer) -> FloatArray:
+    return layer.absorption()
+
+
+def _host(layer: _Layer) -> FloatArray:
+    """Return the absorption that never rises with the wavelength."""
+    return np.asarray(np.maximum.accumulate(layer.absorption()[::-1])[::-1])
+
+
+#: Courses of absorption from band to band, given the rates of nearly the same layer.
+COURSES = (_grey, _exciting, _host)
+
+
 def layer_effect(
     series: Sequence[ChargingSeries],
     fit: FittedExcitation,
@@ -84,20 +102,20 @@ def layer_effect(
     largest = float(largest_density.max())
     fractions = FRACTIONS if largest > ONE_STEP else (1.0,)
     enlarged = max(1.0, fit.reduced_chi2)
-    density, grey, exciting = [0.0], [surface], [surface]
+    density: list[float] = [0.0]
+    courses = [[surface] for _ in COURSES]
     for tried in largest * np.array(fractions):
-        grey.append(layers.fitted(np.minimum(tried, largest_density), grey[-1]))
-        layer = exciting[-1]
-        # Absorption follows k_e, which follows from absorption.
-        for _ in range(2):
-            by_band = np.minimum(tried * layer.absorption(), largest_density)
-            layer = layers.fitted(by_band, layer)
-        exciting.append(layer)
+        for course, absorption in zip(courses, COURSES, strict=True):
+            layer = course[-1]
+            # Absorption follows k_e, which follows from absorption.
+            for _ in range(1 if absorption is _grey else 2):
+                by_band = np.minimum(tried * absorption(layer), largest_density)
+                layer = layers.fitted(by_band, layer)
+            course.append(layer)
         density.append(float(tried))
-        best = min(one.chi2 for one in (*grey, *exciting))
-        if min(grey[-1].chi2, layer.chi2) - best > FAR_OUT * LEFT_OUT * enlarged:
+        best = min(one.chi2 for course in courses for one in course)
+        if min(course[-1].chi2 for course in courses) - best > FAR_OUT * LEFT_OUT * enlarged:
             break
-    courses = (grey, exciting)
     at = np.linspace(0.0, density[-1], LOOKED_UP)
     rise = np.min(
         [
