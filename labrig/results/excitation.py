@@ -210,7 +210,7 @@ class ExcitationResult(RunResult):
         direct = np.maximum(np.array(self.irradiance.direct), 1e-300)
         light = np.array(self.irradiance.direct_sigma) / direct
         by = THICKNESS if layer is not None else ""
-        beside = () if layer is not None else (THICKNESS,)
+        beside = ("kinetic order", THICKNESS if layer is None else "scattering in the sample")
         for number, state in enumerate(fit.states):
             if not state.is_apart:
                 continue

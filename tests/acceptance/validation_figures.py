@@ -317,9 +317,9 @@ FIGURES = (
         figure.light_errors,
     ),
     Figure(
-        "Excitation rates k_e ≥ 0.002 /s of layers that are fitted as surfaces: 60 of optical density "
-        "1, 60 drawn from 0 to 2 with five courses of absorption, and 20 thin ones whose reflectance "
-        "was measured: within 2 σ of the fit, and within the range that thickness leaves",
+        "Excitation rates k_e ≥ 0.002 /s of layers that are fitted as surfaces: 60 of optical "
+        "density 1, 60 drawn from 0 to 2 with five courses of absorption, and 20 thin ones whose "
+        "reflectance was measured: within 2 σ of the fit, and within the range of thickness",
         "layer_range",
         figure.layer_range,
     ),
