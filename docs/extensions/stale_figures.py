@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 
 def _mark(app: Sphinx, docname: str, source: list[str]) -> None:
     if docname == "validation":
-        from tests.acceptance.validation import page
+        from tests.acceptance.validation_page import page
 
         source[0] = page(marked=True)
 

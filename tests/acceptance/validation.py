@@ -14,118 +14,17 @@ lists the campaigns whose code has changed; `table` makes the page anew; `quotes
 pages should quote and do not.
 """
 
-import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
-from difflib import ndiff
-from pathlib import Path
+from collections.abc import Iterable
 
-from tests.acceptance.campaigns import CAMPAIGNS, ROOT, Campaign, Output
-from tests.acceptance.printed import Extract
-from tests.acceptance.quote import Quote
+from tests.acceptance.campaigns import CAMPAIGNS, ROOT, Campaign
 from tests.acceptance.quoted_figures import QUOTES
-from tests.acceptance.validation_figures import FIGURES
-from tests.acceptance.verdict import agrees
+from tests.acceptance.renewal import changes, renew_quotes, says
+from tests.acceptance.validation_page import PAGE, page
 
-TEMPLATE = Path(__file__).with_name("validation.md")
-PAGE = ROOT / "docs/validation.md"
 #: Processor time of the campaigns that CI runs in one turn, and the fraction that takes turns.
 TURN_CPU_S, CHEAP = 90.0, 1 / 3
-STALE_MARK = " †"
-
-
-def page(*, marked: bool = False) -> str:
-    """Return the text of `docs/validation.md`.
-
-    Parameters
-    ----------
-    marked
-        Whether figures are marked whose code has changed since, as in the manual when it is built.
-        The file itself has no marks, which would change with every commit.
-    """
-    kept = {name: output for name, one in CAMPAIGNS.items() if (output := one.kept) is not None}
-    missing = [one for one in CAMPAIGNS.values() if one.name not in kept]
-    stale = {name for name in kept if CAMPAIGNS[name].stale} if marked else set()
-    return TEMPLATE.read_text(encoding="utf-8").format(
-        table="\n".join(_rows(kept, stale)),
-        missing="\n".join(_missing(missing)),
-        outputs="\n".join(_blocks(kept)),
-        stale_mark=STALE_MARK.strip(),
-    )
-
-
-def _rows(kept: dict[str, Output], stale: set[str]) -> Iterator[str]:
-    yield "{.figures}"
-    yield "| what | figure | measured |"
-    yield "|---|---|---|"
-    for figure in FIGURES:
-        if figure.campaign in kept:
-            output = kept[figure.campaign]
-            title = figure.campaign.replace("_", " ")
-            link = f"[{title}](#{_anchor(figure.campaign)})"
-            mark = STALE_MARK if figure.campaign in stale else ""
-            text = figure.extract(output.printed)
-            yield f"| {figure.what} | {text} | {link} {output.date}, {_version(output)}{mark} |"
-
-
-def _version(output: Output) -> str:
-    """Return the version of labrig, and the digest of the sources where it was recorded."""
-    return " ".join(output.header[key] for key in ("labrig", "code") if key in output.header)
-
-
-def _missing(campaigns: Iterable[Campaign]) -> Iterator[str]:
-    for campaign in campaigns:
-        yield f"- `{campaign.command}`\n"
-        for figure in FIGURES:
-            if figure.campaign == campaign.name:
-                yield f"  - {figure.what}"
-        for quoting in sorted({quote.page for quote in QUOTES if quote.campaign == campaign.name}):
-            yield f"  - Figures of [](/{quoting.removeprefix('docs/')})"
-        yield ""
-
-
-def _blocks(kept: dict[str, Output]) -> Iterator[str]:
-    for name, output in kept.items():
-        command = f"```sh\n{output.header['command']}\n```"
-        yield f"({_anchor(name)})=\n### {name}\n\n{command}\n\n```text\n{output.text}```\n"
-
-
-def _anchor(name: str) -> str:
-    return f"output-{name.replace('_', '-')}"
-
-
-def says(quote: Quote, output: Output) -> bool:
-    """Return whether a page quotes what the campaign printed."""
-    text = (ROOT / quote.page).read_text(encoding="utf-8")
-    return " ".join(quote.text(output.printed).split()) in " ".join(text.split())
-
-
-def changes(campaign: Campaign, published: Output, measured: Output) -> list[str]:
-    """Return what a campaign no longer shows of what is published, a line each."""
-    texts: list[tuple[str, Extract]] = [
-        (figure.what, figure.extract) for figure in FIGURES if figure.campaign == campaign.name
-    ]
-    texts += [(quote.page, quote.text) for quote in QUOTES if quote.campaign == campaign.name]
-    changed = []
-    for where, extract in texts:
-        before = extract(published.printed)
-        try:
-            now = extract(measured.printed)
-        except ValueError as error:
-            changed.append(f"{where}: {error}")
-            continue
-        if not agrees(before, now, timed=campaign.timed):
-            changed.append(f"{where}:\n{_difference(before, now)}")
-    if (status := measured.header["exit status"]) != published.header["exit status"]:
-        changed.append(f"exit status {status}")
-    return changed
-
-
-def _difference(published: str, measured: str) -> str:
-    """Return the lines that differ, those published after "-" and those measured after "+"."""
-    lines = ndiff(published.splitlines(), measured.splitlines())
-    return "\n".join(f"    {line}" for line in lines if line[0] in "-+")
 
 
 def turns() -> list[list[Campaign]]:
@@ -166,47 +65,11 @@ def _run(campaigns: Iterable[Campaign], *, keep: bool) -> bool:
         if keep:
             campaign.keep(measured)
             if published is not None:
-                _renew_quotes(campaign, published, measured)
+                renew_quotes(campaign, published, measured)
         hold = hold and not changed
     if keep:
         PAGE.write_text(page(), encoding="utf-8")
     return hold
-
-
-def _renew_quotes(campaign: Campaign, published: Output, measured: Output) -> None:
-    """Write the new figures into README.md, and the new texts into the pages that quote them."""
-    texts = [("README.md", one.extract) for one in FIGURES if one.campaign == campaign.name]
-    texts += [(quote.page, quote.text) for quote in QUOTES if quote.campaign == campaign.name]
-    for name, extract in texts:
-        path = ROOT / name
-        text = path.read_text(encoding="utf-8")
-        try:
-            path.write_text(
-                renewed(text, extract(published.printed), extract(measured.printed)),
-                encoding="utf-8",
-            )
-        except ValueError:
-            print(f"  {name} has to be mended by hand", flush=True)
-
-
-def renewed(page_text: str, before: str, now: str) -> str:
-    """Return a page with a quotation replaced; words keep the page's line breaks.
-
-    Raises
-    ------
-    ValueError
-        The new quotation has other words, whose line breaks nobody knows.
-    """
-    new = now.split()
-
-    def replace(quotation: re.Match[str]) -> str:
-        old = re.split(r"(\s+)", quotation[0])
-        if len(new) != len(old[::2]):
-            raise ValueError("other words")
-        old[::2] = new
-        return "".join(old)
-
-    return re.sub(r"\s+".join(map(re.escape, before.split())), replace, page_text)
 
 
 def _print_quotes() -> None:

@@ -7,9 +7,11 @@ import pytest
 from tests.acceptance.campaigns import CAMPAIGNS, OUTPUTS, ROOT, Output
 from tests.acceptance.quote import Quote
 from tests.acceptance.quoted_figures import QUOTES
+from tests.acceptance.renewal import changes, renewed, says
 from tests.acceptance.sources import digest
-from tests.acceptance.validation import PAGE, TURN_CPU_S, changes, page, renewed, says, turns
+from tests.acceptance.validation import TURN_CPU_S, turns
 from tests.acceptance.validation_figures import FIGURES, Figure
+from tests.acceptance.validation_page import PAGE, page
 from tests.acceptance.verdict import agrees
 
 KEPT = {name: output for name, one in CAMPAIGNS.items() if (output := one.kept) is not None}
