@@ -44,6 +44,9 @@ from .journal import (
 from .made import (
     time_made as time_made,
 )
+from .plain_folder import (
+    require_plain_folder as require_plain_folder,
+)
 from .run_folder import (
     CALIBRATIONS_FILE as CALIBRATIONS_FILE,
     RunFolder as RunFolder,
