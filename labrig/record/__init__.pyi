@@ -5,6 +5,7 @@ from .checksums import (
     CACHE as CACHE,
     FRAMES as FRAMES,
     damaged_frames as damaged_frames,
+    discard_cache as discard_cache,
 )
 from .frames import (
     PERSON as PERSON,
