@@ -108,17 +108,18 @@ def _with_one_more(data: WhitenedSeries, fewer: StatesFit, needed_chi2: float) -
     from their best that their misfit outweighs it.
     """
     log_rate, amplitude, gain = promising_rate(data, fewer)
-    if gain < fewer.joint.chi2 - needed_chi2:
-        return fit_one_more(data, fewer, log_rate, amplitude)
-    weights, offsets = fewer.joint.weights, fewer.joint.offsets
-    found = fit_states(data, fewer.n_free + 1, fewer.fixed, weights, offsets, needed_chi2)
-    reached = 0.0 if found is None else fewer.joint.chi2 - found.joint.chi2
-    if gain < reached + MISSED_GAIN:
-        return found
-    other = fit_one_more(data, fewer, log_rate, amplitude)
-    if other is None or (found is not None and found.joint.chi2 <= other.joint.chi2):
-        return found
-    return other
+    tried: list[StatesFit | None] = []
+    reached = 0.0
+    if gain >= fewer.joint.chi2 - needed_chi2:
+        weights, offsets = fewer.joint.weights, fewer.joint.offsets
+        found = fit_states(data, fewer.n_free + 1, fewer.fixed, weights, offsets, needed_chi2)
+        reached = 0.0 if found is None else fewer.joint.chi2 - found.joint.chi2
+        tried = [found]
+    if not tried or reached < 0 or gain >= reached + MISSED_GAIN:
+        tried.append(fit_one_more(data, fewer, log_rate, amplitude))
+    # A fit that is worse than one with fewer states did not end at its minimum.
+    better = [fit for fit in tried if fit is not None and fit.joint.chi2 <= fewer.joint.chi2]
+    return min(better, key=lambda fit: fit.joint.chi2, default=None)
 
 
 def is_needed(
