@@ -39,6 +39,10 @@ MAX_ITERATIONS = 200
 TOLERANCE = 1e-8
 
 
+class UnfinishedFitError(FitError):
+    """A fit that did not end at a minimum, whose χ² must not be compared."""
+
+
 @dataclass(frozen=True)
 class LawFit:
     """Fit of a law in the series' own units, and in the user's.
@@ -98,6 +102,11 @@ def fit_law(
     -------
     LawFit or None
         The fit; None if the law has no signal.
+
+    Raises
+    ------
+    UnfinishedFitError
+        The lowest fit did not end at a minimum.
     """
     problem = _LawProblem(likelihood.data, law, weights, offsets)
     series = problem.data.series
@@ -107,6 +116,8 @@ def fit_law(
     fit = min(fits, key=lambda each: each.chi2)
     if fit.shape[0] == 0:
         return None
+    if fit.least_squares.creeps:
+        raise UnfinishedFitError(f"the fit of {law.label} did not end at a minimum")
     # Near an exponential, retrapping changes the signal as the rate does: its σ has no limit there.
     least, largest = law.shapes
     if not np.sqrt(fit.least_squares.covariance[LAW_SHAPE, LAW_SHAPE]) <= largest - least:
@@ -124,13 +135,26 @@ def fit_laws(
     offsets: FloatArray,
     added_square: float,
     student: float,
-) -> tuple[LawFit, ...]:
-    """Fit every law; the arguments are those of `fit_law`."""
-    fits = (
-        fit_law(likelihood, law, weights, offsets, added_square, student)
-        for law in DECAY_LAWS.values()
-    )
-    return tuple(fit for fit in fits if fit is not None)
+) -> tuple[tuple[LawFit, ...], tuple[str, ...]]:
+    """Fit every law; the arguments are those of `fit_law`.
+
+    Returns
+    -------
+    fits
+        Fits of the laws that have a signal and ended at a minimum.
+    unfinished
+        Names of the laws whose fit did not, which must not be compared.
+    """
+    fits, unfinished = [], []
+    for law in DECAY_LAWS.values():
+        try:
+            fit = fit_law(likelihood, law, weights, offsets, added_square, student)
+        except UnfinishedFitError:
+            unfinished.append(law.name)
+            continue
+        if fit is not None:
+            fits.append(fit)
+    return tuple(fits), tuple(unfinished)
 
 
 def _log_rate_bounds(series: DecaySeries) -> tuple[float, float]:
@@ -177,10 +201,7 @@ class _LawProblem:
         offsets: FloatArray,
         shapes: tuple[float, float],
     ) -> Iterator[JointFit]:
-        """Yield the fit from [amplitude, log rate, shape] with shapes in a range, if there is one.
-
-        There is none if it does not end at a minimum.
-        """
+        """Yield the fit from [amplitude, log rate, shape] with shapes in a range, if there is one."""
         pivot = self._pivot(start)
         low, high = _log_rate_bounds(self.data.series)
         level, _ = self._level(start, pivot)
@@ -198,8 +219,7 @@ class _LawProblem:
             )
         except FitError:
             return
-        if not fit.least_squares.creeps:
-            yield self._from_reference(fit, pivot)
+        yield self._from_reference(fit, pivot)
 
     def _pivot(self, theta: FloatArray) -> float:
         """Return the time about which the frames tell the level of a signal."""

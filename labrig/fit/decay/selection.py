@@ -14,7 +14,7 @@ from scipy.special import chdtrc, fdtrc
 from labrig.fit.decay.further_state import promising_rate
 from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
-from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states
+from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states, refit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.results import Candidate
@@ -82,6 +82,8 @@ def choose_states(
             fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets)
         else:
             fit = _with_one_more(data, chosen, needed_chi2)
+        if fit is not None and fit.joint.least_squares.creeps and fit.joint.chi2 < needed_chi2:
+            fit = _at_minimum(data, fit)
         if fit is None:
             break
         p_value = None if chosen is None else f_test(likelihood, chosen.joint, fit.joint)
@@ -99,6 +101,12 @@ def choose_states(
             penalty = 2 * float(np.log(data.independent_data(fit.joint.weights)))
             needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
     return chosen, tried
+
+
+def _at_minimum(data: WhitenedSeries, fit: StatesFit) -> StatesFit | None:
+    """Return a fit carried to its minimum; None if a state vanishes there."""
+    finished = refit(data, fit)
+    return finished if finished.n_states == fit.n_states else None
 
 
 def _with_one_more(data: WhitenedSeries, fewer: StatesFit, needed_chi2: float) -> StatesFit | None:
