@@ -171,6 +171,7 @@ from .measured import (
     FloatArray as FloatArray,
     IntArray as IntArray,
     Measured as Measured,
+    OneSided as OneSided,
     field_unit as field_unit,
     iter_values as iter_values,
     with_uncertainty as with_uncertainty,
