@@ -241,7 +241,12 @@ DECAY_LAWS: Mapping[str, DecayLaw] = MappingProxyType(
         law.name: law
         for law in (
             DecayLaw(
-                "becquerel", "Becquerel's law", becquerel_value, becquerel_means, (0.0, 10.0), (0.0,)
+                "becquerel",
+                "Becquerel's law",
+                becquerel_value,
+                becquerel_means,
+                (0.0, 10.0),
+                (0.0,),
             ),
             DecayLaw(
                 "otor", "one trap with retrapping", otor_value, otor_means, (0.0, 1.0), (0.0, 1.0)

@@ -174,6 +174,7 @@ from .measured import (
     OneSided as OneSided,
     field_unit as field_unit,
     iter_values as iter_values,
+    measured_number as measured_number,
     with_uncertainty as with_uncertainty,
 )
 from .phosphor import (

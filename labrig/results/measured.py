@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, PlainSerializer, PlainValidator
 
+from labrig.number_format import plus_minus
 from labrig.results.run_result import RunResult
 
 
@@ -94,6 +95,11 @@ class Measured:
         sigma = math.hypot(self.sigma, other.sigma)
         return (self.value - other.value) / sigma if 0 < sigma < math.inf else math.nan
 
+    @property
+    def plus_minus(self) -> str:
+        """The value ± σ as text, without its unit."""
+        return plus_minus(self.value, self.sigma)
+
     def __str__(self) -> str:
         """Return the value to two digits of its σ, and the unit."""
         return " ".join(filter(None, (with_uncertainty(self.value, self.sigma), self.unit)))
@@ -152,8 +158,13 @@ class OneSided(Measured):
         limit = value - distance if is_upper else value + distance
         return cls(value, distance / ONE_SIDED_SIGMAS, unit, limit=limit)
 
+    @property
+    def plus_minus(self) -> str:
+        """The limit as text, without its unit."""
+        return str(replace(self, unit=""))
+
     def __str__(self) -> str:
-        """Return the limit to the digits that its distance from the bound is worth, and the unit."""
+        """Return the limit to two digits of its distance from the bound, and the unit."""
         if not math.isfinite(self.limit):
             return "?"
         sign = "<" if self.limit >= self.value else ">"
@@ -161,6 +172,31 @@ class OneSided(Measured):
         places = 1 - math.floor(math.log10(distance)) if distance > 0 else 6
         text = f"{sign} {self.limit:.{min(max(places, 0), 9)}f}"
         return " ".join(filter(None, (text, self.unit)))
+
+
+def measured_number(measured: Measured) -> dict[str, float | None]:
+    """Return a quantity as in JSON files: what is infinite is null.
+
+    Parameters
+    ----------
+    measured
+        The quantity; its unit is that of the key.
+
+    Returns
+    -------
+    dict
+        `value` and `sigma`, and `limit_95` of a value that a bound holds.
+
+    Examples
+    --------
+    >>> from labrig.results import Measured, measured_number
+    >>> measured_number(Measured(2.0, 0.1))
+    {'value': 2.0, 'sigma': 0.1}
+    """
+    numbers = {"value": measured.value, "sigma": measured.sigma}
+    if isinstance(measured, OneSided):
+        numbers["limit_95"] = measured.limit
+    return {name: number if math.isfinite(number) else None for name, number in numbers.items()}
 
 
 def with_uncertainty(value: float, sigma: float) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from labrig.number_format import aligned
-from labrig.results import FloatArray, Measured, OneSided
+from labrig.results import FloatArray, Measured, OneSided, measured_number
 
 UNKNOWN = "–"
 #: Version of the JSON: another number means renamed keys or other meanings.
@@ -241,10 +241,4 @@ def _to_dict(state: OrderState) -> dict[str, Any]:
 
 
 def _number(measured: Measured | None) -> dict[str, float | None] | None:
-    if measured is None:
-        return None
-    is_known = measured.sigma < float("inf")
-    number = {"value": measured.value, "sigma": measured.sigma if is_known else None}
-    if isinstance(measured, OneSided):
-        number["limit_95"] = measured.limit if is_known else None
-    return number
+    return None if measured is None else measured_number(measured)

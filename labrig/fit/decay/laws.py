@@ -201,7 +201,7 @@ class _LawProblem:
         offsets: FloatArray,
         shapes: tuple[float, float],
     ) -> Iterator[JointFit]:
-        """Yield the fit from [amplitude, log rate, shape] with shapes in a range, if there is one."""
+        """Yield the fit from [amplitude, log rate, shape] within shapes, if there is one."""
         pivot = self._pivot(start)
         low, high = _log_rate_bounds(self.data.series)
         level, _ = self._level(start, pivot)
@@ -306,7 +306,7 @@ def _basins(
     is_basin = (gains == maximum_filter(gains, size=3, mode="nearest")) & (gains > 0)
     starts = np.column_stack([moments / norms2, log_rate.ravel(), shape.ravel()])
     order = np.argsort(-gains[is_basin], kind="stable")
-    return starts[is_basin.ravel()][order[:MOST_BASINS]]
+    return np.asarray(starts[is_basin.ravel()][order[:MOST_BASINS]])
 
 
 def _in_units(
