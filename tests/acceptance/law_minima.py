@@ -18,6 +18,7 @@ compared; and how often correlated noise is claimed, which no decay has.
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -36,7 +37,7 @@ GRID, STARTS, LARGEST_SHAPE = (40, 9), 10, 3.0
 
 @dataclass(frozen=True)
 class Table:
-    """A decay as it is fitted: times (n,), values and σ (n, C), and whether backgrounds are free."""
+    """A decay as it is fitted: times (n,), values and σ (n, C), and if backgrounds are free."""
 
     t_s: FloatArray
     values: FloatArray
@@ -124,7 +125,7 @@ def becquerel_decays() -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
 
 
 def any_decay(seed: int) -> Table | None:
-    """Return a decay of a law that the seed draws; None if there is no light at the first reading."""
+    """Return a decay of a law that the seed draws; None if it is dark at the first reading."""
     rng = np.random.default_rng([77, seed])
     name = rng.choice(["becquerel", "becquerel", "exponential", "otor", "stretched", "two"])
     p, tau_s = float(np.exp(rng.uniform(np.log(0.4), np.log(6)))), 10 ** rng.uniform(-1, 3)
@@ -189,7 +190,7 @@ class Count:
             self.furthest = max(self.furthest, above)
         states = [each.reduced_chi2 * table.dof(2 * each.n_states) for each in fit.candidates]
         within = [(states[0], other) for other in chi2.values()]
-        within += list(zip(states, states[1:], strict=False))
+        within += pairwise(states)
         self.pairs += len(within)
         self.nested += sum(more > fewer + NEAR for fewer, more in within)
 

@@ -256,11 +256,14 @@ class _LawProblem:
         jacobian = solution.jacobian.copy()
         jacobian[:, 1:3] += np.outer(jacobian[:, 0], theta[0] * slopes)
         jacobian[:, 0] *= level
+        # What the frames tell nothing of may overflow: that is as good as infinite.
+        with np.errstate(over="ignore"):
+            covariance = parameter_covariance(jacobian)[0]
         solution = replace(
             solution,
             parameters=np.concatenate([theta, solution.parameters[3:]]),
             jacobian=jacobian,
-            covariance=parameter_covariance(jacobian)[0],
+            covariance=covariance,
         )
         return replace(fit, shape=theta, least_squares=solution)
 
