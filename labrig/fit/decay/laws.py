@@ -30,8 +30,8 @@ from labrig.results import FittedLaw
 FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
 #: Sizes of the grid of rates and shapes, smallest shape above 0 on it, and most of its basins from
 #: which a law is fitted.
-GRID = (36, 12)
-LEAST_SHAPE = 1e-3
+GRID = (36, 16)
+LEAST_SHAPE = 1e-5
 MOST_BASINS = 3
 #: Places of the rate and of the shape among the parameters.
 LAW_RATE, LAW_SHAPE = slice(1, 2), 2
