@@ -38,6 +38,7 @@ from labrig.results import (
     LayerEffect,
     LightScatter,
     Measured,
+    OneSided,
     PatchExcitation,
     spans_decades,
 )
@@ -87,9 +88,10 @@ def _state_line(fit: FittedExcitation, number: int) -> str:
     state, off = fit.states[number], fit.at_off[-1]
     r0 = plus_minus(float(off.r0[number]), float(off.r0_sigma[number]))
     k_r = plus_minus(state.k_r_per_s, state.k_r_sigma_per_s)
+    order = state.order.plus_minus
     if state.exponent is None:
-        return f"k_r {k_r} /s, r(0) {r0}"
-    order = plus_minus(state.kinetic_order, state.kinetic_order_sigma)
+        held = f", b {order} with 95 %" if isinstance(state.order, OneSided) else ""
+        return f"k_r {k_r} /s, r(0) {r0}{held}"
     if state.is_level_known:
         return f"k_r {k_r} /s, b {order}, r(0) {r0}"
     amplitude = plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number]))
@@ -284,7 +286,7 @@ def _levels_row(fit: FittedExcitation, number: int) -> tuple[str, ...]:
         time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_sigma_s[number]))
         exponent = state.exponent
         cells += [
-            plus_minus(state.kinetic_order, state.kinetic_order_sigma),
+            state.order.plus_minus,
             time,
             UNKNOWN if exponent is None else plus_minus(exponent.value, exponent.sigma),
         ]

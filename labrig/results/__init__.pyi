@@ -181,8 +181,10 @@ from .measured import (
     FloatArray as FloatArray,
     IntArray as IntArray,
     Measured as Measured,
+    OneSided as OneSided,
     field_unit as field_unit,
     iter_values as iter_values,
+    measured_number as measured_number,
     with_uncertainty as with_uncertainty,
 )
 from .phosphor import (

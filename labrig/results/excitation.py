@@ -14,7 +14,7 @@ from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_excitation import BandTests, FittedExcitation
 from labrig.results.layer_effect import THICKNESS, LayerEffect
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import FloatArray, Measured, measured_number
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 from labrig.results.text_files import finite, write_json
@@ -271,6 +271,7 @@ class ExcitationResult(RunResult):
                     "k_r_sigma_per_s": state.k_r_sigma_per_s,
                     "kinetic_order": state.kinetic_order,
                     "kinetic_order_sigma": state.kinetic_order_sigma,
+                    "kinetic_order_limit_95": measured_number(state.order).get("limit_95"),
                     "amplitude_at_full_charge": state.amplitude,
                     "amplitude_at_full_charge_sigma": state.amplitude_sigma,
                     "k_e_per_s": state.k_e_per_s.tolist(),

@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from labrig.material import MAX_ORDER
 from labrig.results.layer_effect import LayerEffect
-from labrig.results.measured import BoolArray, FloatArray, IntArray, Measured
+from labrig.results.measured import BoolArray, FloatArray, IntArray, Measured, OneSided
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
@@ -50,6 +51,14 @@ class ExcitedState:
     def is_first_order(self) -> bool:
         """Whether the state decays as an exponential, whatever its charge."""
         return self.kinetic_order == 1
+
+    @property
+    def order(self) -> Measured:
+        """Kinetic order b, one-sided where it is fitted and at its bound."""
+        b, sigma = self.kinetic_order, self.kinetic_order_sigma
+        if sigma > 0 and b in (1.0, MAX_ORDER):
+            return OneSided.held(b, sigma, 0.0, is_upper=b > 1)
+        return Measured(b, sigma)
 
     @property
     def is_apart(self) -> bool:

@@ -310,6 +310,17 @@ def times(what: str, *peers: str) -> Extract:
     return extract
 
 
+def becquerel_minima(printed: str) -> str:
+    (n,), (far,) = columns(r"background free .*?of (\d+) laws (\d+) end", printed)
+    return f"{far:.0f} of {n:.0f}"
+
+
+def law_minima(printed: str) -> str:
+    pattern = r"any decay .*?of (\d+) laws .*?, (\d+) more than .*?of (\d+) pairs (\d+) fit"
+    (n,), (near,), (pairs,), (nested,) = columns(pattern, printed)
+    return f"{near:.0f} of {n:.0f}; {nested:.0f} of {pairs:.0f}"
+
+
 def laws(printed: str) -> str:
     of_laws = columns(
         r"^(?:two rates|general|one trap).*right +([\d.]+) %.*wrong +([\d.]+) %", printed
