@@ -127,15 +127,13 @@ def _cell(measured: Measured | None) -> str:
 
 
 def _end(patch: PatchLuminance) -> str:
-    """Return the time until 0.3 mcd/m², or what the laws say of it."""
+    """Return the time until 0.3 mcd/m², or its forecast."""
     decay = patch.decay
     if decay.visible_s is not None:
         return f"{plus_minus(decay.visible_s.value / 60, decay.visible_s.sigma / 60)} min"
-    if decay.visible_between_s is None:
-        return "not reached"
-    early, late = decay.visible_between_s
-    end = "no end" if math.isinf(late) else duration_text(late)
-    return f"not reached; laws that fit say {duration_text(early)} to {end}"
+    if decay.visible_forecast is None:
+        return "not measured"
+    return f"not reached; forecast: {decay.visible_forecast}"
 
 
 def _requirements(patches: Mapping[str, PatchLuminance]) -> Iterator[Table]:
