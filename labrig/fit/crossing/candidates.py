@@ -25,6 +25,9 @@ AMPLITUDE, RATE, LOGIT = (1.0, 4.0), (1.5, 3.0), (0.0, 1.5)
 #: times T; ln of the ratio of amplitudes and of rates from one to the next faster.
 SLOWEST_AMPLITUDE, SLOWEST_RATE = (1.5, 3.0), (0.7, 1.3)
 NEXT_AMPLITUDE, NEXT_RATE = (1.3, 1.5), (1.6, 0.8)
+#: Priors of an exponential that is added to a law: part of the last time at which its light is
+#: given, and its ln relative to the whole there.
+ADDED_AT, ADDED_LIGHT = 1 / 3, (-1.0, 1.5)
 #: Least luminance of a law, of which the logarithm is finite.
 LEAST = 1e-300
 
@@ -57,8 +60,9 @@ class Candidate:
 
 def candidates(decay: LogDecay) -> tuple[Candidate, ...]:
     """Return the laws with priors for a record."""
-    laws = (_law(name, decay) for name in SHAPES)
-    return (*laws, *(_exponentials(n, decay) for n in N_EXPONENTIALS))
+    becquerel, *others = (_law(name, decay) for name in SHAPES)
+    exponentials = (_exponentials(n, decay) for n in N_EXPONENTIALS)
+    return (becquerel, *others, *exponentials, _with_exponential(becquerel, decay))
 
 
 def _law(name: str, decay: LogDecay) -> Candidate:
@@ -74,6 +78,26 @@ def _law(name: str, decay: LogDecay) -> Candidate:
     sigma = np.array([AMPLITUDE[1], RATE[1], LOGIT[1]])
     steps = sigma * np.array([[0.0, -0.3, 0.0], [0.0, 0.6, 0.3]])
     return Candidate(name, log_light, mean, sigma, mean + steps)
+
+
+def _with_exponential(law: Candidate, decay: LogDecay) -> Candidate:
+    """Return the sum of a law and one exponential, which hides the law's tail or is hidden by it."""
+    n = len(law.mean)
+    last_s = float(np.exp(decay.log_time[-1]))
+    at_s = ADDED_AT * last_s
+    level = float(np.interp(np.log(at_s), decay.log_time, decay.log_light))
+
+    def log_light(theta: FloatArray, x: FloatArray) -> FloatArray:
+        rate = np.exp(theta[:, n + 1 :])
+        added = theta[:, n : n + 1] - rate * (np.exp(x) - at_s)
+        return np.logaddexp(law.log_light(theta[:, :n], x), added)
+
+    mean = np.array([*law.mean, ADDED_LIGHT[0] + level, SLOWEST_RATE[0] - np.log(last_s)])
+    sigma = np.array([*law.sigma, ADDED_LIGHT[1], SLOWEST_RATE[1]])
+    starts = np.stack([mean, mean])
+    starts[:, :n] = law.starts
+    starts[1, n + 1] += 0.8
+    return Candidate(f"{law.name} and exponential", log_light, mean, sigma, starts)
 
 
 def _exponentials(n: int, decay: LogDecay) -> Candidate:

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from labrig.fit.crossing.bound import earliest_crossing
+from labrig.errors import FitError
+from labrig.fit.crossing.bound import earliest_crossing, growing_rate
 from labrig.fit.crossing.candidates import candidates
 from labrig.fit.crossing.posterior import WALKS, Posterior, posteriors
 from labrig.fit.crossing.readings import LogDecay, reading_sigma
@@ -59,10 +60,18 @@ def forecast_crossing(
     Raises
     ------
     FitError
-        Hardly any reading is above its noise.
+        Hardly any reading is above its noise, or the decay is cut off more sharply than by an
+        exponential.
     """
     sigma = reading_sigma(t_s, light, sigma)
     decay = LogDecay.of(t_s, light, sigma)
+    rates = growing_rate(t_s, light, sigma)
+    if rates is not None:
+        raise FitError(
+            f"the rate −d ln L/dt grows with time, from {rates[0]} to {rates[1]}, which that of no "
+            "sum of decaying exponentials does: a zero that is subtracted too much, a sample that "
+            "cools, or a detector that saturates"
+        )
     at_least = earliest_crossing(t_s, light, sigma, level, level_sigma)
     every = posteriors(decay, candidates(decay))
     weights = _weights(every)
