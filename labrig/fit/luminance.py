@@ -214,7 +214,9 @@ class _Readings:
             found = self.parabola(t)
             return math.nan if found is None else math.log(found.luminance / limit)
 
-        above, below = 0, len(self.t_s) - 1
+        # A first reading may stand too far from the others for a parabola.
+        above = next((k for k, t in enumerate(self.t_s) if not math.isnan(height(t))), 0)
+        below = len(self.t_s) - 1
         if not (height(self.t_s[above]) > 0 > height(self.t_s[below])):
             return None
         while below - above > 1:
@@ -248,7 +250,8 @@ class _Readings:
         )
         # ∫ L dt = L₀ t₀ ∫ (t/t₀)^power d ln t
         ratio = np.log(t[1:][positive] / t[:-1][positive])
-        grown = np.where(np.abs(power) < 1e-9, ratio, np.expm1(power * ratio) / power)
+        is_flat = np.abs(power) < 1e-9
+        grown = np.where(is_flat, ratio, np.expm1(power * ratio) / np.where(is_flat, 1.0, power))
         sums[positive] = light[:-1][positive] * t[:-1][positive] * grown
         weights = np.zeros_like(t)
         weights[:-1] += widths / 2

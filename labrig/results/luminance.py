@@ -1,5 +1,6 @@
 """Luminance of an afterglow at the times that trade standards name, and its marking."""
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,17 +1,18 @@
 """Posteriors of laws from which the decay departs as a random walk of its slope.
 
-No law is exact: −d ln L/d ln t is the law's times 1 + g, where g walks by δ per root of ln t. Its
-integral h moves ln L by −s h, s the slope; residuals therefore correlate, by the kernel of an
-integrated Wiener process, and laws are fitted by generalised least squares. The same walk goes on
-beyond the record: the error of ln t grows there as δ d^(3/2)/√3 with the distance d = ln(t/T).
-Laws and δ are weighed by how well the first part of the record predicts its later part.
+No law is exact: −d ln L/d ln t is the law's times 1 + g, where g is 0 at the end of the record and
+walks from there by δ per root of ln t, to both sides. Its integral h moves ln L by −s h, s the
+slope; residuals therefore correlate, by the kernel of an integrated Wiener process that begins at
+the end, and laws are fitted by generalised least squares. Beyond the record the same walk goes on:
+the error of ln t grows there as δ d^(3/2)/√3 with the distance d = ln(t/T). Laws and δ are weighed
+by how well fits of the first parts of the record predict its later parts.
 
 References
 ----------
 M. C. Kennedy and A. O'Hagan, *Bayesian calibration of computer models*, J. R. Stat. Soc. B 63
 (2001) 425, for a model's departure as a process; G. Wahba, *Spline Models for Observational Data*
-(1990), for the kernel; A. O'Hagan, *Fractional Bayes factors*, J. R. Stat. Soc. B 57 (1995) 99, for
-weights by the prediction of a later part.
+(1990), for the kernel; A. P. Dawid, *Statistical theory: the prequential approach*, J. R. Stat.
+Soc. A 147 (1984) 278, for weights by predictions.
 """
 
 import math
@@ -32,8 +33,10 @@ N_STEPS, DAMPING, BETTER, WORSE = 24, 1e-2, 0.2, 6.0
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e9
 #: Change of a parameter, in its prior's σ, for slopes; largest change in a step.
 SLOPE_STEP, LARGEST_STEP = 1e-5, 1.0
-#: Degrees of freedom of the distribution that draws are taken from.
+#: Degrees of freedom of the distributions of draws and of predictions.
 FREEDOM = 6.0
+#: Parameters that a record determines, of those that a law has.
+SHAPE_PARAMETERS = 3
 
 
 def walk_covariance(distance: FloatArray, slope: FloatArray, delta: float) -> FloatArray:
@@ -61,8 +64,10 @@ class Posterior:
         Inverse of the lower Cholesky factor of the covariance of the values, shape (n, n).
     mode, root
         Most probable parameters (p,), and the root R of their covariance R Rᵀ, (p, p).
+    misfit
+        χ² per value, 1 or more.
     log_weight
-        Logarithm of the probability of the later parts given the first ones, their mean.
+        Logarithm of the probability density of the later parts by the first ones, its mean.
     """
 
     law: Candidate
@@ -87,6 +92,7 @@ class Posterior:
         chi2 += np.square((theta - self.law.mean) / self.law.sigma).sum(axis=1)
         log_drawn = -(FREEDOM + p) / 2 * np.log1p(np.square(normal).sum(axis=1) / FREEDOM)
         log_ratio = -chi2 / 2 - log_drawn
+        log_ratio[~np.isfinite(log_ratio)] = -np.inf
         ratio = np.exp(log_ratio - log_ratio.max())
         return theta[random.choice(2 * n, n, p=ratio / ratio.sum())]
 
@@ -110,7 +116,7 @@ def posteriors(decay: LogDecay, laws: tuple[Candidate, ...]) -> list[Posterior]:
             ]
             k = problems.index((delta, n))
             root = np.linalg.inv(np.linalg.cholesky(information[k])).T
-            misfit = max(1.0, float(chi2[k]) / (n - 3))
+            misfit = max(1.0, float(chi2[k]) / (n - SHAPE_PARAMETERS))
             weight = float(np.mean(scores)) if scores else 0.0
             result.append(Posterior(law, delta, whitening[k], mode[k], root, misfit, weight))
     return result
