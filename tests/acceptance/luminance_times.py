@@ -11,8 +11,8 @@ of the true time. No fitted law contains the families log-normal rates and power
 Per cell: how many ranges hold the true time and how many are not determined (only the earliest time
 is stated, which must hold), in per cent; the median ratio of upper to lower end, and the mean
 interval score (Gneiting and Raftery 2007) of ln t at 95 %, of the determined ranges; how many of
-the earliest times hold, of all decays. Last, of the first `--point-fits` decays, the same of the range of
-the point fits of the laws that describe the readings.
+the earliest times hold, of all decays. Last, of the first `--point-fits` decays, the same of the
+range of the point fits of the laws that describe the readings.
 """
 
 import argparse

@@ -4,11 +4,12 @@
 
 Decays that other people measured: strontium aluminate after violet light (Castaing et al. 2024),
 the luminescence of two quartzes under constant light (CRAN package Luminescence), and of
-semiconductors after a laser's pulse at five powers (Grossmann). None is a sum that a law contains.
-The level is the first reading over 10, 30 and 100, as far as fifty counts are left of it; the true
-time is measured by the whole decay. Up to eighty single readings, evenly spaced in ln t (16 or more), are taken from
-the begin to a part of that time, from four phases, with σ of their counts and without; time and
-light are scaled to hours and 0.3 mcd/m².
+semiconductors after a laser's pulse at five powers (Grossmann), of which the rates of the third and
+the fourth grow with time, as no sum of exponentials does. The level is the first reading over 10,
+30 and 100, as far as fifty counts are left of it; the true time is measured by the whole decay. Up
+to eighty single readings, evenly spaced in ln t (16 or more), are taken from the begin to a part of
+that time, from four phases, with σ of their counts and without; time and light are scaled to hours
+and 0.3 mcd/m².
 
 Columns as of `tests.acceptance.luminance_times`; a line for each decay and each part.
 """
@@ -70,9 +71,7 @@ def decays() -> Iterator[Decay]:
         counts = rows[3:, column]
         used = np.isfinite(counts) & (np.arange(len(counts)) > np.nanargmax(counts) + 3)
         begin_ns = t_ns[np.nanargmax(counts)]
-        yield Decay(
-            f"semiconductor {column}", t_ns[used] - begin_ns, counts[used], float(dark)
-        )
+        yield Decay(f"semiconductor {column}", t_ns[used] - begin_ns, counts[used], float(dark))
 
 
 def records(decay: Decay, part: float) -> Iterator[Record]:

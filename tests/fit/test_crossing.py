@@ -89,8 +89,7 @@ def test_the_scale_is_in_range_and_earliest_time() -> None:
     t_s = np.geomspace(60, END_S / 2, 60)
     light = 0.3 * becquerel(t_s) / becquerel(np.array([END_S]))
     exact, scaled = (
-        forecast(fit_luminance(t_s, light, 0.01 * light, scale_sigma=sigma))
-        for sigma in (0.0, 0.2)
+        forecast(fit_luminance(t_s, light, 0.01 * light, scale_sigma=sigma)) for sigma in (0.0, 0.2)
     )
     assert exact.between_s is not None
     assert scaled.between_s is not None

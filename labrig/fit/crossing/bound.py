@@ -101,9 +101,7 @@ class _Line:
         after = (self.log_light - math.log(level)) / self.fall
         slopes = np.array([1.0, after]) / self.fall
         variance = float(slopes @ self.covariance @ slopes) + (level_sigma / self.fall) ** 2
-        return Measured(
-            self.end_s + self.span_s * after, self.span_s * math.sqrt(variance), "s"
-        )
+        return Measured(self.end_s + self.span_s * after, self.span_s * math.sqrt(variance), "s")
 
 
 def _line(

@@ -81,7 +81,7 @@ def _law(name: str, decay: LogDecay) -> Candidate:
 
 
 def _with_exponential(law: Candidate, decay: LogDecay) -> Candidate:
-    """Return the sum of a law and one exponential, which hides the law's tail or is hidden by it."""
+    """Return the sum of a law and one exponential, which may hide the law's tail."""
     n = len(law.mean)
     last_s = float(np.exp(decay.log_time[-1]))
     at_s = ADDED_AT * last_s

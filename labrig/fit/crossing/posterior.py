@@ -154,9 +154,9 @@ def _log_prediction(
     chi2 = (curves[0] - decay.log_light[later]) @ np.linalg.solve(
         covariance, curves[0] - decay.log_light[later]
     )
-    return -float(
-        np.linalg.slogdet(covariance)[1] + (FREEDOM + len(x)) * np.log1p(chi2 / FREEDOM)
-    ) / 2
+    return (
+        -float(np.linalg.slogdet(covariance)[1] + (FREEDOM + len(x)) * np.log1p(chi2 / FREEDOM)) / 2
+    )
 
 
 def _fits(

@@ -103,7 +103,9 @@ def reading_sigma(t_s: FloatArray, light: FloatArray, sigma: FloatArray | None) 
         )
         relative = max(float(variances[0]), LEAST_SCATTER**2)
         scatter = np.sqrt(relative * np.square(reference) + variances[1])
-    return scatter * math.sqrt(len(x) / max(len(x) - REFERENCE_PARAMETERS, 1))
+    # Parameters of the reference follow the readings.
+    followed = math.sqrt(len(x) / max(len(x) - REFERENCE_PARAMETERS, 1))
+    return np.asarray(followed * scatter)
 
 
 def _reference(
