@@ -150,8 +150,10 @@ from .led_fluorescence import (
 from .luminance import (
     MARKING_S as MARKING_S,
     MCD_PER_M2 as MCD_PER_M2,
+    SIGMAS_95 as SIGMAS_95,
     TABLE_S as TABLE_S,
     VISIBLE_MCD_PER_M2 as VISIBLE_MCD_PER_M2,
+    ForecastTime as ForecastTime,
     LuminanceAt as LuminanceAt,
     LuminanceDecay as LuminanceDecay,
     LuminanceRequirement as LuminanceRequirement,

@@ -177,6 +177,13 @@ CAMPAIGNS = {
         _module("decay_fit_example"),
         _module("veiling_glare"),
         _module("luminance_pulls", "--seeds", "50"),
+        _module("luminance_times", "--decays", "100", "--point-fits", "20"),
+        _module(
+            "luminance_times",
+            *("--decays", "40", "--point-fits", "20", "--further"),
+            called="luminance_times_further",
+        ),
+        _module("luminance_times_real"),
         _module("camera_curves"),
         _module("reflectance_pulls", "--seeds", "4"),
         _module("luminance_budget"),

@@ -209,6 +209,18 @@ def luminance_pulls(printed: str) -> str:
     return ", ".join(parts)
 
 
+def luminance_times(printed: str) -> str:
+    parts, held, open_, least, point_held = columns(
+        r"^.{24} +(0\.\d) +([\d.]+) +([\d.]+) +\S+ +\S+ +([\d.]+) +([\d.]+) ", printed
+    )
+    from_half = [share for part, share in zip(parts, open_, strict=True) if part >= 0.5]
+    return (
+        f"{span(held)} % of the ranges in each cell, of the point fits' {span(point_held)} %; not "
+        f"determined from half of the time on {span(from_half)} %; the earliest time holds in "
+        f"{span(least)} %"
+    )
+
+
 def light_errors(printed: str) -> str:
     # The last case is a thick layer, which no light explains.
     (pulls,) = columns(r"^(?!layer).*: pulls ([\d.]+);", printed)

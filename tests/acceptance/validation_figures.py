@@ -325,6 +325,24 @@ FIGURES = (
         figure.luminance_pulls,
     ),
     Figure(
+        "Time until 0.3 mcd/m² forecast with 95 % by records that end at 0.1, 0.3, 0.5 and 0.9 of "
+        "it, six families of decays, two of which no fitted law contains, 100 decays each: ranges "
+        "that hold the true time",
+        "luminance_times",
+        figure.luminance_times,
+    ),
+    Figure(
+        "The same of four further families, 40 decays each",
+        "luminance_times_further",
+        figure.luminance_times,
+    ),
+    Figure(
+        "The same of real decays (a strontium aluminate, semiconductors; the rates of two of these "
+        "grow with time, as those of no sum of exponentials do)",
+        "luminance_times_real",
+        figure.luminance_times,
+    ),
+    Figure(
         "Excitation rates k_e ≥ 0.002 /s of six paints with the light as it is stated, and with "
         "places, wavelengths or the lamp further off than anybody says, 60 runs each",
         "excitation_light",
