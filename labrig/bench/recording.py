@@ -71,7 +71,12 @@ class Recording:
         planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
         # A kept file that is malformed does not stop a run that measures it anew.
         found = (
-            find_calibrations(rig, runs, wall_at_start(rig, str(rig_path)))
+            find_calibrations(
+                rig,
+                (runs, rig_path.parent),
+                wall_at_start(rig, str(rig_path)),
+                measured=requested.protocol,
+            )
             if requested.uses_calibrations
             else FoundCalibrations(rig, {}, ())
         )

@@ -69,6 +69,9 @@ class PhotonTransfer:
         Gain and read noise, as in the camera file.
     points
         Scatter of the pairs of lit frames.
+    photon_variance_dn2
+        Variance by photons alone at each of `points` in DN², that of reading and rounding
+        subtracted; None where the numbers do not resolve it.
     shared, shared_sigma
         Covariance with the neighbours relative to the variance of a pixel, and its σ.
     reduced_chi2
@@ -80,6 +83,7 @@ class PhotonTransfer:
 
     noise: Noise
     points: tuple[PairScatter, ...]
+    photon_variance_dn2: tuple[float | None, ...]
     shared: float
     shared_sigma: float
     reduced_chi2: float

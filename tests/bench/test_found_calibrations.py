@@ -218,7 +218,7 @@ def test_the_newest_of_this_bench_is_found_and_what_is_named_goes_before(
     kept(tmp_path, reference(None, bench="another", made=MADE + timedelta(days=9)), "others")
     mine = rig.optics.model_copy(update={"fade": "my-fade.yaml"})
     now_s = (MADE + timedelta(days=3)).timestamp()
-    found = find_calibrations(rig.model_copy(update={"optics": mine}), tmp_path, now_s)
+    found = find_calibrations(rig.model_copy(update={"optics": mine}), [tmp_path], now_s)
     assert found.rig.optics.named(IRRADIANCE_KIND) == str(newer / "irradiance.yaml")
     assert found.rig.optics.named(FADE_KIND) == "my-fade.yaml"
     assert found.record(now_s)["irradiance"]["age"] == "48 h"
@@ -230,7 +230,7 @@ def test_the_picture_is_that_of_the_filter_that_is_found(rig: RigFile, tmp_path:
     older = kept(tmp_path, reference(None), "with-filter")
     (older / "lvf.yaml").write_text("read later")
     kept(tmp_path, reference(None, made=MADE + timedelta(days=1)), "fade-anew")
-    found = find_calibrations(rig, tmp_path, MADE.timestamp()).kept
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp()).kept
     assert {name: each.folder.name for name, each in found.items()} == {
         "fade": "fade-anew", "irradiance": "fade-anew", "lvf": "with-filter",
         "reference": "with-filter",
@@ -240,7 +240,7 @@ def test_the_picture_is_that_of_the_filter_that_is_found(rig: RigFile, tmp_path:
 @pytest.mark.parametrize("key", ["lamp", "grey_card", "curves"])
 def test_one_with_other_light_is_not_used(key: str, rig: RigFile, tmp_path: Path) -> None:
     kept(tmp_path, reference(None, **{key: "another"}))
-    found = find_calibrations(rig, tmp_path, MADE.timestamp())
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp())
     assert found.rig == rig
     (note,) = found.notes
     assert "is not used" in note
@@ -252,11 +252,11 @@ def test_an_old_one_is_warned_of_or_as_the_rig_file_says_not_used(
 ) -> None:
     kept(tmp_path, reference(None))
     now_s = (MADE + timedelta(days=31)).timestamp()
-    found = find_calibrations(rig, tmp_path, now_s)
+    found = find_calibrations(rig, [tmp_path], now_s)
     assert found.rig.optics.named(IRRADIANCE_KIND) is not None
     assert "744 h old, more than 720 h: make another one soon" in found.notes[-1]
     strict = rig.model_copy(update={"calibrations": CalibrationRules(only_warn=())})
-    found = find_calibrations(strict, tmp_path, now_s)
+    found = find_calibrations(strict, [tmp_path], now_s)
     assert found.rig == strict
     assert "it is 744 h old, more than 720 h" in found.notes[0]
 
@@ -294,7 +294,7 @@ def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) ->
     for name in ("camera", "blank", "lvf"):
         (folder / f"{name}.yaml").write_text("read later")
     rig = read_rig_file(shipped)
-    found = find_calibrations(rig, tmp_path, MADE.timestamp()).rig
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp()).rig
     chain = read_protocol(protocol).suited_to(found)
     assert isinstance(chain, Phosphor)
     assert [part["protocol"] for part in chain.parts] == [
@@ -320,7 +320,7 @@ def test_a_camera_without_a_flat_field_at_the_aperture_is_not_used(
         flats=(Flat(f_number=4, falloff=((-0.1,),)),),
     )  # fmt: skip
     CAMERA_KIND.write(folder, flat)
-    found = find_calibrations(rig, tmp_path, MADE.timestamp())
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp())
     assert found.without_apertures([4.0]) is found
     assert found.rig.optics.named(CAMERA_KIND) is not None
     stopped_down = found.without_apertures([4.0, 5.6])

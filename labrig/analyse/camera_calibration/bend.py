@@ -70,14 +70,14 @@ def fit_bend(
     prior = np.diag([UNKNOWN**-2, UNKNOWN**-2])
     ratios = CardRatios.of(level, sigma_dn, group, range_dn)
     if ratios is None:
-        return Bend(np.zeros(2), np.linalg.inv(prior), range_dn)
+        return Bend(np.zeros(2), np.diag([UNKNOWN**2, UNKNOWN**2]), range_dn)
     fraction = ratios.level_dn / range_dn
     target, design = ratios.without_nuisances(np.stack([fraction, fraction**2], axis=1))
     information = design.T @ design
     coefficients = np.linalg.solve(information + prior, design.T @ target)
     misfit = np.square(target - design @ coefficients).sum() / max(ratios.dof - 2, 1)
     covariance = np.linalg.inv(information / max(misfit, 1.0) + prior)
-    return Bend(coefficients, covariance, range_dn)
+    return Bend(np.asarray(coefficients, dtype=np.float64), covariance, range_dn)
 
 
 def photon_terms(coefficients: FloatArray, level_dn: FloatArray, range_dn: float) -> FloatArray:

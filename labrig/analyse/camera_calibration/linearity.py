@@ -76,7 +76,7 @@ class CardRatios:
     @property
     def dof(self) -> int:
         """Number of levels less that of the nuisances."""
-        return len(self.level_dn) - self.nuisances.shape[1]
+        return len(self.level_dn) - int(self.nuisances.shape[1])
 
     def without_nuisances(self, design: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return weighted logarithms (n,) and columns of a design (n, k), nuisances taken out."""

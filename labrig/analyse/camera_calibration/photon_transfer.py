@@ -142,17 +142,11 @@ def _counts(
     x, y, width, height = area
     side = first.cfa_side
     ends = min(first.black) < step_dn
-    return tuple(
-        NumberCounts.of(
-            *(
-                frame.mosaic[y + row : y + height : side, x + column : x + width : side]
-                for frame in (first, second)
-            ),
-            step_dn,
-            ends,
-        )
-        for row, column in np.ndindex(side, side)
-    )
+    counts = []
+    for row, column in np.ndindex(side, side):
+        plane = np.s_[y + row : y + height : side, x + column : x + width : side]
+        counts.append(NumberCounts.of(first.mosaic[plane], second.mosaic[plane], step_dn, ends))
+    return tuple(counts)
 
 
 def _uncut(frame: RawFrame, level_dn: float) -> float:
@@ -231,13 +225,15 @@ def photon_transfer(
             f"{len(lit)} and {len(dark)}; take more"
         )
     read = _read_noise(dark)
-    points = [point for pair in lit if (point := _light_variance(pair)) is not None]
+    every = [_light_variance(pair) for pair in lit]
+    points = [point for point in every if point is not None]
     if len(points) < 2:
         raise DataError(
             f"expected noise of at least half a step of the camera's numbers at ISO {iso:g}, got "
             "less than these resolve; add light, or choose a higher ISO"
         )
-    line = _fit_line(points, _dark_light_variance(read, dark), bend)
+    dark_variance = _dark_light_variance(read, dark)
+    line = _fit_line(points, dark_variance, bend)
     if not line.slope.value > 0:
         raise DataError(
             f"expected noise that rises with the light at ISO {iso:g}, got {line.slope.value:.3g} "
@@ -256,8 +252,12 @@ def photon_transfer(
         row_noise_e=float(row * gain),
     )
     scatters = tuple(pair.scatter for pair in lit)
+    photons = tuple(
+        None if point is None else point.variance_dn2 - dark_variance.value for point in every
+    )
+    shared, shared_sigma = _shared_noise(scatters)
     return PhotonTransfer(
-        noise, scatters, *_shared_noise(scatters), line.reduced_chi2, bend=line.bend
+        noise, scatters, photons, shared, shared_sigma, line.reduced_chi2, line.bend
     )
 
 
@@ -399,7 +399,8 @@ def _fit_line(points: Sequence[_Point], dark: Measured, bend: Bend) -> _Line:
         fit = least_squares(misfit, parameters, x_scale=scale)
         parameters = fit.x
     reduced = float(2 * fit.cost) / (len(points) - 1)
-    covariance = np.linalg.inv(fit.jac.T @ fit.jac)
+    jacobian: FloatArray = np.asarray(fit.jac, dtype=np.float64)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
     if chi2.sf(2 * fit.cost, len(points) - 1) < BY_CHANCE:
         covariance *= reduced
     return _Line(
