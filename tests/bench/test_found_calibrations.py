@@ -43,7 +43,8 @@ from tests.quick_yaml import read_quickly, write_quickly
 WIDTH, HEIGHT = 192, 64
 MADE = datetime(2026, 1, 1, tzinfo=UTC)
 LEDS = {"protocol": "led_brightness", "sample": {"name": "bank"}, "exposures": 1, "repeats": 1,
-        "repetitions": 3, "integration": "0.2 s", "longest": "4 s", "leds": ["430 nm", "530 nm"]}  # fmt: skip
+        "repetitions": 3, "integration": "0.2 s", "longest": "4 s",
+        "leds": ["430 nm", "530 nm"]}  # fmt: skip
 CHECK = {"protocol": "calibration_check", "longest": "1 s", "repeats": 1}
 STRIP = Strip(left=(0.07, 0.46), right=(0.93, 0.51), height=0.3, rising=True)
 NM = tuple(np.linspace(397.0, 703.0, 31).tolist())
