@@ -246,6 +246,9 @@ CAMPAIGNS = {
         _module("euler_steps"),
         _module("chart_colours"),
         _module("dark_room"),
+        _module("dark_room", "two-states-no-door", called="prediction_beside_photographs"),
+        _module("sensor_noise", "--seeds", "100"),
+        _module("phosphor_overhead"),
         _module("fluorescent_room"),
         _module("design_recovery"),
         Campaign(

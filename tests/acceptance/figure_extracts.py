@@ -1,6 +1,7 @@
 """Functions that find a figure in what its campaign printed."""
 
 import re
+from statistics import median
 
 from tests.acceptance.printed import Extract, columns, furthest, match, part, span
 
@@ -378,6 +379,30 @@ def dark_rooms(printed: str) -> str:
         f"ΔE {span(own, 1)}, with one state {span(single, 1)}; ratio within "
         f"{furthest(ratio):.1f} % in the mean over time"
     )
+
+
+def predicted_room(printed: str) -> str:
+    sides = match(r"glow over reflected light in \w: (.*)$", printed)
+    return f"{sides}; ΔE {match(r'^ +measured +ΔE +([0-9.]+)', printed)}"
+
+
+def overheads(printed: str) -> str:
+    row = r"^(\S+): (.* ms with, .* ms without phosphorescence), "
+    return "; ".join(f"{name}: {text}" for name, text in re.findall(row, printed, re.MULTILINE))
+
+
+def gains(printed: str) -> str:
+    gain, rms, line = columns(
+        r"^loss .* gain +(\S+) ± .* rms (\S+) σ; bend .* straight line (\S+) ±", printed
+    )
+    return f"{span(gain, 3)}, rms {span(rms, 2)} σ, by a straight line {span(line, 2)}"
+
+
+def read_noises(printed: str) -> str:
+    (rms,) = columns(r"^noise .* stated: .* rms (\S+) σ", printed)
+    below = re.findall(r"(\d+) below \S+, (\d+) truly", printed)
+    limits, truly = (sum(map(int, numbers)) for numbers in zip(*below, strict=True))
+    return f"median {median(rms):.2f} σ, largest {max(rms):.2f} σ; {truly} of {limits} limits"
 
 
 def camera_curves(case: str) -> Extract:
