@@ -81,6 +81,7 @@ def test_first_order_stays_first_order() -> None:
         fit = fitted(values, 1.0, light_stimulated=0.0)
         assert fit.candidates[fit.chosen].label == "1 state of first order"
         assert fit.states[0].exponent is None
+        assert fit.states[0].decay_time_s is not None
         assert fit.states[0].decay_time_s.value == pytest.approx(50.0, rel=0.01)
 
 
