@@ -110,6 +110,14 @@ def decay(
         str | None,
         typer.Option("--share", help="'rates': all tables have the same, each its amplitudes."),
     ] = None,
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Limits of every rate, lifetime and order at 68 and 95 % by profile likelihood, "
+            "not only where σ misleads.",
+        ),
+    ] = False,
     column: Column = None,
     time: Time = None,
     time_unit: TimeUnit = None,
@@ -133,7 +141,9 @@ def decay(
     if out is not None:
         _require_folder(out)
     times_s = [_time_s(text) for text in at or ()]
-    options = TableFitOptions(states, offset, flicker, weights, origin, start, law)
+    options = TableFitOptions(
+        states, offset, flicker, weights, origin, start, law, intervals
+    )
     layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     if share is not None:
         _require_one_of("--share", share, ("rates",))

@@ -110,8 +110,17 @@ from .fitted_law import (
     DecayForecast as DecayForecast,
     FittedLaw as FittedLaw,
     FittedRateSpectrum as FittedRateSpectrum,
+    interval_name as interval_name,
     parameter_text as parameter_text,
     require_law as require_law,
+)
+from .interval import (
+    ASYMMETRIC as ASYMMETRIC,
+    SIGMAS_95 as SIGMAS_95,
+    ProfileInterval as ProfileInterval,
+    interval_lines as interval_lines,
+    interval_rows as interval_rows,
+    read_intervals as read_intervals,
 )
 from .irradiance import (
     CardRatio as CardRatio,
