@@ -253,6 +253,14 @@ def charge(
             "0 to 1, or 'free'. 1 conserves energy.",
         ),
     ] = "1",
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Limits of every order, rate and lifetime at 68 and 95 % by profile likelihood, "
+            "not only where σ misleads.",
+        ),
+    ] = False,
     column: Column = None,
     time: Time = None,
     time_unit: TimeUnit = None,
@@ -275,7 +283,7 @@ def charge(
 
     if out is not None:
         _require_folder(out)
-    options = ChargeTableOptions(on, off, states, order, stimulated)
+    options = ChargeTableOptions(on, off, states, order, stimulated, intervals)
     layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     fit, columns = fit_charge_table(table, options, layout)
     typer.echo(fit.to_json() if json else f"columns  {columns}\n{fit}")

@@ -44,6 +44,14 @@ def process(
             "one of each state, a number holds it.",
         ),
     ] = "auto",
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Limits of every rate and order of a decay or an excitation at 68 and 95 % by "
+            "profile likelihood, not only where σ misleads.",
+        ),
+    ] = False,
     camera: Annotated[
         str | None,
         typer.Option("--camera", help="Camera curves to use instead, for the report's colours."),
@@ -84,8 +92,9 @@ def process(
     from labrig.record import read_run
 
     overrides = Overrides.parse(
-        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method, order
-    )
+        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method, order,
+        intervals=intervals,
+    )  # fmt: skip
     folder = find_run(run, runs)
     if verify:
         typer.echo(verify_frames(read_run(folder), overrides), err=True)

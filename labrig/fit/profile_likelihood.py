@@ -15,9 +15,9 @@ that a secant meets a limit in two or three points.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from labrig.fit.bounded_limits import away_from_bound, toward_bound
@@ -37,14 +37,17 @@ Value = Callable[[FloatArray], tuple[float, FloatArray]]
 PROBABILITIES = (math.erf(math.sqrt(0.5)), 0.95)
 SIGMAS = (1.0, SIGMAS_95)
 #: Weight of a quantity's distance from its target, in units of 1/σ².
-STIFFNESS = 1000.0
+STIFFNESS = 30.0
 #: Steps of a search for a limit, the precision of √Δχ² at its end, and the largest ratio of a step
 #: to the way made so far.
-MOST_POINTS, PRECISION, LONGEST_STEP = 25, 1e-3, 2.0
+MOST_POINTS, PRECISION, LONGEST_STEP = 25, 3e-3, 2.0
 #: Relative step and gain in χ² at which a point of the profile is near enough, and its evaluations.
-TOLERANCE, LEAST_GAIN, MAX_ITERATIONS = 1e-5, 1e-6, 200
-#: Part of a quantity's σ within which it is at the end of its range.
-AT_END = 1e-3
+TOLERANCE, LEAST_GAIN, MAX_ITERATIONS = 1e-4, 1e-4, 200
+#: Part of a quantity's σ within which it is at the end of its range, and of a step from which a
+#: parameter's bound has stopped it.
+AT_END, STOPPED = 0.01, 0.1
+#: Largest number with an exponential.
+LARGEST_LOG = 700.0
 #: Gain in χ² over the fit from which it was not at the minimum.
 LOWER_MINIMUM = 0.01
 
@@ -72,6 +75,11 @@ class Quantity:
     searched: tuple[float, float] = (-math.inf, math.inf)
     not_above: tuple[int, ...] = ()
     not_below: tuple[int, ...] = ()
+
+
+def exponential(value: float) -> float:
+    """Return e^x, infinite beyond what a number holds."""
+    return math.exp(value) if value < LARGEST_LOG else math.inf
 
 
 def parameter(number: int) -> Value:
@@ -187,20 +195,22 @@ class Likelihood:
 
         Parameters at a bound stay there, unless they are part of the gradient.
         """
-        free = ~self.fit.at_bound | (gradient != 0)
-        covariance = self._covariance
-        if not free.all() or self.fit.at_bound.any():
-            covariance = np.zeros_like(covariance)
-            own, _ = parameter_covariance(self.fit.jacobian[:, free])
-            covariance[np.ix_(free, free)] = own
-        involved = gradient != 0
-        return np.asarray(covariance[:, involved] @ gradient[involved])
+        free, involved = self._free(gradient), gradient != 0
+        direction = np.zeros(len(gradient))
+        if free.all():
+            covariance = self.fit.covariance
+        else:
+            covariance, _ = parameter_covariance(self.fit.jacobian[:, free])
+        direction[free] = covariance[:, involved[free]] @ gradient[involved]
+        return direction
 
-    @cached_property
-    def _covariance(self) -> FloatArray:
-        return self.fit.covariance
+    def _free(self, gradient: FloatArray) -> NDArray[np.bool_]:
+        """Return which parameters are not at a bound, or part of a gradient, (p,)."""
+        return ~self.fit.at_bound | (gradient != 0)
 
-    def is_asymmetric(self, quantity: Quantity, shown: Callable[[float], float]) -> bool:
+    def is_asymmetric(
+        self, quantity: Quantity, shown: Callable[[float], float], stated_sigma: float | None = None
+    ) -> bool:
         """Return whether the limits that two points imply differ by more than 20 %.
 
         Each point is one σ from the minimum; the other parameters follow by one step with the slopes
@@ -212,6 +222,8 @@ class Likelihood:
             The quantity.
         shown
             Monotone function of the quantity that is reported with σ.
+        stated_sigma
+            Its σ as reported, where it is another than that by the curvature within bounds.
         """
         value, gradient = quantity.value(self.fit.parameters)
         sigma = self.sigma(quantity)
@@ -219,6 +231,7 @@ class Likelihood:
             return True
         step = self.direction(gradient) / sigma
         along = self.fit.jacobian @ step
+        basis = np.linalg.qr(self.fit.jacobian[:, self._free(gradient)])[0]
         distances = []
         for side in (-1.0, 1.0):
             x = self.fit.parameters + side * step
@@ -228,19 +241,14 @@ class Likelihood:
                 x = np.clip(x, self.lower, self.upper)
             residuals, _ = self.residuals(x)
             moved, _ = quantity.value(x)
-            others = self._basis.T @ residuals
+            others = basis.T @ residuals
             chi2 = residuals @ residuals - others @ others + (along @ residuals) ** 2
             root = math.sqrt(max(float(chi2 - self.fit.chi2), 1e-12))
             implied = value + (moved - value) / root
             distances.append(abs(shown(implied) - shown(value)))
         slope = (shown(value + AT_END * sigma) - shown(value - AT_END * sigma)) / (2 * AT_END)
-        distances.append(abs(slope))
+        distances.append(abs(slope) if stated_sigma is None else stated_sigma)
         return not max(distances) < ASYMMETRIC * min(distances)
-
-    @cached_property
-    def _basis(self) -> FloatArray:
-        """Orthonormal basis of the columns of the Jacobian, shape (m, p)."""
-        return np.asarray(np.linalg.qr(self.fit.jacobian)[0])
 
 
 class LowerMinimumError(Exception):
@@ -308,68 +316,74 @@ class _Way:
 
     def _search(self, points: list[_Point], end: float, root: float) -> float | None:
         """Return the value at which the profile reaches a root of Δχ²; None if it does not."""
+        lengthened, was_beyond = 1.0, None
         for _ in range(MOST_POINTS):
             points.sort(key=lambda point: self.side * point.value)
-            last, target = points[-1], self._interpolated(points, root)
-            nearest = min(points, key=lambda point: abs(point.root - root))
-            is_near = abs(nearest.root - root) <= PRECISION * root
             beyond = next((k for k, point in enumerate(points) if point.root >= root), None)
-            if beyond is not None:
-                target = self._within(points[beyond - 1], points[beyond], root, target)
-            if is_near:
-                return target
-            if beyond is not None:
-                points.append(self._point(target, nearest))
-                continue
-            way = max(self.side * (last.value - points[0].value), root * self._sigma / LONGEST_STEP)
-            further = min(
-                max(self.side * (target - last.value), AT_END * self._sigma),
-                LONGEST_STEP * way,
-                self.side * (end - last.value),
-            )
-            new = self._point(last.value + self.side * further, last)
-            # A value that is at its end, or that a parameter's bound stops, moves no further.
-            if self.side * (new.value - last.value) <= AT_END * self._sigma / 2:
-                return None
+            last = points[-1]
+            if beyond is None and abs(last.root - root) <= PRECISION * root:
+                return last.value
+            if beyond is None:
+                way, wanted = self.side * (last.value - points[0].value), root * self._sigma
+                if last.root > 0:
+                    wanted = min(lengthened * way * (root / last.root - 1), LONGEST_STEP * way)
+                step = min(wanted, self.side * (end - last.value))
+                if step <= AT_END * self._sigma and wanted > step:
+                    return None
+                new = self._point(last.value + self.side * step, last)
+                # A value that a parameter's bound stops moves no further.
+                if not self.side * (new.value - last.value) > STOPPED * step:
+                    return None
+                lengthened, was_beyond = LONGEST_STEP * lengthened, None
+            else:
+                below, above = points[beyond - 1], points[beyond]
+                target = self._interpolated(points[0], below, above, root)
+                nearest = min(below, above, key=lambda point: abs(point.root - root))
+                if abs(nearest.root - root) <= PRECISION * root:
+                    return target
+                # Steps that stay on one side of the limit grow until they cross it.
+                lengthened = 1.0 if was_beyond is None else lengthened
+                step = lengthened * (target - nearest.value)
+                other = above if nearest is below else below
+                if abs(step) > abs(other.value - nearest.value) / 2:
+                    step = max(
+                        (target - nearest.value, (other.value - nearest.value) / 2), key=abs
+                    )
+                new = self._point(nearest.value + step, nearest, root)
+                is_beyond = new.root >= root
+                lengthened = LONGEST_STEP * lengthened if is_beyond == was_beyond else 1.0
+                was_beyond = is_beyond
             points.append(new)
         return None
 
-    def _interpolated(self, points: list[_Point], root: float) -> float:
-        """Return the value at a root by interpolation of distance/root between the nearest points.
+    def _interpolated(self, first: _Point, below: _Point, above: _Point, root: float) -> float:
+        """Return the value at a root between two points.
 
-        At the minimum that is σ.
+        Distance/root, which is σ at the minimum, is interpolated: by a secant where that would lead
+        out of the two points.
         """
-        first = points[0].value
-        nearest = sorted(
-            (abs(each.root - root), each.root, (each.value - first) / each.root)
-            for each in points[1:]
-            if each.root > 0
-        )[:2]
-        roots = [0.0, *(own for _, own, _ in nearest)]
-        ratios = [self.side * self._sigma, *(ratio for _, _, ratio in nearest)]
+        near = [point for point in (below, above) if point.root > 0]
+        roots = [0.0, *(point.root for point in near)]
+        ratios = [self.side * self._sigma, *((each.value - first.value) / each.root for each in near)]
         # Neville's scheme.
         for order in range(1, len(roots)):
             for k in range(len(roots) - order):
                 low, high = roots[k], roots[k + order]
-                if low == high:
-                    return points[-1].value
                 ratios[k] = ((root - low) * ratios[k + 1] - (root - high) * ratios[k]) / (
                     high - low
                 )
-        return first + root * ratios[0]
-
-    def _within(self, below: _Point, above: _Point, root: float, target: float) -> float:
-        """Return a target between two points; by a secant if the one given is not."""
         width = above.value - below.value
-        part = (target - below.value) / width if width else 0.0
+        part = (first.value + root * ratios[0] - below.value) / width
         if not 0 < part < 1:
             part = (root - below.root) / (above.root - below.root)
         return below.value + part * width
 
-    def _point(self, target: float, near: _Point) -> _Point:
-        """Return a point of the profile, at a target or near it."""
+    def _point(self, target: float, near: _Point, root: float = 0.0) -> _Point:
+        """Return a point of the profile near a target, where √Δχ² is about `root`."""
         likelihood, quantity, sigma = self.likelihood, self.quantity, self._sigma
         weight = STIFFNESS / sigma
+        # As far as χ² pulls it back.
+        target += self.side * root * sigma / STIFFNESS**2
 
         def pulled(x: FloatArray) -> tuple[FloatArray, FloatArray]:
             residuals, jacobian = likelihood.residuals(x)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from labrig.number_format import aligned, rounded
+from labrig.results.text_files import finite
 
 #: Ratio of the distances of both limits, or of the larger one to σ, from which σ misleads.
 ASYMMETRIC = 1.2
@@ -65,6 +66,24 @@ class ProfileInterval:
             return ProfileInterval(value, high_68, low_68, high_95, low_95, largest, least)
         return ProfileInterval(value, low_68, high_68, low_95, high_95, least, largest)
 
+    def scaled(self, factor: float) -> "ProfileInterval":
+        """Return the interval with all limits that factor as far from the value."""
+
+        def moved(limit: float) -> float:
+            if limit in (self.least, self.largest):
+                return limit
+            return min(max(self.value + factor * (limit - self.value), self.least), self.largest)
+
+        return ProfileInterval(
+            self.value,
+            moved(self.low_68),
+            moved(self.high_68),
+            moved(self.low_95),
+            moved(self.high_95),
+            self.least,
+            self.largest,
+        )
+
     def widened(self, relative_sigma: float) -> "ProfileInterval":
         """Return the interval of a positive parameter times a factor of 1 with a relative σ.
 
@@ -111,13 +130,16 @@ class ProfileInterval:
         return f"{rounded(low, digits)} to {rounded(high, digits)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the content for a JSON file: limits as pairs, infinite where there is none."""
-        return {
-            "value": self.value,
-            "interval_68": [self.low_68, self.high_68],
-            "interval_95": [self.low_95, self.high_95],
-            "possible": [self.least, self.largest],
-        }
+        """Return the content for a JSON file: limits as pairs, None where there is none."""
+        content: dict[str, Any] = finite(
+            {
+                "value": self.value,
+                "interval_68": [self.low_68, self.high_68],
+                "interval_95": [self.low_95, self.high_95],
+                "possible": [self.least, self.largest],
+            }
+        )
+        return content
 
 
 #: Standard deviations from the mean of a normal distribution within which 95 % are.
@@ -129,7 +151,7 @@ def _digits(low: float, high: float, value: float) -> int:
     size = max((abs(limit) for limit in (low, high) if math.isfinite(limit)), default=1.0)
     ends = [limit if math.isfinite(limit) else value for limit in (low, high)]
     width = abs(ends[1] - ends[0])
-    if not (width > 0 and size > 0):
+    if not (0 < width < math.inf and size > 0):
         return 3
     return min(max(2 + math.floor(math.log10(size)) - math.floor(math.log10(width)), 2), 8)
 

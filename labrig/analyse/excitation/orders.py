@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.analyse.overrides import FREE
-from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.fit.excitation import IntervalChoice, RelativeSigmas, fit_excitation
 from labrig.results import (
     AUTO,
     ChargingSeries,
@@ -143,17 +143,20 @@ class ChosenOrders:
     relative_sigmas: RelativeSigmas
     doubt: tuple[str, ...] = ()
 
-    def fitted(self, series: Sequence[ChargingSeries]) -> FittedExcitation:
+    def fitted(
+        self, series: Sequence[ChargingSeries], intervals: IntervalChoice = "none"
+    ) -> FittedExcitation:
         """Fit series of the sample by the model, from its solution, and find the light's errors.
 
-        How far the veil differs from site to site is taken in proportion to the veil found.
+        How far the veil differs from site to site is taken in proportion to the veil found. The
+        intervals are those of `fit_excitation`.
         """
         best = self.best
         veil = 0.0 if best.veil is None else abs(best.veil.value)
         sigmas = replace(self.relative_sigmas, veil_shape=VEIL_SHAPE * veil)
         order = None if best.are_orders_fitted else best.states[0].kinetic_order
         k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in best.states]).T
-        fit = fit_excitation(series, k_r, amplitude, sigmas, best, order)
+        fit = fit_excitation(series, k_r, amplitude, sigmas, best, order, intervals)
         return replace(
             fit,
             models=best.models,

@@ -1,11 +1,12 @@
 """Result of a fit to charge and decay, readable as text and as JSON; the file `fit.json`."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 from labrig.number_format import aligned
-from labrig.results import FloatArray, Measured
+from labrig.results import FloatArray, Measured, ProfileInterval, interval_lines
 
 UNKNOWN = "–"
 #: Version of the JSON: another number means renamed keys or other meanings.
@@ -125,6 +126,11 @@ class ChargeFit:
         Doubts, one a line.
     readings
         What was fitted.
+    intervals
+        Intervals by profile likelihood, where ±σ misses them by more than 20 % or where they were
+        asked for: by the name of a field of `OrderState` and the number of the state, such as
+        `order 1`, and `lifetime_at_off_s 1`, in which the light at lamp off would fall to nothing
+        if it went on falling so fast: τ/p.
     """
 
     states: tuple[OrderState, ...]
@@ -141,6 +147,7 @@ class ChargeFit:
     chosen: int
     warnings: tuple[str, ...]
     readings: FittedReadings = field(compare=False, repr=False)
+    intervals: Mapping[str, ProfileInterval] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """Return a table of the states, one of the models, and all warnings."""
@@ -154,8 +161,20 @@ class ChargeFit:
             f"light-stimulated η {_text(self.light_stimulated)}, prompt light "
             f"{_text(self.prompt)}, dark level {_text(self.dark)}"
         )
+        lines += interval_lines(self.named_intervals)
         lines += aligned(self.model_rows())
         return "\n".join([*lines, *(f"! {line}" for line in self.warnings)])
+
+    @property
+    def named_intervals(self) -> dict[str, ProfileInterval]:
+        """Intervals by the symbols and units of their parameters."""
+        labels = COLUMN_LABELS | {"lifetime_at_off_s": "τ/p / s"}
+        named = {}
+        for name, interval in self.intervals.items():
+            quantity, _, number = name.partition(" ")
+            symbol, *unit = labels[quantity].split(" / ")
+            named[" / ".join((f"{symbol} {number}", *unit))] = interval
+        return named
 
     def state_rows(self) -> list[list[str]]:
         """Return what is known of the states as a table, its head first."""
@@ -196,6 +215,7 @@ class ChargeFit:
             "chi2_charge": self.chi2_charge,
             "chi2_decay": self.chi2_decay,
             "misfit": self.misfit,
+            "intervals": {name: each.to_dict() for name, each in self.intervals.items()},
             "candidates": [vars(candidate) for candidate in self.candidates],
             "chosen": self.chosen,
             "warnings": list(self.warnings),

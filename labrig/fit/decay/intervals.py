@@ -22,6 +22,7 @@ from labrig.fit.profile_likelihood import (
     LowerMinimumError,
     NoiseScale,
     Quantity,
+    exponential,
     parameter,
 )
 from labrig.material import DECAY_LAWS
@@ -30,8 +31,8 @@ from labrig.results import EXPONENTIALS, ProfileInterval
 #: Range of possible shapes of each law, whatever the fit's bounds, and the shape's name.
 SHAPES = {"becquerel": (0.0, math.inf), "otor": (0.0, 1.0), "stretched": (0.0, 1.0)}
 SHAPE_NAMES = {"becquerel": "exponent", "otor": "retrapping", "stretched": "exponent"}
-#: Least shape of Becquerel's law with a logarithm, and largest exponent with an exponential.
-TINY_SHAPE, LARGEST_LOG = 1e-12, 700.0
+#: Least shape of Becquerel's law with a logarithm.
+TINY_SHAPE = 1e-12
 
 #: Reported quantities by name, each a monotone function of the profiled one.
 Shown = dict[str, Callable[[float], float]]
@@ -120,8 +121,8 @@ def rate_intervals(
         own = joint.least_squares.covariance
         noise = _noise(covariance[2 * state, 2 * state], own[2 * state, 2 * state], dof)
         shown: Shown = {
-            f"k_r_per_s {number}": lambda log_rate: _exp(log_rate) / series.span_s,
-            f"lifetime_s {number}": lambda log_rate: series.span_s * _exp(-log_rate),
+            f"k_r_per_s {number}": lambda log_rate: exponential(log_rate) / series.span_s,
+            f"lifetime_s {number}": lambda log_rate: series.span_s * exponential(-log_rate),
         }
         wanted.append((quantity, noise, shown))
     return _intervals(likelihood, wanted, all_of_them=all_of_them)
@@ -169,10 +170,10 @@ def law_intervals(
         return _noise(variance, likelihood.sigma(quantity) ** 2, dof)
 
     rate, quantity = Quantity(parameter(1)), Quantity(parameter(2), *SHAPES[kind.name], kind.shapes)
-    time_s: Shown = {"decay_time_s": lambda log_rate: span_s * _exp(-log_rate)}
+    time_s: Shown = {"decay_time_s": lambda log_rate: span_s * exponential(-log_rate)}
     of_shape: Shown = {SHAPE_NAMES[kind.name]: float}
     if kind.name == "becquerel":
-        rate, time_s = Quantity(_log_time), {"decay_time_s": lambda log_s: span_s * _exp(log_s)}
+        rate, time_s = Quantity(_log_time), {"decay_time_s": lambda log_s: span_s * exponential(log_s)}
         of_shape = {"exponent": _reciprocal, "kinetic_order": _order_of}
     wanted = [(rate, noise(rate), time_s), (quantity, noise(quantity), of_shape)]
     return _intervals(likelihood, wanted, all_of_them=all_of_them)
@@ -233,10 +234,6 @@ def _log_time(theta: FloatArray) -> tuple[float, FloatArray]:
     gradient = np.zeros(len(theta))
     gradient[1], gradient[2] = -1.0, -1 / shape
     return -float(theta[1]) - math.log(shape), gradient
-
-
-def _exp(value: float) -> float:
-    return math.exp(min(value, LARGEST_LOG)) if value < math.inf else math.inf
 
 
 def _reciprocal(shape: float) -> float:

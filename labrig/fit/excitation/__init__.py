@@ -3,12 +3,14 @@
 from labrig.fit.excitation.charging import Charging, closure
 from labrig.fit.excitation.course import ExcitationCourse, excitation_course
 from labrig.fit.excitation.fit import fit_excitation
+from labrig.fit.excitation.intervals import IntervalChoice
 from labrig.fit.excitation.levels import levels_at_off
 from labrig.fit.excitation.parameters import RelativeSigmas
 
 __all__ = [
     "Charging",
     "ExcitationCourse",
+    "IntervalChoice",
     "RelativeSigmas",
     "closure",
     "excitation_course",
