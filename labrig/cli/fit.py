@@ -141,9 +141,7 @@ def decay(
     if out is not None:
         _require_folder(out)
     times_s = [_time_s(text) for text in at or ()]
-    options = TableFitOptions(
-        states, offset, flicker, weights, origin, start, law, intervals
-    )
+    options = TableFitOptions(states, offset, flicker, weights, origin, start, law, intervals)
     layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     if share is not None:
         _require_one_of("--share", share, ("rates",))

@@ -10,9 +10,9 @@ the probability: the unified approach of G. J. Feldman and R. D. Cousins (Phys. 
     Φ(√c) − Φ(−(μ² + c)/(2 μ)) = P       nearer to the bound.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
-from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 #: Distance from the bound below which the threshold is that at the bound, and relative precision.
@@ -38,8 +38,8 @@ def toward_bound(distance: float, sigmas: float) -> float | None:
         return sigmas
     if distance <= _threshold(0.0, sigmas):
         return None
-    return float(
-        brentq(lambda root: root - _threshold(distance - root, sigmas), 0.0, min(sigmas, distance))
+    return _root(
+        lambda root: root - _threshold(distance - root, sigmas), 0.0, min(sigmas, distance)
     )
 
 
@@ -59,7 +59,7 @@ def away_from_bound(pull: float, sigmas: float) -> float:
     def excess(mu: float) -> float:
         return mu * mu + 2 * mu * pull - _threshold(mu, sigmas) ** 2
 
-    return _threshold(float(brentq(excess, 0.0, sigmas)), sigmas)
+    return _threshold(_root(excess, 0.0, sigmas), sigmas)
 
 
 @lru_cache(maxsize=1024)
@@ -75,4 +75,11 @@ def _threshold(mu: float, sigmas: float) -> float:
     def excess(root: float) -> float:
         return float(ndtr(root) - ndtr(-(mu * mu + root * root) / (2 * mu))) - probability
 
-    return float(brentq(excess, at_bound, sigmas, rtol=PRECISION))
+    return _root(excess, at_bound, sigmas)
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    # Not above: it takes long to load.
+    from scipy.optimize import brentq
+
+    return float(brentq(function, low, high, rtol=PRECISION))

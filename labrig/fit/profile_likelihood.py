@@ -4,17 +4,18 @@ The profile of a quantity is the least χ² at each of its values, all other par
 limit is where it exceeds the minimum by 1 (68.3 %) or 3.84 (95 %); where the scale of the noise was
 told by ν degrees of freedom, by the squared quantile of Student's t, which is the F-test's. Unlike
 ±σ, such limits do not depend on how the model is parametrised (D. M. Bates and D. G. Watts,
-*Nonlinear Regression Analysis and Its Applications*, 1988, ch. 6; D. J. Venzon and S. H. Moolgavkar,
-Appl. Statist. 37, 1988, 87).
+*Nonlinear Regression Analysis and Its Applications*, 1988, ch. 6; D. J. Venzon and S. H.
+Moolgavkar, Appl. Statist. 37, 1988, 87).
 
 A point of the profile is the minimum of χ² + w² (g − g₀)²: it lies on the profile exactly, at a
 value of the quantity g near g₀, whatever the weight w. √Δχ² is nearly linear along the profile, so
-that a secant meets a limit in two or three points.
+that a limit is met after few points.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +39,16 @@ PROBABILITIES = (math.erf(math.sqrt(0.5)), 0.95)
 SIGMAS = (1.0, SIGMAS_95)
 #: Weight of a quantity's distance from its target, in units of 1/σ².
 STIFFNESS = 30.0
-#: Steps of a search for a limit, the precision of √Δχ² at its end, and the largest ratio of a step
-#: to the way made so far.
-MOST_POINTS, PRECISION, LONGEST_STEP = 25, 3e-3, 2.0
+#: Steps of a search for a limit, precision of the limit in σ, largest ratio of a step to the way
+#: made so far, and part of that way by which a step aims beyond.
+MOST_POINTS, PRECISION, LONGEST_STEP, BEYOND = 25, 0.01, 2.0, 0.03
 #: Relative step and gain in χ² at which a point of the profile is near enough, and its evaluations.
 TOLERANCE, LEAST_GAIN, MAX_ITERATIONS = 1e-4, 1e-4, 200
-#: Part of a quantity's σ within which it is at the end of its range, and of a step from which a
+#: Part of a quantity's σ within which it is at the end of its range, and of a step below which a
 #: parameter's bound has stopped it.
 AT_END, STOPPED = 0.01, 0.1
+#: Largest σ that a search goes by, as a part of the range searched.
+PART_OF_RANGE = 0.2
 #: Largest number with an exponential.
 LARGEST_LOG = 700.0
 #: Gain in χ² over the fit from which it was not at the minimum.
@@ -122,10 +125,11 @@ class NoiseScale:
         return float(stdtrit(max(self.dof, 1.0), (1 + probability) / 2))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Point:
-    """A point of the profile: the quantity, the signed root of Δχ², and the parameters."""
+    """A point of the profile: where the quantity was pulled to and is, √Δχ², and the parameters."""
 
+    target: float
     value: float
     root: float
     x: FloatArray
@@ -175,9 +179,7 @@ class Likelihood:
         LowerMinimumError
             The profile falls below the minimum: there is a better fit.
         """
-        ends = [
-            _Way(self, quantity, side, noise or NoiseScale()).limits() for side in (-1.0, 1.0)
-        ]
+        ends = [_Way(self, quantity, side, noise or NoiseScale()).limits() for side in (-1.0, 1.0)]
         (low_68, low_95), (high_68, high_95) = ends
         value, _ = quantity.value(self.fit.parameters)
         return ProfileInterval(
@@ -213,8 +215,8 @@ class Likelihood:
     ) -> bool:
         """Return whether the limits that two points imply differ by more than 20 %.
 
-        Each point is one σ from the minimum; the other parameters follow by one step with the slopes
-        of the minimum. Of the root of its Δχ², which is 1 for a linear model, the limit is implied.
+        Each point is one σ from the minimum; the other parameters follow by one step with the
+        slopes of the minimum. The root of its Δχ² is 1 for a linear model, and implies the limit.
 
         Parameters
         ----------
@@ -239,8 +241,11 @@ class Likelihood:
                 if not quantity.least < value + side * sigma < quantity.largest:
                     return True
                 x = np.clip(x, self.lower, self.upper)
-            residuals, _ = self.residuals(x)
-            moved, _ = quantity.value(x)
+            with np.errstate(all="ignore"):
+                residuals, _ = self.residuals(x)
+                moved, _ = quantity.value(x)
+            if not np.isfinite(residuals).all():
+                return True
             others = basis.T @ residuals
             chi2 = residuals @ residuals - others @ others + (along @ residuals) ** 2
             root = math.sqrt(max(float(chi2 - self.fit.chi2), 1e-12))
@@ -272,7 +277,7 @@ class _Way:
         end = min(end, quantity.largest) if side > 0 else max(end, quantity.least)
         value, _ = quantity.value(fit.parameters)
         sigma = self._sigma
-        points = [_Point(value, 0.0, fit.parameters)]
+        points = [_Point(value, value, 0.0, fit.parameters)]
         limits = []
         for sigmas, factor in zip(SIGMAS, self.noise.factors, strict=True):
             root = self._root(points, end, sigmas, factor)
@@ -283,18 +288,18 @@ class _Way:
             limits.append(bound if limit is None else limit)
         return limits[0], limits[1]
 
-    @property
+    @cached_property
     def _sigma(self) -> float:
+        """σ of the quantity; on a plateau, where it has none, a part of the range searched."""
         sigma = self.likelihood.sigma(self.quantity)
-        if sigma > 0:
-            return sigma
-        value, _ = self.quantity.value(self.likelihood.fit.parameters)
         low, high = self.quantity.searched
-        return max(abs(value), 1.0) if math.isinf(high - low) else 0.1 * (high - low)
+        largest = PART_OF_RANGE * (high - low)
+        if math.isinf(largest):
+            value, _ = self.quantity.value(self.likelihood.fit.parameters)
+            largest = math.inf if sigma > 0 else max(abs(value), 1.0)
+        return min(sigma, largest) if sigma > 0 else largest
 
-    def _root(
-        self, points: list[_Point], end: float, sigmas: float, factor: float
-    ) -> float | None:
+    def _root(self, points: list[_Point], end: float, sigmas: float, factor: float) -> float | None:
         """Return the root of Δχ² at a limit, less near a bound; None if the bound is within."""
         quantity, fit = self.quantity, self.likelihood.fit
         value, gradient = quantity.value(fit.parameters)
@@ -309,81 +314,66 @@ class _Way:
         is_bound = end in (least, largest)
         if not is_bound or abs(end - value) > 2 * sigmas * factor * sigma * LONGEST_STEP:
             return factor * sigmas
-        if abs(points[-1].value - end) > AT_END * sigma:
-            points.append(self._point(end, points[-1]))
-        toward = toward_bound(points[-1].root / factor, sigmas)
+        at_end = next((point for point in points if point.target == end), None)
+        if at_end is None:
+            at_end = self._point(end, max(points, key=lambda point: self.side * point.target))
+            points.append(at_end)
+        toward = toward_bound(at_end.root / factor, sigmas)
         return None if toward is None else factor * toward
 
     def _search(self, points: list[_Point], end: float, root: float) -> float | None:
         """Return the value at which the profile reaches a root of Δχ²; None if it does not."""
-        lengthened, was_beyond = 1.0, None
+        # Not above: it takes long to load.
+        from scipy.optimize import brentq
+
+        if not self._reaches(points, end, root):
+            return None
+        points.sort(key=lambda point: self.side * point.target)
+        beyond = next(k for k, point in enumerate(points) if point.root >= root)
+        below, above = points[beyond - 1], points[beyond]
+        between = {point.target: point for point in (below, above)}
+
+        def excess(target: float) -> float:
+            if target not in between:
+                near = min(between.values(), key=lambda point: abs(point.target - target))
+                between[target] = self._point(target, near)
+            return between[target].root - root
+
+        width = min(abs(above.target - below.target), self._sigma)
+        brentq(excess, below.target, above.target, xtol=PRECISION * width)
+        # Between the two nearest points, √Δχ² is a straight line.
+        found = sorted(between.values(), key=lambda point: point.root - root)
+        beyond = next(k for k, point in enumerate(found) if point.root >= root)
+        below, above = found[beyond - 1], found[beyond]
+        part = (root - below.root) / (above.root - below.root)
+        points += [point for point in found if point not in points]
+        return below.value + part * (above.value - below.value)
+
+    def _reaches(self, points: list[_Point], end: float, root: float) -> bool:
+        """Return whether the profile reaches a root of Δχ², after points on the way there."""
+        lengthened = 1.0
         for _ in range(MOST_POINTS):
-            points.sort(key=lambda point: self.side * point.value)
-            beyond = next((k for k, point in enumerate(points) if point.root >= root), None)
-            last = points[-1]
-            if beyond is None and abs(last.root - root) <= PRECISION * root:
-                return last.value
-            if beyond is None:
-                way, wanted = self.side * (last.value - points[0].value), root * self._sigma
-                if last.root > 0:
-                    wanted = min(lengthened * way * (root / last.root - 1), LONGEST_STEP * way)
-                step = min(wanted, self.side * (end - last.value))
-                if step <= AT_END * self._sigma and wanted > step:
-                    return None
-                new = self._point(last.value + self.side * step, last)
-                # A value that a parameter's bound stops moves no further.
-                if not self.side * (new.value - last.value) > STOPPED * step:
-                    return None
-                lengthened, was_beyond = LONGEST_STEP * lengthened, None
-            else:
-                below, above = points[beyond - 1], points[beyond]
-                target = self._interpolated(points[0], below, above, root)
-                nearest = min(below, above, key=lambda point: abs(point.root - root))
-                if abs(nearest.root - root) <= PRECISION * root:
-                    return target
-                # Steps that stay on one side of the limit grow until they cross it.
-                lengthened = 1.0 if was_beyond is None else lengthened
-                step = lengthened * (target - nearest.value)
-                other = above if nearest is below else below
-                if abs(step) > abs(other.value - nearest.value) / 2:
-                    step = max(
-                        (target - nearest.value, (other.value - nearest.value) / 2), key=abs
-                    )
-                new = self._point(nearest.value + step, nearest, root)
-                is_beyond = new.root >= root
-                lengthened = LONGEST_STEP * lengthened if is_beyond == was_beyond else 1.0
-                was_beyond = is_beyond
+            last = max(points, key=lambda point: self.side * point.target)
+            if max(point.root for point in points) >= root:
+                return True
+            way, wanted = self.side * (last.target - points[0].target), root * self._sigma
+            if last.root > 0:
+                wanted = way * min(lengthened * (root / last.root - 1) + BEYOND, LONGEST_STEP)
+            step = min(wanted, self.side * (end - last.target))
+            if step < AT_END * min(wanted, self._sigma):
+                return False
+            new = self._point(last.target + self.side * step, last)
             points.append(new)
-        return None
+            # A value that a parameter's bound stops moves no further.
+            if not self.side * (new.value - last.value) > STOPPED * step:
+                return new.root >= root
+            lengthened *= LONGEST_STEP
+        return False
 
-    def _interpolated(self, first: _Point, below: _Point, above: _Point, root: float) -> float:
-        """Return the value at a root between two points.
-
-        Distance/root, which is σ at the minimum, is interpolated: by a secant where that would lead
-        out of the two points.
-        """
-        near = [point for point in (below, above) if point.root > 0]
-        roots = [0.0, *(point.root for point in near)]
-        ratios = [self.side * self._sigma, *((each.value - first.value) / each.root for each in near)]
-        # Neville's scheme.
-        for order in range(1, len(roots)):
-            for k in range(len(roots) - order):
-                low, high = roots[k], roots[k + order]
-                ratios[k] = ((root - low) * ratios[k + 1] - (root - high) * ratios[k]) / (
-                    high - low
-                )
-        width = above.value - below.value
-        part = (first.value + root * ratios[0] - below.value) / width
-        if not 0 < part < 1:
-            part = (root - below.root) / (above.root - below.root)
-        return below.value + part * width
-
-    def _point(self, target: float, near: _Point, root: float = 0.0) -> _Point:
-        """Return a point of the profile near a target, where √Δχ² is about `root`."""
+    def _point(self, target: float, near: _Point) -> _Point:
+        """Return a point of the profile near a target."""
         likelihood, quantity, sigma = self.likelihood, self.quantity, self._sigma
         weight = STIFFNESS / sigma
-        # As far as χ² pulls it back.
-        target += self.side * root * sigma / STIFFNESS**2
 
         def pulled(x: FloatArray) -> tuple[FloatArray, FloatArray]:
             residuals, jacobian = likelihood.residuals(x)
@@ -420,4 +410,4 @@ class _Way:
         if delta < -LOWER_MINIMUM:
             raise LowerMinimumError
         value, _ = quantity.value(fit.parameters)
-        return _Point(value, math.sqrt(max(delta, 0.0)), fit.parameters)
+        return _Point(target, value, math.sqrt(max(delta, 0.0)), fit.parameters)

@@ -147,9 +147,7 @@ def law_intervals(
     time = series.t + series.start
 
     def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        means, slopes = kind.means(
-            float(np.exp(theta[1])), float(theta[2]), time, series.exposure
-        )
+        means, slopes = kind.means(float(np.exp(theta[1])), float(theta[2]), time, series.exposure)
         return theta[0] * means, np.column_stack([means, theta[0] * slopes])
 
     log_rate = math.log(fitted.rate_per_s * series.span_s)
@@ -173,7 +171,10 @@ def law_intervals(
     time_s: Shown = {"decay_time_s": lambda log_rate: span_s * exponential(-log_rate)}
     of_shape: Shown = {SHAPE_NAMES[kind.name]: float}
     if kind.name == "becquerel":
-        rate, time_s = Quantity(_log_time), {"decay_time_s": lambda log_s: span_s * exponential(log_s)}
+        rate, time_s = (
+            Quantity(_log_time),
+            {"decay_time_s": lambda log_s: span_s * exponential(log_s)},
+        )
         of_shape = {"exponent": _reciprocal, "kinetic_order": _order_of}
     wanted = [(rate, noise(rate), time_s), (quantity, noise(quantity), of_shape)]
     return _intervals(likelihood, wanted, all_of_them=all_of_them)

@@ -6,7 +6,7 @@ import numpy as np
 
 from labrig.fit.decay.bend import bend
 from labrig.fit.decay.drift import drift_effect
-from labrig.fit.decay.fit_warnings import Evidence, student_factor, warnings_about
+from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.further_state import FastStates, fast_states, hidden_state
 from labrig.fit.decay.intervals import decay_intervals
 from labrig.fit.decay.joint import covariance_under_flicker, weight_sigma

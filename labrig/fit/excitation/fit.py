@@ -112,9 +112,7 @@ def fit_excitation(
     problem = ExcitationProblem(series, len(rates), reference, uncertain, order)
     problem.rewhiten(theta)
     solution = _minimised(problem, theta, FINE)
-    return _result(
-        problem, solution, reference, uncertain, law_warnings, intervals, errors.sites
-    )
+    return _result(problem, solution, reference, uncertain, law_warnings, intervals, errors.sites)
 
 
 def _brightest(series: Sequence[ChargingSeries]) -> int:
@@ -263,7 +261,7 @@ def _result(
     at_off = _at_off(problem, rates, stated[own], solution.covariance, falling)
     by_band = band_tests(problem, solution)
     missing = missing_signal(problem, solution)
-    return FittedExcitation(
+    fit = FittedExcitation(
         states=states,
         channel_weights=rates.weights,
         channel_weights_sigma=weights_sigma,
@@ -284,8 +282,14 @@ def _result(
         evenness=rates.evenness,
         lamp_sigma=uncertain.lamp,
         site_sizes=site_sizes,
-        intervals=excitation_intervals(problem, solution, uncertain, falling, intervals),
     )
+    if intervals == "none":
+        return fit
+    stated = dict(zip(fit.covariance_parameters, np.sqrt(np.diag(fit.covariance)), strict=True))
+    found = excitation_intervals(
+        problem, solution, uncertain, falling, None if intervals == "all" else stated
+    )
+    return replace(fit, intervals=found)
 
 
 def _veil(problem: ExcitationProblem, solution: LeastSquaresFit) -> Measured | None:

@@ -4,10 +4,12 @@ The noise and the sizes of the light's errors are held as they were fitted. The 
 enters k_e one to one, moves each limit of k_e by its own share.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labrig.fit.excitation.parameters import Parameters, RelativeSigmas, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
@@ -36,13 +38,17 @@ class _Wanted(NamedTuple):
     quantities: tuple[Quantity, ...]
     light_sigma: tuple[float, ...]
 
+    def value_of_first(self, theta: FloatArray) -> float:
+        """Return the first quantity."""
+        return self.quantities[0].value(theta)[0]
+
 
 def excitation_intervals(
     problem: ExcitationProblem,
     solution: LeastSquaresFit,
     uncertain: RelativeSigmas,
-    falling: FloatArray,
-    choice: IntervalChoice,
+    falling: NDArray[np.intp],
+    stated_sigma: Mapping[str, float] | None,
 ) -> dict[str, ProfileInterval]:
     """Return intervals named as `FittedExcitation.covariance_parameters` are.
 
@@ -54,24 +60,28 @@ def excitation_intervals(
         Further sources of scatter.
     falling
         Numbers of the states by falling rate, shape (N,).
-    choice
-        Whether to return all, or those of which two points of the profile say that ±σ misses them
-        by more than 20 %: of the k_e of a state the largest decides for all that it excites.
+    stated_sigma
+        σ by the same names: only what two points of the profile show ±σ to miss by more than 20 %
+        has an interval. Of the k_e of a state the largest decides for all that it excites. None
+        returns all.
     """
-    if choice == "none":
-        return {}
     lower, upper = problem.parameters.bounds()
     likelihood = Likelihood(problem.residuals, solution, lower, upper)
     found: dict[str, ProfileInterval] = {}
-    for wanted in _wanted(problem.parameters, solution.parameters, uncertain, falling, choice):
-        if choice == "auto" and not likelihood.is_asymmetric(wanted.quantities[0], float):
-            continue
-        for name, quantity, sigma in zip(*wanted, strict=True):
-            try:
-                interval = likelihood.interval(quantity)
-            except LowerMinimumError:
+    for wanted in _wanted(problem.parameters, solution.parameters, uncertain, falling):
+        if stated_sigma is not None:
+            first, value = wanted.quantities[0], wanted.value_of_first(solution.parameters)
+            # Without the light's part, which is no part of the profile.
+            light = wanted.light_sigma[0] * value
+            sigma = float(np.sqrt(max(stated_sigma[wanted.names[0]] ** 2 - light**2, 0.0)))
+            if not likelihood.is_asymmetric(first, float, sigma):
                 continue
-            found[name] = interval.widened(sigma)
+        for name, quantity, sigma in zip(*wanted, strict=True):
+            if stated_sigma is not None and quantity.value(solution.parameters)[0] <= 0:
+                continue
+            # A fit from which the profile falls is not at its minimum, and has a warning.
+            with suppress(LowerMinimumError):
+                found[name] = likelihood.interval(quantity).widened(sigma)
     return found
 
 
@@ -79,8 +89,7 @@ def _wanted(
     parameters: Parameters,
     theta: FloatArray,
     uncertain: RelativeSigmas,
-    falling: FloatArray,
-    choice: IntervalChoice,
+    falling: NDArray[np.intp],
 ) -> Iterator[_Wanted]:
     columns, bands = parameters.columns, parameters.bands
     light_sigma = np.broadcast_to(uncertain.irradiance, bands)
