@@ -6,8 +6,8 @@ Each measurement has a seed of its own. Truths are integrated numerically, witho
 formulas. Some are not what a fit assumes: noise of Student's t with 4 degrees of freedom, flicker
 of 0.2 % that the fit is not told. Near a bound (an order of 1, no retrapping, light that does not
 excite) the intervals are one-sided. Printed are the percentages of measurements whose interval
-holds the truth, with the standard deviation of chance in brackets, of intervals that are one-sided at
-95 %, and of those that differ from ±σ by more than 20 %.
+holds the truth, with the standard deviation of chance in brackets, of intervals that are one-sided
+at 95 %, and of those that differ from ±σ by more than 20 %.
 """
 
 import argparse
