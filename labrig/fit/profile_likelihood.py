@@ -308,9 +308,9 @@ class _Way:
         other_end = least if self.side > 0 else largest
         if abs(value - other_end) <= AT_END * sigma:
             # The bound holds the estimate: how hard χ² pulls it there tells how far it would go.
-            slope = fit.jacobian @ (self.likelihood.direction(gradient) / unit)
-            pull = max(float(fit.residuals @ slope), 0.0) / factor
-            return factor * away_from_bound(pull, sigmas)
+            step = self.likelihood.direction(gradient) / unit
+            pull = float(fit.residuals @ (fit.jacobian @ step)) if np.isfinite(step).all() else 0.0
+            return factor * away_from_bound(max(pull, 0.0) / factor, sigmas)
         is_bound = end in (least, largest)
         if not is_bound or abs(end - value) > 2 * sigmas * factor * sigma * LONGEST_STEP:
             return factor * sigmas
