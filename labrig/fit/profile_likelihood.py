@@ -39,9 +39,9 @@ PROBABILITIES = (math.erf(math.sqrt(0.5)), 0.95)
 SIGMAS = (1.0, SIGMAS_95)
 #: Weight of a quantity's distance from its target, in units of 1/σ².
 STIFFNESS = 30.0
-#: Steps of a search for a limit, precision of the limit in σ, largest ratio of a step to the way
-#: made so far, and part of that way by which a step aims beyond.
-MOST_POINTS, PRECISION, LONGEST_STEP, BEYOND = 25, 0.01, 2.0, 0.03
+#: Steps of a search for a limit, relative precision of √Δχ² at its end, largest ratio of a step to
+#: the way made so far, and part of that way by which a step aims beyond.
+MOST_POINTS, PRECISION, LONGEST_STEP, BEYOND = 25, 3e-3, 2.0, 0.03
 #: Relative step and gain in χ² at which a point of the profile is near enough, and its evaluations.
 TOLERANCE, LEAST_GAIN, MAX_ITERATIONS = 1e-4, 1e-4, 200
 #: Part of a quantity's σ within which it is at the end of its range, and of a step below which a
@@ -206,6 +206,17 @@ class Likelihood:
         direction[free] = covariance[:, involved[free]] @ gradient[involved]
         return direction
 
+    def way(self, gradient: FloatArray) -> FloatArray:
+        """Return the change (p,) of the parameters along the profile by that of a quantity.
+
+        It is 0 where the quantity is not determined.
+        """
+        direction = self.direction(gradient)
+        variance = float(gradient @ direction)
+        if not 0 < variance < math.inf:
+            return np.zeros(len(gradient))
+        return direction / variance
+
     def _free(self, gradient: FloatArray) -> NDArray[np.bool_]:
         """Return which parameters are not at a bound, or part of a gradient, (p,)."""
         return ~self.fit.at_bound | (gradient != 0)
@@ -308,9 +319,9 @@ class _Way:
         other_end = least if self.side > 0 else largest
         if abs(value - other_end) <= AT_END * sigma:
             # The bound holds the estimate: how hard χ² pulls it there tells how far it would go.
-            step = self.likelihood.direction(gradient) / unit
-            pull = float(fit.residuals @ (fit.jacobian @ step)) if np.isfinite(step).all() else 0.0
-            return factor * away_from_bound(max(pull, 0.0) / factor, sigmas)
+            step = unit * self.likelihood.way(gradient)
+            pull = max(float(fit.residuals @ (fit.jacobian @ step)), 0.0)
+            return factor * away_from_bound(pull / factor, sigmas)
         is_bound = end in (least, largest)
         if not is_bound or abs(end - value) > 2 * sigmas * factor * sigma * LONGEST_STEP:
             return factor * sigmas
@@ -337,12 +348,12 @@ class _Way:
             if target not in between:
                 near = min(between.values(), key=lambda point: abs(point.target - target))
                 between[target] = self._point(target, near)
-            return between[target].root - root
+            off = between[target].root - root
+            return 0.0 if abs(off) <= PRECISION * root else off
 
-        width = min(abs(above.target - below.target), self._sigma)
-        brentq(excess, below.target, above.target, xtol=PRECISION * width)
+        brentq(excess, below.target, above.target)
         # Between the two nearest points, √Δχ² is a straight line.
-        found = sorted(between.values(), key=lambda point: point.root - root)
+        found = sorted(between.values(), key=lambda point: point.root)
         beyond = next(k for k, point in enumerate(found) if point.root >= root)
         below, above = found[beyond - 1], found[beyond]
         part = (root - below.root) / (above.root - below.root)
@@ -388,13 +399,10 @@ class _Way:
         upper[not_above] = np.maximum(np.minimum(upper[not_above], target), lower[not_above])
         lower[not_below] = np.minimum(np.maximum(lower[not_below], target), upper[not_below])
         _, gradient = quantity.value(near.x)
-        direction = likelihood.direction(gradient)
-        rate = float(gradient @ direction)
-        step = direction * ((target - near.value) / rate) if 0 < rate < math.inf else 0.0
-        start = near.x + step
+        start = near.x + (target - near.value) * likelihood.way(gradient)
         with np.errstate(all="ignore"):
-            residuals, _ = pulled(np.clip(start, lower, upper))
-            if not np.isfinite(residuals).all():
+            residuals, jacobian = pulled(np.clip(start, lower, upper))
+            if not (np.isfinite(residuals).all() and np.isfinite(jacobian).all()):
                 start = near.x
         fit = least_squares(
             pulled,

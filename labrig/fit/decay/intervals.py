@@ -31,6 +31,8 @@ from labrig.results import EXPONENTIALS, ProfileInterval
 #: Range of possible shapes of each law, whatever the fit's bounds, and the shape's name.
 SHAPES = {"becquerel": (0.0, math.inf), "otor": (0.0, 1.0), "stretched": (0.0, 1.0)}
 SHAPE_NAMES = {"becquerel": "exponent", "otor": "retrapping", "stretched": "exponent"}
+#: Change of the logarithm of a time within which its limits are sought.
+FARTHEST = 4.0
 #: Least shape of Becquerel's law with a logarithm.
 TINY_SHAPE = 1e-12
 
@@ -155,28 +157,22 @@ def law_intervals(
     least, largest = kind.shapes
     lower, upper = np.array([0.0, -np.inf, least]), np.array([np.inf, np.inf, largest])
     likelihood = _likelihood(data, law.joint, shape, theta, lower, upper)
-    total = fitted.covariance[1:3, 1:3] / student
-    total[0] /= fitted.rate_per_s
-    total[:, 0] /= fitted.rate_per_s
     span_s = series.span_s
-
-    def noise(quantity: Quantity) -> NoiseScale:
-        _, gradient = quantity.value(likelihood.fit.parameters)
-        own = gradient[1:3]
-        with np.errstate(invalid="ignore"):
-            variance = float(own @ total @ own)
-        return _noise(variance, likelihood.sigma(quantity) ** 2, dof)
-
-    rate, quantity = Quantity(parameter(1)), Quantity(parameter(2), *SHAPES[kind.name], kind.shapes)
+    own = law.joint.least_squares.covariance[1, 1]
+    noise = _noise(float(law.covariance[1, 1] / student), float(own), dof)
+    searched = log_rate - FARTHEST, log_rate + FARTHEST
+    rate = Quantity(parameter(1), searched=searched)
+    quantity = Quantity(parameter(2), *SHAPES[kind.name], kind.shapes)
     time_s: Shown = {"decay_time_s": lambda log_rate: span_s * exponential(-log_rate)}
     of_shape: Shown = {SHAPE_NAMES[kind.name]: float}
     if kind.name == "becquerel":
+        log_time, _ = _log_time(likelihood.fit.parameters)
         rate, time_s = (
-            Quantity(_log_time),
+            Quantity(_log_time, searched=(log_time - FARTHEST, log_time + FARTHEST)),
             {"decay_time_s": lambda log_s: span_s * exponential(log_s)},
         )
         of_shape = {"exponent": _reciprocal, "kinetic_order": _order_of}
-    wanted = [(rate, noise(rate), time_s), (quantity, noise(quantity), of_shape)]
+    wanted = [(rate, noise, time_s), (quantity, noise, of_shape)]
     return _intervals(likelihood, wanted, all_of_them=all_of_them)
 
 
