@@ -147,6 +147,8 @@ def decay(
         _require_one_of("--share", share, ("rates",))
         if at:
             raise UsageError("--at: not with --share; fit a table by itself to tell its signal")
+        if intervals:
+            raise UsageError("--intervals: not with --share; fit a table by itself to have them")
         _fit_shared(tables, options, layout, out, json)
         return
     if len(tables) > 1:

@@ -219,7 +219,7 @@ class Likelihood:
 
     def _free(self, gradient: FloatArray) -> NDArray[np.bool_]:
         """Return which parameters are not at a bound, or part of a gradient, (p,)."""
-        return ~self.fit.at_bound | (gradient != 0)
+        return np.asarray(~self.fit.at_bound | (gradient != 0))
 
     def is_asymmetric(
         self, quantity: Quantity, shown: Callable[[float], float], stated_sigma: float | None = None

@@ -26,8 +26,8 @@ T_S = np.arange(0.0, 60.0, 1.5)
 NO_BOUND = np.full(4, np.inf)
 
 
-def two_states(sigma: float, seed: int) -> Residuals:
-    """Return residuals of exponentials by [log k₁, a₁, log k₂, a₂], over a σ of 1."""
+def two_states(sigma: float, seed: int, unit: float = 1.0) -> Residuals:
+    """Return residuals of exponentials by [log k₁, a₁, log k₂, a₂], in a unit."""
     rng = np.random.default_rng(seed)
     y = np.exp(-0.3 * T_S) + 0.6 * np.exp(-0.05 * T_S) + sigma * rng.standard_normal(len(T_S))
 
@@ -35,9 +35,8 @@ def two_states(sigma: float, seed: int) -> Residuals:
         rates = np.exp(x[[0, 2]])
         decays = np.exp(-np.multiply.outer(T_S, rates))
         slopes = -T_S[:, None] * rates * x[[1, 3]] * decays
-        return decays @ x[[1, 3]] - y, np.stack(
-            [slopes[:, 0], decays[:, 0], slopes[:, 1], decays[:, 1]], axis=1
-        )
+        columns = [slopes[:, 0], decays[:, 0], slopes[:, 1], decays[:, 1]]
+        return (decays @ x[[1, 3]] - y) / unit, np.stack(columns, axis=1) / unit
 
     return residuals
 
@@ -95,9 +94,9 @@ def test_limits_of_a_linear_model_are_its_sigma(seed: int, variance: float, dof:
 
 def test_limits_follow_the_quantity() -> None:
     """Those of a product of parameters are found as if it were one."""
-    residuals = two_states(0.06, 5)
+    residuals = two_states(0.06, 5, unit=0.06)
     likelihood = Likelihood.at_minimum(
-        lambda x: tuple(part / 0.06 for part in residuals(x)),  # type: ignore[return-value]
+        residuals,
         np.array([-1.0, 1.0, -3.0, 0.6]), -NO_BOUND, NO_BOUND,
     )  # fmt: skip
 
@@ -189,9 +188,9 @@ def test_a_profile_that_falls_below_the_fit_is_no_interval() -> None:
 
 def test_states_do_not_change_places() -> None:
     """Where one exponential does as well, the profile of the fast rate is not that of the slow."""
-    residuals = two_states(0.3, 4)
+    residuals = two_states(0.3, 4, unit=0.3)
     likelihood = Likelihood.at_minimum(
-        lambda x: tuple(part / 0.3 for part in residuals(x)),  # type: ignore[return-value]
+        residuals,
         np.array([-1.0, 1.0, -3.0, 0.6]),
         np.array([-8.0, 0.0, -8.0, 0.0]), np.array([3.0, np.inf, 3.0, np.inf]),
     )  # fmt: skip
