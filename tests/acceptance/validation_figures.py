@@ -93,6 +93,21 @@ FIGURES = (
         "law_confusion",
         figure.laws,
     ),
+    *(
+        Figure(
+            f"Intervals by profile likelihood of {what}, 400 seeds each: fraction of the "
+            "measurements in which the intervals of 68 and 95 % hold the truth, least and greatest "
+            "of all parameters (chance alone makes ± 2.3 % and ± 1.1 %)",
+            f"interval_coverage_{kind}",
+            figure.intervals,
+        )
+        for kind, what in {
+            "decay": "rates, orders and laws' parameters of decays at low signal, also where the "
+            "noise is Student's t, or flicker is not told, or the truth is at a bound",
+            "charge": "orders and rates of charge and decay, also near the bound of the order",
+            "excitation": "rates and orders of excitations",
+        }.items()
+    ),
     Figure(
         "Least-squares fit on the nonlinear reference sets of NIST, all 22 sets from both starts: "
         "digits in agreement with the certified parameters, of 11 certified",

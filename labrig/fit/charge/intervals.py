@@ -84,7 +84,8 @@ def _quantities(
     if state.is_order_fitted:
         order = Quantity(parameter(first + ORDER), least=1.0, searched=(1.0, MAX_ORDER))
         yield order, {"order": float, "exponent": _exponent}
-    yield Quantity(_log_rate_at_off(first, charge_s)), {"lifetime_at_off_s": _falling}
+    at_off = Quantity(_log_rate_at_off(first, charge_s))
+    yield at_off, {"rate_at_off_per_s": exponential, "lifetime_at_off_s": _falling}
     if state.is_kappa_known:
         yield Quantity(parameter(first + LOG_KAPPA)), {"kappa_per_s": exponential}
         yield Quantity(_log_k_r(first)), {"k_r_per_s": exponential}

@@ -129,8 +129,8 @@ class ChargeFit:
     intervals
         Intervals by profile likelihood, where ±σ misses them by more than 20 % or where they were
         asked for: by the name of a field of `OrderState` and the number of the state, such as
-        `order 1`, and `lifetime_at_off_s 1`, in which the light at lamp off would fall to nothing
-        if it went on falling so fast: τ/p.
+        `order 1`, and of `rate_at_off_per_s 1` and `lifetime_at_off_s 1`, the rate p/τ at which
+        the light falls at lamp off, and its inverse.
     """
 
     states: tuple[OrderState, ...]
@@ -168,7 +168,7 @@ class ChargeFit:
     @property
     def named_intervals(self) -> dict[str, ProfileInterval]:
         """Intervals by the symbols and units of their parameters."""
-        labels = COLUMN_LABELS | {"lifetime_at_off_s": "τ/p / s"}
+        labels = AT_OFF_LABELS | COLUMN_LABELS
         named = {}
         for name, interval in self.intervals.items():
             quantity, _, number = name.partition(" ")
@@ -223,6 +223,8 @@ class ChargeFit:
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
+#: Rate at which the light falls at lamp off, and its inverse.
+AT_OFF_LABELS = {"rate_at_off_per_s": "p/τ / s⁻¹", "lifetime_at_off_s": "τ/p / s"}
 #: Heads of the columns of the table of states.
 COLUMN_LABELS = {
     "order": "b",
