@@ -30,6 +30,8 @@ class ChargeTableOptions:
         Kinetic order: `auto`, `first` or `general`.
     stimulated
         Fraction η of the carriers that find their trap filled and recombine at once, or `free`.
+    intervals
+        Whether every order, rate and lifetime has an interval by profile likelihood.
     """
 
     on: str
@@ -37,6 +39,7 @@ class ChargeTableOptions:
     states: int | None = None
     order: str = "auto"
     stimulated: str = "1"
+    intervals: bool = False
 
     def __post_init__(self) -> None:
         if self.order not in ORDERS:
@@ -128,6 +131,7 @@ def fit_charge_table(
             states=options.states or "auto",
             order=cast(Literal["auto", "first", "general"], options.order),
             light_stimulated=options.light_stimulated,
+            intervals=options.intervals,
         )
     except FitError as error:
         raise FitError(f"{path}: {error}") from None

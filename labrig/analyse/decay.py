@@ -130,6 +130,7 @@ def analyse(part: Part) -> DecayResult:
         states=states,
         fixed_rates_per_s=overrides.fixed_rates_per_s,
         law=overrides.law,
+        intervals=overrides.intervals,
     )
     fits = _fit_all(series, fit)
     temperature_c = glow_temperature_c(run, part.protocol.rate_frames)

@@ -75,6 +75,8 @@ class Overrides:
         Keys of the rig file's `optics:` to replace: calibrations that were made later.
     method
         Method of estimating re-radiation; None takes the protocol's.
+    intervals
+        Whether every rate and order has an interval by profile likelihood.
     """
 
     regions: Mapping[str, Region] = field(default_factory=dict)
@@ -86,6 +88,7 @@ class Overrides:
     camera: str | None = None
     optics: Mapping[str, str] = field(default_factory=dict)
     method: EstimateMethod | None = None
+    intervals: bool = False
 
     @classmethod
     def parse(
@@ -99,6 +102,8 @@ class Overrides:
         law: str = AUTO,
         method: str | None = None,
         order: str = AUTO,
+        *,
+        intervals: bool = False,
     ) -> Self:
         """Parse the texts of a command line.
 
@@ -122,6 +127,8 @@ class Overrides:
             Method of estimating re-radiation.
         order
             Kinetic order of excitation: `auto`, `free` or a number.
+        intervals
+            Whether every rate and order has an interval by profile likelihood.
 
         Raises
         ------
@@ -147,6 +154,7 @@ class Overrides:
             camera,
             dict(_parse_calibration(text) for text in optics),
             None if method is None else _parse_method(method),
+            intervals,
         )
 
     def bench(self, run: Path) -> RigFile:

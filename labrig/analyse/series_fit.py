@@ -28,6 +28,7 @@ def fit_series(
     law: str = AUTO,
     *,
     equal_weights: bool = False,
+    intervals: bool = False,
 ) -> DecayFit:
     """Fit a sum of exponentials to the usable rows of a series.
 
@@ -50,6 +51,9 @@ def fit_series(
     equal_weights
         Whether all values have one σ, that of the residuals: unweighted least squares, whatever σ
         the series has.
+    intervals
+        Whether every rate, and every parameter of the law, has an interval by profile likelihood,
+        as in `fit_decay`.
 
     Returns
     -------
@@ -100,6 +104,7 @@ def fit_series(
         correlation=usable.correlation,
         offset_correlation=usable.dark_correlation,
         law=law,
+        intervals=intervals,
     )
     if not _is_seen(fit, float(usable.t_s.min())):
         raise FitError(

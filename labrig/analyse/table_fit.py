@@ -68,6 +68,8 @@ class TableFitOptions:
         Time from which points are fitted, as `origin`; None takes all.
     law
         Law that describes the decay, or `auto`.
+    intervals
+        Whether every rate, and every parameter of the law, has an interval by profile likelihood.
     """
 
     states: int | None = None
@@ -77,6 +79,7 @@ class TableFitOptions:
     origin: str | None = None
     start: str | None = None
     law: str = AUTO
+    intervals: bool = False
 
     def __post_init__(self) -> None:
         if self.weights not in WEIGHTS:
@@ -216,6 +219,7 @@ def _fit(series: Series, options: TableFitOptions) -> DecayFit:
         flicker,
         law=options.law,
         equal_weights=options.weights == EQUAL,
+        intervals=options.intervals,
     )
 
 

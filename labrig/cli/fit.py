@@ -110,6 +110,14 @@ def decay(
         str | None,
         typer.Option("--share", help="'rates': all tables have the same, each its amplitudes."),
     ] = None,
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Limits of every rate, lifetime and order at 68 and 95 % by profile likelihood, "
+            "not only where σ misleads.",
+        ),
+    ] = False,
     column: Column = None,
     time: Time = None,
     time_unit: TimeUnit = None,
@@ -133,12 +141,14 @@ def decay(
     if out is not None:
         _require_folder(out)
     times_s = [_time_s(text) for text in at or ()]
-    options = TableFitOptions(states, offset, flicker, weights, origin, start, law)
+    options = TableFitOptions(states, offset, flicker, weights, origin, start, law, intervals)
     layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     if share is not None:
         _require_one_of("--share", share, ("rates",))
         if at:
             raise UsageError("--at: not with --share; fit a table by itself to tell its signal")
+        if intervals:
+            raise UsageError("--intervals: not with --share; fit a table by itself to have them")
         _fit_shared(tables, options, layout, out, json)
         return
     if len(tables) > 1:
@@ -243,6 +253,14 @@ def charge(
             "0 to 1, or 'free'. 1 conserves energy.",
         ),
     ] = "1",
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Limits of every order, rate and lifetime at 68 and 95 % by profile likelihood, "
+            "not only where σ misleads.",
+        ),
+    ] = False,
     column: Column = None,
     time: Time = None,
     time_unit: TimeUnit = None,
@@ -265,7 +283,7 @@ def charge(
 
     if out is not None:
         _require_folder(out)
-    options = ChargeTableOptions(on, off, states, order, stimulated)
+    options = ChargeTableOptions(on, off, states, order, stimulated, intervals)
     layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     fit, columns = fit_charge_table(table, options, layout)
     typer.echo(fit.to_json() if json else f"columns  {columns}\n{fit}")

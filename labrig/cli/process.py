@@ -44,6 +44,14 @@ def process(
             "one of each state, a number holds it.",
         ),
     ] = "auto",
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Limits of every rate and order of a decay or an excitation at 68 and 95 % by "
+            "profile likelihood, not only where σ misleads.",
+        ),
+    ] = False,
     camera: Annotated[
         str | None,
         typer.Option("--camera", help="Camera curves to use instead, for the report's colours."),
@@ -85,8 +93,9 @@ def process(
     from labrig.record import discard_cache, read_run
 
     overrides = Overrides.parse(
-        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method, order
-    )
+        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method, order,
+        intervals=intervals,
+    )  # fmt: skip
     folder = find_run(run, runs)
     if verify:
         discard_cache(folder)

@@ -21,6 +21,7 @@ from labrig.report.chart import (
     logarithmic_axis,
 )
 from labrig.report.figure_style import INK, MUTED, OTHER_CHANNELS, SHADE
+from labrig.report.interval_table import interval_tables
 from labrig.report.page import Report
 from labrig.report.sections import Picture, Section, Table
 from labrig.results import FloatArray
@@ -96,7 +97,11 @@ def _states(fit: ChargeFit) -> Section:
     return Section(
         "States",
         (text,),
-        tables=(_table(head, rows, caption), Table(("of all states", "value"), common)),
+        tables=(
+            _table(head, rows, caption),
+            *interval_tables(fit.named_intervals),
+            Table(("of all states", "value"), common),
+        ),
     )
 
 

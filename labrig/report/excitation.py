@@ -26,6 +26,7 @@ from labrig.report.figure_style import (
     place,
     points,
 )
+from labrig.report.interval_table import interval_tables
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
     SEEN_SIGMAS,
@@ -40,6 +41,8 @@ from labrig.results import (
     Measured,
     OneSided,
     PatchExcitation,
+    ProfileInterval,
+    interval_lines,
     spans_decades,
 )
 
@@ -47,6 +50,12 @@ HEIGHT_PT = 270.0
 UNKNOWN = "–"
 #: What is given of excitation rates where the charge does not tell their scale.
 RELATIVE = "k_e over its largest"
+#: Symbols and units of quantities with an interval.
+SYMBOLS = {
+    "k_r_per_s": ("k_r", " / s⁻¹"),
+    "k_e_per_s": ("k_e", " / s⁻¹"),
+    "kinetic_order": ("b", ""),
+}
 #: Number of positions along the filter whose charging is drawn.
 SHOWN = 5
 MEASURED = (
@@ -76,6 +85,7 @@ def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
         bands = zip(pairwise(result.irradiance.bands_nm), _rates(fit, number), strict=True)
         for (low, high), text in bands:
             yield f"  {low:.0f}-{high:.0f} nm: {quantity} {text}{unit}"
+    yield from interval_lines(_named_intervals(fit, result.irradiance.bands_nm))
     yield f"reduced χ² {rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"
     if len(fit.models) > 1:
         yield f"models: {_models_line(fit)}"
@@ -217,8 +227,24 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
         (
             _levels_table(fit, ASSUMED if assumed else MEASURED),
             _rates_table(fit, irradiance.bands_nm),
+            *interval_tables(_named_intervals(fit, irradiance.bands_nm)),
         ),
     )
+
+
+def _named_intervals(
+    fit: FittedExcitation, bands_nm: tuple[float, ...]
+) -> dict[str, ProfileInterval]:
+    """Return intervals by symbol, state, band and unit."""
+    named = {}
+    for name, interval in fit.intervals.items():
+        quantity, state, *band = name.split(" ")
+        symbol, unit = SYMBOLS[quantity]
+        if band:
+            low, high = bands_nm[int(band[0]) - 1 : int(band[0]) + 1]
+            state += f", {low:.0f}–{high:.0f} nm"
+        named[f"{symbol} {state}{unit}"] = interval
+    return named
 
 
 def _row_by_row(series: ChargingSeries, values: FloatArray) -> FloatArray:

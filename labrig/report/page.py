@@ -19,6 +19,7 @@ from labrig.record import FrameRecord, RunDescription
 from labrig.report import parameters
 from labrig.report.figure_files import FigureFile, FigureFiles, chart_element
 from labrig.report.sections import Section
+from labrig.results import interval_rows
 
 _FOLDER = Path(__file__).parent
 _SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
@@ -41,6 +42,7 @@ def environment() -> Environment:
         rounded=rounded,
         utc=_utc,
         state_rows=parameters.state_rows,
+        interval_rows=interval_rows,
         quality_rows=parameters.quality_rows,
         reradiance_rows=parameters.reradiance_rows,
         candidate_rows=parameters.candidate_rows,

@@ -114,8 +114,17 @@ from .fitted_law import (
     DecayForecast as DecayForecast,
     FittedLaw as FittedLaw,
     FittedRateSpectrum as FittedRateSpectrum,
+    interval_name as interval_name,
     parameter_text as parameter_text,
     require_law as require_law,
+)
+from .interval import (
+    ASYMMETRIC as ASYMMETRIC,
+    SIGMAS_95 as SIGMAS_95,
+    ProfileInterval as ProfileInterval,
+    interval_lines as interval_lines,
+    interval_rows as interval_rows,
+    read_intervals as read_intervals,
 )
 from .irradiance import (
     CardRatio as CardRatio,
@@ -150,7 +159,6 @@ from .led_fluorescence import (
 from .luminance import (
     MARKING_S as MARKING_S,
     MCD_PER_M2 as MCD_PER_M2,
-    SIGMAS_95 as SIGMAS_95,
     TABLE_S as TABLE_S,
     VISIBLE_MCD_PER_M2 as VISIBLE_MCD_PER_M2,
     ForecastTime as ForecastTime,

@@ -301,6 +301,7 @@ class ExcitationResult(RunResult):
             "dof": fit.dof,
             "covariance_parameters": list(fit.covariance_parameters),
             "covariance": fit.covariance.tolist(),
+            "intervals": {name: each.to_dict() for name, each in fit.intervals.items()},
             "models": [vars(model) for model in fit.models],
             "warnings": list(fit.warnings),
         }

@@ -1,7 +1,7 @@
 """Fit of a decay: rates and amplitudes with their uncertainties."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from textwrap import wrap
 from typing import Any
@@ -20,7 +20,9 @@ from labrig.results.fitted_law import (
     FittedLaw,
     FittedRateSpectrum,
     curve_variance,
+    interval_name,
 )
+from labrig.results.interval import ProfileInterval, interval_lines
 from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text
 
@@ -35,7 +37,7 @@ _SAME_SIGMA = 0.05
 #: Change of a rate in σ from which what it would be due to is worth a word.
 WORTH_A_WORD = 0.3
 #: Version of `fit.json`: another number means renamed keys or other meanings.
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 
 
 @dataclass(frozen=True)
@@ -249,6 +251,9 @@ class FittedDecay:
     unseen_state
         Fast state that the data would not show; None if frames leave no room for one, or a warning
         tells one.
+    intervals
+        Intervals by profile likelihood, where ±σ misses them by more than 20 % or where they were
+        asked for: of `k_r_per_s 1`, `lifetime_s 1`, …, and of the law's own `parameters`.
     """
 
     states: tuple[DecayState, ...]
@@ -276,6 +281,7 @@ class FittedDecay:
     sigma_origin: str = field(default="", kw_only=True)
     sigma_factor: float = field(default=1.0, kw_only=True)
     unseen_state: UnseenState | None = field(default=None, kw_only=True)
+    intervals: Mapping[str, ProfileInterval] = field(default_factory=dict, kw_only=True)
 
     @property
     def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
@@ -313,6 +319,11 @@ class FittedDecay:
     def brightest_channel(self) -> str:
         """Name of the channel of weight 1, in whose DN/s the amplitudes are."""
         return self.channels[self.brightest]
+
+    @property
+    def named_intervals(self) -> dict[str, ProfileInterval]:
+        """Intervals by the symbols and units of their parameters."""
+        return {interval_name(name): each for name, each in self.intervals.items()}
 
     def amplitudes_in(self, channel: str) -> tuple[Measured, ...]:
         """Return the amplitude of every state at lamp off in the DN/s of a channel.
@@ -608,6 +619,7 @@ class FittedDecay:
             "sigma_origin": self.sigma_origin,
             "sigma_factor": self.sigma_factor,
             "unseen_state": asdict(self.unseen_state) if self.unseen_state else None,
+            "intervals": {name: each.to_dict() for name, each in self.intervals.items()},
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -630,6 +642,7 @@ class FittedDecay:
         lines = aligned([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
         if not self.reference.is_lamp_off:
             lines.append(f"amplitudes are those at {self.reference}, where laws begin")
+        lines += interval_lines(self.named_intervals)
         lines.append(
             f"weights  {self._values_text(self.channel_weights, self.channel_weights_sigma)}"
         )

@@ -20,6 +20,7 @@ from labrig.results.fitted_decay import (
     UnseenState,
 )
 from labrig.results.fitted_law import fitted_law, fitted_rate_spectrum
+from labrig.results.interval import read_intervals
 from labrig.results.text_files import write_json
 
 FILE = "fit.json"
@@ -221,6 +222,7 @@ def _from_dict(content: Any) -> FittedDecay:
         sigma_origin=content["sigma_origin"],
         sigma_factor=float(content["sigma_factor"]),
         unseen_state=None if unseen is None else _unseen_state(unseen),
+        intervals=read_intervals(content["intervals"]),
     )
 
 

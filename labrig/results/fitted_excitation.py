@@ -1,10 +1,12 @@
 """Fit of an excitation: rates of all states and bands with their uncertainties."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from labrig.material import MAX_ORDER
+from labrig.results.interval import ProfileInterval
 from labrig.results.layer_effect import LayerEffect
 from labrig.results.measured import BoolArray, FloatArray, IntArray, Measured, OneSided
 
@@ -247,6 +249,9 @@ class FittedExcitation:
     evenness
         Brightness of every site after the same glow over that of the values, its geometric mean 1,
         shape (P,); 1 if it was not fitted.
+    intervals
+        Intervals by profile likelihood, where ±σ misses them by more than 20 % or where they were
+        asked for, by the names in `covariance_parameters`.
     """
 
     states: tuple[ExcitedState, ...]
@@ -266,6 +271,7 @@ class FittedExcitation:
     order_gain: float = 0.0
     models: tuple[ExcitationModel, ...] = ()
     layer: LayerEffect | None = None
+    intervals: Mapping[str, ProfileInterval] = field(default_factory=dict)
 
     @property
     def is_first_order(self) -> bool:

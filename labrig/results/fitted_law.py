@@ -73,6 +73,35 @@ def parameter_text(name: str, number: str) -> str:
     return f"{symbol} {'' if is_limit else '= '}{number} {unit}".rstrip()
 
 
+#: Symbols and units of quantities that each state has.
+STATE_SYMBOLS = {"k_r_per_s": ("k", "s⁻¹"), "lifetime_s": ("1/k", "s")}
+
+
+def interval_name(name: str) -> str:
+    """Return the head of the row of `FittedDecay.intervals` in a table.
+
+    Parameters
+    ----------
+    name
+        Name of the parameter, with the number of its state.
+
+    Returns
+    -------
+    str
+        Symbol, number of the state and unit.
+
+    Examples
+    --------
+    >>> from labrig.results import interval_name
+    >>> interval_name("lifetime_s 2"), interval_name("exponent")
+    ('1/k 2 / s', 'exponent')
+    """
+    quantity, _, state = name.partition(" ")
+    symbol, unit = (STATE_SYMBOLS | LAW_SYMBOLS)[quantity]
+    label = f"{symbol} {state}".rstrip()
+    return f"{label} / {unit}" if unit else label
+
+
 def require_law(name: str) -> None:
     """Refuse what is no name of a law, nor `auto`.
 

@@ -13,6 +13,7 @@ from scipy.special import ndtr
 from labrig.number_format import aligned
 from labrig.quantity import TIME_S, duration_text, parse
 from labrig.results.budget import Budget
+from labrig.results.interval import SIGMAS_95
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.text_files import finite, json_text
 
@@ -25,8 +26,6 @@ MARKING_S = (600.0, 3600.0)
 VISIBLE_MCD_PER_M2 = 0.3
 #: Probability from which a requirement counts as met, and its complement as missed.
 CONFIDENT = 0.95
-#: Size of a normal error in σ that 95 % of them do not exceed.
-SIGMAS_95 = 1.96
 #: Units of luminance by their names, in mcd/m².
 LUMINANCE_UNITS = {
     "mcd/m2": 1.0, "cd/m2": 1000.0, "µcd/m2": 1e-3, "ucd/m2": 1e-3, "nit": 1000.0, "nits": 1000.0,

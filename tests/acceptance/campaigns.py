@@ -204,6 +204,14 @@ CAMPAIGNS = {
             *("--seeds", "200", "--jobs", "1", "--table", "hidden"),
             called="decay_states_that_hide",
         ),
+        *(
+            _module(
+                "interval_coverage",
+                *("--seeds", seeds, "--only", kind),
+                called=f"interval_coverage_{kind}",
+            )
+            for kind, seeds in {"decay": "400", "charge": "400", "excitation": "400"}.items()
+        ),
         _module("sao_charge_and_decay"),
         _module("excitation_light"),
         _module("layer_range"),

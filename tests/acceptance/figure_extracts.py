@@ -433,3 +433,13 @@ def fluorescent_rooms(printed: str) -> str:
             f"{max(*pulls, *others):.1f} σ"
         )
     return "; ".join(said)
+
+
+def intervals(printed: str) -> str:
+    """Fractions of the truths that intervals hold, and that ± σ holds."""
+    row = r"68 %: interval +([\d.]+)\(.*?±σ +([\d.]+) .*?interval +([\d.]+)\(.*?±1.96 σ +([\d.]+)"
+    narrow, by_sigma, wide, by_two = columns(row, printed)
+    return (
+        f"{span(narrow)} % and {span(wide)} % in the intervals, {span(by_sigma)} % and "
+        f"{span(by_two)} % within ± 1 σ and ± 1.96 σ"
+    )

@@ -93,6 +93,21 @@ FIGURES = (
         "law_confusion",
         figure.laws,
     ),
+    *(
+        Figure(
+            f"Intervals by profile likelihood of {what}, 400 seeds each: fraction of the "
+            "measurements in which the intervals of 68 and 95 % hold the truth, least and greatest "
+            "of all parameters (chance alone makes ± 2.3 % and ± 1.1 %)",
+            f"interval_coverage_{kind}",
+            figure.intervals,
+        )
+        for kind, what in {
+            "decay": "rates, orders and laws' parameters of decays at low signal, also where the "
+            "noise is Student's t, or flicker is not told, or the truth is at a bound",
+            "charge": "orders and rates of charge and decay, also near the bound of the order",
+            "excitation": "rates and orders of excitations",
+        }.items()
+    ),
     Figure(
         "Decays of Becquerel's law, p 1.08 to 1.6, τ 30 s to 100 s, first reading 20 s to 300 s "
         "after lamp off, σ 1 %, background free, 96 tables: fits of that law that end more than 9 "

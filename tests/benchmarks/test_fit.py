@@ -12,6 +12,7 @@ from scipy.optimize import curve_fit
 
 from labrig.analyse import fit_series
 from labrig.fit.least_squares import least_squares
+from labrig.fit.profile_likelihood import Likelihood, NoiseScale, Quantity, parameter
 from labrig.results import Series
 
 Floats = npt.NDArray[np.float64]
@@ -255,4 +256,44 @@ def test_as_a_run_does_it(against: Against) -> None:
         },
         rounds=15,
         what="decay of a run: 60 frames x 3 channels, 1 to 3 states",
+    )
+
+
+def test_intervals_of_two_rates(data: tuple[Floats, Floats], against: Against) -> None:
+    """Limits at 68 and 95 % by the F-test, from the same minimum; they are the same."""
+    y, sigma = data
+
+    def residuals(x: Floats) -> tuple[Floats, Floats]:
+        off = (model(T_S, *x) - y) / sigma
+        return off, jacobian(T_S, *x) / sigma[:, np.newaxis]
+
+    lower, upper = np.full(4, 1e-9), np.full(4, np.inf)
+    likelihood = Likelihood.at_minimum(residuals, START, lower, upper)
+    noise = NoiseScale(likelihood.fit.reduced_chi2, likelihood.fit.dof)
+
+    def ours() -> Floats:
+        found = [likelihood.interval(Quantity(parameter(k)), noise) for k in (0, 2)]
+        return np.array([[i.low_95, i.low_68, i.value, i.high_68, i.high_95] for i in found])
+
+    parameters = lmfit.Parameters()
+    for name, value in zip(NAMES, likelihood.fit.parameters, strict=True):
+        parameters.add(name, value, min=0)
+    minimizer = lmfit.Minimizer(
+        lambda p: np.asarray((model(T_S, *p.valuesdict().values()) - y) / sigma), parameters
+    )
+    minimum = minimizer.leastsq()
+
+    def theirs() -> Floats:
+        limits = lmfit.conf_interval(
+            minimizer, minimum, p_names=["k1", "k2"], sigmas=[0.682689, 0.95]
+        )
+        return np.array([[value for _, value in limits[name]] for name in ("k1", "k2")])
+
+    off = np.abs(ours() - theirs()) / sigmas(y, sigma)[[0, 2], np.newaxis]
+    assert off.max() < 5e-3
+    against(
+        ours,
+        {"lmfit conf_interval": theirs},
+        rounds=10,
+        what="2 states, 60 frames: limits of both rates",
     )

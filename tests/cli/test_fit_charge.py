@@ -39,6 +39,20 @@ def test_text_and_json_tell_the_order(labrig: Labrig, table: Path) -> None:
     assert fit["light_stimulated"] == {"value": 1.0, "sigma": 0.0}
 
 
+def test_intervals_of_the_order_are_printed_and_on_the_page(
+    labrig: Labrig, table: Path, tmp_path: Path
+) -> None:
+    command = ("fit", "charge", table, "--on", "30", "--off", "200", "--states", "1")
+    ended = labrig(*command, "--intervals", "--out", tmp_path / "made")
+    assert ended.code == 0, ended.err
+    assert "b 1 " in ended.out
+    fit = json.loads((tmp_path / "made" / "result" / "fit.json").read_text(encoding="utf-8"))
+    low, high = fit["intervals"]["order 1"]["interval_95"]
+    assert low < 1.7 < high
+    page = (tmp_path / "made" / "result" / "report.html").read_text(encoding="utf-8")
+    assert "profile likelihood" in page
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

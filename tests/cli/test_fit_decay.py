@@ -1,5 +1,6 @@
 """`labrig fit decay` by the command line."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,3 +24,25 @@ def test_what_was_said_of_the_table_is_in_the_provenance(
     assert options["time_per_channel"] == "0.5 s"
     assert (options["weights"], options["start"], options["states"]) == ("counts", "1", "1")
     assert "block" not in options
+
+
+def test_all_intervals_are_printed_and_written_as_asked(
+    labrig: Callable[..., Ended], tmp_path: Path
+) -> None:
+    t_s = np.arange(0.0, 100.0, 2.0)
+    values = np.exp(-0.04 * t_s) + 0.01 * np.random.default_rng(2).standard_normal(len(t_s))
+    table = tmp_path / "glow.csv"
+    columns = np.transpose([t_s, values, np.full_like(t_s, 0.01)])
+    np.savetxt(table, columns, header="t_s,y,sigma", delimiter=",", comments="")
+    command = ("fit", "decay", table, "--states", "1")
+    assert "68 %" not in labrig(*command).out
+    ended = labrig(*command, "--intervals", "--out", tmp_path / "made")
+    assert ended.code == 0, ended.err
+    assert "k 1 / s⁻¹" in ended.out
+    assert "1/k 1 / s" in ended.out
+    fit = json.loads(labrig(*command, "--intervals", "--json").out)
+    low, high = fit["intervals"]["k_r_per_s 1"]["interval_95"]
+    assert low < 0.04 < high
+    assert fit["intervals"]["lifetime_s 1"]["possible"] == [0.0, None]
+    page = (tmp_path / "made" / "result" / "report.html").read_text(encoding="utf-8")
+    assert "Intervals" in page

@@ -30,7 +30,7 @@ from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectan
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
-from labrig.fit.excitation import RelativeSigmas
+from labrig.fit.excitation import IntervalChoice, RelativeSigmas
 from labrig.record import FrameRole
 from labrig.results import (
     ChargingSeries,
@@ -43,8 +43,8 @@ from labrig.results import (
     PatchExcitation,
 )
 
-#: Function that fits all series of a patch.
-Fitting = Callable[[Sequence[ChargingSeries]], FittedExcitation]
+#: Function that fits all series of a patch, with the intervals asked for.
+Fitting = Callable[[Sequence[ChargingSeries], IntervalChoice], FittedExcitation]
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
 #: Fits after which the course of excitation within bands stays the same.
@@ -132,7 +132,7 @@ def _patch_excitation(
     if irradiance.lights:
         by_leds = bool(part.protocol.select.leds)
         charging, fitted = _within_bands(charging, irradiance, choice, by_leds=by_leds)
-    fit = fitted(_series(charging))
+    fit = fitted(_series(charging), "all" if part.overrides.intervals else "auto")
     density, basis = largest_density(
         irradiance.bands_nm,
         part.protocol.sample.max_optical_density,
@@ -140,7 +140,7 @@ def _patch_excitation(
     )
     fit = choice.in_a_layer(_series(charging), fit, density, basis)
     closure = predicted_charging(
-        charging, relative_sigmas, lambda reduced: fitted(_series(reduced))
+        charging, relative_sigmas, lambda reduced: fitted(_series(reduced), "none")
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
@@ -185,7 +185,7 @@ def _within_bands(
         charging = within_bands(charging, irradiance, fit, by_leds=by_leds)
         fit = choice.fitted(_series(charging))
     charging = within_bands(charging, irradiance, fit, by_leds=by_leds)
-    return charging, lambda series: with_doubt(choice.fitted(series), even)
+    return charging, lambda series, intervals: with_doubt(choice.fitted(series, intervals), even)
 
 
 def _scale(

@@ -12,7 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.analyse.overrides import FREE
-from labrig.fit.excitation import RelativeSigmas, fit_excitation, layer_effect
+from labrig.fit.excitation import (
+    IntervalChoice,
+    RelativeSigmas,
+    fit_excitation,
+    layer_effect,
+)
 from labrig.results import (
     AUTO,
     ChargingSeries,
@@ -144,15 +149,18 @@ class ChosenOrders:
     relative_sigmas: RelativeSigmas
     doubt: tuple[str, ...] = ()
 
-    def fitted(self, series: Sequence[ChargingSeries]) -> FittedExcitation:
+    def fitted(
+        self, series: Sequence[ChargingSeries], intervals: IntervalChoice = "none"
+    ) -> FittedExcitation:
         """Fit series of the sample by the model, from its solution, and find the light's errors.
 
-        How far the veil differs from site to site is taken in proportion to the veil found.
+        How far the veil differs from site to site is taken in proportion to the veil found. The
+        intervals are those of `fit_excitation`.
         """
         best, sigmas = self.best, self._sigmas
         order = None if best.are_orders_fitted else best.states[0].kinetic_order
         k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in best.states]).T
-        fit = fit_excitation(series, k_r, amplitude, sigmas, best, order)
+        fit = fit_excitation(series, k_r, amplitude, sigmas, best, order, intervals)
         return replace(
             fit,
             models=best.models,

@@ -149,7 +149,10 @@ def with_doubt(fit: FittedExcitation, even: FittedExcitation) -> FittedExcitatio
         )
         for index, state in enumerate(fit.states)
     )
-    return replace(fit, states=states, covariance=covariance)
+    before = np.sqrt(np.diag(fit.covariance))
+    widening = dict(zip(fit.covariance_parameters, sigma / before, strict=True))
+    intervals = {name: each.scaled(float(widening[name])) for name, each in fit.intervals.items()}
+    return replace(fit, states=states, covariance=covariance, intervals=intervals)
 
 
 def _parameters(fit: FittedExcitation) -> FloatArray:

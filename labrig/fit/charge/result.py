@@ -1,11 +1,19 @@
 """Result of a fit to charge and decay, readable as text and as JSON; the file `fit.json`."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from labrig.number_format import aligned
-from labrig.results import FloatArray, Measured, OneSided, measured_number
+from labrig.results import (
+    FloatArray,
+    Measured,
+    OneSided,
+    ProfileInterval,
+    interval_lines,
+    measured_number,
+)
 
 UNKNOWN = "–"
 #: Version of the JSON: another number means renamed keys or other meanings.
@@ -128,6 +136,11 @@ class ChargeFit:
         Doubts, one a line.
     readings
         What was fitted.
+    intervals
+        Intervals by profile likelihood, where ±σ misses them by more than 20 % or where they were
+        asked for: by the name of a field of `OrderState` and the number of the state, such as
+        `order 1`, and of `rate_at_off_per_s 1` and `lifetime_at_off_s 1`, the rate p/τ at which
+        the light falls at lamp off, and its inverse.
     """
 
     states: tuple[OrderState, ...]
@@ -144,6 +157,7 @@ class ChargeFit:
     chosen: int
     warnings: tuple[str, ...]
     readings: FittedReadings = field(compare=False, repr=False)
+    intervals: Mapping[str, ProfileInterval] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """Return a table of the states, one of the models, and all warnings."""
@@ -159,6 +173,7 @@ class ChargeFit:
         )
         if self.is_any_one_sided:
             lines.append("<, >: at a bound of what is possible, limit of 95 % probability")
+        lines += interval_lines(self.named_intervals)
         lines += aligned(self.model_rows())
         return "\n".join([*lines, *(f"! {line}" for line in self.warnings)])
 
@@ -168,6 +183,17 @@ class ChargeFit:
         common = (self.light_stimulated, self.prompt, self.dark)
         own = (getattr(state, each.name) for state in self.states for each in fields(state))
         return any(isinstance(each, OneSided) for each in (*common, *own))
+
+    @property
+    def named_intervals(self) -> dict[str, ProfileInterval]:
+        """Intervals by the symbols and units of their parameters."""
+        labels = AT_OFF_LABELS | COLUMN_LABELS
+        named = {}
+        for name, interval in self.intervals.items():
+            quantity, _, number = name.partition(" ")
+            symbol, *unit = labels[quantity].split(" / ")
+            named[" / ".join((f"{symbol} {number}", *unit))] = interval
+        return named
 
     def state_rows(self) -> list[list[str]]:
         """Return what is known of the states as a table, its head first."""
@@ -211,6 +237,7 @@ class ChargeFit:
             "chi2_charge": self.chi2_charge,
             "chi2_decay": self.chi2_decay,
             "misfit": self.misfit,
+            "intervals": {name: each.to_dict() for name, each in self.intervals.items()},
             "candidates": [vars(candidate) for candidate in self.candidates],
             "chosen": self.chosen,
             "warnings": list(self.warnings),
@@ -218,6 +245,8 @@ class ChargeFit:
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
+#: Rate at which the light falls at lamp off, and its inverse.
+AT_OFF_LABELS = {"rate_at_off_per_s": "p/τ / s⁻¹", "lifetime_at_off_s": "τ/p / s"}
 #: Heads of the columns of the table of states.
 COLUMN_LABELS = {
     "order": "b",

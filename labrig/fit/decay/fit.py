@@ -9,12 +9,17 @@ from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
 from labrig.fit.decay.envelope import Envelope, envelope
-from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
+from labrig.fit.decay.fit_warnings import (
+    Evidence,
+    refuse_if_constant,
+    refuse_if_rising,
+    student_factor,
+)
 from labrig.fit.decay.law_ties import tie_warnings
 from labrig.fit.decay.laws import LawFit, fit_laws
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
-from labrig.fit.decay.result import DecayFit, assemble, student_factor
+from labrig.fit.decay.result import DecayFit, assemble
 from labrig.fit.decay.scatter import (
     residual_sigma,
     scaled_sigma,
@@ -67,6 +72,7 @@ def fit_decay(
     correlation: ArrayLike | None = None,
     offset_correlation: ArrayLike | None = None,
     law: str = AUTO,
+    intervals: bool = False,
 ) -> DecayFit:
     """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al., section 4.4).
 
@@ -124,6 +130,9 @@ def fit_decay(
         `rate-spectrum`. `auto` takes exponentials, unless no number of states was asked for and the
         BIC of another law is lower by 2, by 6 than that of a single one or if it is a spectrum of
         rates. All of them are fitted in any case.
+    intervals
+        Whether every rate, and every parameter of the law, has an interval by profile likelihood.
+        Those that ±σ misses by more than 20 % have one in any case.
 
     Returns
     -------
@@ -225,6 +234,7 @@ def fit_decay(
             asked=n_states,
             most_states=numbers[-1],
             n_fixed=len(fixed),
+            all_intervals=intervals,
         ),
     )
     if not is_choice:

@@ -75,6 +75,8 @@ class Evidence:
         Whether the data refute one state fewer.
     asked, most_states, n_fixed
         Requested number of states, largest number that was to be tried and number of fixed rates.
+    all_intervals
+        Whether every rate and parameter of the law is to have an interval.
     """
 
     data: WhitenedSeries
@@ -91,6 +93,22 @@ class Evidence:
     asked: int | None
     most_states: int
     n_fixed: int
+    all_intervals: bool
+
+    @property
+    def sigma_dof(self) -> float:
+        """Degrees of freedom that told the σ of the values; infinite where they were given."""
+        estimated = self.scatter or self.sigma_scale
+        return np.inf if estimated is None else estimated.dof
+
+    @property
+    def student(self) -> float:
+        """Factor ν/(ν − 2) of every variance where σ was told by ν degrees of freedom.
+
+        Unweighted least squares has none, as every program's.
+        """
+        is_plain = self.scatter is not None and self.scatter.is_of_residuals
+        return 1.0 if is_plain else student_factor(self.sigma_dof)
 
     @property
     def other_laws(self) -> list[FittedLaw | FittedRateSpectrum]:
@@ -115,6 +133,13 @@ class Evidence:
         """Whether a law other than exponentials is clearly better."""
         laws = self.other_laws
         return bool(laws) and laws[0].bic < self.exponentials_bic - CLEAR_BIC
+
+
+def student_factor(dof: float) -> float:
+    """Return ν/(ν − 2), the factor of a variance whose σ was told by ν degrees of freedom."""
+    if np.isinf(dof):
+        return 1.0
+    return dof / (dof - 2) if dof > 2 else float("inf")
 
 
 def refuse_if_rising(data: WhitenedSeries, weights: FloatArray) -> None:

@@ -8,6 +8,7 @@ from labrig.fit.decay.bend import bend
 from labrig.fit.decay.drift import drift_effect
 from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.further_state import FastStates, fast_states, hidden_state
+from labrig.fit.decay.intervals import decay_intervals
 from labrig.fit.decay.joint import covariance_under_flicker, weight_sigma
 from labrig.fit.decay.laws import LAW_RATE, LawFit
 from labrig.fit.decay.misfit_covariance import with_misfit
@@ -60,6 +61,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         )
         laws = tuple(_with_correlation(each, evidence.data, correlation) for each in laws)
     covariance, log_rate_covariance = _covariances(fit, data, fitted_covariance)
+    intervals, interval_warnings = decay_intervals(data, fit, fitted_covariance, laws, evidence)
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates[order]) / series.span_s
     amplitudes = (fit.amplitudes * np.exp(np.exp(fit.log_rates) * series.start))[
@@ -100,8 +102,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         dof=fit.dof(data),
         bic=joint.chi2 + joint.n_parameters * float(np.log(data.independent_data(joint.weights))),
         covariance=covariance[np.ix_(kept, kept)],
-        warnings=tuple(
-            warnings_about(
+        warnings=(
+            *warnings_about(
                 data,
                 fit,
                 states,
@@ -110,7 +112,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
                 hidden,
                 correlation,
                 bend(data, fit, fitted_covariance),
-            )
+            ),
+            *interval_warnings,
         ),
         candidates=evidence.candidates,
         law=evidence.law,
@@ -131,6 +134,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         sigma=sigma_used,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
+        intervals=intervals,
         drift_effect_s=_drift_effect_s(fit, data, states),
     )
 
@@ -199,20 +203,13 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     if evidence.scatter is not None and evidence.scatter.is_of_residuals:
         return covariance
     if evidence.scatter is not None:
-        return with_misfit(covariance, fit, data, noise) * student_factor(evidence.scatter.dof)
+        return with_misfit(covariance, fit, data, noise) * evidence.student
     if evidence.sigma_scale is not None:
-        return covariance * student_factor(evidence.sigma_scale.dof)
+        return covariance * evidence.student
     if noise.is_given:
         return covariance
     added_square = noise.added_square(noise.flicker)
     return covariance_under_flicker(fit.joint, data, fit.signal(data.series), added_square)
-
-
-def student_factor(dof: float) -> float:
-    """Return ν/(ν − 2), the factor of a variance whose σ was told by ν degrees of freedom."""
-    if np.isinf(dof):
-        return 1.0
-    return dof / (dof - 2) if dof > 2 else float("inf")
 
 
 def _covariances(

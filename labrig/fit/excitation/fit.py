@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import FitError
 from labrig.fit.excitation.band_tests import band_tests
+from labrig.fit.excitation.intervals import IntervalChoice, excitation_intervals
 from labrig.fit.excitation.lamp_pulls import law_test
 from labrig.fit.excitation.levels import levels_at_off
 from labrig.fit.excitation.light_errors import found_errors
@@ -62,6 +63,7 @@ def fit_excitation(
     uncertain: RelativeSigmas | None = None,
     near: FittedExcitation | None = None,
     order: float | None = 1.0,
+    intervals: IntervalChoice = "none",
 ) -> FittedExcitation:
     """Fit all series together.
 
@@ -78,6 +80,9 @@ def fit_excitation(
         A fit of nearly the same series as start; by default several levels of charge are tried.
     order
         Kinetic order of all states; None fits one of each.
+    intervals
+        Which rates and orders have an interval by profile likelihood: "none", "all", or "auto",
+        those that ±σ misses by more than 20 %.
 
     Raises
     ------
@@ -101,13 +106,13 @@ def fit_excitation(
     # With errors of the sizes given: what is found may have grown to make good for another law.
     law_warnings = _law_warnings(problem, theta)
     if not uncertain.largest_factor:
-        return _result(problem, solution, reference, uncertain, law_warnings)
+        return _result(problem, solution, reference, uncertain, law_warnings, intervals)
     errors = found_errors(problem.parameters, solution, series, uncertain.largest_factor)
     series, uncertain = errors.applied(series, uncertain)
     problem = ExcitationProblem(series, len(rates), reference, uncertain, order)
     problem.rewhiten(theta)
     solution = _minimised(problem, theta, FINE)
-    return _result(problem, solution, reference, uncertain, law_warnings, errors.sites)
+    return _result(problem, solution, reference, uncertain, law_warnings, intervals, errors.sites)
 
 
 def _brightest(series: Sequence[ChargingSeries]) -> int:
@@ -201,6 +206,7 @@ def _result(
     reference: int,
     uncertain: RelativeSigmas,
     law_warnings: Sequence[str],
+    intervals: IntervalChoice,
     site_sizes: tuple[float, ...] = (),
 ) -> FittedExcitation:
     n, bands, columns = (
@@ -255,7 +261,7 @@ def _result(
     at_off = _at_off(problem, rates, stated[own], solution.covariance, falling)
     by_band = band_tests(problem, solution)
     missing = missing_signal(problem, solution)
-    return FittedExcitation(
+    fit = FittedExcitation(
         states=states,
         channel_weights=rates.weights,
         channel_weights_sigma=weights_sigma,
@@ -277,6 +283,13 @@ def _result(
         lamp_sigma=uncertain.lamp,
         site_sizes=site_sizes,
     )
+    if intervals == "none":
+        return fit
+    stated = dict(zip(fit.covariance_parameters, np.sqrt(np.diag(fit.covariance)), strict=True))
+    found = excitation_intervals(
+        problem, solution, uncertain, falling, None if intervals == "all" else stated
+    )
+    return replace(fit, intervals=found)
 
 
 def _veil(problem: ExcitationProblem, solution: LeastSquaresFit) -> Measured | None:
