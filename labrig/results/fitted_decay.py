@@ -23,6 +23,7 @@ from labrig.results.fitted_law import (
 )
 from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text
+from labrig.results.unseen_flicker import UnseenFlicker
 
 #: Times of the measurement beyond which a signal is not predicted with σ.
 FORECAST_SPANS = 3.0
@@ -35,7 +36,7 @@ _SAME_SIGMA = 0.05
 #: Change of a rate in σ from which what it would be due to is worth a word.
 WORTH_A_WORD = 0.3
 #: Version of `fit.json`: another number means renamed keys or other meanings.
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 
 
 @dataclass(frozen=True)
@@ -249,6 +250,9 @@ class FittedDecay:
     unseen_state
         Fast state that the data would not show; None if frames leave no room for one, or a warning
         tells one.
+    unseen_flicker
+        Periodic flicker that evenly spaced frames do not distinguish from the decay; None if there
+        is none.
     """
 
     states: tuple[DecayState, ...]
@@ -276,6 +280,7 @@ class FittedDecay:
     sigma_origin: str = field(default="", kw_only=True)
     sigma_factor: float = field(default=1.0, kw_only=True)
     unseen_state: UnseenState | None = field(default=None, kw_only=True)
+    unseen_flicker: UnseenFlicker | None = field(default=None, kw_only=True)
 
     @property
     def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
@@ -608,6 +613,7 @@ class FittedDecay:
             "sigma_origin": self.sigma_origin,
             "sigma_factor": self.sigma_factor,
             "unseen_state": asdict(self.unseen_state) if self.unseen_state else None,
+            "unseen_flicker": asdict(self.unseen_flicker) if self.unseen_flicker else None,
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -651,8 +657,8 @@ class FittedDecay:
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         if self.other_laws:
             lines += aligned([["law", "", "reduced χ²", "BIC"], *self._law_rows()])
-        if self.outside_sigma:
-            lines += wrap(f"not in σ {self.outside_sigma}", LINE_WIDTH, subsequent_indent=" " * 9)
+        for outside in filter(None, (self.outside_sigma, str(self.unseen_flicker or ""))):
+            lines += wrap(f"not in σ {outside}", LINE_WIDTH, subsequent_indent=" " * 9)
         lines += [f"! {warning}" for warning in self.warnings]
         return "\n".join(lines)
 

@@ -21,6 +21,7 @@ from labrig.results.fitted_decay import (
 )
 from labrig.results.fitted_law import fitted_law, fitted_rate_spectrum
 from labrig.results.text_files import write_json
+from labrig.results.unseen_flicker import UnseenFlicker
 
 FILE = "fit.json"
 
@@ -178,7 +179,7 @@ def _from_dict(content: Any) -> FittedDecay:
         raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
     weights: Mapping[str, float] = content["channel_weights"]
     scatter, spectrum = content["sigma_from_scatter"], content["rate_spectrum"]
-    unseen = content["unseen_state"]
+    unseen, flicker = content["unseen_state"], content["unseen_flicker"]
     return FittedDecay(
         states=tuple(
             DecayState(
@@ -221,6 +222,7 @@ def _from_dict(content: Any) -> FittedDecay:
         sigma_origin=content["sigma_origin"],
         sigma_factor=float(content["sigma_factor"]),
         unseen_state=None if unseen is None else _unseen_state(unseen),
+        unseen_flicker=None if flicker is None else UnseenFlicker(**flicker),
     )
 
 

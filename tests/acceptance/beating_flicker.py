@@ -8,8 +8,10 @@ of 0.2 % that is independent from frame to frame, and a periodic one of 0.7 %: a
 periods, and a square wave as of a heater that is switched. Each seed draws the phase, the noise and
 the begins of the frames. The fit is the one of `labrig process` with the number of states given.
 
-Printed are, in percent, how often a rate is wrong by more than 3 σ, and how often no warning says a
-word then; the root mean square of (fitted − true)/σ; and how often any warning is given.
+Printed are, in percent, how often a rate is wrong by more than 3 σ, and how often neither a warning
+nor the statement on unseen flicker says a word then; how often a warning is given, how often one of
+them says that residuals repeat, and how often the statement; the root mean square of
+(fitted − true)/σ.
 """
 
 import argparse
@@ -19,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import square
 
-import labrig
-from labrig.fit import DecayFit
+from labrig.fit import DecayFit, fit_decay
 from labrig.protocols.steps.random_spacing import RandomSpacing
 
 FIRST_S, EVERY_S, FRAMES = 0.5, 5.0, 36
@@ -62,7 +63,7 @@ def fitted(
     t_s = (FIRST_S + EVERY_S * np.arange(FRAMES)).tolist()
     if is_random:
         spacing = RandomSpacing(EVERY_S, SPENT_S)
-        t_s = spacing.begins_s(t_s, exposure_s, seed=int(rng.integers(2**32)))
+        t_s = spacing.begins_s(t_s, [exposure_s] * FRAMES, seed=int(rng.integers(2**32)))
     at_s = np.add.outer(t_s, exposure_s * POINTS)
     light = sum(a * np.exp(-k * at_s) for k, a in zip(*STATES[n_states], strict=True))
     phase = rng.uniform(0, 2 * np.pi)
@@ -70,7 +71,7 @@ def fitted(
     frames = light.mean(axis=1) * (1 + FLICKER * rng.standard_normal(FRAMES))
     values = np.outer(frames, WEIGHTS)
     values += NOISE * rng.standard_normal(values.shape)
-    return labrig.fit_decay(
+    return fit_decay(
         t_s,
         values,
         np.full_like(values, NOISE),
@@ -90,9 +91,12 @@ def line(n_states: int, fits: Sequence[DecayFit]) -> str:
     )  # fmt: skip
     wrong = (np.abs(pulls) > WRONG_SIGMAS).any(axis=1)
     warned = np.array([bool(fit.warnings) for fit in fits])
+    repeats = np.array(["residuals repeat" in " ".join(fit.warnings) for fit in fits])
+    unseen = np.array([fit.unseen_flicker is not None for fit in fits])
     rms = np.sqrt((pulls**2).mean())
-    numbers = (100 * share.mean() for share in (wrong, wrong & ~warned, warned))
-    return "  ".join(f"{number:5.0f}" for number in numbers) + f"  {rms:5.2f}"
+    shares = (wrong, wrong & ~warned & ~unseen, warned, repeats, unseen)
+    numbers = (100 * share.mean() for share in shares)
+    return "   ".join(f"{number:5.1f}" for number in numbers) + f"  {rms:5.2f}"
 
 
 def main() -> None:
@@ -102,7 +106,7 @@ def main() -> None:
     parser.add_argument("--exposure", type=float, default=0.63)
     arguments = parser.parse_args()
     print(f"{arguments.seeds} decays a line, exposures of {arguments.exposure:g} s")
-    print("states  spacing  flicker        wrong  silent  warned  rms pull")
+    print("states  spacing  flicker        wrong  silent  warned  repeats  unseen  rms pull")
     for n_states in STATES:
         for is_random in (False, True):
             for flicker in FLICKERS:
