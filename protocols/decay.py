@@ -245,9 +245,7 @@ class DecaySettings(ProtocolModel):
         if self.spacing == "even":
             return even
         spacing = self._random_spacing(offers)
-        return replace(
-            even, times_s=tuple(spacing.begins_s(even.times_s, even.exposures_s, seed))
-        )
+        return replace(even, times_s=tuple(spacing.begins_s(even.times_s, even.exposures_s, seed)))
 
     def _random_spacing(self, offers: CameraOffers) -> RandomSpacing:
         return RandomSpacing(self.every, offers.overhead_s + MARGIN_S)

@@ -250,6 +250,8 @@ class FittedDecay:
     unseen_state
         Fast state that the data would not show; None if frames leave no room for one, or a warning
         tells one.
+    value_unit
+        Unit of the values, and so of amplitudes and offsets, such as `DN/s`; empty if unknown.
     unseen_flicker
         Periodic flicker that evenly spaced frames do not distinguish from the decay; None if there
         is none.
@@ -281,6 +283,7 @@ class FittedDecay:
     sigma_factor: float = field(default=1.0, kw_only=True)
     unseen_state: UnseenState | None = field(default=None, kw_only=True)
     unseen_flicker: UnseenFlicker | None = field(default=None, kw_only=True)
+    value_unit: str = field(default="", kw_only=True)
 
     @property
     def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
@@ -613,6 +616,7 @@ class FittedDecay:
             "sigma_origin": self.sigma_origin,
             "sigma_factor": self.sigma_factor,
             "unseen_state": asdict(self.unseen_state) if self.unseen_state else None,
+            "value_unit": self.value_unit,
             "unseen_flicker": asdict(self.unseen_flicker) if self.unseen_flicker else None,
         }
         content: dict[str, Any] = finite(fields)
@@ -633,14 +637,16 @@ class FittedDecay:
             ]
             for number, state in enumerate(self.states, start=1)
         ]
-        lines = aligned([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
+        amplitude = f"amplitude / ({self.value_unit})" if self.value_unit else "amplitude"
+        lines = aligned([["state", "k / s⁻¹", "1/k / s", amplitude], *rows])
         if not self.reference.is_lamp_off:
             lines.append(f"amplitudes are those at {self.reference}, where laws begin")
         lines.append(
             f"weights  {self._values_text(self.channel_weights, self.channel_weights_sigma)}"
         )
         if any(self.offsets_sigma):
-            lines.append(f"offsets  {self._values_text(self.offsets, self.offsets_sigma)}")
+            offsets = self._values_text(self.offsets, self.offsets_sigma)
+            lines.append(f"offsets  {offsets} {self.value_unit}".rstrip())
         if len(self.repeats) > 1:
             pairs = zip(self.repeats, self.levels, strict=True)
             lines.append(f"levels   {', '.join(f'{name} {level:.4f}' for name, level in pairs)}")

@@ -222,6 +222,7 @@ def _from_dict(content: Any) -> FittedDecay:
         sigma_origin=content["sigma_origin"],
         sigma_factor=float(content["sigma_factor"]),
         unseen_state=None if unseen is None else _unseen_state(unseen),
+        value_unit=content["value_unit"],
         unseen_flicker=None if flicker is None else UnseenFlicker(**flicker),
     )
 

@@ -24,8 +24,8 @@ Spacing = Literal["random", "even"]
 PLANNED_SEED = 0
 #: Fraction of the time that readout leaves between two frames which metered exposures may take.
 EXPOSED = 0.5
-#: Longest random part of a pause in units of its exponential distribution, and its mean: no pause is
-#: longer than about twice the mean one.
+#: Longest random part of a pause in units of its exponential distribution, and its mean: no pause
+#: is longer than about twice the mean one.
 LONGEST = 2.0
 MEAN = 1 - LONGEST / np.expm1(LONGEST)
 #: Frequencies of a flicker that are looked at, per frame, of which the worst one is stated.

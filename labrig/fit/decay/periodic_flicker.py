@@ -170,7 +170,7 @@ def unseen_flicker(t_s: FloatArray, exposure_s: FloatArray) -> UnseenFlicker | N
 
 
 def _coherence(t_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
-    """Return |Σ exp(2πi f t)|/n of times (n,) at frequencies (f,): 1 where a flicker stands still."""
+    """Return |Σ exp(2πi f t)|/n of times (n,) at frequencies (f,): 1 where flicker stands still."""
     phase = np.multiply.outer(frequency_hz, t_s - t_s[0])
     return np.abs(np.exp(2j * np.pi * phase).mean(axis=1))
 

@@ -13,8 +13,8 @@ from labrig.fit.decay.laws import LAW_RATE, LawFit
 from labrig.fit.decay.misfit_covariance import with_misfit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation, noise_correlation
 from labrig.fit.decay.periodic_flicker import unseen_flicker
-from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.series import DecaySeries
+from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
