@@ -158,8 +158,8 @@ def read_described_series(
     Examples
     --------
     >>> from labrig.results import read_described_series
-    >>> read_described_series("series.csv")[1]
-    'time t_s (s, line 1); values R, G, B; σ R_sigma, G_sigma, B_sigma'
+    >>> read_described_series("series.csv")[1].split("; σ")[0]
+    'time t_s (s, line 1); values R (DN/s), G (DN/s), B (DN/s)'
     """
     folder = Path(path)
     if folder.is_dir():

@@ -122,8 +122,8 @@ class RandomSpacing:
         return (
             f"random, every {every} in the mean and at least {duration_text(round(least_s, 2))} "
             "apart",
-            f"of a flicker with a period near {every}, about {100 * random:.0f} % looks like a "
-            f"part of the decay; evenly spaced, {100 * even:.0f} %",
+            f"of a flicker near {every}, {100 * random:.0f} % looks like decay; evenly spaced, "
+            f"{100 * even:.0f} %",
         )
 
     def even_lines(self, exposure_s: float) -> tuple[str, str]:
@@ -131,6 +131,6 @@ class RandomSpacing:
         every = duration_text(self.every_s)
         return (
             f"even, every {every}",
-            f"of a flicker with a period near {every}, {100 * self.beat_of_even(exposure_s):.0f} % "
-            "would look like a part of the decay (spacing: random)",
+            f"of a flicker near {every}, {100 * self.beat_of_even(exposure_s):.0f} % looks like "
+            "decay",
         )

@@ -101,8 +101,8 @@ def periodogram(
     >>> from labrig.fit import periodogram
     >>> t_s = np.sort(np.random.default_rng(1).uniform(0, 180, 36))
     >>> lines = periodogram(t_s, np.sin(2 * np.pi * t_s / 5.1), np.ones(36))
-    >>> print(f"{lines.period_s:.2f} s, p < 1e-9: {lines.p_value < 1e-9}")
-    5.10 s, p < 1e-9: True
+    >>> print(f"{lines.period_s:.1f} s, p < 1e-9: {lines.p_value < 1e-9}")
+    5.1 s, p < 1e-9: True
     """
     rows = np.flatnonzero(signal_to_noise > 0)[:MOST_VALUES]
     t_s, residuals, signal_to_noise = t_s[rows], residuals[rows], signal_to_noise[rows]
@@ -172,7 +172,7 @@ def unseen_flicker(t_s: FloatArray, exposure_s: FloatArray) -> UnseenFlicker | N
 def _coherence(t_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
     """Return |Σ exp(2πi f t)|/n of times (n,) at frequencies (f,): 1 where flicker stands still."""
     phase = np.multiply.outer(frequency_hz, t_s - t_s[0])
-    return np.abs(np.exp(2j * np.pi * phase).mean(axis=1))
+    return np.asarray(np.abs(np.exp(2j * np.pi * phase).mean(axis=1)))
 
 
 def _even_from(n_values: int) -> float:
