@@ -8,7 +8,7 @@ from labrig.fit import DecayFit, FloatArray, fit_decay, periodogram
 from labrig.fit.decay.periodic_flicker import unseen_flicker
 from labrig.protocols.steps.random_spacing import RandomSpacing
 
-EVEN_S = 0.5 + 5.0 * np.arange(36)
+EVEN_S: FloatArray = 0.5 + 5.0 * np.arange(36)
 RATE_PER_S, EXPOSURE_S = 0.02, 0.6
 REPEAT = "the residuals repeat every"
 
@@ -65,7 +65,7 @@ def test_a_clean_decay_has_no_warning_whatever_its_spacing() -> None:
 def test_the_p_value_is_the_chance_of_a_line_in_noise(is_random: bool) -> None:
     rng = np.random.default_rng(3)
     snr = np.exp(-RATE_PER_S * EVEN_S) * 300
-    p_values = []
+    p_values, found = [], None
     for seed in range(400):
         t_s = random_s(seed) if is_random else EVEN_S
         found = periodogram(t_s, rng.standard_normal(len(t_s)), snr)
@@ -73,6 +73,7 @@ def test_the_p_value_is_the_chance_of_a_line_in_noise(is_random: bool) -> None:
         p_values.append(found.p_value)
     # 5 % within three binomial σ; a line that is not quite independent of others counts for less.
     assert 0.017 < np.mean(np.array(p_values) < 0.05) < 0.083
+    assert found is not None
     assert found.power_at(found.p_value) == pytest.approx(found.power.max(), rel=1e-6)
 
 
@@ -99,7 +100,7 @@ def test_even_spacing_hides_what_exposures_do_not_average_out() -> None:
     assert long.share == pytest.approx(np.sinc(3.2 / 5.0), rel=1e-6)
     assert unseen_flicker(EVEN_S, np.full(36, 5.0)) is None
     # A clock that is read to a millisecond is no random one; a second of 5 s is not enough.
-    nearly = EVEN_S + np.random.default_rng(1).uniform(0, 0.3, 36)
+    nearly: FloatArray = EVEN_S + np.random.default_rng(1).uniform(0, 0.3, 36)
     assert unseen_flicker(nearly, np.zeros(36)) is not None
 
 
