@@ -8,7 +8,7 @@ from labrig.fit import DecayFit, FloatArray, fit_decay, periodogram
 from labrig.fit.decay.periodic_flicker import unseen_flicker
 from labrig.protocols.steps.random_spacing import RandomSpacing
 
-EVEN_S: FloatArray = 0.5 + 5.0 * np.arange(36)
+EVEN_S = np.linspace(0.5, 175.5, 36)
 RATE_PER_S, EXPOSURE_S = 0.02, 0.6
 REPEAT = "the residuals repeat every"
 
