@@ -5,7 +5,7 @@ After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appea
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated, Literal, Self
 
@@ -42,6 +42,7 @@ from .steps.camera_settings import (
 from .steps.exposure_metering import DecayMeter, MeteringFrame, Schedule, glow, measure_frame
 from .steps.glow import METER_CHARGE_S, DarkUnit, MeterCharge, MeterUnit
 from .steps.patch_names import Patches
+from .steps.random_spacing import PLANNED_SEED, RandomSpacing, Spacing
 from .steps.sample_pose import (
     charge,
     check_visible,
@@ -94,7 +95,10 @@ class DecaySettings(ProtocolModel):
         chosen, for example `5 min`. A longer charge must not glow more than twice as bright.
         Default: as long as `charge`, at most 10 minutes.
     every
-        Time between the begins of two photographs, for example `5 s`.
+        Time between the begins of two photographs, in the mean, for example `5 s`.
+    spacing
+        Spacing of the photographs' begins: `random`, so that no periodic flicker of light or camera
+        beats with them, or `even`. The first and the last photograph are the same.
     duration
         Time after lamp off until which photographs begin, for example `180 s`.
     first
@@ -129,6 +133,7 @@ class DecaySettings(ProtocolModel):
     plateau: Plateau = Plateau()
     meter: MeterCharge = None
     every: DurationS = Field(5.0, gt=0)
+    spacing: Spacing = "random"
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
     repeats: Count = Field(1, ge=1)
@@ -170,7 +175,7 @@ class DecaySettings(ProtocolModel):
         return self.model_copy(update={"first": first_s})
 
     def frame_times_s(self) -> list[float]:
-        """Return the planned begin of each frame in seconds after lamp off."""
+        """Return the even begin of each frame in seconds after lamp off."""
         return frame_times_s(self.first_s, self.every, self.duration)
 
     def settings(self, exposure_s: float) -> ExposureSettings:
@@ -180,7 +185,10 @@ class DecaySettings(ProtocolModel):
     def longest_exposure_s(self, offers: CameraOffers) -> float:
         """Return the longest offered shutter time that fits between two frames, in seconds."""
         if isinstance(self.exposure, str):
-            return longest_exposure_s(self.every, offers)
+            longest_s = longest_exposure_s(self.every, offers)
+            if self.spacing == "even" or self.exposure == "grow":
+                return longest_s
+            return min(self._random_spacing(offers).longest_exposure_s(offers), longest_s)
         return longest_exposure_s(self.every, offers, offers.exposure_near(self.exposure))
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
@@ -212,16 +220,37 @@ class DecaySettings(ProtocolModel):
         offers: CameraOffers,
         metering: Sequence[MeteringFrame],
         warn: Callable[[str], None],
+        seed: int,
     ) -> Schedule:
-        """Return the frames of a decay; their shutter times follow from metering, unless given."""
+        """Return the frames of a decay.
+
+        Their shutter times follow from metering, unless given, and their begins from the seed.
+        """
         times_s = self.frame_times_s()
         if isinstance(self.exposure, float):
-            return Schedule.constant(times_s, offers.exposure_near(self.exposure))
+            exposure_s = offers.exposure_near(self.exposure)
+            return self._spaced(Schedule.constant(times_s, exposure_s), offers, seed)
         growth = self.grow_at_most if self.exposure == "grow" else 1.0
         longest_s = self.longest_exposure_s(offers)
-        return DecayMeter(metering).schedule(times_s, offers, longest_s, growth, warn)
+        meter = DecayMeter(metering)
+        even = meter.schedule(times_s, offers, longest_s, growth, warn)
+        spaced = self._spaced(even, offers, seed)
+        # A frame that begins earlier than the even one is brighter.
+        own = meter.schedule(spaced.times_s, offers, longest_s, growth, lambda text: None)
+        exposures_s = map(min, spaced.exposures_s, own.exposures_s)
+        return Schedule(spaced.times_s, tuple(exposures_s))
 
-    def assumed_schedule(self, offers: CameraOffers) -> Schedule:
+    def _spaced(self, even: Schedule, offers: CameraOffers, seed: int) -> Schedule:
+        """Return the frames of an even schedule at the begins that they have in the end."""
+        if self.spacing == "even":
+            return even
+        spacing = self._random_spacing(offers)
+        return replace(even, times_s=tuple(spacing.begins_s(even.times_s, even.exposures_s, seed)))
+
+    def _random_spacing(self, offers: CameraOffers) -> RandomSpacing:
+        return RandomSpacing(self.every, offers.overhead_s + MARGIN_S)
+
+    def assumed_schedule(self, offers: CameraOffers, seed: int) -> Schedule:
         """Return the schedule of a plan, which has metered nothing: the longest exposures.
 
         With `exposure: grow` they are those of a glow that fades evenly, by `grow_at_most`.
@@ -233,7 +262,7 @@ class DecaySettings(ProtocolModel):
             offers.exposure_at_most(longest_s * growth ** ((time_s - times_s[-1]) / fading_s))
             for time_s in times_s
         )
-        return Schedule(tuple(times_s), tuple(exposures_s))
+        return self._spaced(Schedule(tuple(times_s), tuple(exposures_s)), offers, seed)
 
     def expected_schedule(
         self,
@@ -241,7 +270,7 @@ class DecaySettings(ProtocolModel):
         expected: Callable[[float, float], Sequence[FrameMeasurement]],
         warn: Callable[[str], None],
     ) -> Schedule:
-        """Return the expected result of `schedule`, before anything is measured.
+        """Return the expected result of `schedule`, before anything is measured or drawn.
 
         Parameters
         ----------
@@ -254,7 +283,7 @@ class DecaySettings(ProtocolModel):
             Function that receives warnings.
         """
         metering = [MeteringFrame(*at, expected(*at)) for at in self.meter_ladder(offers)]
-        return self.schedule(offers, metering, warn)
+        return self.schedule(offers, metering, warn, PLANNED_SEED)
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
         """Return the settings of the shortest metering frames, for a check of clipped frames."""
@@ -277,6 +306,16 @@ class DecaySettings(ProtocolModel):
             f"for the {duration_text(self.charge)} of 'charge'; for less, give the lamp of the rig "
             "file a shorter 'warm_up'",
         )
+
+    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+        """Return how the frames of a decay are spaced, in two lines for a plan."""
+        spacing = self._random_spacing(offers)
+        exposure_s = self.longest_exposure_s(offers)
+        if isinstance(self.exposure, float):
+            exposure_s = offers.exposure_near(self.exposure)
+        if self.spacing == "even" or not spacing.free_s(exposure_s):
+            return spacing.even_lines(exposure_s)
+        return spacing.lines(exposure_s, len(self.frame_times_s()))
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Charge for that long, and at least for the lamp's warm-up time."""
@@ -326,17 +365,18 @@ class DecayUnit:
     def _schedule(self, session: Session) -> Schedule:
         protocol, offers = self.protocol, session.rig[CAMERA].offers()
         regions = list(protocol.patches.values())
+        seed = session.seed("begins of frames") if protocol.spacing == "random" else 0
 
         def decide() -> Schedule:
             frames = [
                 frame for frame in session.frames(FrameRole.METER) if frame.unit == self.metering
             ]
             metering = [measure_frame(frame, regions) for frame in frames]
-            return protocol.schedule(offers, metering, session.warn)
+            return protocol.schedule(offers, metering, session.warn, seed)
 
         if isinstance(protocol.exposure, float):
-            return protocol.schedule(offers, [], session.warn)
-        return session.choose("exposure", decide, protocol.assumed_schedule(offers))
+            return protocol.schedule(offers, [], session.warn, seed)
+        return session.choose("exposure", decide, protocol.assumed_schedule(offers, seed))
 
     def _charge(self, session: Session, exposure_s: float) -> None:
         if isinstance(self.protocol.charge, float):

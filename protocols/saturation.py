@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.acquire import ManualStep, ProtocolModel, Unit
+from labrig.acquire import CameraOffers, ManualStep, ProtocolModel, Unit
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.region import CENTRE
 
@@ -19,6 +19,7 @@ from .decay import Decay, DecayUnit
 from .steps.camera_settings import CameraSettings
 from .steps.glow import DarkUnit, MeterUnit
 from .steps.patch_names import Patches
+from .steps.random_spacing import Spacing
 from .steps.scenes import Arranged, Arrangement, Prepared
 
 
@@ -100,7 +101,10 @@ class Saturation(ProtocolModel):
         Second, weaker irradiance, which saturation in level takes. Default: none, and r(0) remains
         unknown.
     every
-        Time between the begins of two photographs, for example `5 s`.
+        Time between the begins of two photographs, in the mean, for example `5 s`.
+    spacing
+        Spacing of the photographs' begins: `random`, so that no periodic flicker of light or camera
+        beats with them, or `even`.
     duration
         Time after lamp off until which photographs begin, for example `180 s`.
     first
@@ -122,6 +126,7 @@ class Saturation(ProtocolModel):
     charges: tuple[Charge, ...] = Field((300.0, 2700.0, 5400.0), min_length=2)
     weaker: WeakerLight | None = None
     every: DurationS = Field(5.0, gt=0)
+    spacing: Spacing = "random"
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: DurationS = Field(0.8, ge=0)
     camera: CameraSettings = CameraSettings()
@@ -154,6 +159,10 @@ class Saturation(ProtocolModel):
             *full[1:],
         ]
 
+    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+        """Return how the frames of the decays are spaced, in two lines for a plan."""
+        return self._decay(self.charges[0]).frame_spacing(offers)
+
     def _decays(self, light: Light) -> list[Unit]:
         metering = f"meter-{light}"
         decays: list[Unit] = [
@@ -173,6 +182,7 @@ class Saturation(ProtocolModel):
                 "sample": self.sample,
                 "charge": f"{charge_s!r} s",
                 "every": f"{self.every!r} s",
+                "spacing": self.spacing,
                 "for": f"{self.duration!r} s",
                 "first": f"{self.first!r} s",
                 "camera": self.camera,

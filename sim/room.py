@@ -43,11 +43,18 @@ from .optics import (
     vignetting,
 )
 from .sample_changer import SampleHolder
-from .sensor import BAYER_RGGB, Course, Sensor, SensorTemperature, gain_electrons_per_dn
+from .sensor import (
+    BAYER_RGGB,
+    Course,
+    ExposureCourse,
+    Sensor,
+    SensorTemperature,
+    gain_electrons_per_dn,
+)
 from .simulation import Simulation
 from .table import Table
 from .truth import Truth, true_lvf, true_patches
-from .wander import Wander
+from .wander import Ripple, Wander
 
 FloatArray = NDArray[np.float64]
 
@@ -56,7 +63,7 @@ TICK_S = 1e-6
 
 #: Streams of random numbers drawn from the seed, so that one does not shift another.
 CURVES_STREAM, SENSOR_STREAM, FRAME_STREAM, LIVE_STREAM = 0, 1, 2, 3
-FLICKER_STREAM, BLACK_STREAM = 30, 31
+FLICKER_STREAM, BLACK_STREAM, RIPPLE_STREAM = 30, 31, 32
 
 
 class Room:
@@ -129,6 +136,7 @@ class Room:
             row_noise=sensor.row_noise,
             nonlinearity=sensor.nonlinearity,
             flicker_course=self._flicker_course(),
+            ripple=self._ripple(),
             black_course_dn=self._black_course_dn(),
             subtracts_black=sensor.subtracts_black,
         )
@@ -407,6 +415,12 @@ class Room:
     def _flicker_course(self) -> Course | None:
         over_s = self._simulation.sensor.flicker_over
         return None if over_s is None else Wander(self._rng(FLICKER_STREAM), over_s)
+
+    def _ripple(self) -> ExposureCourse | None:
+        sensor = self._simulation.sensor
+        if not sensor.ripple:
+            return None
+        return Ripple(self._rng(RIPPLE_STREAM), sensor.ripple, sensor.ripple_period).mean
 
     def _black_course_dn(self) -> Course | None:
         sensor = self._simulation.sensor

@@ -17,6 +17,8 @@ Float32Array = NDArray[np.float32]
 Mosaic = NDArray[np.uint16]
 #: Function of the time in seconds since 1970.
 Course = Callable[[float], float]
+#: Function of begin and length of an exposure.
+ExposureCourse = Callable[[float, float], float]
 
 #: Colour channel (0 R, 1 G, 2 B) of the four places of a Bayer cell, row by row.
 BAYER_RGGB = (0, 1, 1, 2)
@@ -124,6 +126,9 @@ class Sensor:
     flicker_course
         Function of a frame's time that returns its flicker, in multiples of `flicker`; None: every
         frame has one of its own.
+    ripple
+        Function of an exposure's begin and length that returns the relative change of its light by
+        a periodic gain; None: none.
     black_course_dn
         Function of a frame's time that returns the wander of its black level in DN.
     subtracts_black
@@ -141,6 +146,7 @@ class Sensor:
         row_noise: float = 0.0,
         nonlinearity: float = 0.0,
         flicker_course: Course | None = None,
+        ripple: ExposureCourse | None = None,
         black_course_dn: Course | None = None,
         subtracts_black: bool = False,
     ) -> None:
@@ -159,6 +165,7 @@ class Sensor:
         self._row_noise = row_noise
         self._nonlinearity = nonlinearity
         self._flicker_course = flicker_course
+        self._ripple = ripple
         self._black_course_dn = black_course_dn
 
     def expose(
@@ -194,7 +201,8 @@ class Sensor:
         flicker = rng.standard_normal()
         if self._flicker_course is not None:
             flicker = self._flicker_course(at_s)
-        common = max(1 + self._flicker * flicker, 0.0)
+        ripple = self._ripple(at_s, exposure_s) if self._ripple is not None else 0.0
+        common = max(1 + self._flicker * flicker + ripple, 0.0)
         dark_e = DARK_ELECTRONS_PER_S * exposure_s * 2 ** ((temperature_c - AMBIENT_C) / DOUBLING_C)
         electrons = light_electrons * self._response
         electrons *= np.float32(common)

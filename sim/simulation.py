@@ -157,6 +157,11 @@ class SensorSettings(Part):
     flicker_over
         Time over which the flicker of frames is alike, for example `30 s`: its correlation falls to
         1/e, as that of an AR(1) process. Null: every frame has a flicker of its own.
+    ripple
+        Amplitude of a sine in the sensor's gain, as a fraction, for example `0.7 %`, as a power
+        supply or a regulated temperature makes it. Its phase follows from the seed.
+    ripple_period
+        Period of that sine, for example `5.1 s`.
     crosstalk
         Fraction of a pixel's charge that appears in each of its four neighbours instead.
     row_noise
@@ -181,6 +186,8 @@ class SensorSettings(Part):
     height: Pixels = 936
     flicker: Fraction = 0.007
     flicker_over: Annotated[DurationS, Field(gt=0)] | None = None
+    ripple: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.0
+    ripple_period: Annotated[DurationS, Field(gt=0)] = 5.1
     crosstalk: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
     row_noise: Annotated[Fraction, Field(ge=0)] = 0.0
     black_wander_dn: Annotated[float, Field(ge=0, le=100)] = 0.0

@@ -1,4 +1,4 @@
-"""Random numbers that change slowly: flicker of a lamp, the black level of a camera."""
+"""Courses over time: random ones, of flicker and of a black level, and a periodic one."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,3 +34,29 @@ class Wander:
         """Return the number at a time, in seconds since 1970."""
         waves = np.cos(self._per_s * (wall_s - ZERO_S) + self._phase)
         return float(np.sqrt(2 / WAVES) * waves.sum())
+
+
+class Ripple:
+    """A sine over time of random phase, of which an exposure takes the mean.
+
+    Parameters
+    ----------
+    rng
+        Random generator of the phase.
+    amplitude
+        Amplitude of the sine.
+    period_s
+        Its period in seconds, > 0.
+    """
+
+    def __init__(self, rng: np.random.Generator, amplitude: float, period_s: float) -> None:
+        self._amplitude = amplitude
+        self._per_s = 1 / period_s
+        self._phase = rng.uniform(0.0, 2 * np.pi)
+
+    def mean(self, wall_s: float, lasts_s: float) -> float:
+        """Return the mean over an exposure of `lasts_s` that begins then, seconds since 1970."""
+        middle_s = wall_s - ZERO_S + lasts_s / 2
+        sine = np.sin(2 * np.pi * self._per_s * middle_s + self._phase)
+        # NumPy's sinc x is sin πx / πx.
+        return float(self._amplitude * np.sinc(self._per_s * lasts_s) * sine)

@@ -118,7 +118,7 @@ def test_keys_are_described_by_the_models_and_their_base_classes(
     protocols = validators["protocol"].schema["$defs"]
     every = protocols["Decay"]["properties"]["every"]
     assert every["description"] == (
-        "Time between the begins of two photographs, for example `5 s`."
+        "Time between the begins of two photographs, in the mean, for example `5 s`."
     )
     assert every["default"] == "5 s"
     assert every["markdownDescription"] == every["description"]

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from labrig.acquire.frame_regions import regions_in
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
+from labrig.acquire.values import CameraOffers
 from labrig.calibration import CalibrationKind
 from labrig.quantity import LengthMm, MassPerArea
 from labrig.record import FrameRole, unit_in
@@ -126,6 +127,10 @@ class ProtocolModel(BaseModel):
             If the rig file names a file or folder that does not exist.
         """
         return self
+
+    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+        """Return how repeated frames are spaced in time, in lines for a plan; mostly none."""
+        return ()
 
     def notes(self, rig: RigFile) -> Sequence[str]:
         """Return what a person should know of this protocol on a rig before a run, a line each."""

@@ -1,6 +1,7 @@
 """The runner: performs the units of a protocol and records them in the run folder."""
 
 import logging
+import uuid
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
@@ -140,7 +141,11 @@ def _run_remaining_units(
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        recorder = _Recorder(rig.clock, writer, frames, spectra, actions, all_actions, observer)
+        attempts = [attempt.uid for attempt in record.attempts if attempt.unit == unit.name]
+        seed = _seed(attempts[0] if attempts else writer.uid)
+        recorder = _Recorder(
+            rig.clock, writer, frames, spectra, actions, all_actions, observer, seed
+        )
         session = Session(rig, recorder, observer, temperature, lights)
         try:
             with rig.clock.noticing_sleep():
@@ -155,6 +160,11 @@ def _run_remaining_units(
         actions = recorder.kept_actions
 
 
+def _seed(uid: str) -> int:
+    """Return a seed of random numbers, which follows from the uid of a unit's first attempt."""
+    return uuid.UUID(uid).int % 2**32
+
+
 class _Recorder:
     """Recorder that converts the rig's times to wall times and writes to the attempt."""
 
@@ -167,8 +177,10 @@ class _Recorder:
         actions: Sequence[ActionRecord],
         all_actions: list[ActionRecord],
         observer: RunObserver,
+        seed: int,
     ) -> None:
         self._clock = clock
+        self._seed = seed
         self._writer = writer
         self._observer = observer
         self.kept_frames = list(frames)
@@ -251,6 +263,9 @@ class _Recorder:
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return decide()
+
+    def seed(self) -> int:
+        return self._seed
 
     def _last_manual_step(self) -> ActionRecord | None:
         return next((action for action in reversed(self.kept_actions) if action.is_manual), None)

@@ -87,6 +87,9 @@ class Recorder(Protocol):
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """Return `decide()` on a bench; `worst` in a plan, which has no data to decide on."""
 
+    def seed(self) -> int:
+        """Return a seed of this unit's random numbers, the same in all attempts at it."""
+
 
 class Observer(Protocol):
     """Observer of what goes on in a run; times are on the rig's clock in seconds."""
@@ -333,6 +336,15 @@ class Session:
         self._recorder.acted("protocol", f"{what}: {chosen}", now_s, now_s, 0.0)
         return chosen
 
+    def seed(self, purpose: str) -> int:
+        """Return and record a seed of random numbers for a purpose such as `begins of frames`.
+
+        Every unit has another one, which a unit that is done again keeps.
+        """
+        seed, now_s = self._recorder.seed(), self.clock.now()
+        self._recorder.acted("protocol", f"seed of {purpose}: {seed}", now_s, now_s, 0.0)
+        return seed
+
     def warn(self, text: str) -> None:
         """Show a warning to the person at the terminal."""
         self._observer.warn(text)
@@ -442,6 +454,7 @@ class _PartRecorder:
         self.last_manual_step = recorder.last_manual_step
         self.all_actions = recorder.all_actions
         self.choose = recorder.choose
+        self.seed = recorder.seed
         self._recorder = recorder
         self._part = part
 

@@ -236,6 +236,7 @@ def _material(
                 k_r_per_s_sigma=state.k_r_sigma_per_s,
                 amplitude=state.amplitude if math.isfinite(state.amplitude) else None,
                 amplitude_sigma=state.amplitude_sigma,
+                amplitude_unit=fit.value_unit or None,
             )
             for state in fit.states_at_lamp_off
         ),

@@ -27,6 +27,8 @@ from labrig.optics import (
 )
 from labrig.results import EmissionSpectrum
 
+#: Unit of the radiance per nm on either scale.
+SCALE_UNITS = {"relative": "1/sr", "absolute": "W/(m2 sr nm)"}
 #: Relative σ of a card's curve that has none.
 CARD_SIGMA = 0.01
 
@@ -66,7 +68,7 @@ class RadiometricScale:
         )
 
     def _scaled(self, state: State) -> State:
-        changed: dict[str, Any] = {}
+        changed: dict[str, Any] = {"amplitude_unit": SCALE_UNITS[self.kind]}
         for name in ("amplitude", "reradiation"):
             value, sigma = getattr(state, name), getattr(state, f"{name}_sigma")
             if value is None:

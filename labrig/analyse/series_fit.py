@@ -115,6 +115,7 @@ def fit_series(
     return replace(
         fit,
         reference=by_clock(fit.reference, series.clock),
+        value_unit=series.value_unit,
         warnings=(*series.warnings, *fit.warnings),
     )
 

@@ -60,7 +60,7 @@ class _PlannedUnit:
 
 
 def summary(recording: "Recording", free_bytes: int) -> list[str]:
-    """Return lab time, steps by hand, frames and disk space of a plan, one line each."""
+    """Return lab time, steps by hand, frames and disk space of a plan, in lines."""
     plan, rig, size = recording.plan, recording.rig, recording.plan.size()
     by_hand = len(plan.manual_steps)
     hand_text = counted(by_hand, "step") if by_hand else "nothing"
@@ -74,6 +74,7 @@ def summary(recording: "Recording", free_bytes: int) -> list[str]:
         f"  lab time  at most {duration_text(plan.duration_s)}, {counted(len(plan.units), 'unit')}",
         f"  by hand   {hand_text}",
         f"  frames    at most {plan.frames}{frame_text}",
+        *(f"            {line}" for line in recording.protocol.frame_spacing(plan.offers)),
         f"  disk      about {size_text(size.total_bytes)}, {size_text(free_bytes)} are free",
         f"            frames {size_text(size.frames_bytes)} ({size_text(plan.offers.frame_bytes)} "
         f"each), results {size_text(size.results_bytes)}",

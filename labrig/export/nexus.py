@@ -6,7 +6,7 @@ application definition describes a decay.
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
@@ -98,6 +98,47 @@ def add_fields(entry: h5py.Group, result: RunResult, name: str, version: str) ->
             )
         if value is not None:
             _add(group, last, path[-1], value)
+        if path[-1] == "covariance":
+            owner = _owner(result, groups_of=path[:-1])
+            add_covariance_units(group[last], getattr(owner, "covariance_parameters", ()))
+
+
+def _owner(result: RunResult, groups_of: Sequence[str]) -> Any:
+    """Return what a path within a result, as of `iter_values`, leads to."""
+    owner: Any = result
+    for name in groups_of:
+        if isinstance(owner, Mapping):
+            # The only entry of a mapping may have an empty name.
+            owner = {str(key): value for key, value in owner.items()}.get(name, owner.get(""))
+        elif isinstance(owner, tuple | list):
+            owner = owner[int(name) - 1]
+        else:
+            owner = getattr(owner, name)
+    return owner
+
+
+def add_covariance_units(field: h5py.Dataset, parameters: Sequence[str], own: str = "") -> None:
+    """Add to a covariance the units of its rows, whose products are those of its numbers.
+
+    Parameters
+    ----------
+    field
+        Field of the covariance.
+    parameters
+        Names of the rows, each with its unit at the end of its first word; empty for numbers
+        without a dimension.
+    own
+        Unit of the parameters whose names have none because they have that of the values.
+    """
+    if not parameters:
+        return
+    in_values = ("amplitude", "offset")
+    rows = [
+        own or DN_PER_S if name.startswith(in_values) else field_unit(name.split()[0]) or "1"
+        for name in parameters
+    ]
+    field.attrs["units"] = f"products of {', '.join(rows)}"
+    field.attrs["rows"] = ", ".join(parameters)
 
 
 def _valid_path(*names: str) -> list[str]:
@@ -230,14 +271,15 @@ def _add_parameters(process: h5py.Group, fit: FittedDecay) -> None:
 
     states = fit.states
     add("rate", [s.k_r_per_s for s in states], [s.k_r_sigma_per_s for s in states], "1/s")
-    add("amplitude", [s.amplitude for s in states], [s.amplitude_sigma for s in states], DN_PER_S)
+    unit = fit.value_unit or DN_PER_S
+    add("amplitude", [s.amplitude for s in states], [s.amplitude_sigma for s in states], unit)
     add_text(parameters, "channel", fit.channels)
     add("channel_weight", fit.channel_weights, fit.channel_weights_sigma)
-    add("offset", fit.offsets, fit.offsets_sigma, DN_PER_S)
+    add("offset", fit.offsets, fit.offsets_sigma, unit)
     add("flicker", [fit.flicker], [fit.flicker_sigma])
     add_number(parameters, "reduced_chi2", fit.reduced_chi2)
-    order = "of rate 1, amplitude 1, rate 2, …, offset of the brightest channel"
-    add_number(parameters, "covariance", fit.covariance, "", order)
+    covariance = add_number(parameters, "covariance", fit.covariance)
+    add_covariance_units(covariance, fit.covariance_parameters, unit)
 
 
 def _brightest(patch: DecayPatch) -> int:

@@ -8,7 +8,14 @@ from labrig.fit.bispectral import (
     separate_columns,
 )
 from labrig.fit.charge import ChargeCandidate, ChargeFit, OrderState, fit_charge_and_decay
-from labrig.fit.decay import DecayFit, DecayTable, fit_decay, fit_shared_rates
+from labrig.fit.decay import (
+    DecayFit,
+    DecayTable,
+    Periodogram,
+    fit_decay,
+    fit_shared_rates,
+    periodogram,
+)
 from labrig.fit.least_squares import (
     EPSILON,
     Ending,
@@ -46,6 +53,7 @@ __all__ = [
     "MixtureFit",
     "MixtureTexture",
     "OrderState",
+    "Periodogram",
     "PowerLaw",
     "SeparatedColumns",
     "bispectral_columns",
@@ -58,5 +66,6 @@ __all__ = [
     "fit_shared_rates",
     "fit_trap_depth",
     "least_squares",
+    "periodogram",
     "separate_columns",
 ]

@@ -102,6 +102,8 @@ class State(_Part):
     amplitude
         Amplitude a = Λ k_r r(0) of the state in the decay, in the camera's or the fit's own unit;
         Λ k_r r(0)ᵇ with a kinetic order.
+    amplitude_unit
+        Unit of `amplitude` and its σ, for example `DN/s`; null if it is not known.
     r0
         Concentration r(0) of the state at lamp off to which `amplitude` belongs, 0 to 1.
     decay_time_s
@@ -139,6 +141,7 @@ class State(_Part):
     k_r_per_s: Rate
     kinetic_order: Order = 1.0
     amplitude: NotNegative | None = None
+    amplitude_unit: str | None = None
     r0: Concentration | None = None
     decay_time_s: Rate | None = None
     k_e_per_s: Series | None = None
@@ -232,6 +235,8 @@ class State(_Part):
         self, handler: SerializerFunctionWrapHandler
     ) -> dict[str, Any]:
         content: dict[str, Any] = handler(self)
+        if self.amplitude_unit is None:
+            content.pop("amplitude_unit", None)
         if self.kinetic_order == 1:
             for name in OF_ORDER:
                 content.pop(name, None)

@@ -172,7 +172,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     >>> processed.report.as_posix()
     'runs/decay/result/report.html'
     >>> print(processed.lines[0].splitlines()[1])
-    state  k / s⁻¹      1/k / s    amplitude
+    state  k / s⁻¹      1/k / s    amplitude / (DN/s)
     """
     folder, overrides = Path(folder), overrides or Overrides()
     protocol = read_run_protocol(folder)
@@ -249,7 +249,7 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     >>> from labrig.process import draw_figures
     >>> path, n_pages = draw_figures("runs/decay")
     >>> path.as_posix(), n_pages
-    ('runs/decay/result/figures/figures.pdf', 7)
+    ('runs/decay/result/figures/figures.pdf', 8)
     """
     folder = Path(folder)
     run, protocol, result = read_run(folder), read_run_protocol(folder), read_result(folder)

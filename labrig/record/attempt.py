@@ -93,6 +93,7 @@ class AttemptWriter:
         import event_model
 
         self.unit = unit
+        self.uid = new_uid()
         self._journal = journal
         self._frames_folder = frames_folder
         self._next_number = next_number
@@ -101,7 +102,7 @@ class AttemptWriter:
         self._disk = disk
         self._executor = executor
         self._bundle = event_model.compose_run(
-            uid=new_uid(), time=wall(), metadata={**metadata, "unit": unit}
+            uid=self.uid, time=wall(), metadata={**metadata, "unit": unit}
         )
         self._streams: dict[str, Any] = {}
         journal.append("start", self._bundle.start_doc)

@@ -20,6 +20,7 @@ from labrig.report.decay_figures import (
 from labrig.report.law_figure import law_figure
 from labrig.report.methods import REFERENCES, UNKNOWN, UNKNOWN_OF_A_TABLE, methods
 from labrig.report.outside_sigma import outside_sections, unrecorded_temperature
+from labrig.report.periodogram_figure import periodogram_figure, residual_periodogram
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.report_model import (
     DECAY_ASSUMPTIONS,
@@ -432,6 +433,8 @@ def _patch(number: int, patch: PatchReport, screen: Screen, anchor: str) -> _Pat
     noise_parts: tuple[str, ...] = ()
     if fit is not None:
         figures.append(Picture("residuals", residual_figure(series, fit)))
+        if (lines := residual_periodogram(series, fit)) is not None:
+            figures.append(Picture("periodogram", periodogram_figure(lines)))
         figures.append(Picture("laws", law_figure(series, fit)))
     if patch.noise is not None:
         figures.append(Picture("noise", noise_figure(patch.noise)))

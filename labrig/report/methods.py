@@ -18,6 +18,8 @@ from labrig.results import EXPONENTIALS, LAW_LABELS, LAW_NAMES, FittedDecay
 
 #: Relative difference below which durations and exposures are given as one value.
 ALIKE = 0.02
+#: Relative spread of the pauses between frames from which they are random.
+RANDOM = 0.1
 
 
 def recording(
@@ -112,13 +114,24 @@ def _exposures(frames: Sequence[FrameRecord]) -> str:
 
 
 def _interval(decays: Sequence[FrameRecord]) -> str:
-    """Return the planned interval between exposures as text: the measured one less lateness."""
+    """Return the planned interval between exposures as text: the measured one less lateness.
+
+    Of random begins it is the mean, and the shortest one.
+    """
     gaps_s = [
         (after.start_time - after.late_s) - (before.start_time - before.late_s)
         for before, after in pairwise(decays)
         if before.unit == after.unit
     ]
-    return f", one every {duration_text(float(np.median(gaps_s)))}" if gaps_s else ""
+    if not gaps_s:
+        return ""
+    mean_s, least_s = float(np.mean(gaps_s)), min(gaps_s)
+    if max(gaps_s) - least_s > RANDOM * mean_s:
+        return (
+            f", at random times, one every {duration_text(mean_s)} in the mean and at least "
+            f"{duration_text(float(rounded(least_s, 3)))} apart"
+        )
+    return f", one every {duration_text(float(np.median(gaps_s)))}"
 
 
 def _mean(report: DecayReport, sensor: Sensor | None) -> str:

@@ -18,7 +18,8 @@ def unrecorded_temperature(result: DecayResult) -> tuple[str, ...]:
 def outside_sections(result: DecayResult) -> tuple[Section, ...]:
     """Return the section with all statements of a decay; empty if there are none."""
     unseen = _of_patches(result, lambda patch: patch.fit.outside_sigma if patch.fit else "")
-    statements = (*unrecorded_temperature(result), *unseen)
+    flicker = _of_patches(result, lambda patch: str((patch.fit and patch.fit.unseen_flicker) or ""))
+    statements = (*unrecorded_temperature(result), *unseen, *flicker)
     if not statements:
         return ()
     text = tuple(f"{line[0].upper()}{line[1:]}." for line in statements)

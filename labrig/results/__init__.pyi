@@ -256,6 +256,7 @@ from .trap_depth import (
     state_name as state_name,
     trap_depths_json as trap_depths_json,
 )
+from .unseen_flicker import UnseenFlicker as UnseenFlicker
 from .validate_illuminants import (
     LampComparison as LampComparison,
     LampPatch as LampPatch,

@@ -25,6 +25,7 @@ from labrig.results.fitted_law import (
 from labrig.results.interval import ProfileInterval, interval_lines
 from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text
+from labrig.results.unseen_flicker import UnseenFlicker
 
 #: Times of the measurement beyond which a signal is not predicted with σ.
 FORECAST_SPANS = 3.0
@@ -254,6 +255,11 @@ class FittedDecay:
     intervals
         Intervals by profile likelihood, where ±σ misses them by more than 20 % or where they were
         asked for: of `k_r_per_s 1`, `lifetime_s 1`, …, and of the law's own `parameters`.
+    value_unit
+        Unit of the values, and so of amplitudes and offsets, such as `DN/s`; empty if unknown.
+    unseen_flicker
+        Periodic flicker that evenly spaced frames do not distinguish from the decay; None if there
+        is none.
     """
 
     states: tuple[DecayState, ...]
@@ -282,6 +288,8 @@ class FittedDecay:
     sigma_factor: float = field(default=1.0, kw_only=True)
     unseen_state: UnseenState | None = field(default=None, kw_only=True)
     intervals: Mapping[str, ProfileInterval] = field(default_factory=dict, kw_only=True)
+    unseen_flicker: UnseenFlicker | None = field(default=None, kw_only=True)
+    value_unit: str = field(default="", kw_only=True)
 
     @property
     def other_laws(self) -> tuple[FittedLaw | FittedRateSpectrum, ...]:
@@ -620,6 +628,8 @@ class FittedDecay:
             "sigma_factor": self.sigma_factor,
             "unseen_state": asdict(self.unseen_state) if self.unseen_state else None,
             "intervals": {name: each.to_dict() for name, each in self.intervals.items()},
+            "value_unit": self.value_unit,
+            "unseen_flicker": asdict(self.unseen_flicker) if self.unseen_flicker else None,
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -639,7 +649,8 @@ class FittedDecay:
             ]
             for number, state in enumerate(self.states, start=1)
         ]
-        lines = aligned([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
+        amplitude = f"amplitude / ({self.value_unit})" if self.value_unit else "amplitude"
+        lines = aligned([["state", "k / s⁻¹", "1/k / s", amplitude], *rows])
         if not self.reference.is_lamp_off:
             lines.append(f"amplitudes are those at {self.reference}, where laws begin")
         lines += interval_lines(self.named_intervals)
@@ -647,7 +658,8 @@ class FittedDecay:
             f"weights  {self._values_text(self.channel_weights, self.channel_weights_sigma)}"
         )
         if any(self.offsets_sigma):
-            lines.append(f"offsets  {self._values_text(self.offsets, self.offsets_sigma)}")
+            offsets = self._values_text(self.offsets, self.offsets_sigma)
+            lines.append(f"offsets  {offsets} {self.value_unit}".rstrip())
         if len(self.repeats) > 1:
             pairs = zip(self.repeats, self.levels, strict=True)
             lines.append(f"levels   {', '.join(f'{name} {level:.4f}' for name, level in pairs)}")
@@ -664,8 +676,8 @@ class FittedDecay:
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         if self.other_laws:
             lines += aligned([["law", "", "reduced χ²", "BIC"], *self._law_rows()])
-        if self.outside_sigma:
-            lines += wrap(f"not in σ {self.outside_sigma}", LINE_WIDTH, subsequent_indent=" " * 9)
+        for outside in filter(None, (self.outside_sigma, str(self.unseen_flicker or ""))):
+            lines += wrap(f"not in σ {outside}", LINE_WIDTH, subsequent_indent=" " * 9)
         lines += [f"! {warning}" for warning in self.warnings]
         return "\n".join(lines)
 

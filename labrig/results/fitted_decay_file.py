@@ -22,6 +22,7 @@ from labrig.results.fitted_decay import (
 from labrig.results.fitted_law import fitted_law, fitted_rate_spectrum
 from labrig.results.interval import read_intervals
 from labrig.results.text_files import write_json
+from labrig.results.unseen_flicker import UnseenFlicker
 
 FILE = "fit.json"
 
@@ -179,7 +180,7 @@ def _from_dict(content: Any) -> FittedDecay:
         raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
     weights: Mapping[str, float] = content["channel_weights"]
     scatter, spectrum = content["sigma_from_scatter"], content["rate_spectrum"]
-    unseen = content["unseen_state"]
+    unseen, flicker = content["unseen_state"], content["unseen_flicker"]
     return FittedDecay(
         states=tuple(
             DecayState(
@@ -223,6 +224,8 @@ def _from_dict(content: Any) -> FittedDecay:
         sigma_factor=float(content["sigma_factor"]),
         unseen_state=None if unseen is None else _unseen_state(unseen),
         intervals=read_intervals(content["intervals"]),
+        value_unit=content["value_unit"],
+        unseen_flicker=None if flicker is None else UnseenFlicker(**flicker),
     )
 
 

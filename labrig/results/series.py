@@ -61,7 +61,7 @@ class Series:
         Correlation of the channels' dark levels, whose σ is `dark_sigma`, shape (C, C); None if
         unknown. Not a column of series.csv.
     value_unit
-        Unit of `values`; empty if unknown. Not a column of series.csv.
+        Unit of `values`, which their columns in series.csv have in brackets; empty if unknown.
     warnings
         What is to be said of the rows that were read, such as those left out. Not in series.csv.
     clock
@@ -157,10 +157,14 @@ def write_series(path: Path, series: Sequence[Series]) -> None:
     >>> [series.region for series in labrig.read_series("two-patches.csv")]
     ['sample', 'right']
     """
-    channels = {part.channels for part in series}
+    channels = {(part.channels, part.value_unit) for part in series}
     if len(channels) != 1:
-        raise DataError(f"expected series of the same channels, got {sorted(channels)}")
-    columns = [column for name in channels.pop() for column in (name, name + SIGMA_SUFFIX)]
+        raise DataError(f"expected series of the same channels and unit, got {sorted(channels)}")
+    names, unit = channels.pop()
+    in_unit = f" ({unit})" if unit else ""
+    columns = [
+        column for name in names for column in (name + in_unit, name + SIGMA_SUFFIX + in_unit)
+    ]
     rows = (row for part in series for row in _rows(part))
     write_csv(path, (TIME, EXPOSURE, *columns, *RESERVED), rows)
 

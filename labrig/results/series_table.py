@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal
@@ -73,6 +74,8 @@ def join_series(parts: Sequence[Series]) -> Series:
 
 
 _FROM_THE_TABLE = TableLayout()
+#: Column of a σ in series.csv, with the unit that the values have, too.
+_SIGMA_COLUMN = re.compile(rf"(?P<name>.+){SIGMA_SUFFIX}(?P<unit>| \(.+\))")
 #: Remedy for a cell without a number.
 _DELETE = "delete the row"
 
@@ -155,8 +158,8 @@ def read_described_series(
     Examples
     --------
     >>> from labrig.results import read_described_series
-    >>> read_described_series("series.csv")[1]
-    'time t_s (s, line 1); values R, G, B; σ R_sigma, G_sigma, B_sigma'
+    >>> read_described_series("series.csv")[1].split("; σ")[0]
+    'time t_s (s, line 1); values R (DN/s), G (DN/s), B (DN/s)'
     """
     folder = Path(path)
     if folder.is_dir():
@@ -290,16 +293,27 @@ def _cells(line: str, number: int) -> list[str]:
 def _own_columns(table: Block) -> Columns:
     """Return the roles of the columns of a series.csv, whose names are taken literally."""
     index = {name: column for column, name in enumerate(table.names)}
-    channels = table.names[2 : -len(RESERVED) : 2]
-    if len(index) != len(table.names) or any(name + SIGMA_SUFFIX not in index for name in channels):
+    own = [_SIGMA_COLUMN.fullmatch(name) for name in table.names[3 : -len(RESERVED) : 2]]
+    sigmas = [match for match in own if match]
+    units = {match["unit"] for match in sigmas}
+    expected = [f"{match['name']}{match['unit']}" for match in sigmas]
+    if (
+        len(index) != len(table.names)
+        or len(units) != 1
+        or expected != list(table.names[2 : -len(RESERVED) : 2])
+    ):
         raise UsageError(f"{EXPECTED}, got {', '.join(table.names)}; a column was renamed")
+    channels = [
+        Channel(match["name"], column, column + 1)
+        for column, match in zip(range(2, len(table.names), 2), sigmas, strict=False)
+    ]
     return Columns(
         names=table.names,
         time=TimeAxis(0, 1.0, "s, line 1"),
         exposure=1,
-        channels=tuple(Channel(name, index[name], index[name + SIGMA_SUFFIX]) for name in channels),
+        channels=tuple(channels),
         reserved={name: index[name] for name in RESERVED},
-        value_unit="DN/s",
+        value_unit=units.pop()[2:-1],
     )
 
 

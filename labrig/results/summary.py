@@ -52,7 +52,7 @@ def read_summary(folder: Path) -> tuple[str, ...]:
     >>> from pathlib import Path
     >>> from labrig.results import read_summary
     >>> read_summary(Path("runs/decay/result"))[1]
-    'state  k / s⁻¹      1/k / s    amplitude'
+    'state  k / s⁻¹      1/k / s    amplitude / (DN/s)'
     >>> read_summary(Path("nowhere"))
     ()
     """

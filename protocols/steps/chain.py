@@ -6,7 +6,7 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from labrig import plugins
-from labrig.acquire import PartUnit, ProtocolModel, RigFile, Sample
+from labrig.acquire import CameraOffers, PartUnit, ProtocolModel, RigFile, Sample
 from labrig.record import unit_in, unit_within
 from labrig.region import Region
 from labrig.yaml_file import validate
@@ -76,6 +76,18 @@ class Chain(ProtocolModel):
             for content, part in zip(self.parts, self._links(), strict=True)
         ]
         return self.model_copy(update={"parts": tuple(parts)})
+
+    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+        """Return the parts whose frames are spaced alike, and how, in lines for a plan."""
+        parts: dict[tuple[str, ...], list[str]] = {}
+        for part in self._links():
+            if lines := tuple(part.protocol.frame_spacing(offers)):
+                parts.setdefault(lines, []).append(part.name)
+        return [
+            text
+            for (first, *others), names in parts.items()
+            for text in (f"{', '.join(names)}: {first}", *others)
+        ]
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols that neither the rig file names nor an earlier part measures."""

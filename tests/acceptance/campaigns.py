@@ -152,6 +152,7 @@ CAMPAIGNS = {
             called="coverage_pipeline_other_scenarios",
         ),
         _module("coverage_decay_fit", "--seeds", "100"),
+        _module("beating_flicker", "--seeds", "100"),
         _module("reference_data"),
         _module("predicted_sigmas", "--days", "32", "--only", "double"),
         _module(

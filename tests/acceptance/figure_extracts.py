@@ -40,6 +40,14 @@ def decay_fit(printed: str) -> str:
     return f"{span(one)} % within 1 σ, {span(two)} % within 2 σ"
 
 
+def beating(printed: str) -> str:
+    wrong = {
+        spacing: columns(rf"^(\d) +{spacing} +sine (?:5\.1|4\.9|2\.55) s +([\d.]+)", printed)[1]
+        for spacing in ("even", "random")
+    }
+    return f"{span(wrong['even'])} % evenly spaced, {span(wrong['random'])} % at random times"
+
+
 def power_laws(printed: str) -> str:
     (flagged,) = columns(r"^power law .*power law ([\d.]+) %", printed)
     return f"{span(flagged)} %"

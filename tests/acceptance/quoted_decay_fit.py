@@ -90,8 +90,22 @@ def _example_rates(printed: str) -> str:
     return f"The fit finds two states, {fast} and {slow} per second"
 
 
+def _beating(printed: str) -> str:
+    def wrong(states: int, spacing: str) -> str:
+        return match(rf"^{states} +{spacing} +sine 5\.1 s +([\d.]+)", printed)
+
+    decays = match(r"^(\d+) decays a line", printed)
+    return (
+        f"Over {decays} decays each, with a sine of 0.7 % and 5.1 s, frames every 5 s have the "
+        f"rate of one state wrong by more than 3 σ in {wrong(1, 'even')} % where they are even and "
+        f"in {wrong(1, 'random')} % where they are random, and a rate of two states in "
+        f"{wrong(2, 'even')} % and {wrong(2, 'random')} %"
+    )
+
+
 QUOTES = (
     Quote(PAGE, "tables_that_drift", _correlated),
+    Quote(PAGE, "beating_flicker", _beating),
     Quote(PAGE, "tables_of_wrong_sigma", _wrong_sigma),
     Quote(PAGE, "decay_states_that_hide", _hidden),
     Quote(PAGE, "law_confusion", _laws),

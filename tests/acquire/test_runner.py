@@ -163,3 +163,26 @@ def test_a_missing_device_is_named(folder: RunFolder) -> None:
     rig = Rig("bare bench", clock, {"camera": NotingCamera(clock, list[str]().append)}, {})
     with folder, pytest.raises(ProtocolError, match="needs a lamp, the rig 'bare bench' has none"):
         run_units([Flash("a")], rig, folder, Watching(), {})
+
+
+def test_a_unit_that_is_done_again_draws_the_same_seed(folder: RunFolder) -> None:
+    clock, notes = VirtualClock(), list[str]()
+    rig, _ = make_rig(clock, notes)
+    drawn: list[tuple[str, int]] = []
+
+    class Chancy(Flash):
+        def run(self, session: Session) -> None:
+            drawn.append((self.name, session.seed("begins")))
+            if len(drawn) == 2:
+                raise DeviceError("camera: gone")
+
+    with folder:
+        with pytest.raises(DeviceError):
+            run_units([Chancy("a"), Chancy("b")], rig, folder, Watching(), {})
+        folder.close_open_attempts(clock.wall, "fail", "test")
+        run_units([Chancy("a"), Chancy("b")], rig, folder, Watching(), {})
+        texts = [action.action for action in folder.read().completed()["b"].actions]
+    (first, before), (failed, lost), (again, after) = drawn
+    assert (first, failed, again) == ("a", "b", "b")
+    assert lost == after != before
+    assert texts == [f"seed of begins: {after}"]

@@ -88,7 +88,7 @@ def test_the_report_says_what_was_done(
         "the door was <open>",
         # Asked for were 10 min; the lamp takes 15 min to warm up.
         "was charged under the lamp for 15 min.",
-        "took 12 RAW frames, each exposed for 1 s, one every 5 s",
+        "took 12 RAW frames, each exposed for 1 s, at random times, one every 5 s in the mean",
         "averaged over a region of the frame of 48 × 32 pixels",
         "(4 dark frames of 1 s, taken before the decay)",
         "The number of states was set to 1.",

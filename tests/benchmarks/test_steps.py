@@ -126,6 +126,9 @@ class NothingRecorded:
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return worst
 
+    def seed(self) -> int:
+        return 0
+
 
 class NoDisk:
     """Forgets what it is given."""

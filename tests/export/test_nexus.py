@@ -88,6 +88,8 @@ def test_the_fit_is_that_of_fit_json_and_leaves_the_residuals_it_says(
         assert fit["parameters/rate_errors"][0] == state["k_r_sigma_per_s"]
         assert fit["parameters/amplitude"].attrs["units"] == "DN/s"
         assert fit["parameters/covariance"][()].tolist() == kept["covariance"]
+        units = fit["parameters/covariance"].attrs["units"]
+        assert units == "products of 1/s, DN/s, DN/s"
         assert json.loads(fit["fit/data"].asstr()[()]) == kept
         measured, curve = file["entry/decay_1_sample"], fit["decay_1_curve"]
         k, t = state["k_r_per_s"], measured["exposure_start"][()]

@@ -21,6 +21,7 @@ from labrig.report.decay_figures import (
 )
 from labrig.report.figure_files import FigureFiles
 from labrig.report.figure_style import CARET_DOWN, figure_style
+from labrig.report.periodogram_figure import periodogram_figure, residual_periodogram
 from labrig.report.residual_figures import residual_figure, residuals
 from labrig.report.sections import Picture
 from labrig.report.timing import FrameTiming
@@ -41,6 +42,8 @@ def fit_of(series: Series) -> DecayFit:
 
 
 FIT = fit_of(SERIES)
+LINES = residual_periodogram(SERIES, FIT)
+assert LINES is not None
 TIMINGS = [FrameTiming(f"{n}", f"decay-{n % 2}", 5.0 * n, 0.001 * n) for n in range(10)]
 
 
@@ -50,10 +53,11 @@ TIMINGS = [FrameTiming(f"{n}", f"decay-{n % 2}", 5.0 * n, 0.001 * n) for n in ra
         lambda: linear_decay(SERIES, FIT),
         lambda: logarithmic_decay(SERIES, FIT),
         lambda: residual_figure(SERIES, FIT),
+        lambda: periodogram_figure(LINES),
         lambda: overview_figures([patch(SERIES)])[0],
         lambda: timing_figure(TIMINGS),
     ],
-    ids=["linear", "log", "residuals", "overview", "timing"],
+    ids=["linear", "log", "residuals", "periodogram", "overview", "timing"],
 )
 def test_axes_are_labelled_and_inside_the_figure(make: Callable[[], Chart]) -> None:
     with figure_style():

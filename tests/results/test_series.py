@@ -72,7 +72,7 @@ def test_csv_gives_back_what_was_written(
     for one, other in zip(written, read, strict=True):
         for field in ("t_s", "exposure_s", "values", "sigma", "iso", "f_number"):
             assert np.array_equal(getattr(one, field), getattr(other, field), equal_nan=True)
-        for field in ("channels", "frame", "unit", "flag", "region"):
+        for field in ("channels", "frame", "unit", "flag", "region", "value_unit"):
             assert getattr(one, field) == getattr(other, field)
 
 
@@ -95,7 +95,8 @@ SERIES = Series(
 def test_the_file_is_as_the_contract_says(tmp_path: Path) -> None:
     SERIES.write_csv(tmp_path / "series.csv")
     assert (tmp_path / "series.csv").read_text().splitlines() == [
-        "t_s,exposure_s,R,R_sigma,G,G_sigma,iso,f_number,frame,unit,region,flag",
+        "t_s,exposure_s,R (DN/s),R_sigma (DN/s),G (DN/s),G_sigma (DN/s),iso,f_number,frame,unit,"
+        "region,flag",
         "0.6,0.5,10.0,0.1,20.0,0.2,100.0,,000001.cr2,a,paint,",
         "2.0,0.5,5.0,0.1,10.0,0.2,100.0,,000002.cr2,b,paint,late+clipped",
         "4.0,1.0,2.5,,0.3333333333333333,0.1,200.0,,000003.cr2,a,paint,late",

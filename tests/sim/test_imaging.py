@@ -13,7 +13,7 @@ from labrig.sim.lamp import C2_NM_K, WAVELENGTH_NM, Lamp
 from labrig.sim.lvf import PIECES, Lvf
 from labrig.sim.sensor import BLACK_DN, Sensor, gain_electrons_per_dn
 from labrig.sim.simulation import LampSettings
-from labrig.sim.wander import ZERO_S, Wander
+from labrig.sim.wander import ZERO_S, Ripple, Wander
 from tests.sim.darkroom import SMALL, Darkroom, colours
 
 FloatArray = NDArray[np.float64]
@@ -182,3 +182,18 @@ def test_nothing_of_it_is_there_unless_it_is_switched_on() -> None:
     imaging = Imaging(bench.simulation.imaging, 1)
     assert imaging.imaged(EVEN) is EVEN
     assert imaging.textured(EVEN, Arrangement()) is EVEN
+
+
+def test_a_ripple_is_a_sine_of_which_an_exposure_takes_the_mean() -> None:
+    ripple = Ripple(np.random.default_rng(2), 0.05, 4.0)
+    begins_s = ZERO_S + np.linspace(0, 8, 33)
+    at_once = np.array([ripple.mean(begin_s, 1e-6) for begin_s in begins_s])
+    assert np.abs(at_once).max() == pytest.approx(0.05, rel=0.02)
+    assert at_once[16:] == pytest.approx(at_once[:17], abs=1e-6)
+    fine = [ripple.mean(begins_s[3] + t, 0.0) for t in (np.arange(1000) + 0.5) / 1000]
+    assert ripple.mean(begins_s[3], 1.0) == pytest.approx(np.mean(fine), rel=1e-5)
+    assert ripple.mean(begins_s[3], 4.0) == pytest.approx(0.0, abs=1e-12)
+    steady = Sensor(np.random.default_rng(5), FLAT, 0.0)
+    rippled = Sensor(np.random.default_rng(5), FLAT, 0.0, ripple=ripple.mean)
+    ratio = exposed(rippled, begins_s[3]) / exposed(steady, begins_s[3]) - 1
+    assert ratio == pytest.approx(ripple.mean(begins_s[3], 0.01), abs=1e-3)

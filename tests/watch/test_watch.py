@@ -147,7 +147,7 @@ def test_the_points_are_the_decay(growing: Growing) -> None:
     assert greens == sorted(greens, reverse=True)
     # before dark frames are subtracted, and so within a few per cent of the result
     series = (growing.path / "result" / "left" / "series.csv").read_text().splitlines()
-    column = series[0].split(",").index("G")
+    column = series[0].split(",").index("G (DN/s)")
     assert greens[0] == pytest.approx(float(series[1].split(",")[column]), rel=0.05)
 
 

@@ -40,6 +40,7 @@ def excited_material(
                 kinetic_order_sigma=_known(state.kinetic_order_sigma) or None,
                 amplitude=float(max(at_off.amplitude[number], 0.0)),
                 amplitude_sigma=_known(at_off.amplitude_sigma[number]),
+                amplitude_unit="DN/s",
                 r0=float(np.clip(at_off.r0[number], 0.0, 1.0)),
                 r0_sigma=_known(at_off.r0_sigma[number]),
                 **_decay_time(fit, number),

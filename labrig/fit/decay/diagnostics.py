@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtr, chdtrc, fdtrc, ndtr
 
+from labrig.fit.decay.periodic_flicker import Periodogram, periodogram
 from labrig.fit.decay.states import APART_SIGMAS, ILL_DETERMINED, sigmas_apart
 from labrig.fit.least_squares import FloatArray
 from labrig.number_format import rounded
@@ -46,6 +48,10 @@ class Misfit:
         χ² and degrees of freedom of the residuals across the signal; 0 for one channel.
     noise_dof
         Degrees of freedom of the noise estimate; inf if σ and flicker were given.
+    middle_s, signal_to_noise
+        Middles of the exposures in seconds, and signal of each frame in σ, shape (n,).
+    repeat
+        Index of the charge that each frame follows, shape (n,).
     """
 
     t_s: FloatArray
@@ -54,6 +60,9 @@ class Misfit:
     colour_chi2: float
     colour_dof: float
     noise_dof: float
+    middle_s: FloatArray
+    signal_to_noise: FloatArray
+    repeat: NDArray[np.intp]
 
 
 def misfit_warnings(misfit: Misfit, subject: str, remedy: str) -> list[str]:
@@ -90,7 +99,7 @@ def misfit_warnings(misfit: Misfit, subject: str, remedy: str) -> list[str]:
             f"channels {misfit.colour_chi2 / misfit.colour_dof:.3g}): check dark level and σ of "
             "each channel, or fit the channels one by one"
         )
-    return warnings
+    return warnings + _flicker_warnings(misfit)
 
 
 def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> list[str]:
@@ -124,6 +133,45 @@ def _outlier_warnings(misfit: Misfit) -> list[str]:
         "(labrig process --exclude, labrig fit decay --from, or its row)"
         for row in outliers[np.argsort(-size[outliers])][:MAX_NAMED]
     ]
+
+
+def _flicker_warnings(misfit: Misfit) -> list[str]:
+    """Return a warning if the residuals after one of the charges repeat periodically."""
+    repeats = [misfit.repeat == one for one in np.unique(misfit.repeat)]
+    lines = [
+        (found, rows)
+        for rows in repeats
+        if (
+            found := periodogram(
+                misfit.middle_s[rows], misfit.frames[rows], misfit.signal_to_noise[rows]
+            )
+        )
+        is not None
+    ]
+    if not lines:
+        return []
+    found, rows = min(lines, key=lambda line: line[0].p_value)
+    p_value = min(found.p_value * len(lines), 1.0)
+    if p_value > MISFIT_LEVEL:
+        return []
+    phase = 2 * np.pi * misfit.middle_s[rows] / found.period_s
+    sine = misfit.signal_to_noise[rows] * np.stack([np.cos(phase), np.sin(phase)])
+    amplitude = np.linalg.norm(np.linalg.lstsq(sine.T, misfit.frames[rows])[0])
+    return [
+        f"the residuals repeat every {rounded(found.period_s, 3)} s, by ±"
+        f"{rounded(100 * float(amplitude), 2)} % (p = {p_value:.1g}){_aliases(found)}: light or "
+        "camera flickers; σ allows for it as for noise, find its source (a power supply, a "
+        "regulated temperature)"
+    ]
+
+
+def _aliases(line: Periodogram) -> str:
+    """Return which other periods the line of evenly spaced frames may have."""
+    if line.spacing_s is None:
+        return ""
+    rate, own = 1 / line.spacing_s, 1 / line.period_s
+    others = [f"{rounded(1 / frequency, 3)} s" for frequency in (rate - own, rate + own)]
+    return f", or every {others[0]}, {others[1]}, …, which evenly spaced frames do not tell apart"
 
 
 def order_p_value(residuals: FloatArray) -> float:

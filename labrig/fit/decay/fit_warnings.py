@@ -339,7 +339,7 @@ def _law_warning(fit: StatesFit, evidence: Evidence) -> str:
 def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence, bent: Bend | None) -> Misfit:
     """Return the residuals to test; an evident bend of the sensor is not told twice."""
     series = data.series
-    frames, _ = joint.frame_residuals(data)
+    frames, squared_snr = joint.frame_residuals(data)
     n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
     along, across = joint.leverage(data)
     residuals = joint.least_squares.residuals[: series.values.size]
@@ -353,4 +353,7 @@ def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence, bent: Ben
         colour_chi2=colour_chi2,
         colour_dof=series.n_values - n_frames - across,
         noise_dof=evidence.noise_dof,
+        middle_s=series.t_s + series.exposure * series.span_s / 2,
+        signal_to_noise=np.sqrt(squared_snr),
+        repeat=series.repeat,
     )

@@ -13,11 +13,20 @@ from labrig.fit.decay.joint import covariance_under_flicker, weight_sigma
 from labrig.fit.decay.laws import LAW_RATE, LawFit
 from labrig.fit.decay.misfit_covariance import with_misfit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation, noise_correlation
+from labrig.fit.decay.periodic_flicker import unseen_flicker
+from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
-from labrig.results import DecayReference, DecayState, FittedDecay, UnseenState, first_row_at
+from labrig.results import (
+    DecayReference,
+    DecayState,
+    FittedDecay,
+    UnseenFlicker,
+    UnseenState,
+    first_row_at,
+)
 
 
 @dataclass(frozen=True)
@@ -131,6 +140,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
             if fast is None or (hidden is not None and hidden.is_likely)
             else _unseen_state(fit, data, fast, states)
         ),
+        unseen_flicker=_unseen_flicker(series),
         sigma=sigma_used,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
@@ -172,6 +182,14 @@ def _unseen_state(
         rate_changes=tuple(changes[:, 0, worst].tolist()),
         amplitude_changes=tuple(changes[:, 1, worst].tolist()),
     )
+
+
+def _unseen_flicker(series: DecaySeries) -> UnseenFlicker | None:
+    """Return what the frames after the charge with most of them hide."""
+    measured = series.inverse_sigma.any(axis=1)
+    most = np.argmax(np.bincount(series.repeat[measured]))
+    rows = measured & (series.repeat == most)
+    return unseen_flicker(series.t_s[rows], series.exposure[rows] * series.span_s)
 
 
 def _noise_correlation(
