@@ -37,6 +37,10 @@ class Sample(BaseModel):
     thickness
         Thickness of the layer, for example `0.4 mm`, which the material file takes over. Several
         patches count as equally thick.
+    max_optical_density
+        Largest decadic optical density that the layer may have in the light that it absorbs most,
+        for example `0.05`, as a spectrometer measured it or as you are sure of it. It bounds what
+        the thickness may do to excitation rates. Several patches share it.
     mass_per_area
         Mass of the phosphor per area, for example `300 g/m2`, which the material file takes over.
     batch
@@ -52,6 +56,7 @@ class Sample(BaseModel):
 
     name: str = Field("sample", min_length=1)
     thickness: Annotated[LengthMm, Field(gt=0)] | None = None
+    max_optical_density: Annotated[float, Field(gt=0, le=4)] | None = None
     mass_per_area: Annotated[MassPerArea, Field(gt=0)] | None = None
     batch: str | None = None
     last_light: str | None = Field(None, description="when and which light it saw last")

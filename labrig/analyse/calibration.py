@@ -7,12 +7,19 @@ import numpy as np
 from labrig.analyse.chain import analyse_parts
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripFrames
-from labrig.calibration import CardPicture, LvfFile, ReferenceFile
+from labrig.calibration import (
+    LVF_KIND,
+    REFERENCE_KIND,
+    CardPicture,
+    LvfFile,
+    ReferenceFile,
+    kinds,
+)
 from labrig.fit.lvf import place_means
 from labrig.optics import SLICES
 from labrig.protocols.lvf_calibration import LvfFrames, filter_unit
 from labrig.reduce import read_exif, read_raw, strip_profile_in
-from labrig.results import CalibrationResult
+from labrig.results import CalibrationResult, RunResult
 
 
 def analyse(part: Part) -> CalibrationResult:
@@ -24,23 +31,66 @@ def analyse(part: Part) -> CalibrationResult:
         No part can be analysed.
     """
     analysed = analyse_parts(part)
+    lvf = analysed.inputs[""].lvf
+    pictures = [
+        _picture(_part_of(part, link.name, link.protocol), lvf)
+        for link in part.protocol.chain()
+        if link.protocol.protocol == LVF_KIND.protocol
+        and link.name in analysed.results
+        and lvf is not None
+    ]
     return CalibrationResult(
         parts=analysed.results,
         failed=analysed.failed,
-        reference=_reference(part, analysed.inputs[""].lvf, set(analysed.results)),
+        reference=_reference(part, pictures[-1] if pictures else None, set(analysed.results)),
         warnings=analysed.warnings,
     )
 
 
-def _reference(part: Part, lvf: LvfFile | None, measured: set[str]) -> ReferenceFile:
+def reference_of(part: Part, result: RunResult) -> ReferenceFile | None:
+    """Return the bench to which a run belongs that measures one kind of calibration of it.
+
+    Parameters
+    ----------
+    part
+        The run.
+    result
+        Its result.
+
+    Returns
+    -------
+    ReferenceFile or None
+        The bench; None where the run measures none, or has no frames.
+
+    Raises
+    ------
+    DataError
+        A frame is damaged.
+
+    Examples
+    --------
+    >>> from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, reference_of
+    >>> import labrig
+    >>> run, result = labrig.read_run("runs/decay"), labrig.read_result("runs/decay")
+    >>> rig = Overrides().bench(run.folder)
+    >>> part = Part(run, read_run_protocol(run.folder), rig, Overrides(), Inputs())
+    >>> reference_of(part, result) is None
+    True
+    """
+    kind = next((kind for kind in kinds() if kind.protocol == part.protocol.protocol), None)
+    has_frames = any(attempt.frames for attempt in part.run.completed().values())
+    if kind is None or not kind.of_bench or kind.name == REFERENCE_KIND.name or not has_frames:
+        return None
+    if kind.name not in result.provides():
+        return None
+    lvf = result.provides()[kind.name] if kind.name == LVF_KIND.name else None
+    return _reference(part, None if lvf is None else _picture(part, lvf), {kind.protocol})
+
+
+def _reference(part: Part, picture: CardPicture | None, measured: set[str]) -> ReferenceFile:
     run, optics = part.run, part.rig.optics
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     temperatures_c = [reading.temperature_c for reading in run.temperatures()]
-    pictures = [
-        _picture(_part_of(part, link.name, link.protocol), lvf)
-        for link in part.protocol.chain()
-        if link.protocol.protocol == "lvf_calibration" and link.name in measured and lvf is not None
-    ]
     last_s = round(max(frame.end_time for frame in frames))
     return ReferenceFile(
         bench=part.rig.name,
@@ -51,7 +101,7 @@ def _reference(part: Part, lvf: LvfFile | None, measured: set[str]) -> Reference
         curves=optics.camera,
         made=datetime.fromtimestamp(last_s, UTC),
         temperature_c=round(float(np.mean(temperatures_c)), 2) if temperatures_c else None,
-        picture=pictures[-1] if pictures else None,
+        picture=picture,
         source=f"{', '.join(sorted(measured))}, measured with labrig",
         run=run.folder.resolve().name,
     )

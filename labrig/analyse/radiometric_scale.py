@@ -73,6 +73,9 @@ class RadiometricScale:
                 continue
             number = np.array(value) * self.value
             changed[name] = _plain(number)
+            ends = getattr(state, f"{name}_range", None)
+            if ends is not None:
+                changed[f"{name}_range"] = tuple(_plain(np.array(end) * self.value) for end in ends)
             if sigma is not None:
                 total = np.hypot(np.array(sigma) * self.value, number * self.relative_sigma)
                 changed[f"{name}_sigma"] = _plain(total)

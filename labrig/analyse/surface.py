@@ -22,7 +22,7 @@ def with_reflectance(
     reflectance
         Reflectance file; None leaves the material as it is.
     """
-    measured = None if reflectance is None else _own(patch, reflectance.patches)
+    measured = patch_reflectance(patch, reflectance)
     if measured is None or reflectance is None:
         return material
     return material.model_copy(
@@ -67,7 +67,10 @@ def with_reflectances(
     }
 
 
-def _own(patch: str, entries: Mapping[str, PatchReflectance]) -> PatchReflectance | None:
-    if not patch and len(entries) == 1:
-        return next(iter(entries.values()))
-    return entries.get(patch)
+def patch_reflectance(patch: str, reflectance: ReflectanceFile | None) -> PatchReflectance | None:
+    """Return the numbers of a patch; None if it was not measured."""
+    if reflectance is None:
+        return None
+    if not patch and len(reflectance.patches) == 1:
+        return next(iter(reflectance.patches.values()))
+    return reflectance.patches.get(patch)

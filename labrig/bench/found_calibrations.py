@@ -1,4 +1,4 @@
-"""Calibrations that are kept beside the runs, found for a rig whose file names none."""
+"""Calibrations that are kept beside the runs or the rig file, for a rig whose file names none."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
@@ -77,17 +77,22 @@ class FoundCalibrations:
         )
 
 
-def find_calibrations(rig: RigFile, runs: Path, now_s: float) -> FoundCalibrations:
+def find_calibrations(
+    rig: RigFile, beside: Collection[Path], now_s: float, measured: str = ""
+) -> FoundCalibrations:
     """Find calibrations for what a rig file names none of: of each kind the newest of this bench.
 
     Parameters
     ----------
     rig
         The rig file; its `calibrations:` says how old they may be.
-    runs
-        Folder of the run folders.
+    beside
+        Folders that may have a folder `calibrations`: that of the run folders, that of the rig
+        file.
     now_s
         Present time in seconds since 1970.
+    measured
+        Name of the protocol that is to run: what it measures anew is not looked for.
 
     Raises
     ------
@@ -96,10 +101,12 @@ def find_calibrations(rig: RigFile, runs: Path, now_s: float) -> FoundCalibratio
     """
     if not rig.calibrations.find:
         return FoundCalibrations(rig, {}, ())
-    wanted = [kind for kind in kinds() if rig.optics.named(kind) is None]
+    wanted = [
+        kind for kind in kinds() if rig.optics.named(kind) is None and kind.protocol != measured
+    ]
     kept: dict[str, KeptCalibration] = {}
     notes: list[str] = []
-    for each in kept_calibrations(runs):
+    for each in kept_calibrations(*beside):
         if each.reference.bench != rig.name:
             continue
         reason = _refused(each, rig, now_s)

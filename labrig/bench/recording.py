@@ -21,6 +21,7 @@ from labrig.bench.found_calibrations import FoundCalibrations, find_calibrations
 from labrig.bench.opening import open_bench, wall_at_start, with_frame_size
 from labrig.bench.run_log import run_log
 from labrig.bench_optics import require_optics
+from labrig.calibration import REFERENCE_KIND
 from labrig.errors import DiskError, ProtocolError, UsageError
 from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
 from labrig.yaml_file import yaml_text
@@ -71,7 +72,12 @@ class Recording:
         planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
         # A kept file that is malformed does not stop a run that measures it anew.
         found = (
-            find_calibrations(rig, runs, wall_at_start(rig, str(rig_path)))
+            find_calibrations(
+                rig,
+                (runs, rig_path.parent),
+                wall_at_start(rig, str(rig_path)),
+                measured=requested.protocol,
+            )
             if requested.uses_calibrations
             else FoundCalibrations(rig, {}, ())
         )
@@ -94,7 +100,9 @@ class Recording:
             "nothing in this run compares the bench with that calibration: labrig run "
             "calibration_check does",
         )
-        is_unchecked = self.found.kept and not any(
+        reference = self.found.kept.get(REFERENCE_KIND.name)
+        has_picture = reference is not None and reference.reference.picture is not None
+        is_unchecked = has_picture and not any(
             CHECK in (unit.rpartition("/")[0], self.protocol.protocol) for unit in self.plan.units
         )
         return (

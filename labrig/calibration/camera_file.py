@@ -25,6 +25,9 @@ class Noise(_Part):
         Electrons per DN from the photon transfer curve, and σ.
     read_noise_e, read_noise_e_sigma
         Read noise of one pixel in electrons without the row noise, and σ.
+    read_noise_is_limit
+        Whether the read noise is only known to be below `read_noise_e`, with 95 % confidence: it is
+        too small a part of a step of the camera's numbers to change them.
     row_noise_e
         Read noise in electrons that is common to all pixels of a row.
     """
@@ -34,6 +37,7 @@ class Noise(_Part):
     gain_e_per_dn_sigma: NotNegative
     read_noise_e: NotNegative
     read_noise_e_sigma: NotNegative
+    read_noise_is_limit: bool = False
     row_noise_e: NotNegative = 0.0
 
 

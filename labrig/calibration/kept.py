@@ -33,13 +33,16 @@ class KeptCalibration:
         return {name: path for name, path in paths.items() if path.is_file()}
 
 
-def keep_calibration(run: Path) -> Path | None:
+def keep_calibration(run: Path, reference: ReferenceFile | None = None) -> Path | None:
     """Copy the calibration files of a run's result to the calibrations beside the run.
 
     Parameters
     ----------
     run
         Folder of a run that has a result.
+    reference
+        The bench, where the result has no reference file: that of a run which measures one kind of
+        calibration of the bench. None: there is none to keep.
 
     Returns
     -------
@@ -54,7 +57,7 @@ def keep_calibration(run: Path) -> Path | None:
     True
     """
     result = run / "result"
-    if not (result / REFERENCE_KIND.file_name).is_file():
+    if reference is None and not (result / REFERENCE_KIND.file_name).is_file():
         return None
     folder = run.resolve().parent / FOLDER / run.resolve().name
     new = folder.with_name(f"{folder.name}.part")
@@ -63,19 +66,21 @@ def keep_calibration(run: Path) -> Path | None:
     for kind in kinds():
         for path in [*result.glob(kind.file_name), *result.glob(f"*/{kind.file_name}")]:
             shutil.copyfile(path, new / kind.file_name)
+    if reference is not None:
+        REFERENCE_KIND.write(new, reference)
     if folder.exists():
         shutil.rmtree(folder)
     new.rename(folder)
     return folder
 
 
-def kept_calibrations(runs: Path) -> list[KeptCalibration]:
-    """Return the calibrations that are kept beside the runs in a folder, the newest first.
+def kept_calibrations(*beside: Path) -> list[KeptCalibration]:
+    """Return the calibrations that are kept in folders, the newest first.
 
     Parameters
     ----------
-    runs
-        Folder of the run folders.
+    *beside
+        Folders that have a folder `calibrations`: that of the run folders, that of the rig file.
 
     Returns
     -------
@@ -94,11 +99,12 @@ def kept_calibrations(runs: Path) -> list[KeptCalibration]:
     >>> kept_calibrations(Path("runs"))
     []
     """
-    kept = (KeptCalibration(path.parent, REFERENCE_KIND.read(path)) for path in _references(runs))
+    paths = {path.resolve(): None for folder in beside for path in _references(folder)}
+    kept = (KeptCalibration(path.parent, REFERENCE_KIND.read(path)) for path in paths)
     return sorted(kept, key=lambda each: (each.reference.made, each.folder.name), reverse=True)
 
 
-def _references(runs: Path) -> Iterator[Path]:
-    for path in sorted((runs / FOLDER).glob(f"*/{REFERENCE_KIND.file_name}")):
+def _references(beside: Path) -> Iterator[Path]:
+    for path in sorted((beside / FOLDER).glob(f"*/{REFERENCE_KIND.file_name}")):
         if path.parent.suffix != ".part":
             yield path

@@ -30,6 +30,9 @@ class CalibrationKind(Generic[FileT]):
         Name of its file in the result of a run.
     model
         Content of its file.
+    of_bench
+        Whether it describes the bench, so that later runs of any sample find it beside theirs; a
+        calibration of samples does not hold for others.
 
     Examples
     --------
@@ -46,6 +49,7 @@ class CalibrationKind(Generic[FileT]):
     optics_key: str
     file_name: str
     model: type[FileT]
+    of_bench: bool = True
 
     def read(self, path: Path) -> FileT:
         """Read the file at `path`, or the one in the result of a run or chained run at `path`.

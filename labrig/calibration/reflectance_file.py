@@ -92,4 +92,5 @@ REFLECTANCE_KIND = CalibrationKind(
     optics_key="reflectance",
     file_name="reflectance.yaml",
     model=ReflectanceFile,
+    of_bench=False,
 )

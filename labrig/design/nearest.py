@@ -253,6 +253,7 @@ def _by_area(materials: Sequence[Material], fractions: Sequence[float]) -> Mater
                 state.model_copy(
                     update={
                         "reradiation": emitted,
+                        "reradiation_range": None,
                         "reradiation_sigma": None,
                         "amplitude": None,
                         "amplitude_sigma": None,

@@ -1,7 +1,7 @@
 """Luminance of an afterglow at given times, from readings around them.
 
 No law of decay is assumed: around each time ln L is a parabola in ln t, which every law is within a
-factor of some tenths in time. Only beyond the last reading laws say what is possible.
+factor of some tenths in time. Only the forecast beyond the last reading rests on laws.
 """
 
 import math
@@ -14,14 +14,16 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 
 from labrig.errors import FitError
-from labrig.fit.decay import fit_decay
+from labrig.fit.crossing import forecast_crossing
 from labrig.fit.least_squares import least_squares
 from labrig.quantity import duration_text
 from labrig.results import (
     MARKING_S,
+    SIGMAS_95,
     TABLE_S,
     VISIBLE_MCD_PER_M2,
     FloatArray,
+    ForecastTime,
     LuminanceAt,
     LuminanceDecay,
     LuminanceRequirement,
@@ -42,8 +44,6 @@ LEAST_SLOPE = 1e-3
 MEDIAN_TO_SIGMA = 1.4826
 #: Probability of χ² below which a parabola misses the readings.
 MISSED = 0.05
-#: Times of the last reading up to which laws are followed, and the number of times.
-FOLLOWED, N_FOLLOWED = 300.0, 400
 
 
 def fit_luminance(
@@ -102,7 +102,7 @@ def fit_luminance(
     readings = _Readings.checked(t_s, luminance_mcd_per_m2, sigma_mcd_per_m2, scale_sigma)
     visible_s = readings.falls_below(VISIBLE_MCD_PER_M2)
     at = {t: readings.luminance_at(t) for t in TABLE_S}
-    between_s, warnings = (None, ()) if visible_s else readings.reaches(VISIBLE_MCD_PER_M2)
+    forecast, warnings = (None, ()) if visible_s else readings.forecast(VISIBLE_MCD_PER_M2)
     return LuminanceDecay(
         t_s=readings.t_s,
         luminance_mcd_per_m2=readings.value,
@@ -115,7 +115,7 @@ def fit_luminance(
             (each, LuminanceAt(each.t_s, readings.luminance_at(each.t_s))) for each in required
         ),
         visible_s=visible_s,
-        visible_between_s=between_s,
+        visible_forecast=forecast,
         slope=readings.slope_between(*MARKING_S),
         light_sum=readings.light_sum(),
         colours=colours,
@@ -214,7 +214,9 @@ class _Readings:
             found = self.parabola(t)
             return math.nan if found is None else math.log(found.luminance / limit)
 
-        above, below = 0, len(self.t_s) - 1
+        # A first reading may stand too far from the others for a parabola.
+        above = next((k for k, t in enumerate(self.t_s) if not math.isnan(height(t))), 0)
+        below = len(self.t_s) - 1
         if not (height(self.t_s[above]) > 0 > height(self.t_s[below])):
             return None
         while below - above > 1:
@@ -248,7 +250,8 @@ class _Readings:
         )
         # ∫ L dt = L₀ t₀ ∫ (t/t₀)^power d ln t
         ratio = np.log(t[1:][positive] / t[:-1][positive])
-        grown = np.where(np.abs(power) < 1e-9, ratio, np.expm1(power * ratio) / power)
+        is_flat = np.abs(power) < 1e-9
+        grown = np.where(is_flat, ratio, np.expm1(power * ratio) / np.where(is_flat, 1.0, power))
         sums[positive] = light[:-1][positive] * t[:-1][positive] * grown
         weights = np.zeros_like(t)
         weights[:-1] += widths / 2
@@ -285,16 +288,24 @@ class _Readings:
             "covered",
         )
 
-    def reaches(self, limit: float) -> tuple[tuple[float, float] | None, tuple[str, ...]]:
-        """Return when the laws of decay fall below a limit after the last reading."""
+    def forecast(self, limit: float) -> tuple[ForecastTime | None, tuple[str, ...]]:
+        """Return when the luminance falls below a limit after the last reading, or why not."""
+        end = self.parabola(float(self.t_s[-1]), at_end=True)
+        if end is not None and end.luminance * (1 + SIGMAS_95 * end.relative_sigma) < limit:
+            return None, (
+                f"the last readings are below {limit:g} {UNIT}, and no reading before is clearly "
+                "above it: begin earlier after lamp off",
+            )
+        constant = float(self.scale_sigma.min())
+        added = math.sqrt(float(self.scale_sigma[-1]) ** 2 - constant**2)
+        # What comes on top at the end is an error of the zero: it is as large at the limit.
+        zero = added * max(float(self.value[-1]), limit) / limit
         try:
-            decay = fit_decay(self.t_s, self.value, self.sigma)
+            return (
+                forecast_crossing(
+                    self.t_s, self.value, self.sigma, limit, math.hypot(constant, zero)
+                ),
+                (),
+            )
         except FitError as error:
-            return None, (f"no law of decay says when {limit:g} {UNIT} is reached: {error}",)
-        later_s = self.t_s[-1] * np.geomspace(1.0, FOLLOWED, N_FOLLOWED)
-        forecast = decay.forecast(later_s)
-        ends = []
-        for light in (forecast.low, forecast.high):
-            below = np.flatnonzero(light < limit)
-            ends.append(float(later_s[below[0]]) if len(below) else math.inf)
-        return (ends[0], ends[1]), ()
+            return None, (f"no forecast of when {limit:g} {UNIT} is reached: {error}",)

@@ -59,6 +59,8 @@ class DecayLaw:
         derivatives by the logarithm of the rate and by the shape (n, 2).
     shapes
         Least and largest shape.
+    limits
+        Shapes at which the law is a simpler one: an exponential, and the second order of one trap.
     """
 
     name: str
@@ -66,6 +68,7 @@ class DecayLaw:
     value: Callable[[FloatArray, FloatArray], FloatArray]
     means: Means
     shapes: tuple[float, float]
+    limits: tuple[float, ...]
 
 
 def becquerel_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
@@ -111,7 +114,7 @@ def becquerel_means(
 def otor_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
     """Return the light of one trap at x = k t over that at lamp off."""
     level = _trap_level(phase, shape)
-    return level**2 / (shape + (1 - shape) * level)
+    return level * (level / np.maximum(shape + (1 - shape) * level, TINY))
 
 
 def otor_means(
@@ -188,20 +191,21 @@ def _trap(rate_per_s: float, shape: float, t_s: FloatArray) -> _Trap:
     phase = rate_per_s * t_s
     retrapped, escaped = shape, 1 - shape
     level = _trap_level(phase, np.asarray(shape))
-    share = retrapped + escaped * level
-    light = level**2 / share
+    share = np.maximum(retrapped + escaped * level, TINY)
+    ratio = level / share
+    light = level * ratio
     # Of g (1/m − 1) − (1 − g) log m = k t: dm/d log k = −k t l, dm/dg = (1/m − 1 + log m) l.
     by_log_rate = -phase * light
     log_level = np.log(np.maximum(level, TINY))
-    by_shape = level * (1 - level + level * log_level) / share
-    light_by_level = level * (2 * retrapped + escaped * level) / share**2
+    by_shape = ratio * (1 - level + level * log_level)
+    light_by_level = ratio * (2 * retrapped + escaped * level) / share
     return _Trap(
         level,
         light,
         by_log_rate,
         by_shape,
         light_by_level * by_log_rate,
-        light_by_level * by_shape - light * (1 - level) / share,
+        light_by_level * by_shape - ratio**2 * (1 - level),
     )
 
 
@@ -231,15 +235,29 @@ def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return psi, slope
 
 
-#: The laws by their names. A shape needs a bound where an exponential is the limit.
+#: The laws by their names. Each contains an exponential.
 DECAY_LAWS: Mapping[str, DecayLaw] = MappingProxyType(
     {
         law.name: law
         for law in (
-            DecayLaw("becquerel", "Becquerel's law", becquerel_value, becquerel_means, (0.0, 10.0)),
-            DecayLaw("otor", "one trap with retrapping", otor_value, otor_means, (0.0, 1.0)),
             DecayLaw(
-                "stretched", "stretched exponential", stretched_value, stretched_means, (0.1, 0.95)
+                "becquerel",
+                "Becquerel's law",
+                becquerel_value,
+                becquerel_means,
+                (0.0, 10.0),
+                (0.0,),
+            ),
+            DecayLaw(
+                "otor", "one trap with retrapping", otor_value, otor_means, (0.0, 1.0), (0.0, 1.0)
+            ),
+            DecayLaw(
+                "stretched",
+                "stretched exponential",
+                stretched_value,
+                stretched_means,
+                (0.1, 1.0),
+                (1.0,),
             ),
         )
     }

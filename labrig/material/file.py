@@ -45,6 +45,9 @@ MEASURED = (
     "k_e_per_s",
     "reradiation",
 )
+#: Fields of a state that may have a range by the thickness of the sample, which is written where
+#: it is known.
+RANGED = ("k_e_per_s", "reradiation")
 #: Fields that are written where the kinetic order is not 1.
 OF_ORDER = ("kinetic_order", "kinetic_order_sigma", "decay_time_s", "decay_time_s_sigma")
 #: Fields of a material that are written where they are known.
@@ -111,6 +114,12 @@ class State(_Part):
     reradiation
         Re-radiation Λ of the state in every band, as relative radiance; as many numbers as there
         are bands.
+    k_e_per_s_range
+        Least and largest k_e of every band, in the same unit, that the thickness of the sample may
+        hide: light falls with depth, and k_e is fitted as that of a surface. It is a range, no σ.
+        Default: not looked at.
+    reradiation_range
+        Least and largest Λ of every band likewise. Default: not looked at.
     k_r_per_s_sigma
         Standard deviation of `k_r_per_s`, in 1/s.
     kinetic_order_sigma
@@ -134,6 +143,8 @@ class State(_Part):
     decay_time_s: Rate | None = None
     k_e_per_s: Series | None = None
     reradiation: Series | None = None
+    k_e_per_s_range: tuple[Series, Series] | None = None
+    reradiation_range: tuple[Series, Series] | None = None
     k_r_per_s_sigma: NotNegative | None = None
     kinetic_order_sigma: NotNegative | None = None
     amplitude_sigma: NotNegative | None = None
@@ -154,6 +165,20 @@ class State(_Part):
                 raise ValueError(
                     f"expected {len(value)} values in '{name}_sigma' as in '{name}', "
                     f"got {len(sigma)}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _range_has_its_value(self) -> Self:
+        for name in RANGED:
+            value, ends = getattr(self, name), getattr(self, f"{name}_range")
+            if ends is None:
+                continue
+            bands = 0 if value is None else len(value)
+            if any(len(end) != bands for end in ends):
+                raise ValueError(
+                    f"expected {bands} least and {bands} largest values in '{name}_range', as in "
+                    f"'{name}', got {len(ends[0])} and {len(ends[1])}"
                 )
         return self
 
@@ -203,11 +228,16 @@ class State(_Part):
         return getattr(self, name)
 
     @model_serializer(mode="wrap")
-    def _without_the_first_order(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _without_what_does_not_apply(
+        self, handler: SerializerFunctionWrapHandler
+    ) -> dict[str, Any]:
         content: dict[str, Any] = handler(self)
         if self.kinetic_order == 1:
             for name in OF_ORDER:
                 content.pop(name, None)
+        for name in RANGED:
+            if getattr(self, f"{name}_range") is None:
+                content.pop(f"{name}_range", None)
         return content
 
 

@@ -156,9 +156,8 @@ def _state(state: OrderState) -> State | None:
             own |= {"kinetic_order": order.value, "kinetic_order_sigma": order.sigma}
         k_r = state.k_r_per_s
         return State(k_r_per_s=k_r.value, k_r_per_s_sigma=k_r.sigma, **own)
-    time_s = state.decay_time_s
-    if order.value > 1 or not np.isfinite(time_s.sigma):
+    rate = state.rate_at_off_per_s
+    if order.value > 1 or not np.isfinite(rate.sigma):
         return None
     # Of first order, the decay alone tells k_r.
-    rate_sigma = time_s.sigma / time_s.value**2
-    return State(k_r_per_s=1 / time_s.value, k_r_per_s_sigma=rate_sigma, **own)
+    return State(k_r_per_s=rate.value, k_r_per_s_sigma=rate.sigma, **own)

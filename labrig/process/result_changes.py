@@ -195,7 +195,7 @@ def _parameters_of_charge(path: Path) -> Parameters:
         return {}
     if content.get("kind") != "charge":
         return {}
-    symbols = {"order": "b", "amplitude": "a", "decay_time_s": "τ"}
+    symbols = {"order": "b", "amplitude": "a", "rate_at_off_per_s": "p/τ"}
     named = {
         f"{symbol} {number}": state[name]
         for number, state in enumerate(content["states"], start=1)

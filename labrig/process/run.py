@@ -7,7 +7,14 @@ from pathlib import Path
 
 from labrig import plugins
 from labrig.acquire import ProtocolModel, RigFile
-from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, temperature_warnings
+from labrig.analyse import (
+    Inputs,
+    Overrides,
+    Part,
+    read_run_protocol,
+    reference_of,
+    temperature_warnings,
+)
 from labrig.bench_optics import camera_curves, with_shipped_camera
 from labrig.calibration import LvfFile, keep_calibration
 from labrig.errors import FitError, UsageError
@@ -182,7 +189,8 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])
     analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
     inputs = Inputs.of(rig)
-    result: RunResult = analyse(Part(run, protocol, rig, overrides, inputs))
+    part = Part(run, protocol, rig, overrides, inputs)
+    result: RunResult = analyse(part)
     lvf = inputs.updated_by(result).lvf
     camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
     warnings = (*result.warnings, *unknown_camera, *temperature_warnings(run, protocol.rate_frames))
@@ -202,7 +210,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     write_report(result_folder / "report.html", report)
     include_comparison(folder, result_folder)
     changes = put_in_place(result_folder)
-    keep_calibration(folder)
+    keep_calibration(folder, None if result.failures() else reference_of(part, result))
 
     page = folder / "result" / "report.html"
     if failures := result.failures():

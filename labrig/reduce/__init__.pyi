@@ -54,7 +54,6 @@ from .pair_noise import (
     STRIPS as STRIPS,
 )
 from .photon_transfer import (
-    ROUNDING_VARIANCE as ROUNDING_VARIANCE,
     NoiseModel as NoiseModel,
     variance_terms as variance_terms,
 )
@@ -69,6 +68,13 @@ from .raw import (
     RawFrame as RawFrame,
     read_exif as read_exif,
     read_raw as read_raw,
+)
+from .rounding import (
+    ROUNDING_VARIANCE as ROUNDING_VARIANCE,
+    rounded_variance as rounded_variance,
+    rounding_slope as rounding_slope,
+    shared_rounding_variance as shared_rounding_variance,
+    unrounded_variance as unrounded_variance,
 )
 from .saturation import (
     is_clipped as is_clipped,

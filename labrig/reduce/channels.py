@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from labrig.errors import DataError, FrameError
 from labrig.reduce.black_cut_off import TOO_MANY, BlackCutOff
-from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
 from labrig.reduce.plane_noise import TILE, Floats, Mosaic, PlaneNoise, plane_noise
 from labrig.reduce.raw import RawFrame
+from labrig.reduce.rounding import shared_rounding_variance, unrounded_variance
 from labrig.reduce.saturation import count_levels, is_clipped
 from labrig.region import Region, region_pixels
 
@@ -382,6 +382,9 @@ class ChannelStats:
         What `mean` is lowered by in that correction.
     cut_off_sigma
         Part of `sigma` by that correction, which all pixels of the frame have in common.
+    rounding_sigma
+        Part of `sigma` by rounding to whole numbers, which pixels have in common as far as their
+        values do not spread over a step.
     read_dn
         Read noise in DN by which it is; None of a camera that cuts off none.
     """
@@ -396,6 +399,7 @@ class ChannelStats:
     cut_off: int = 0
     cut_off_dn: float = 0.0
     cut_off_sigma: float = 0.0
+    rounding_sigma: float = 0.0
     read_dn: float | None = None
 
     @property
@@ -645,16 +649,15 @@ def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
     order = np.argsort(value, kind="stable")
     peak = value[order][np.searchsorted(np.cumsum(count[order]), PEAK_QUANTILE * n)]
     variance = sum(plane.noise.mean_variance * float(plane.count.sum()) for plane in planes) / n**2
-    if min(plane.noise.mean_variance for plane in planes) < ROUNDING_VARIANCE:
-        # Without noise to dither it, rounding is the same in every pixel and does not average out.
-        variance = max(variance, ROUNDING_VARIANCE)
+    std = float(np.sqrt(spread / max(n - 1, 1)))
+    rounding_sigma = _rounding_sigma(std, planes)
     # One read noise for all pixels of the frame: its error does not average out.
     cut_off_sigma = sum(plane.cut_off_sigma * float(plane.count.sum()) for plane in planes) / n
     outliers = [plane.hot for plane in planes if plane.hot is not None]
     return ChannelStats(
         mean=mean,
-        sigma=float(np.hypot(np.sqrt(variance), cut_off_sigma)),
-        std=float(np.sqrt(spread / max(n - 1, 1))),
+        sigma=float(np.sqrt(variance + rounding_sigma**2 + cut_off_sigma**2)),
+        std=std,
         peak=float(peak),
         n=int(n),
         saturated=sum(plane.saturated for plane in planes),
@@ -662,4 +665,13 @@ def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
         cut_off=sum(plane.cut_off for plane in planes),
         cut_off_dn=sum(plane.cut_off_dn * float(plane.count.sum()) for plane in planes) / n,
         cut_off_sigma=cut_off_sigma,
+        rounding_sigma=rounding_sigma,
     )
+
+
+def _rounding_sigma(std_dn: float, planes: Sequence[PlaneCount]) -> float:
+    """Return σ of a mean in DN by rounding, whose error is in all pixels unless values spread."""
+    steps = np.concatenate([np.diff(np.unique(np.rint(plane.value))) for plane in planes])
+    step_dn = int(np.gcd.reduce(steps.astype(np.int64))) if steps.size else 1
+    spread = unrounded_variance(np.array((std_dn / step_dn) ** 2))
+    return step_dn * float(np.sqrt(shared_rounding_variance(spread)))

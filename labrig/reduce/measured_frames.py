@@ -213,10 +213,19 @@ def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:
     return mean, sigma
 
 
-def cut_off_sigmas(views: Sequence[RegionMeasurement]) -> Floats:
-    """Return σ of the means in DN by the correction for noise cut off below black, shape (n, C)."""
+def shared_sigmas(views: Sequence[RegionMeasurement]) -> Floats:
+    """Return σ of the means in DN by what all pixels of a frame have in common, shape (n, C).
+
+    It is that of the correction for noise cut off below black, and that of rounding.
+    """
     return np.array(
-        [[stats.cut_off_sigma for stats in view.measured.channels.values()] for view in views]
+        [
+            [
+                np.hypot(stats.cut_off_sigma, stats.rounding_sigma)
+                for stats in view.measured.channels.values()
+            ]
+            for view in views
+        ]
     )
 
 

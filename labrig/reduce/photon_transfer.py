@@ -14,9 +14,6 @@ from labrig.nonnegative import nonnegative_least_squares
 
 FloatArray = NDArray[np.float64]
 
-#: Variance of rounding to integers in DN² (uniform distribution), the least of a digital value.
-ROUNDING_VARIANCE = 1 / 12
-
 
 @dataclass(frozen=True)
 class NoiseModel:

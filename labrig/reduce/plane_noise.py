@@ -26,7 +26,8 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel
+from labrig.reduce.photon_transfer import NoiseModel
+from labrig.reduce.rounding import ROUNDING_VARIANCE
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 Mosaic: TypeAlias = npt.NDArray[np.uint16]

@@ -17,10 +17,10 @@ from labrig.reduce.measured_frames import (
     RegionMeasurement,
     SeriesFrame,
     cut_off_levels,
-    cut_off_sigmas,
     levels,
     measure_frames,
     pixels,
+    shared_sigmas,
     strips,
 )
 from labrig.reduce.pair_noise import (
@@ -295,7 +295,7 @@ def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]
     level, sigma = levels(views)
     light = level - fit_dark(exposure_s, level, sigma).base
     frames = PatchFrames(exposure_s, strips(views), light, sigma, pixels(views))
-    frames = replace(frames, sigma=np.hypot(paired_dark_sigma(frames), cut_off_sigmas(views)))
+    frames = replace(frames, sigma=np.hypot(paired_dark_sigma(frames), shared_sigmas(views)))
     return _PatchDark(
         views[0].kind,
         fit_dark(exposure_s, level, frames.sigma),
@@ -451,7 +451,7 @@ def _patch_series(
         return paired_noise(frames, t_s, unit, patch.usable, patch.darks, together)
 
     patch_noise = noise(patch.frames)
-    sigma = np.hypot(patch_noise.sigma, cut_off_sigmas(patch.views))
+    sigma = np.hypot(patch_noise.sigma, shared_sigmas(patch.views))
     if backgrounds := _backgrounds(measured):
         _, alone = levels(backgrounds)
         beside = replace(

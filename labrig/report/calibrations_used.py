@@ -1,12 +1,12 @@
-"""Section on the calibrations that a run found beside the runs."""
+"""Section on the calibrations that a run found beside the runs or the rig file."""
 
 from labrig.record import CALIBRATIONS_FILE, RunRecord
 from labrig.report.sections import Section, Table
 from labrig.yaml_file import read_yaml
 
 TEXT = (
-    "The rig file names none of these: they were found beside the runs, the newest ones of this "
-    "bench."
+    "The rig file names none of these: they were found beside the runs or the rig file, the newest "
+    "ones of this bench."
 )
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from labrig.calibration import CameraFile, Linearity
+from labrig.calibration import CameraFile, Linearity, Noise
 from labrig.number_format import exposure_text, plus_minus, rounded
 from labrig.optics import Factor
 from labrig.report.figure_style import (
@@ -40,23 +40,24 @@ HEIGHT_PT = 230.0
 def render(result: CameraCalibrationResult, source: Source) -> Rendered:
     """Render noise, linearity, factors of the settings, and flat field."""
     file = result.calibration
-    sections = [_noise(file, result.photon_transfers)]
+    sections = [_noise(result.photon_transfers)]
     if file.linearity is not None:
         sections.append(_linearity(file.linearity))
     sections += [_settings(file, result.repeat_flicker), _flat_field(file, result.flats)]
     return Rendered(tuple(sections), tuple(_lines(file)))
 
 
-def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
+def _noise(transfers: Sequence[PhotonTransfer]) -> Section:
     """Return the section with gain and read noise at each ISO speed."""
     rows = tuple(
         (
             f"{noise.iso:g}",
             plus_minus(noise.gain_e_per_dn, noise.gain_e_per_dn_sigma),
-            plus_minus(noise.read_noise_e, noise.read_noise_e_sigma),
+            plus_minus(100 * bend.value, 100 * bend.sigma),
+            _read_noise(noise),
             f"{noise.row_noise_e:.2g}",
         )
-        for noise in file.noise
+        for noise, bend in ((transfer.noise, transfer.bend) for transfer in transfers)
     )
     return Section(
         "Photon transfer curve",
@@ -65,12 +66,27 @@ def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
             Picture(
                 "photon-transfer",
                 partial(_transfer_figure, transfers),
-                "Variance of a pixel from frame to frame, dark subtracted, in DN². Lines: photon "
-                "noise of the fitted gain.",
+                "Variance of a pixel from frame to frame, that of reading and rounding subtracted, "
+                "in DN². Lines: photon noise of the gain for faint light; a sensor that bends "
+                "leaves them near white.",
             ),
         ),
-        (Table(("ISO", "Gain / (e/DN)", "Read noise / e", "Row noise / e"), rows),),
+        (
+            Table(
+                ("ISO", "Gain / (e/DN)", "Bend at white / %", "Read noise / e", "Row noise / e"),
+                rows,
+                "The gain is that of faint light; the bend is the deviation from linearity at "
+                "white, by the photon transfer and the ratios of the channels together.",
+            ),
+        ),
     )
+
+
+def _read_noise(noise: Noise) -> str:
+    """Return the read noise in electrons, or the limit below which it is."""
+    if noise.read_noise_is_limit:
+        return f"below {rounded(noise.read_noise_e)}"
+    return plus_minus(noise.read_noise_e, noise.read_noise_e_sigma)
 
 
 def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
@@ -83,8 +99,7 @@ def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
     for number, transfer in enumerate(transfers):
         colour, marker = OTHER_CHANNELS[number % len(OTHER_CHANNELS)], MARKERS[number % 8]
         level = np.array([point.level_dn for point in transfer.points])
-        read = transfer.noise.read_noise_e / transfer.noise.gain_e_per_dn
-        variance = np.array([point.light_variance_dn2 for point in transfer.points]) - read**2
+        variance = np.array(transfer.photon_variance_dn2, dtype=np.float64)
         points(axes, level, variance, marker, colour, PAPER)
         axes.plot(level, level / transfer.noise.gain_e_per_dn, color=colour, linewidth=1.0)
         entries.append(marker_entry(f"ISO {transfer.noise.iso:g}", marker, colour, PAPER))
@@ -251,7 +266,7 @@ def _lines(file: CameraFile) -> Iterator[str]:
     for noise in file.noise:
         yield (
             f"ISO {noise.iso:g}: gain {plus_minus(noise.gain_e_per_dn, noise.gain_e_per_dn_sigma)} "
-            f"e/DN, read noise {plus_minus(noise.read_noise_e, noise.read_noise_e_sigma)} e"
+            f"e/DN, read noise {_read_noise(noise)} e"
         )
     yield f"flicker {plus_minus(100 * file.flicker, 100 * file.flicker_sigma)} %"
     for name, factors in (("shutter", file.shutter), ("aperture", file.aperture)):

@@ -83,9 +83,11 @@ def _states(fit: ChargeFit) -> Section:
         f"{fit.chi2_decay:.2f} in the decay ({fit.n_decay})."
     )
     caption = (
-        "b: kinetic order; amplitude at lamp off in the unit of the values; after this charge each "
-        "state glows as (1 + t/τ)^(−p), or as exp(−t/τ) where b is 1. Digits in brackets are σ in "
-        "units of the last places; – is not determined."
+        "b: kinetic order; amplitude at lamp off in the unit of the values; p/τ: rate by which the "
+        "light falls at lamp off. After this charge each state glows as (1 + t/τ)^(−p), or as "
+        "exp(−t/τ) where b is held at 1; where b is not above 1 by more than 2 σ, the rate alone "
+        "is determined. Digits in brackets are σ in units of the last places; < and >: at a bound "
+        "of what is possible, limit of 95 % probability; – is not determined."
     )
     common = (
         ("fraction η of carriers that recombine at filled traps", str(fit.light_stimulated)),

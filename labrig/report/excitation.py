@@ -36,8 +36,10 @@ from labrig.results import (
     ExcitationResult,
     FittedExcitation,
     FloatArray,
+    LayerEffect,
     LightScatter,
     Measured,
+    OneSided,
     PatchExcitation,
     ProfileInterval,
     interval_lines,
@@ -75,6 +77,8 @@ def render(result: ExcitationResult, source: Source) -> Rendered:
 def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
     """Yield the lines for the terminal: states, rates by band, χ² and closure."""
     fit = patch.fit
+    if fit.layer is not None:
+        yield f"thickness: {fit.layer}"
     for number in range(len(fit.states)):
         yield f"state {number + 1}: {_state_line(fit, number)}"
         quantity, unit = ("k_e", " /s") if fit.states[number].is_apart else (RELATIVE, "")
@@ -94,9 +98,10 @@ def _state_line(fit: FittedExcitation, number: int) -> str:
     state, off = fit.states[number], fit.at_off[-1]
     r0 = plus_minus(float(off.r0[number]), float(off.r0_sigma[number]))
     k_r = plus_minus(state.k_r_per_s, state.k_r_sigma_per_s)
+    order = state.order.plus_minus
     if state.exponent is None:
-        return f"k_r {k_r} /s, r(0) {r0}"
-    order = plus_minus(state.kinetic_order, state.kinetic_order_sigma)
+        held = f", b {order} with 95 %" if isinstance(state.order, OneSided) else ""
+        return f"k_r {k_r} /s, r(0) {r0}{held}"
     if state.is_level_known:
         return f"k_r {k_r} /s, b {order}, r(0) {r0}"
     amplitude = plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number]))
@@ -137,15 +142,26 @@ def _rates(fit: FittedExcitation, number: int) -> list[str]:
     if not state.is_apart:
         value, sigma = fit.relative_k_e(number)
         columns = value, sigma, value > SEEN_SIGMAS * sigma, value + UPPER_SIGMAS * sigma
+        ends = np.stack([value, value])
+    else:
+        ends = fit.k_e_range(number)
+        largest = ends[1] / np.where(state.k_e_per_s > 0, state.k_e_per_s, 1.0)
+        columns = (*columns[:3], state.k_e_upper_per_s * np.maximum(largest, 1.0))
     return [
-        _rate_text(float(value), float(sigma)) if detected else f"< {rounded(float(upper), 2)}"
-        for value, sigma, detected, upper in zip(*columns, strict=True)
+        _rate_text(float(value), float(sigma), *between)
+        if detected
+        else f"< {rounded(float(upper), 2)}"
+        for value, sigma, detected, upper, between in zip(*columns, ends.T.tolist(), strict=True)
     ]
 
 
-def _rate_text(value: float, sigma: float) -> str:
-    """Return a rate with its σ; the largest of relative rates, to which others refer, is exact."""
-    return plus_minus(value, sigma) if sigma > 0 else rounded(value)
+def _rate_text(value: float, sigma: float, least: float, largest: float) -> str:
+    """Return a rate with its range by thickness, then its σ.
+
+    The largest of relative rates, to which others refer, is exact.
+    """
+    text = plus_minus(value, sigma) if sigma > 0 else rounded(value)
+    return text if least == largest else f"{rounded(least, 3)} to {rounded(largest, 3)}, {text}"
 
 
 def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Section:
@@ -200,6 +216,7 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             f"{len(direct.charges)} by the lamp itself, fitted together by the rate "
             "equation in exact steps. k_e belongs to an irradiance of vector length "
             f"{rounded(irradiance.vector_length)}.",
+            *([] if fit.layer is None else [_layer_line(fit.layer)]),
             _light_line(patch.light),
             *([] if fit.veil is None else [_veil_line(fit.veil)]),
             *(f"{line[0].upper()}{line[1:]}." for line in band_lines(fit.by_band)),
@@ -234,6 +251,14 @@ def _row_by_row(series: ChargingSeries, values: FloatArray) -> FloatArray:
     """Return values (n, 1, C) of a series by lights as (n, L, C), NaN at the other lights."""
     is_own = series.row_of_shots() == np.arange(len(series.irradiance))
     return np.where(is_own[..., None], values, np.nan)
+
+
+def _layer_line(layer: LayerEffect) -> str:
+    """Return the sentence on the thickness of the sample."""
+    return (
+        f"Thickness, before all σ: {layer}. Light falls with depth, and rates are fitted as those "
+        "of a surface; a range is what may be, and no σ."
+    )
 
 
 def _light_line(light: LightScatter) -> str:
@@ -287,7 +312,7 @@ def _levels_row(fit: FittedExcitation, number: int) -> tuple[str, ...]:
         time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_sigma_s[number]))
         exponent = state.exponent
         cells += [
-            plus_minus(state.kinetic_order, state.kinetic_order_sigma),
+            state.order.plus_minus,
             time,
             UNKNOWN if exponent is None else plus_minus(exponent.value, exponent.sigma),
         ]
@@ -312,7 +337,8 @@ def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
             (f"{low:.0f}–{high:.0f}", *(column[band] for column in columns))
             for band, (low, high) in enumerate(pairwise(bands_nm))
         ),
-        "Value ± 1 σ, or its upper limit with 95 % probability.",
+        "Range by the thickness of the sample, then value as of a surface ± 1 σ, or the upper "
+        "limit with 95 % probability and at that thickness.",
     )
 
 

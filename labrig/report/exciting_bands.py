@@ -6,7 +6,6 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from labrig.number_format import rounded
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,
@@ -34,14 +33,6 @@ def band_lines(tests: BandTests | None) -> Iterator[str]:
     if tests is None:
         yield "one glow for all bands: not tested, one band excites all places"
         return
-    known = tests.level_error_upper < 1
-    error = f"{rounded(100 * tests.level_error_upper, 2)} %" if known else "100 % or more"
-    below = (
-        f"below {rounded(tests.optical_density_upper, 2)} with 95 % probability; at that r(0) is "
-        f"too large by {error}, and Λ as much too small, which is not in σ"
-    )
-    found = f"about {rounded(tests.optical_density, 2)}, the layer is thick"
-    yield f"optical density for exciting light: {found if tests.is_thick else below}"
     quantities = {
         "glow at full charge": tests.amplitude,
         "decay": tests.rate,

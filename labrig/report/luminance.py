@@ -80,7 +80,8 @@ def _section(result: LuminanceResult) -> Section:
     )
     caption = (
         f"Luminance after lamp off, with 1 σ of every reading; dashed: {VISIBLE_MCD_PER_M2:g} "
-        f"{MCD_PER_M2}, a hundred times the limit of visibility."
+        f"{MCD_PER_M2}, a hundred times the limit of visibility; thick on it: the time when it is "
+        "reached, forecast with 95 %, where it was not measured."
     )
     tables = [_table(result.patches), *_requirements(result.patches)]
     if several:
@@ -127,15 +128,13 @@ def _cell(measured: Measured | None) -> str:
 
 
 def _end(patch: PatchLuminance) -> str:
-    """Return the time until 0.3 mcd/m², or what the laws say of it."""
+    """Return the time until 0.3 mcd/m², or its forecast."""
     decay = patch.decay
     if decay.visible_s is not None:
         return f"{plus_minus(decay.visible_s.value / 60, decay.visible_s.sigma / 60)} min"
-    if decay.visible_between_s is None:
-        return "not reached"
-    early, late = decay.visible_between_s
-    end = "no end" if math.isinf(late) else duration_text(late)
-    return f"not reached; laws that fit say {duration_text(early)} to {end}"
+    if decay.visible_forecast is None:
+        return "not measured"
+    return f"not reached; forecast: {decay.visible_forecast}"
 
 
 def _requirements(patches: Mapping[str, PatchLuminance]) -> Iterator[Table]:
@@ -220,6 +219,10 @@ def _figure(patches: Mapping[str, PatchLuminance]) -> Figure:
         entries.append(marker_entry(name, marker, colour))
         lowest, highest = min(lowest, float(light.min())), max(highest, float(light.max()))
         first_s, last_s = min(first_s, float(t_s[0])), max(last_s, float(t_s[-1]))
+        forecast = decay.visible_forecast
+        if forecast is not None and forecast.between_s is not None:
+            axes.plot(forecast.between_s, [VISIBLE_MCD_PER_M2] * 2, color=colour, linewidth=3.0)
+            last_s = max(last_s, forecast.between_s[1])
     entries.append(line_entry(f"{VISIBLE_MCD_PER_M2:g} {MCD_PER_M2}", MUTED, DASHED))
     if last_s:
         axes.set_xlim(first_s / 1.2, last_s * 1.2)

@@ -232,15 +232,22 @@ def _rows(
 
 
 def _quantity_text(state: State, name: str, band: int | None = None) -> str:
-    """Return a quantity of a state, in a band if there are bands, with its σ as text."""
+    """Return a quantity of a state as text, in a band if there are bands.
+
+    Its range by the thickness of the sample, if it has one, stands before value and σ.
+    """
     value, sigma = state.known(name), getattr(state, f"{name}_sigma")
     if name == "decay_time_s" and value is None:
         value = state.decay_time_of_rate_s
     if value is None:
         return UNKNOWN
-    if band is not None:
-        value, sigma = value[band], None if sigma is None else sigma[band]
-    return _value_text(value, math.nan if sigma is None else sigma)
+    if band is None:
+        return _value_text(value, math.nan if sigma is None else sigma)
+    text = _value_text(value[band], math.nan if sigma is None else sigma[band])
+    ends = getattr(state, f"{name}_range")
+    if ends is None or ends[0][band] == ends[1][band]:
+        return text
+    return f"{rounded(ends[0][band], 3)} to {rounded(ends[1][band], 3)}, {text}"
 
 
 def _exponent_text(state: State) -> str:

@@ -1,13 +1,18 @@
 """Rendering of a result by the renderer that its protocol registers."""
 
+from dataclasses import replace
+
 from labrig.plugins import REPORTS, load, names
 from labrig.report import any_result
+from labrig.report.budgets import budget_sections
 from labrig.report.sections import Rendered, Renderer, Source
 from labrig.results import RunResult
 
 
 def render(result: RunResult, source: Source) -> Rendered:
     """Render a result by the registered renderer of its protocol, or as plain tables without one.
+
+    The budgets of its headline values follow.
 
     Parameters
     ----------
@@ -42,9 +47,11 @@ def render(result: RunResult, source: Source) -> Rendered:
     ... )
     >>> rendered = render(labrig.read_result(run.folder), Source(run, protocol, rig, about))
     >>> [section.title for section in rendered.sections]
-    ['Results', 'Sample', 'Patch sample', 'Timing and stability', 'Not in σ']
+    ['Results', 'Sample', 'Patch sample', 'Timing and stability', 'Not in σ',
+     'How far each number may be trusted']
     """
     show: Renderer = any_result.render
     if result.kind in names(REPORTS):
         show = load(REPORTS, result.kind, str(source.run.folder))
-    return show(result, source)
+    rendered = show(result, source)
+    return replace(rendered, sections=(*rendered.sections, *budget_sections(result)))

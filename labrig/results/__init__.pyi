@@ -12,6 +12,10 @@ from .blank import (
     BlankResult as BlankResult,
     StrayLight as StrayLight,
 )
+from .budget import (
+    UNDIVIDED as UNDIVIDED,
+    Budget as Budget,
+)
 from .calibration import CalibrationResult as CalibrationResult
 from .calibration_check import (
     CalibrationCheckResult as CalibrationCheckResult,
@@ -116,7 +120,7 @@ from .fitted_law import (
 )
 from .interval import (
     ASYMMETRIC as ASYMMETRIC,
-    SIGMAS_95 as SIGMAS_95,
+    NORMAL_95 as NORMAL_95,
     ProfileInterval as ProfileInterval,
     interval_lines as interval_lines,
     interval_rows as interval_rows,
@@ -132,6 +136,12 @@ from .isotropy import (
     AngularGlow as AngularGlow,
     IsotropyResult as IsotropyResult,
     is_within_paper as is_within_paper,
+)
+from .layer_effect import (
+    PRIOR_DENSITY as PRIOR_DENSITY,
+    THICKNESS as THICKNESS,
+    DensityBasis as DensityBasis,
+    LayerEffect as LayerEffect,
 )
 from .led_brightness import (
     LedBrightnessResult as LedBrightnessResult,
@@ -149,8 +159,10 @@ from .led_fluorescence import (
 from .luminance import (
     MARKING_S as MARKING_S,
     MCD_PER_M2 as MCD_PER_M2,
+    SIGMAS_95 as SIGMAS_95,
     TABLE_S as TABLE_S,
     VISIBLE_MCD_PER_M2 as VISIBLE_MCD_PER_M2,
+    ForecastTime as ForecastTime,
     LuminanceAt as LuminanceAt,
     LuminanceDecay as LuminanceDecay,
     LuminanceRequirement as LuminanceRequirement,
@@ -180,8 +192,10 @@ from .measured import (
     FloatArray as FloatArray,
     IntArray as IntArray,
     Measured as Measured,
+    OneSided as OneSided,
     field_unit as field_unit,
     iter_values as iter_values,
+    measured_number as measured_number,
     with_uncertainty as with_uncertainty,
 )
 from .phosphor import (

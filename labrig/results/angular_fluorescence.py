@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
@@ -224,6 +225,15 @@ class AngularFluorescenceResult(RunResult):
     def detectable(self) -> float:
         """Smallest amplitude that each of the tests would have found with 90 % power."""
         return max(test.detectable for test in self.tests)
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the dependences on angle, by the scatter of views."""
+        tests = {f"{view.led}, {view.direction}: by angle": view.means.test for view in self.yarns}
+        for view in self.spheres:
+            if view.part == "re-radiated":
+                tests[f"{view.led}: by view"] = view.shading.by_view
+                tests[f"{view.led}: by incidence"] = view.shading.by_incidence
+        return {name: Budget.of(test.amplitude) for name, test in tests.items()}
 
     def write_files(self, folder: Path) -> None:
         """Write `angular.csv`."""

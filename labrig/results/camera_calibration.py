@@ -23,21 +23,35 @@ class PairScatter:
     ----------
     level_dn
         Mean of the two frames above dark in DN.
+    levels_dn
+        That of each position of the colour filter.
     variance_dn2
         Variance of a pixel in one frame without the common-mode noise of its row, in DN².
     neighbours_dn2
         Sum of the covariances of a pixel with its eight neighbours in DN².
     row_variance_dn2
         Variance of the common-mode noise of a row in DN².
+    kurtosis
+        Mean fourth power over the squared variance: 3 of normal noise.
     pixels
         Number of pixels that were compared.
+    step_dn
+        Step of the camera's numbers in DN.
     """
 
     level_dn: float
+    levels_dn: tuple[float, ...]
     variance_dn2: float
     neighbours_dn2: float
     row_variance_dn2: float
+    kurtosis: float
     pixels: int
+    step_dn: int = 1
+
+    @property
+    def total_variance_dn2(self) -> float:
+        """Variance of a pixel in one frame in DN², that of its row included."""
+        return self.variance_dn2 + self.row_variance_dn2
 
     @property
     def light_variance_dn2(self) -> float:
@@ -55,17 +69,25 @@ class PhotonTransfer:
         Gain and read noise, as in the camera file.
     points
         Scatter of the pairs of lit frames.
+    photon_variance_dn2
+        Variance by photons alone at each of `points` in DN², that of reading and rounding
+        subtracted; None where the numbers do not resolve it.
     shared, shared_sigma
         Covariance with the neighbours relative to the variance of a pixel, and its σ.
     reduced_chi2
-        Reduced χ² of the photon-transfer line; more than a few if the variance is not linear.
+        Reduced χ² of the photon-transfer curve; more than a few if the variance does not follow it.
+    bend
+        ln of the signal at white over that of a linear sensor, by the ratios of channels and the
+        photon transfer together.
     """
 
     noise: Noise
     points: tuple[PairScatter, ...]
+    photon_variance_dn2: tuple[float | None, ...]
     shared: float
     shared_sigma: float
     reduced_chi2: float
+    bend: Measured
 
     @property
     def neighbours_share_noise(self) -> bool:

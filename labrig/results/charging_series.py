@@ -166,6 +166,9 @@ class ChargingSeries:
     start
         Concentration of every state at all sites when the first of all charges begins, shape (N,).
         None: the sample is dark.
+    arriving
+        Fraction of the light of each band that arrives at Q depths of the sample, each of which
+        stands for as much of it, shape (Q, B). None: the sample is a surface.
     """
 
     name: str
@@ -182,6 +185,7 @@ class ChargingSeries:
     veil_shapes: FloatArray | None = None
     earlier: EarlierCharges | None = None
     start: FloatArray | None = None
+    arriving: FloatArray | None = None
 
     @property
     def sites(self) -> int:
@@ -239,6 +243,19 @@ class ChargingSeries:
             everywhere = np.tile(earlier.irradiance, (len(self.across), 1))
             earlier = replace(earlier, irradiance=everywhere)
         return replace(self, irradiance=irradiance, across=None, earlier=earlier)
+
+    def at_depths(self) -> list[Self]:
+        """Return the series at each depth of the sample, as of a surface in the light there."""
+        return [
+            replace(
+                self,
+                irradiance=self.irradiance * fraction,
+                earlier=self.earlier
+                and replace(self.earlier, irradiance=self.earlier.irradiance * fraction),
+                arriving=None,
+            )
+            for fraction in (() if self.arriving is None else self.arriving)
+        ]
 
     def before(self) -> Self | None:
         """Return the series of earlier charges, without photographs; None if there were none."""
@@ -323,6 +340,10 @@ class ChargingSeries:
             0 <= min(lights) <= max(lights) < rows and self.across is None
         ):
             raise FitError(f"{self.name}: expected one of {rows} lights at every charge")
+        if self.arriving is not None and self.arriving.shape[1] != bands:
+            raise FitError(
+                f"{self.name}: expected fractions of light in {bands} bands at each depth"
+            )
         if not (self.irradiance >= 0).all():
             raise FitError(f"{self.name}: expected irradiances of 0 or more, got a smaller one")
         measured = np.isfinite(self.values) & np.isfinite(self.sigma)

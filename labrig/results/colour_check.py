@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
@@ -121,6 +122,15 @@ class ColourCheckResult(RunResult):
     card_balance_sigma: FloatArray
     card_misfit: float | None
     filter_shift_nm: float | None
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the mean ΔE2000, of which no σ but a limit is known."""
+        ways = {"plain": self.plain, "through the filter": self.through}
+        return {
+            f"mean ΔE2000, {way}": Budget(summary.mean)
+            for way, summary in ways.items()
+            if summary is not None
+        }
 
     def write_files(self, folder: Path) -> None:
         """Write a table of the patches, `colour_check.csv`."""

@@ -1,6 +1,6 @@
 """Result of a decay run: the time series of every patch and the fit to it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -9,9 +9,11 @@ import numpy as np
 
 from labrig.material import Material, write_material
 from labrig.region import Region
+from labrig.results.budget import Budget, named
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_decay_file import write_fitted_decay
-from labrig.results.measured import FloatArray
+from labrig.results.fitted_law import EXPONENTIALS
+from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series, write_series
 
@@ -83,6 +85,46 @@ class DecayPatch:
     material: Material | None = None
     drift_effect: FloatArray | None = None
 
+    def budgets(self, name: str) -> Iterator[tuple[str, Budget]]:
+        """Yield the budgets of rates and amplitudes, or of the parameters of another law.
+
+        A state that goes unseen is their range by model, where its size is known. The calibrations
+        that matter are those of times, and of the camera's linearity: neither is in σ.
+        """
+        fit = self.fit
+        if fit is None:
+            return
+        missing = ("temperature",) if self.drift_effect is not None else ()
+        if fit.law != EXPONENTIALS:
+            for parameter, value in fit.parameters.items():
+                yield named(name, parameter), Budget.of(value, left_out=missing)
+            return
+        unit = self.series.value_unit
+        unseen = fit.unseen_state
+        for number, state in enumerate(fit.states):
+            quantities = (
+                ("k_r", Measured(state.k_r_per_s, state.k_r_sigma_per_s, "1/s"), "rate_changes"),
+                (
+                    "amplitude",
+                    Measured(state.amplitude, state.amplitude_sigma, unit),
+                    "amplitude_changes",
+                ),
+            )
+            for quantity, stated, changes in quantities:
+                change = (
+                    abs(getattr(unseen, changes)[number]) * abs(stated.value) if unseen else 0.0
+                )
+                ends = (stated.value - change, stated.value + change)
+                yield (
+                    named(name, f"{quantity} of state {number + 1}"),
+                    Budget.of(
+                        stated,
+                        model_range=ends if unseen else None,
+                        model_of="a state that goes unseen" if unseen else "",
+                        left_out=missing,
+                    ),
+                )
+
     def write_files(self, folder: Path) -> None:
         """Write `series.csv` and, where there is a fit, `fit.json` and `material.yaml`."""
         folder.mkdir(exist_ok=True)
@@ -133,6 +175,15 @@ class DecayResult(RunResult):
     def provides(self) -> dict[str, dict[str, FittedDecay]]:
         """Return the fits by patch."""
         return {"decays": self.fits}
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of rates and amplitudes of every patch."""
+        several = len(self.patches) > 1
+        return {
+            quantity: budget
+            for name, patch in self.patches.items()
+            for quantity, budget in patch.budgets(name if several else "")
+        }
 
     def failures(self) -> tuple[str, ...]:
         """Return the reasons why no patch at all could be fitted."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from labrig.material import ReradiationMatrix, write_fluorescent, write_reradiation
 from labrig.optics import edges_from_centres
+from labrig.results.budget import Budget, named
 from labrig.results.measured import BoolArray, FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
@@ -100,6 +101,28 @@ class DirectColumns:
     common_sigma: FloatArray
     light_sigma: FloatArray
     drift: Measured
+
+    def reradiated_total(self, light: int, scale_sigma: float) -> Budget:
+        """Return the part of a light's power that comes back re-radiated in all bands measured.
+
+        Parameters
+        ----------
+        light
+            Number of the light, from 0.
+        scale_sigma
+            Relative σ of reference and spectrometer, which are in σ of every entry; NaN if their
+            files have none.
+        """
+        known = np.isfinite(self.reradiated[:, light]) & np.isfinite(
+            self.reradiated_sigma[:, light]
+        )
+        value, sigma = self.reradiated[known, light], self.reradiated_sigma[known, light]
+        shared, common = self.light_sigma[light] * value, self.common_sigma[known, light]
+        scaled = np.nan_to_num(scale_sigma) * value
+        own = np.maximum(sigma**2 - shared**2 - common**2 - scaled**2, 0.0)
+        noise = float(np.sqrt(own.sum() + common.sum() ** 2 + shared.sum() ** 2))
+        calibration = None if np.isnan(scale_sigma) else abs(float(scaled.sum()))
+        return Budget(float(value.sum()), noise=noise, calibration=calibration)
 
     @property
     def correlation(self) -> FloatArray:
@@ -216,6 +239,21 @@ class DirectBispectralResult(RunResult):
     samples: Mapping[str, DirectColumns]
     reference_sigma: float
     scale_sigma: float
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the re-radiated part of every light's power."""
+        scales = np.array([self.reference_sigma, self.scale_sigma])
+        known = scales[np.isfinite(scales)]
+        scale_sigma = float(np.linalg.norm(known)) if len(known) else np.nan
+        several = len(self.samples) > 1
+        return {
+            named(name if several else "", f"re-radiated of {light}"): columns.reradiated_total(
+                number, scale_sigma
+            )
+            for name, columns in self.samples.items()
+            for number, light in enumerate(columns.lights)
+            if np.isfinite(columns.reradiated[:, number]).any()
+        }
 
     def write_files(self, folder: Path) -> None:
         """Write the files of each sample, those of the only one into the folder itself.

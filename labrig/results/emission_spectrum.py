@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from labrig.finite import Finite, NotNegative
 from labrig.material import Spectrum
 from labrig.optics import band_means, edges_from_centres
+from labrig.results.budget import Budget, named
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.yaml_file import read_model, write_yaml
@@ -331,6 +332,15 @@ class EmissionSpectrumResult(RunResult):
     def provides(self) -> Mapping[str, Any]:
         """Return the spectrum of every patch."""
         return {"spectra": {name: patch.spectrum for name, patch in self.patches.items()}}
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the centroids, whose σ has filter and camera in it."""
+        return {
+            named(name, "centroid"): Budget(
+                patch.spectrum.centroid.value, "nm", undivided=patch.spectrum.centroid.sigma
+            )
+            for name, patch in self.patches.items()
+        }
 
     def write_files(self, folder: Path) -> None:
         """Write `emission.yaml` and `spectrum.csv`; of several patches in a folder each."""

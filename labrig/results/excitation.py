@@ -1,6 +1,6 @@
 """Result of an excitation run: excitation rates by band, and the material from them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -9,10 +9,12 @@ import numpy as np
 
 from labrig.calibration import IrradianceFile
 from labrig.material import Material, write_material
+from labrig.results.budget import Budget, named
 from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_excitation import BandTests, FittedExcitation
-from labrig.results.measured import FloatArray
+from labrig.results.layer_effect import THICKNESS, LayerEffect
+from labrig.results.measured import FloatArray, Measured, measured_number
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 from labrig.results.text_files import finite, write_json
@@ -194,6 +196,59 @@ class ExcitationResult(RunResult):
         """Return the materials by patch."""
         return {"materials": {name: patch.material for name, patch in self.patches.items()}}
 
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of k_r, of k_e in the bands that are seen to excite, and of Λ."""
+        return {
+            named(name, quantity): budget
+            for name, patch in self.patches.items()
+            for quantity, budget in self._patch_budgets(patch)
+        }
+
+    def _patch_budgets(self, patch: PatchExcitation) -> Iterator[tuple[str, Budget]]:
+        fit, layer = patch.fit, patch.fit.layer
+        edges = self.irradiance.bands_nm
+        direct = np.maximum(np.array(self.irradiance.direct), 1e-300)
+        light = np.array(self.irradiance.direct_sigma) / direct
+        by = THICKNESS if layer is not None else ""
+        beside = ("kinetic order", THICKNESS if layer is None else "scattering in the sample")
+        for number, state in enumerate(fit.states):
+            if not state.is_apart:
+                continue
+            of = f"of state {number + 1}"
+            k_r = Measured(state.k_r_per_s, state.k_r_sigma_per_s, "1/s")
+            yield f"k_r {of}", Budget.of(k_r)
+            for band in np.flatnonzero(state.seen):
+                k_e = Measured(state.k_e_per_s[band], state.k_e_sigma_per_s[band], "1/s")
+                least, largest = fit.k_e_range(number)[:, band].tolist()
+                yield (
+                    f"k_e {of}, {edges[band]:.0f}-{edges[band + 1]:.0f} nm",
+                    Budget.of(
+                        Measured(float(k_e.value), float(k_e.sigma), "1/s"),
+                        float(light[band] * k_e.value),
+                        model_range=None if layer is None else (least, largest),
+                        model_of=by,
+                        left_out=beside,
+                    ),
+                )
+            material = patch.material.states[number]
+            if material.reradiation is None or material.reradiation_sigma is None:
+                continue
+            peak = int(np.argmax(material.reradiation))
+            ends = material.reradiation_range
+            factors = patch.material.scale_factors
+            scale = np.linalg.norm([(factor.sigma or 0.0) / factor.value for factor in factors])
+            value = material.reradiation[peak]
+            yield (
+                f"Λ {of}, {edges[peak]:.0f}-{edges[peak + 1]:.0f} nm",
+                Budget.of(
+                    Measured(value, material.reradiation_sigma[peak], ""),
+                    float(scale * value) if factors else None,
+                    model_range=None if ends is None else (ends[0][peak], ends[1][peak]),
+                    model_of=by,
+                    left_out=beside,
+                ),
+            )
+
     def write_files(self, folder: Path) -> None:
         """Write `material.yaml` and `excitation.json` of each patch, in a folder of its name."""
         for name, patch in self.patches.items():
@@ -209,15 +264,18 @@ class ExcitationResult(RunResult):
             "schema_version": self.schema_version,
             "bands_nm": self.irradiance.bands_nm,
             "irradiance_vector_length": self.irradiance.vector_length,
+            "thickness": None if fit.layer is None else _layer(fit.layer),
             "states": [
                 {
                     "k_r_per_s": state.k_r_per_s,
                     "k_r_sigma_per_s": state.k_r_sigma_per_s,
                     "kinetic_order": state.kinetic_order,
                     "kinetic_order_sigma": state.kinetic_order_sigma,
+                    "kinetic_order_limit_95": measured_number(state.order).get("limit_95"),
                     "amplitude_at_full_charge": state.amplitude,
                     "amplitude_at_full_charge_sigma": state.amplitude_sigma,
                     "k_e_per_s": state.k_e_per_s.tolist(),
+                    "k_e_range_per_s": fit.k_e_range(number).tolist(),
                     "k_e_sigma_per_s": state.k_e_sigma_per_s.tolist(),
                     "k_e_upper_per_s": state.k_e_upper_per_s.tolist(),
                     "r0": float(level_at_off.r0[number]),
@@ -247,6 +305,16 @@ class ExcitationResult(RunResult):
             "models": [vars(model) for model in fit.models],
             "warnings": list(fit.warnings),
         }
+
+
+def _layer(layer: LayerEffect) -> dict[str, Any]:
+    """Return the effect of thickness as content of a file."""
+    return {
+        "optical_density": list(layer.optical_density),
+        "basis": str(layer.basis),
+        "k_e_factor": layer.k_e_factor.tolist(),
+        "reradiation_factor": layer.reradiation_factor.tolist(),
+    }
 
 
 def _by_band(tests: BandTests) -> dict[str, Any]:

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from labrig.material import MAX_ORDER
 from labrig.results.interval import ProfileInterval
-from labrig.results.measured import BoolArray, FloatArray, IntArray, Measured
+from labrig.results.layer_effect import LayerEffect
+from labrig.results.measured import BoolArray, FloatArray, IntArray, Measured, OneSided
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
@@ -51,6 +53,14 @@ class ExcitedState:
     def is_first_order(self) -> bool:
         """Whether the state decays as an exponential, whatever its charge."""
         return self.kinetic_order == 1
+
+    @property
+    def order(self) -> Measured:
+        """Kinetic order b, one-sided where it is fitted and at its bound."""
+        b, sigma = self.kinetic_order, self.kinetic_order_sigma
+        if sigma > 0 and b in (1.0, MAX_ORDER):
+            return OneSided.held(b, sigma, 0.0, is_upper=b > 1)
+        return Measured(b, sigma)
 
     @property
     def is_apart(self) -> bool:
@@ -196,22 +206,6 @@ class BandTests:
         return float(np.sqrt(12 * max(self.light_variance.value, 0.0)) / np.log(10))
 
     @property
-    def optical_density_upper(self) -> float:
-        """Upper limit of D with 95 % probability, as far as it is below 1."""
-        return float(np.sqrt(12 * self._variance_upper) / np.log(10))
-
-    @property
-    def level_error_upper(self) -> float:
-        """Relative error of r(0) in a layer of that density, to first order of its variance."""
-        with np.errstate(over="ignore"):
-            return float(np.expm1(-self.charged_glow_by_variance * self._variance_upper))
-
-    @property
-    def _variance_upper(self) -> float:
-        value, sigma = self.light_variance.value, self.light_variance.sigma
-        return max(value, 0.0) + UPPER_SIGMAS * sigma
-
-    @property
     def is_thick(self) -> bool:
         """Whether light is absorbed so much that it charges the surface more than the depth."""
         return self.light_variance.value > THICK_SIGMAS * self.light_variance.sigma
@@ -242,6 +236,8 @@ class FittedExcitation:
         not held at 1.
     models
         Models that were tried, of which this is one.
+    layer
+        What the sample's thickness may do to k_e and Λ, beside all σ; None if it was not looked at.
     by_band
         Tests whether all bands excite the same glow; None if the sites are excited by one band.
     veil
@@ -275,6 +271,7 @@ class FittedExcitation:
     order_gain: float = 0.0
     models: tuple[ExcitationModel, ...] = ()
     intervals: Mapping[str, ProfileInterval] = field(default_factory=dict)
+    layer: LayerEffect | None = None
 
     @property
     def is_first_order(self) -> bool:
@@ -335,6 +332,19 @@ class FittedExcitation:
             return relative, np.where(np.arange(bands) == largest, 0.0, np.inf)
         variance = np.diag(slopes @ of_state @ slopes.T) / k_e[largest] ** 2
         return relative, np.sqrt(np.maximum(variance, 0.0))
+
+    def k_e_range(self, number: int) -> FloatArray:
+        """Return least and largest k_e of a state in 1/s by thickness, without σ, shape (2, B).
+
+        Parameters
+        ----------
+        number
+            Number of the state, from 0.
+        """
+        k_e = self.states[number].k_e_per_s
+        return (
+            np.stack([k_e, k_e]) if self.layer is None else k_e * self.layer.k_e_factor[:, number]
+        )
 
     def k_e(self) -> FloatArray:
         """Return the excitation rates of all states in 1/s, shape (N, B)."""

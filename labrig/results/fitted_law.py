@@ -11,7 +11,14 @@ from labrig.errors import UsageError
 from labrig.material import DECAY_LAWS, exponential_means
 from labrig.number_format import aligned, rounded
 from labrig.quantity import duration_text
-from labrig.results.measured import FloatArray, Measured, with_uncertainty
+from labrig.results.measured import (
+    ONE_SIDED_SIGMAS,
+    FloatArray,
+    Measured,
+    OneSided,
+    measured_number,
+    with_uncertainty,
+)
 
 #: Names of the sums of exponentials among the laws: a few, and a smooth spectrum of many.
 EXPONENTIALS, RATE_SPECTRUM = "exponentials", "rate-spectrum"
@@ -46,7 +53,7 @@ def parameter_text(name: str, number: str) -> str:
     name
         Name of the parameter.
     number
-        Its value with σ, as text.
+        Its value with σ, or its limit, as text.
 
     Returns
     -------
@@ -62,7 +69,8 @@ def parameter_text(name: str, number: str) -> str:
     if name not in LAW_SYMBOLS:
         return number
     symbol, unit = LAW_SYMBOLS[name]
-    return f"{symbol} = {number} {unit}".rstrip()
+    is_limit = number[:1] in ("<", ">")
+    return f"{symbol} {'' if is_limit else '= '}{number} {unit}".rstrip()
 
 
 #: Symbols and units of quantities that each state has.
@@ -152,19 +160,25 @@ class FittedLaw:
 
         Of Becquerel's law `decay_time_s` τ, `exponent` p and, for p > 1, `kinetic_order` b; of one
         trap `decay_time_s` 1/k, that of the light at lamp off, and `retrapping`; of a stretched
-        exponential `decay_time_s` τ and `exponent` β.
+        exponential `decay_time_s` τ and `exponent` β. What a bound of the law holds is one-sided.
         """
         _, rate_sigma, shape_sigma, _ = np.sqrt(np.diag(self.covariance))
         shape = Measured(self.shape, float(shape_sigma))
+        if shape_sigma > 0 and self.shape in DECAY_LAWS[self.name].shapes:
+            is_upper = self.shape == DECAY_LAWS[self.name].shapes[1]
+            shape = OneSided.held(self.shape, float(shape_sigma), 0.0, is_upper=is_upper)
         time = Measured(1 / self.rate_per_s, float(rate_sigma) / self.rate_per_s**2, "s")
         if self.name == "otor":
             # A shape without σ is held at the exponential: no retrapping is told.
             return {"decay_time_s": time} | ({"retrapping": shape} if shape_sigma else {})
         if self.name == "stretched":
             return {"decay_time_s": time, "exponent": shape}
+        if self.shape == 0:
+            # An exponential: p has no upper limit, b = 1/(1 − 1/p) has one.
+            return {"decay_time_s": time, "kinetic_order": _held_at_first_order(shape)}
         if self.shape <= shape_sigma:
             # Nothing tells it from an exponential: the exponent has no upper limit.
-            return {"decay_time_s": time} if self.shape == 0 else {}
+            return {}
         exponent = Measured(1 / self.shape, float(shape_sigma) / self.shape**2)
         tau_s = 1 / (self.shape * self.rate_per_s)
         by_parameters = -tau_s * np.array([1 / self.rate_per_s, 1 / self.shape])
@@ -215,8 +229,7 @@ class FittedLaw:
             "shape": self.shape,
             "covariance": self.covariance.tolist(),
             "parameters": {
-                name: {"value": measured.value, "sigma": measured.sigma}
-                for name, measured in self.parameters.items()
+                name: measured_number(measured) for name, measured in self.parameters.items()
             },
             "channel_weights": list(self.channel_weights),
             "offsets": list(self.offsets),
@@ -293,6 +306,14 @@ def _signal(
     by_offset = np.full(len(decay), float(with_offset))
     variance = curve_variance(np.column_stack([jacobian, by_offset]), law.covariance)
     return decay + offset, variance
+
+
+def _held_at_first_order(shape: Measured) -> Measured:
+    """Return the kinetic order b = 1/(1 − g) of the shape g = 0; it is held where g is."""
+    if not isinstance(shape, OneSided):
+        return Measured(1.0, 0.0)
+    order = 1 / (1 - shape.limit) if shape.limit < 1 else math.inf
+    return OneSided(1.0, (order - 1) / ONE_SIDED_SIGMAS, limit=order)
 
 
 def fitted_law(content: Mapping[str, Any]) -> FittedLaw:

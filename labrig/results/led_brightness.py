@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import LEDS_KIND, LedsFile, UvScale
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 
@@ -119,6 +120,14 @@ class LedBrightnessResult(RunResult):
     leds: Mapping[str, LedMeasured]
     drift: Measured | None
     findings: tuple[LedFinding, ...]
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the brightness of every LED, whose σ has card and curves in it."""
+        known = {name: led.brightness for name, led in self.leds.items() if led.brightness}
+        return {
+            f"brightness of {name}": Budget(light.value, light.unit, undivided=light.sigma)
+            for name, light in known.items()
+        }
 
     def provides(self) -> Mapping[str, Any]:
         """Return the calibration."""

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from labrig.material import Provenance, ReradiationMatrix, write_fluorescent
+from labrig.results.budget import Budget, named
 from labrig.results.measured import BoolArray, FloatArray, Measured
 from labrig.results.reradiation_methods import (
     EstimateMethod,
@@ -234,6 +235,27 @@ class LedFluorescenceResult(RunResult):
     def is_lamp(self) -> BoolArray:
         """Whether a light is a broadband lamp, which has no wavelength of its own, shape (m,)."""
         return np.isin(self.leds, self.lamps)
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of quantum yields and of the colour under the first light.
+
+        Their σ is that of the joint fit, with lights and curves in it; the other method has none.
+        """
+        budgets: dict[str, Budget] = {}
+        for name, patch in self.patches.items():
+            values = {
+                f"quantum yield of dye {number}": (dye.quantum_yield.value, dye.quantum_yield.sigma)
+                for number, dye in enumerate(patch.dyes, start=1)
+            }
+            for colour in patch.colours[:1]:
+                axes = zip(("L*", "a*", "b*"), colour.lab, colour.lab_sigma, strict=True)
+                values |= {f"{axis} under {colour.light}": (at, sigma) for axis, at, sigma in axes}
+            budgets |= {
+                named(name, quantity): Budget(value, undivided=None if isnan(sigma) else sigma)
+                for quantity, (value, sigma) in values.items()
+                if not isnan(value)
+            }
+        return budgets
 
     def write_files(self, folder: Path) -> None:
         """Write a material file, its matrix and mixture for each sample, and a table of colours."""

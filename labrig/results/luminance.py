@@ -2,14 +2,17 @@
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
 from scipy.special import ndtr
 
 from labrig.number_format import aligned
 from labrig.quantity import TIME_S, duration_text, parse
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.text_files import finite, json_text
 
@@ -22,6 +25,8 @@ MARKING_S = (600.0, 3600.0)
 VISIBLE_MCD_PER_M2 = 0.3
 #: Probability from which a requirement counts as met, and its complement as missed.
 CONFIDENT = 0.95
+#: Size of a normal error in σ that 95 % of them do not exceed.
+SIGMAS_95 = 1.96
 #: Units of luminance by their names, in mcd/m².
 LUMINANCE_UNITS = {
     "mcd/m2": 1.0, "cd/m2": 1000.0, "µcd/m2": 1e-3, "ucd/m2": 1e-3, "nit": 1000.0, "nits": 1000.0,
@@ -152,6 +157,49 @@ class LuminanceAt:
         return Verdict.FAIL if probability <= 1 - CONFIDENT else Verdict.UNDECIDED
 
 
+@dataclass(frozen=True)
+class ForecastTime:
+    """Time until a luminance after the last reading, as the readings before allow.
+
+    Attributes
+    ----------
+    at_least
+        Earliest time in s with its σ, by no law: ln L is convex for every sum of exponentials with
+        amplitudes ≥ 0, and for retrapping. None where the last readings do not fall clearly.
+    between_s
+        Range in s that holds the time with a probability of 95 %; None if its end is ten times its
+        begin or more: then the time is not determined.
+    median_s
+        Time in s that is as likely exceeded as not; None if it is not determined.
+    laws
+        Probabilities of the laws by their names, from predictions of the record's later part.
+    """
+
+    at_least: Measured | None
+    between_s: tuple[float, float] | None
+    median_s: float | None
+    laws: Mapping[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """Return the range, or the earliest time, in words."""
+        least = (
+            "no time follows from the last readings"
+            if self.at_least is None
+            else f"at least {duration_text(self.least_s)} by its convexity"
+        )
+        if self.between_s is None:
+            return f"{least}, the end not determined"
+        early, late = (duration_text(end) for end in self.between_s)
+        return f"{early} to {late} with 95 %" + ("" if self.at_least is None else f", {least}")
+
+    @property
+    def least_s(self) -> float:
+        """Time in s that the earliest one exceeds with a probability of 97.5 %; 0 without it."""
+        if self.at_least is None:
+            return 0.0
+        return max(self.at_least.value - SIGMAS_95 * self.at_least.sigma, 0.0)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LuminanceDecay:
     """Luminance of an afterglow, from its readings.
@@ -170,9 +218,8 @@ class LuminanceDecay:
     visible_s
         Time in seconds until which the luminance is above 0.3 mcd/m²; None if that was not
         measured.
-    visible_between_s
-        Range of that time by the laws that describe the readings, from the last reading on; None
-        if it was measured or no law describes them. An end that no law reaches is infinite.
+    visible_forecast
+        Forecast of that time where it is after the last reading; else None.
     slope
         −d ln L/d ln t from 10 to 60 min; None without luminances there.
     light_sum
@@ -194,7 +241,7 @@ class LuminanceDecay:
     at: tuple[LuminanceAt, ...]
     required: tuple[tuple[LuminanceRequirement, LuminanceAt], ...]
     visible_s: Measured | None
-    visible_between_s: tuple[float, float] | None
+    visible_forecast: ForecastTime | None
     slope: Measured | None
     light_sum: Measured
     colours: str
@@ -216,6 +263,26 @@ class LuminanceDecay:
         parts += [f"{self.visible_s.value / 60:.0f}"] if self.visible_s else []
         parts += [self.colours] if self.colours else []
         return "-".join(parts)
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of luminances, of the light sum, and of the time until 0.3 mcd/m².
+
+        The scale is the calibration; in σ of the time it is together with the noise.
+        """
+        has_scale, budgets = self.scale_sigma > 0, {}
+        for entry in self.at:
+            if (light := entry.luminance) is not None:
+                budgets[f"luminance at {duration_text(entry.t_s)}"] = Budget.of(
+                    light, self.scale_sigma * light.value if has_scale else None
+                )
+        # The sum of trapezia, as in σ of the light sum.
+        common = self.scale_sigma * float(np.trapezoid(self.luminance_mcd_per_m2, self.t_s))
+        budgets["light sum"] = Budget.of(self.light_sum, common if has_scale else None)
+        if self.visible_s is not None:
+            name = f"time until {VISIBLE_MCD_PER_M2:g} {MCD_PER_M2}"
+            until = self.visible_s
+            budgets[name] = Budget(until.value, until.unit, undivided=until.sigma)
+        return budgets
 
     def __str__(self) -> str:
         """Return a table for people."""
@@ -245,12 +312,10 @@ class LuminanceDecay:
         if self.visible_s is not None:
             minutes = Measured(self.visible_s.value / 60, self.visible_s.sigma / 60, "min")
             return str(minutes)
-        text = f"not reached until {duration_text(float(self.t_s[-1]))}"
-        if self.visible_between_s is None:
-            return text
-        early, late = self.visible_between_s
-        until = "no end" if math.isinf(late) else duration_text(late)
-        return f"{text}; the laws of decay that fit say {duration_text(early)} to {until}"
+        if self.visible_forecast is None:
+            return "not measured"
+        until = duration_text(float(self.t_s[-1]))
+        return f"not reached until {until}; forecast: {self.visible_forecast}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `luminance.json`; what is not finite or not known is None."""
@@ -258,12 +323,13 @@ class LuminanceDecay:
             {
                 "schema_version": 1,
                 "origin": self.origin,
+                "budgets": {name: budget.to_dict() for name, budget in self.budgets().items()},
                 "at": [
                     {"t_s": entry.t_s, "luminance_mcd_per_m2": _number(entry.luminance)}
                     for entry in self.at
                 ],
                 "visible_s": _number(self.visible_s),
-                "visible_between_s": self.visible_between_s,
+                "visible_forecast": _forecast(self.visible_forecast),
                 "slope": _number(self.slope),
                 "light_sum_mcd_s_per_m2": _number(self.light_sum),
                 "marking": self.marking,
@@ -294,3 +360,14 @@ def _text(measured: Measured | None, missing: str) -> str:
 
 def _number(measured: Measured | None) -> dict[str, float] | None:
     return None if measured is None else {"value": measured.value, "sigma": measured.sigma}
+
+
+def _forecast(forecast: ForecastTime | None) -> dict[str, Any] | None:
+    if forecast is None:
+        return None
+    return {
+        "at_least_s": _number(forecast.at_least),
+        "between_s": forecast.between_s,
+        "median_s": forecast.median_s,
+        "laws": dict(forecast.laws),
+    }

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from labrig.results.budget import Budget, named
 from labrig.results.luminance import TABLE_S, LuminanceDecay
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
@@ -156,6 +157,15 @@ class LuminanceResult(RunResult):
             return 0.0 if known is None else known.value
 
         return tuple(sorted(self.patches, key=luminance, reverse=True))
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of luminances, light sums and times of every patch."""
+        several = len(self.patches) > 1
+        return {
+            named(name if several else "", quantity): budget
+            for name, patch in self.patches.items()
+            for quantity, budget in patch.decay.budgets().items()
+        }
 
     def write_files(self, folder: Path) -> None:
         """Write the files of each patch; of several patches, each into a folder of its name."""

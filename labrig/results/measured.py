@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, PlainSerializer, PlainValidator
 
+from labrig.number_format import plus_minus
 from labrig.results.run_result import RunResult
 
 
@@ -94,9 +95,108 @@ class Measured:
         sigma = math.hypot(self.sigma, other.sigma)
         return (self.value - other.value) / sigma if 0 < sigma < math.inf else math.nan
 
+    @property
+    def plus_minus(self) -> str:
+        """The value ± σ as text, without its unit."""
+        return plus_minus(self.value, self.sigma)
+
     def __str__(self) -> str:
         """Return the value to two digits of its σ, and the unit."""
         return " ".join(filter(None, (with_uncertainty(self.value, self.sigma), self.unit)))
+
+
+#: Distance of a one-sided limit of 95 % probability from a bound, in σ.
+ONE_SIDED_SIGMAS = 1.645
+
+
+@dataclass(frozen=True)
+class OneSided(Measured):
+    """A value that a bound of its range holds: it is between that bound and `limit`.
+
+    Attributes
+    ----------
+    value
+        The bound, at which the value is fitted.
+    sigma
+        Distance of the limit over 1.645.
+    limit
+        Limit of 95 % probability, on the open side.
+
+    Examples
+    --------
+    >>> print(OneSided.held(1.0, 0.02, pull=0.0))
+    < 1.033
+    >>> print(OneSided.held(10.0, 1.0, pull=0.5, is_upper=True))
+    > 8.8
+    """
+
+    limit: float = field(kw_only=True)
+
+    @classmethod
+    def held(
+        cls, value: float, sigma: float, pull: float, unit: str = "", *, is_upper: bool = False
+    ) -> "OneSided":
+        """Return a value at its bound, by the curvature of χ² there.
+
+        Parameters
+        ----------
+        value
+            The bound.
+        sigma
+            Standard uncertainty without the bound, > 0.
+        pull
+            Distance in σ by which the value would be beyond the bound without it, ≥ 0.
+        unit
+            Unit of the value.
+        is_upper
+            Whether the bound is the largest possible value.
+        """
+        # Where χ² is larger than at the bound by 1.645²: with a pull a shorter way off.
+        distance = ONE_SIDED_SIGMAS * sigma
+        if math.isfinite(sigma):
+            distance = sigma * (math.hypot(pull, ONE_SIDED_SIGMAS) - pull)
+        limit = value - distance if is_upper else value + distance
+        return cls(value, distance / ONE_SIDED_SIGMAS, unit, limit=limit)
+
+    @property
+    def plus_minus(self) -> str:
+        """The limit as text, without its unit."""
+        return str(replace(self, unit=""))
+
+    def __str__(self) -> str:
+        """Return the limit to two digits of its distance from the bound, and the unit."""
+        if not math.isfinite(self.limit):
+            return "?"
+        sign = "<" if self.limit >= self.value else ">"
+        distance = abs(self.limit - self.value)
+        places = 1 - math.floor(math.log10(distance)) if distance > 0 else 6
+        text = f"{sign} {self.limit:.{min(max(places, 0), 9)}f}"
+        return " ".join(filter(None, (text, self.unit)))
+
+
+def measured_number(measured: Measured) -> dict[str, float | None]:
+    """Return a quantity as in JSON files: what is infinite is null.
+
+    Parameters
+    ----------
+    measured
+        The quantity; its unit is that of the key.
+
+    Returns
+    -------
+    dict
+        `value` and `sigma`, and `limit_95` of a value that a bound holds.
+
+    Examples
+    --------
+    >>> from labrig.results import Measured, measured_number
+    >>> measured_number(Measured(2.0, 0.1))
+    {'value': 2.0, 'sigma': 0.1}
+    """
+    numbers = {"value": measured.value, "sigma": measured.sigma}
+    if isinstance(measured, OneSided):
+        numbers["limit_95"] = measured.limit
+    return {name: number if math.isfinite(number) else None for name, number in numbers.items()}
 
 
 def with_uncertainty(value: float, sigma: float) -> str:

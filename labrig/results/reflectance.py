@@ -5,10 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from labrig.calibration import REFLECTANCE_KIND, PatchReflectance, ReflectanceFile
+from labrig.results.budget import Budget, named
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
+
+#: Wavelengths in nm near which the albedo is a headline value.
+HEADLINE_NM = (450.0, 550.0, 650.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +99,18 @@ class ReflectanceResult(RunResult):
     patches: Mapping[str, MeasuredReflectance]
     drift: tuple[float, float]
     calibration: ReflectanceFile
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the albedo nearest to some wavelengths."""
+        budgets = {}
+        for name, patch in self.patches.items():
+            for near_nm in HEADLINE_NM:
+                at = int(np.argmin(np.abs(patch.wavelength_nm - near_nm)))
+                albedo = Measured(float(patch.albedo[at]), float(patch.albedo_sigma[at]))
+                budgets[named(name, f"albedo at {patch.wavelength_nm[at]:.0f} nm")] = Budget.of(
+                    albedo, patch.common_sigma * albedo.value
+                )
+        return budgets
 
     def provides(self) -> Mapping[str, Any]:
         """Return the numbers of all patches."""

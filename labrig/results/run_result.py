@@ -5,13 +5,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
 from labrig.errors import DataError, UsageError
 from labrig.plugins import RESULTS, load
 from labrig.results.text_files import finite, write_text
+
+if TYPE_CHECKING:
+    from labrig.results.budget import Budget
 
 FILE = "result.json"
 
@@ -47,6 +50,13 @@ class RunResult:
         """Return values for later parts of a chain, by the name of a field of their `Inputs`."""
         return {}
 
+    def budgets(self) -> "Mapping[str, Budget]":
+        """Return how far each headline value may be trusted, by its name; none of some protocols.
+
+        They are in `result.json` under `budgets`, and in every report.
+        """
+        return {}
+
     def failures(self) -> tuple[str, ...]:
         """Return the reasons why there is no result at all, a line each; none if there is one."""
         return ()
@@ -64,7 +74,13 @@ class RunResult:
         """Return the content of `result.json`, in which infinity and NaN are texts."""
         fields = TypeAdapter(type(self)).dump_python(self, mode="json")
         content: dict[str, Any] = finite(
-            {"kind": self.kind, "schema_version": self.schema_version} | fields, _nonfinite_text
+            {
+                "kind": self.kind,
+                "schema_version": self.schema_version,
+                "budgets": {name: budget.to_dict() for name, budget in self.budgets().items()},
+            }
+            | fields,
+            _nonfinite_text,
         )
         return content
 
@@ -87,6 +103,8 @@ class RunResult:
         """
         fields = dict(content)
         kind, version = fields.pop("kind", None), fields.pop("schema_version", None)
+        # They follow from the other fields.
+        fields.pop("budgets", None)
         if (kind, version) != (cls.kind, cls.schema_version):
             raise ValueError(
                 f"a result of '{kind}', version {version}, not of '{cls.kind}', version "

@@ -8,8 +8,10 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from labrig.results.budget import Budget, named
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_law import EXPONENTIALS
+from labrig.results.layer_effect import THICKNESS
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
@@ -279,6 +281,19 @@ class SaturationResult(RunResult):
 
     patches: Mapping[str, PatchSaturation]
     weaker_light: Measured | None
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the levels of charge.
+
+        In the depth of a thick sample the level is lower, which the glow hardly shows.
+        """
+        return {
+            named(name, f"r(0) of state {number}"): Budget.of(
+                Measured(level.r, level.sigma), left_out=(THICKNESS,)
+            )
+            for name, patch in self.patches.items()
+            for number, level in enumerate(patch.levels, start=1)
+        }
 
     def write_files(self, folder: Path) -> None:
         """Write `saturation.csv`."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from labrig.number_format import aligned, rounded
 from labrig.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.text_files import finite, json_text
 
@@ -57,6 +58,10 @@ class TrapDepth:
             rate, rate * math.hypot(self.log_rate.sigma, inverse_ev * self.depth_ev.sigma), "1/s"
         )
 
+    def budget(self) -> Budget:
+        """Return the budget of the depth: σ of rates and of temperatures come together."""
+        return Budget(self.depth_ev.value, "eV", undivided=self.depth_ev.sigma)
+
     def __str__(self) -> str:
         """Return a table for people."""
         low, high = self.temperature_c[[0, -1]]
@@ -86,6 +91,7 @@ class TrapDepth:
                 "k_r_sigma_per_s": self.rate_sigma_per_s.tolist(),
                 "temperature_sigma_k": self.temperature_sigma_k,
                 "depth_ev": _number(self.depth_ev),
+                "budgets": {"depth": self.budget().to_dict()},
                 "log10_frequency_per_s": _number(self.log10_frequency),
                 "k_r_at_reference_per_s": _number(self.rate_at(self.reference_c)),
                 "reference_c": self.reference_c,

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 from labrig.optics import Spectrum
 from labrig.region import Region
+from labrig.results.budget import Budget
 from labrig.results.led_fluorescence import MatrixOnBands
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
@@ -177,6 +178,16 @@ class ValidateIlluminantsResult(RunResult):
     colours_from: Literal["curves", "chart"]
     chart_delta_e: tuple[float, float] | None
     lamps: Mapping[str, LampComparison]
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the colour differences between photographs and predictions."""
+        return {
+            f"{name} under {lamp}: ΔE2000": Budget(
+                patch.delta_e.value, undivided=patch.delta_e.sigma
+            )
+            for lamp, comparison in self.lamps.items()
+            for name, patch in comparison.patches.items()
+        }
 
     def write_files(self, folder: Path) -> None:
         """Write a table of values and colours."""

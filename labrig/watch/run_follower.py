@@ -10,7 +10,6 @@ from typing import Any
 from labrig.acquire import ProtocolModel, plan, read_protocol, read_rig_file
 from labrig.catalogue import RunStatus, status_of
 from labrig.errors import DataError, LabrigError, UsageError
-from labrig.number_format import plus_minus
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.region import Region
@@ -221,7 +220,7 @@ class RunFollower:
         only = next(iter(self._protocol.patches_of("")), "")
         return {
             name or only: ", ".join(
-                parameter_text(parameter, plus_minus(each.value, each.sigma))
+                parameter_text(parameter, each.plus_minus)
                 for parameter, each in fit.parameters.items()
             )
             for name, fit in results.items()

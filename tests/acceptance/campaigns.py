@@ -177,10 +177,18 @@ CAMPAIGNS = {
         _module("decay_fit_example"),
         _module("veiling_glare"),
         _module("luminance_pulls", "--seeds", "50"),
+        _module("luminance_times", "--decays", "100", "--point-fits", "20"),
+        _module(
+            "luminance_times",
+            *("--decays", "40", "--point-fits", "20", "--further"),
+            called="luminance_times_further",
+        ),
+        _module("luminance_times_real"),
         _module("camera_curves"),
         _module("reflectance_pulls", "--seeds", "4"),
         _module("luminance_budget"),
         _module("law_confusion", "--seeds", "100"),
+        _module("law_minima", "--seeds", "300"),
         _module("unequal_filling", "--seeds", "40"),
         *(
             _module(
@@ -206,6 +214,7 @@ CAMPAIGNS = {
         ),
         _module("sao_charge_and_decay"),
         _module("excitation_light"),
+        _module("layer_range"),
         _module("trap_models"),
         _module("lightlogger"),
         _module("faults_at_any_moment", "--trials", "450", "--seed", "8"),
@@ -245,6 +254,9 @@ CAMPAIGNS = {
         _module("euler_steps"),
         _module("chart_colours"),
         _module("dark_room"),
+        _module("dark_room", "two-states-no-door", called="prediction_beside_photographs"),
+        _module("sensor_noise", "--seeds", "100"),
+        _module("phosphor_overhead"),
         _module("fluorescent_room"),
         _module("design_recovery"),
         Campaign(

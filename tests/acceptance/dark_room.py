@@ -9,6 +9,10 @@ exposure for all; glow over reflected light, rendered over photographed − 1, m
 and furthest in σ. A case is right where the run's own material is within 3 % in the mean over all
 times and within 3 σ at each, and its mean ΔE is 2 or less; of a material with several states or
 another order the single state must be off by twice as much.
+
+Figure 10 of Nalbach, Seidel and Ritschel, a prediction beside photographs, are the cases of another
+run: the material is that of one run, the photographs are those of the other, on a bench without a
+door. Both sides of glow over reflected light are printed, at the first and the last photograph.
 """
 
 import argparse
@@ -141,6 +145,9 @@ def is_right(case: Case, patch: RenderedPatch) -> bool:
 
 def told(case: Case, folder: Path) -> bool:
     """Print the comparison of a case; return whether it is right."""
+    for other in CASES:
+        if other.name == case.of:
+            recorded(other, folder)
     run = recorded(case, folder)
     measured_in = folder / (case.of or case.name) / "runs"
     material = next(measured_in.iterdir()) / "result" / "material.yaml"
@@ -165,6 +172,11 @@ def told(case: Case, folder: Path) -> bool:
             f"{excess[furthest]:+6.2f} %, {pull[np.argmax(np.abs(pull))]:+6.2f} σ",
             flush=True,
         )
+    seen, shown = ratio.photographed, ratio.photographed * (1 + ratio.excess("measured"))
+    print(
+        f"    glow over reflected light in {ratio.channel}: photographed {seen[0]:.5f} and "
+        f"{seen[-1]:.6f}, rendered {shown[0]:.5f} and {shown[-1]:.6f}"
+    )
     for line in (*compared.notes, *compared.left_out, *compared.warnings):
         print(f"    {line}")
     return right

@@ -1,6 +1,7 @@
 """Functions that find a figure in what its campaign printed."""
 
 import re
+from statistics import median
 
 from tests.acceptance.printed import Extract, columns, furthest, match, part, span
 
@@ -209,10 +210,32 @@ def luminance_pulls(printed: str) -> str:
     return ", ".join(parts)
 
 
+def luminance_times(printed: str) -> str:
+    parts, held, open_, least, point_held = columns(
+        r"^.{24} +(0\.\d) +([\d.]+) +([\d.]+) +\S+ +\S+ +([\d.]+) +([\d.]+) ", printed
+    )
+    from_half = [share for part, share in zip(parts, open_, strict=True) if part >= 0.5]
+    return (
+        f"{span(held)} % of the ranges in each cell, of the point fits' {span(point_held)} %; not "
+        f"determined from half of the time on {span(from_half)} %; the earliest time holds in "
+        f"{span(least)} %"
+    )
+
+
 def light_errors(printed: str) -> str:
     # The last case is a thick layer, which no light explains.
     (pulls,) = columns(r"^(?!layer).*: pulls ([\d.]+);", printed)
     return f"rms of error over σ {span(pulls, 2)}"
+
+
+def layer_range(printed: str) -> str:
+    rows = columns(
+        r"^(?:optical|held out, all|thin).*: of +\d+ k_e +(\d+) % within 2 σ of the fit, +(\d+) %",
+        printed,
+    )
+    return ", ".join(
+        f"{before:.0f} % and {after:.0f} %" for before, after in zip(*rows, strict=True)
+    )
 
 
 def trap_models(order: str) -> Extract:
@@ -300,6 +323,17 @@ def times(what: str, *peers: str) -> Extract:
     return extract
 
 
+def becquerel_minima(printed: str) -> str:
+    (n,), (far,) = columns(r"background free .*?of (\d+) laws (\d+) end", printed)
+    return f"{far:.0f} of {n:.0f}"
+
+
+def law_minima(printed: str) -> str:
+    pattern = r"any decay .*?of (\d+) laws .*?, (\d+) more than .*?of (\d+) pairs (\d+) fit"
+    (n,), (near,), (pairs,), (nested,) = columns(pattern, printed)
+    return f"{near:.0f} of {n:.0f}; {nested:.0f} of {pairs:.0f}"
+
+
 def laws(printed: str) -> str:
     of_laws = columns(
         r"^(?:two rates|general|one trap).*right +([\d.]+) %.*wrong +([\d.]+) %", printed
@@ -345,6 +379,30 @@ def dark_rooms(printed: str) -> str:
         f"ΔE {span(own, 1)}, with one state {span(single, 1)}; ratio within "
         f"{furthest(ratio):.1f} % in the mean over time"
     )
+
+
+def predicted_room(printed: str) -> str:
+    sides = match(r"glow over reflected light in \w: (.*)$", printed)
+    return f"{sides}; ΔE {match(r'^ +measured +ΔE +([0-9.]+)', printed)}"
+
+
+def overheads(printed: str) -> str:
+    row = r"^(\S+): (.* ms with, .* ms without phosphorescence), "
+    return "; ".join(f"{name}: {text}" for name, text in re.findall(row, printed, re.MULTILINE))
+
+
+def gains(printed: str) -> str:
+    gain, rms, line = columns(
+        r"^loss .* gain +(\S+) ± .* rms (\S+) σ; bend .* straight line (\S+) ±", printed
+    )
+    return f"{span(gain, 3)}, rms {span(rms, 2)} σ, by a straight line {span(line, 2)}"
+
+
+def read_noises(printed: str) -> str:
+    (rms,) = columns(r"^noise .* stated: .* rms (\S+) σ", printed)
+    below = re.findall(r"(\d+) below \S+, (\d+) truly", printed)
+    limits, truly = (sum(map(int, numbers)) for numbers in zip(*below, strict=True))
+    return f"median {median(rms):.2f} σ, largest {max(rms):.2f} σ; {truly} of {limits} limits"
 
 
 def camera_curves(case: str) -> Extract:

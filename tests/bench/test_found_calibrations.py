@@ -16,6 +16,7 @@ from labrig.calibration import (
     CAMERA_KIND,
     FADE_KIND,
     IRRADIANCE_KIND,
+    LEDS_KIND,
     REFERENCE_KIND,
     CameraFile,
     CardPicture,
@@ -34,12 +35,16 @@ from labrig.record import CALIBRATIONS_FILE, read_run
 from labrig.reduce import find_strip, read_hdr_frame, strip_profile
 from labrig.results import CalibrationCheckResult
 from tests.analyse.excitation.test_excitation_run import true_irradiance
+from tests.analyse.led_bench import record as record_leds
 from tests.analyse.recorded import record
 from tests.protocols.protocol_files import written
 from tests.quick_yaml import read_quickly, write_quickly
 
 WIDTH, HEIGHT = 192, 64
 MADE = datetime(2026, 1, 1, tzinfo=UTC)
+LEDS = {"protocol": "led_brightness", "sample": {"name": "bank"}, "exposures": 1, "repeats": 1,
+        "repetitions": 3, "integration": "0.2 s", "longest": "4 s",
+        "leds": ["430 nm", "530 nm"]}  # fmt: skip
 CHECK = {"protocol": "calibration_check", "longest": "1 s", "repeats": 1}
 STRIP = Strip(left=(0.07, 0.46), right=(0.93, 0.51), height=0.3, rising=True)
 NM = tuple(np.linspace(397.0, 703.0, 31).tolist())
@@ -218,7 +223,7 @@ def test_the_newest_of_this_bench_is_found_and_what_is_named_goes_before(
     kept(tmp_path, reference(None, bench="another", made=MADE + timedelta(days=9)), "others")
     mine = rig.optics.model_copy(update={"fade": "my-fade.yaml"})
     now_s = (MADE + timedelta(days=3)).timestamp()
-    found = find_calibrations(rig.model_copy(update={"optics": mine}), tmp_path, now_s)
+    found = find_calibrations(rig.model_copy(update={"optics": mine}), [tmp_path], now_s)
     assert found.rig.optics.named(IRRADIANCE_KIND) == str(newer / "irradiance.yaml")
     assert found.rig.optics.named(FADE_KIND) == "my-fade.yaml"
     assert found.record(now_s)["irradiance"]["age"] == "48 h"
@@ -226,11 +231,68 @@ def test_the_newest_of_this_bench_is_found_and_what_is_named_goes_before(
     assert note.startswith("irradiance of the calibration newer, 48 h old")
 
 
+@pytest.mark.parametrize(
+    ("protocol", "shipped"),
+    [
+        ("colour_check", "sim-phosphor"),
+        ("led_fluorescence", "sim-fluorescent"),
+        ("led_brightness", "sim-fluorescent"),
+        ("emission_spectrum", "sim-phosphor"),
+        ("reflectance", "sim-phosphor"),
+        ("decay", "sim-phosphor"),
+    ],
+)
+@pytest.mark.parametrize("beside", ["runs", "bench"])
+def test_every_protocol_finds_what_lies_beside_the_runs_or_the_rig_file(
+    protocol: str, shipped: str, beside: str, tmp_path: Path
+) -> None:
+    path = resources.find("config", "rig", shipped)
+    mine = tmp_path / "bench" / "rig.yaml"
+    mine.parent.mkdir()
+    written_rig = read_quickly(path.read_text())
+    written_rig["simulation"]["epoch"] = "2026-01-02T00:00:00Z"
+    if "initial" in written_rig["simulation"]:
+        written_rig["simulation"]["initial"] = {"lamp": "off"}
+    mine.write_text(write_quickly(written_rig))
+    rig = read_rig_file(mine)
+    kept(
+        tmp_path / beside,
+        reference(
+            None, bench=rig.name, lamp=rig.optics.lamp, grey_card=rig.optics.grey_card,
+            curves=rig.optics.camera,
+        ),
+    )  # fmt: skip
+    recording = Recording.prepare(
+        resources.find("protocols", "protocol", protocol), mine, tmp_path / "runs"
+    )
+    assert set(recording.found.kept) == {"fade", "irradiance", "reference"}
+    assert any(note.startswith("fade, irradiance of the calibration") for note in recording.notes())
+
+
+def test_leds_that_were_calibrated_beside_a_run_are_found_by_it(tmp_path: Path) -> None:
+    """A run of led_brightness, processed, and one of led_fluorescence after it."""
+    calibrated = record_leds(tmp_path, LEDS)
+    process_run(calibrated)
+    (one,) = kept_calibrations(tmp_path / "runs")
+    assert one.reference.bench == "simulated dark room with LEDs"
+    recording = Recording.prepare(
+        resources.find("protocols", "protocol", "led_fluorescence"),
+        tmp_path / "rig.yaml",
+        tmp_path / "runs",
+    )
+    assert recording.rig.optics.named(LEDS_KIND) == str(one.files()["leds"])
+    assert any(note.startswith("leds of the calibration") for note in recording.notes())
+    # There is no picture to compare the bench with.
+    assert not any("calibration_check" in note for note in recording.notes())
+    again = Recording.prepare(tmp_path / "protocol.yaml", tmp_path / "rig.yaml", tmp_path / "runs")
+    assert LEDS_KIND.name not in again.found.kept  # it is measured anew
+
+
 def test_the_picture_is_that_of_the_filter_that_is_found(rig: RigFile, tmp_path: Path) -> None:
     older = kept(tmp_path, reference(None), "with-filter")
     (older / "lvf.yaml").write_text("read later")
     kept(tmp_path, reference(None, made=MADE + timedelta(days=1)), "fade-anew")
-    found = find_calibrations(rig, tmp_path, MADE.timestamp()).kept
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp()).kept
     assert {name: each.folder.name for name, each in found.items()} == {
         "fade": "fade-anew", "irradiance": "fade-anew", "lvf": "with-filter",
         "reference": "with-filter",
@@ -240,7 +302,7 @@ def test_the_picture_is_that_of_the_filter_that_is_found(rig: RigFile, tmp_path:
 @pytest.mark.parametrize("key", ["lamp", "grey_card", "curves"])
 def test_one_with_other_light_is_not_used(key: str, rig: RigFile, tmp_path: Path) -> None:
     kept(tmp_path, reference(None, **{key: "another"}))
-    found = find_calibrations(rig, tmp_path, MADE.timestamp())
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp())
     assert found.rig == rig
     (note,) = found.notes
     assert "is not used" in note
@@ -252,11 +314,11 @@ def test_an_old_one_is_warned_of_or_as_the_rig_file_says_not_used(
 ) -> None:
     kept(tmp_path, reference(None))
     now_s = (MADE + timedelta(days=31)).timestamp()
-    found = find_calibrations(rig, tmp_path, now_s)
+    found = find_calibrations(rig, [tmp_path], now_s)
     assert found.rig.optics.named(IRRADIANCE_KIND) is not None
     assert "744 h old, more than 720 h: make another one soon" in found.notes[-1]
     strict = rig.model_copy(update={"calibrations": CalibrationRules(only_warn=())})
-    found = find_calibrations(strict, tmp_path, now_s)
+    found = find_calibrations(strict, [tmp_path], now_s)
     assert found.rig == strict
     assert "it is 744 h old, more than 720 h" in found.notes[0]
 
@@ -294,7 +356,7 @@ def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) ->
     for name in ("camera", "blank", "lvf"):
         (folder / f"{name}.yaml").write_text("read later")
     rig = read_rig_file(shipped)
-    found = find_calibrations(rig, tmp_path, MADE.timestamp()).rig
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp()).rig
     chain = read_protocol(protocol).suited_to(found)
     assert isinstance(chain, Phosphor)
     assert [part["protocol"] for part in chain.parts] == [
@@ -320,7 +382,7 @@ def test_a_camera_without_a_flat_field_at_the_aperture_is_not_used(
         flats=(Flat(f_number=4, falloff=((-0.1,),)),),
     )  # fmt: skip
     CAMERA_KIND.write(folder, flat)
-    found = find_calibrations(rig, tmp_path, MADE.timestamp())
+    found = find_calibrations(rig, [tmp_path], MADE.timestamp())
     assert found.without_apertures([4.0]) is found
     assert found.rig.optics.named(CAMERA_KIND) is not None
     stopped_down = found.without_apertures([4.0, 5.6])

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from labrig.errors import FitError
 from labrig.fit import ChargeFit, fit_charge_and_decay
+from labrig.results import OneSided
 from tests.pulls import assert_sigma_is_right
 
 FloatArray = NDArray[np.float64]
@@ -80,6 +81,7 @@ def test_first_order_stays_first_order() -> None:
         fit = fitted(values, 1.0, light_stimulated=0.0)
         assert fit.candidates[fit.chosen].label == "1 state of first order"
         assert fit.states[0].exponent is None
+        assert fit.states[0].decay_time_s is not None
         assert fit.states[0].decay_time_s.value == pytest.approx(50.0, rel=0.01)
 
 
@@ -91,6 +93,34 @@ def test_two_states_of_general_order() -> None:
     assert fit.candidates[fit.chosen].label == "2 states of general order"
     assert [state.order.value for state in fit.states] == pytest.approx([1.8, 1.3], abs=0.06)
     assert fit.chi2_charge == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_state_of_first_order_and_one_of_second_keep_their_places() -> None:
+    """The rate at lamp off orders them: τ of an order near 1 is without end."""
+    t_s = np.concatenate(
+        [np.arange(0.0, 20, 2), np.arange(22.0, 218, 5), np.geomspace(223, 900, 80)]
+    )
+    truth = light([(0.02, 0.08, 1.0, 1500.0), (0.01, 0.02, 2.0, 5000.0)], t_s=t_s)
+    held = []
+    for seed in range(4):
+        noise = np.random.default_rng(seed).standard_normal(len(t_s))
+        fit = fit_charge_and_decay(
+            t_s, truth + 0.05 * noise, 0.05, light_on_s=ON_S, light_off_s=OFF_S, states=2,
+            order="general",
+        )  # fmt: skip
+        first, second = fit.states
+        assert (first.order.value < 1.3, second.order.value > 1.7) == (True, True)
+        rate = first.rate_at_off_per_s
+        assert abs(rate.value - 0.08) < 4 * rate.sigma < 0.03
+        assert (first.exponent is None) == (first.decay_time_s is None)
+        if first.order.value == 1:
+            held.append(first.order)
+            assert "< 1." in str(fit)
+    assert 0 < len(held) < 4
+    for order in held:
+        assert isinstance(order, OneSided)
+        assert 0 < order.limit - 1 < 0.2
+        assert order.sigma > 0
 
 
 def test_without_saturation_only_the_decay_is_told() -> None:

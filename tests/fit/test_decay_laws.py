@@ -1,14 +1,20 @@
 """Laws that are no sum of a few exponentials: chosen where they hold, with parameters and σ."""
 
 import math
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.optimize import least_squares
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.material import DECAY_LAWS, exponential_means
-from labrig.results import FORECAST_SPANS, FittedDecay, FloatArray
+from labrig.fit.decay import laws
+from labrig.fit.decay.noise_likelihood import NoiseLikelihood
+from labrig.material import DECAY_LAWS, DecayLaw, exponential_means
+from labrig.results import FORECAST_SPANS, FittedDecay, FloatArray, OneSided
 from tests.pulls import assert_sigma_is_right
 
 T_S = np.concatenate([np.arange(0.0, 60.0, 1.5), np.arange(60.0, 400.0, 12.0)])
@@ -54,6 +60,100 @@ def test_exponentials_stay_exponentials() -> None:
         fit = fit_decay(T_S, values, sigma, exposure_s=EXPOSURE_S)
         assert (fit.law, fit.n_states) == ("exponentials", 2)
         assert fit.compared_laws[0].probability > 0.95
+
+
+def lowest_chi2(t_s: FloatArray, values: FloatArray, sigma: FloatArray, offset: bool) -> float:
+    """χ² of (1 + t/τ)^(−p) by a search in τ and p, for which level and background follow."""
+
+    def residuals(theta: FloatArray) -> FloatArray:
+        shape = np.exp(-theta[1] * np.log1p((t_s - t_s[0]) / (np.exp(theta[0]) + t_s[0])))
+        columns = [shape, np.ones_like(t_s)][: 1 + offset]
+        design = np.column_stack(columns) / sigma[:, None]
+        return np.asarray(design @ np.linalg.lstsq(design, values / sigma)[0] - values / sigma)
+
+    starts = [(log_tau, p) for log_tau in (1.0, 3.5, 6.0) for p in (0.5, 1.2, 2.5)]
+    return min(2 * least_squares(residuals, start, xtol=1e-12).cost for start in starts)
+
+
+@pytest.mark.parametrize(
+    ("p", "tau_s", "first_s", "offset"),
+    [(1.08, 70.0, 300.0, False), (1.2, 30.0, 60.0, True), (1.4, 100.0, 60.0, False),
+     (0.6, 20.0, 100.0, False), (2.5, 40.0, 20.0, True)],
+)  # fmt: skip
+def test_becquerels_law_ends_at_its_lowest_chi2(
+    p: float, tau_s: float, first_s: float, offset: bool
+) -> None:
+    t_s = np.geomspace(first_s, 40 * first_s, 120)
+    signal = 1000 * (1 + t_s / tau_s) ** -p
+    sigma = 0.01 * signal
+    seed = round(100 * p + tau_s + first_s)
+    values = signal + sigma * np.random.default_rng(seed).standard_normal(120)
+    fit = fit_decay(t_s, values, sigma, offset_sigma=np.inf if offset else 0.0, flicker=0.0)
+    (law,) = (law for law in fit.laws if law.name == "becquerel")
+    chi2 = law.reduced_chi2 * (120 - 3 - offset)
+    assert chi2 == pytest.approx(lowest_chi2(t_s, values, sigma, offset), abs=1e-3)
+    assert not any("correlates" in line for line in fit.warnings)
+
+
+@given(
+    shape=st.floats(0.02, 1.2),
+    log_rate=st.floats(-5.0, 0.0),
+    relative=st.sampled_from([1e-3, 1e-2, 5e-2]),
+    offset=st.booleans(),
+    seed=st.integers(0, 10_000),
+)
+@settings(max_examples=8)
+def test_a_law_never_fits_worse_than_one_that_it_contains(
+    shape: float, log_rate: float, relative: float, offset: bool, seed: int
+) -> None:
+    t_s = np.geomspace(2.0, 400.0, 50)
+    signal = DECAY_LAWS["becquerel"].value(np.exp(log_rate) * t_s, np.full_like(t_s, shape))
+    signal = signal / signal[0]
+    sigma = np.hypot(relative * signal, 1e-4)
+    values = signal + sigma * np.random.default_rng(seed).standard_normal(50) + 0.02 * offset
+    fit = fit_decay(t_s, values, sigma, offset_sigma=np.inf if offset else 0.0, flicker=0.0)
+    states = [each.reduced_chi2 * (50 - 2 * each.n_states - offset) for each in fit.candidates]
+    chi2 = {law.name: law.reduced_chi2 * (50 - 3 - offset) for law in fit.laws}
+    assert set(chi2) == set(DECAY_LAWS)
+    assert max(chi2.values()) <= states[0] + 1e-3
+    assert all(more <= fewer + 1e-3 for fewer, more in pairwise(states))
+
+
+def test_a_fit_that_does_not_end_at_a_minimum_is_named_and_not_compared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    own = laws.fit_law
+
+    def fit_law(likelihood: NoiseLikelihood, law: DecayLaw, *others: Any) -> laws.LawFit | None:
+        if law.name == "becquerel":
+            raise laws.UnfinishedFitError("unfinished")
+        return own(likelihood, law, *others)
+
+    monkeypatch.setattr(laws, "fit_law", fit_law)
+    fit = fitted("becquerel", 0.4, 3)
+    (warning,) = (line for line in fit.warnings if "did not end at a minimum" in line)
+    assert "Becquerel" in warning
+    assert {law.name for law in fit.compared_laws}.isdisjoint({"becquerel"})
+    with pytest.raises(FitError, match="minimum"):
+        fitted("becquerel", 0.4, 3, law="becquerel")
+
+
+def test_what_a_bound_holds_has_a_one_sided_limit() -> None:
+    signal = exponential_means(np.array([0.05]), T_S, EXPOSURE_S)[:, 0]
+    limits = []
+    for seed in range(310, 314):
+        values, sigma = measured(signal, seed)
+        fit = fit_decay(T_S, values, sigma, exposure_s=EXPOSURE_S)
+        own = {law.name: law for law in fit.laws}
+        if own["becquerel"].shape == 0:
+            limits.append(own["becquerel"].parameters["kinetic_order"])
+        if own["stretched"].shape == 1:
+            limits.append(own["stretched"].parameters["exponent"])
+    assert limits
+    for each in limits:
+        assert isinstance(each, OneSided)
+        assert 1e-3 < abs(each.limit - 1) < 0.1
+        assert str(each)[0] == ("<" if each.limit > 1 else ">")
 
 
 @pytest.mark.campaign

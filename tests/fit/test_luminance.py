@@ -107,8 +107,9 @@ def test_an_end_that_was_not_measured_is_not_in_the_marking() -> None:
     assert found.marking is not None
     assert found.marking.endswith("-K-W")
     assert found.marking.count("-") == 2
-    assert found.visible_between_s is not None
-    early, late = found.visible_between_s
+    assert found.visible_forecast is not None
+    assert found.visible_forecast.between_s is not None
+    early, late = found.visible_forecast.between_s
     assert 7200 < early < late
     assert early < 1.1 * end_s(becquerel)
     assert late > 0.9 * end_s(becquerel)

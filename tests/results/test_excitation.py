@@ -61,6 +61,13 @@ def test_places_go_along_the_filter(result: ExcitationResult) -> None:
     assert position_nm[0] < 460 < 600 < position_nm[-1]
 
 
+def test_an_order_that_its_bound_holds_has_a_one_sided_limit(result: ExcitationResult) -> None:
+    (state,) = result.patches["left"].fit.states
+    assert str(replace(state, kinetic_order=1.0, kinetic_order_sigma=0.02).order) == "< 1.033"
+    assert str(replace(state, kinetic_order=1.1, kinetic_order_sigma=0.02).order) == "1.100(20)"
+    assert replace(state, kinetic_order=1.0, kinetic_order_sigma=0.0).order.sigma == 0
+
+
 @pytest.mark.parametrize("is_known", [True, False])
 def test_of_a_kinetic_order_only_what_is_known_is_shown(
     result: ExcitationResult, is_known: bool

@@ -4,13 +4,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from labrig.analyse.camera_calibration.bend import Bend, fit_bend
 from labrig.analyse.camera_calibration.factors import CardFrame, Factors, fit_factors
 from labrig.analyse.camera_calibration.flat_field import fit_flat
 from labrig.analyse.camera_calibration.glare import measure_glare
 from labrig.analyse.camera_calibration.linearity import deviation, fit_linearity
 from labrig.analyse.camera_calibration.photon_transfer import (
-    MeasureScatter,
+    MeasurePair,
+    Pair,
     pairs_of,
     photon_transfer,
 )
@@ -27,7 +30,6 @@ from labrig.results import (
     CameraCalibrationResult,
     FittedFlat,
     FloatArray,
-    PairScatter,
     PhotonTransfer,
     Series,
 )
@@ -59,14 +61,15 @@ def analyse(part: Part) -> CameraCalibrationResult:
     lit = part_frames(part, *LIT)
     card = card_levels(lit, darks, region)
     photon = [frame for frame in lit if frame.role == CardFrames.PHOTON]
-    transfers = tuple(
-        _fit_transfer(noise_iso, photon, darks, region) for noise_iso in protocol.isos
-    )
     bracket = [frame for frame in lit if frame.unit == LINEARITY]
     if not bracket:
         raise DataError("expected the brackets of 'linearity', got none; resume the run")
     range_dn, full_dn = _saturation_levels(max(bracket, key=lambda frame: frame.exposure_s), region)
     linearity = card.linearity(iso, range_dn, full_dn)
+    transfers = tuple(
+        _fit_transfer(noise_iso, photon, darks, region, card.bend(noise_iso, range_dn))
+        for noise_iso in protocol.isos
+    )
     factors = fit_factors(
         card.card_frames((CardFrames.REPEAT, CardFrames.BRACKET), linearity),
         iso,
@@ -136,12 +139,19 @@ class CardLevels:
         self, iso: float, range_dn: float, saturation_dn: float | None
     ) -> Linearity | None:
         """Fit the deviation from linearity to the frames at one ISO."""
+        return fit_linearity(*self._at_iso(iso), range_dn, saturation_dn)
+
+    def bend(self, iso: float, range_dn: float) -> Bend:
+        """Fit the bend to the frames at one ISO."""
+        return fit_bend(*self._at_iso(iso), range_dn)
+
+    def _at_iso(self, iso: float) -> tuple[FloatArray, FloatArray, NDArray[np.intp]]:
+        """Return levels and σ in DN, NaN at other ISOs, and a number for each aperture."""
         rows = self.series.usable & np.array([frame.iso == iso for frame in self.frames])
         stops = [frame.f_number for frame in self.frames]
         stop_values = list(dict.fromkeys(stops))
         group = np.array([stop_values.index(stop) for stop in stops], dtype=np.intp)
-        level = np.where(rows[:, np.newaxis], self.level_dn, np.nan)
-        return fit_linearity(level, self.sigma_dn, group, range_dn, saturation_dn)
+        return np.where(rows[:, np.newaxis], self.level_dn, np.nan), self.sigma_dn, group
 
     def card_frames(self, roles: Sequence[str], linearity: Linearity | None) -> list[CardFrame]:
         """Return the light of the card in frames of the roles, corrected for non-linearity."""
@@ -183,7 +193,11 @@ def card_levels(
 
 
 def _fit_transfer(
-    iso: float, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord], card: Region
+    iso: float,
+    lit: Sequence[FrameRecord],
+    darks: Sequence[FrameRecord],
+    card: Region,
+    bend: Bend,
 ) -> PhotonTransfer:
     """Fit the photon transfer at one ISO.
 
@@ -198,8 +212,9 @@ def _fit_transfer(
     iso_frames = [frame for frame in lit if frame.iso == iso]
     return photon_transfer(
         iso,
-        _measure_scatters(pairs_of(iso_frames), card, dark_dn),
-        _measure_scatters(pairs_of(dark), card, dark_dn),
+        _measure_pairs(pairs_of(iso_frames), card, dark_dn),
+        _measure_pairs(pairs_of(dark), card, dark_dn),
+        bend,
     )
 
 
@@ -223,11 +238,11 @@ def _saturation_levels(brightest: FrameRecord, card: Region) -> tuple[float, flo
     return measured.range_dn, measured.range_dn if clips else None
 
 
-def _measure_scatters(
+def _measure_pairs(
     pairs: Sequence[tuple[FrameRecord, FrameRecord]], card: Region, dark_dn: float
-) -> list[PairScatter]:
-    scatters = reduce_groups(pairs, MeasureScatter(card, dark_dn))
-    return [pair for scatter in scatters for pair in scatter]
+) -> list[Pair]:
+    measured = reduce_groups(pairs, MeasurePair(card, dark_dn))
+    return [pair for one_or_none in measured for pair in one_or_none]
 
 
 def _fit_flats(
@@ -256,9 +271,9 @@ def _warnings(
     for transfer in transfers:
         if transfer.reduced_chi2 > STRAIGHT_CHI2:
             yield (
-                f"the noise at ISO {transfer.noise.iso:g} does not rise evenly with the light (χ² "
-                f"{transfer.reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW "
-                "frames, or did something move?"
+                f"the noise at ISO {transfer.noise.iso:g} does not rise with the light as that of "
+                f"photons (χ² {transfer.reduced_chi2:.1f} a degree of freedom): does the camera "
+                "filter its RAW frames, or did something move?"
             )
     evident = [transfer for transfer in transfers if transfer.neighbours_share_noise]
     if evident:

@@ -11,6 +11,8 @@ with δ the error of the subtracted dark level. A deviation that is the same pow
 not observable in this way.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,66 @@ from labrig.results import FloatArray
 KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)
 #: Fraction of the range below which read noise dominates.
 MIN_FRACTION = 0.005
+
+
+@dataclass(frozen=True, eq=False)
+class CardRatios:
+    """Logarithms of n levels of a grey card, of which only ratios of channels count.
+
+    Attributes
+    ----------
+    level_dn
+        The levels above dark in DN, shape (n,).
+    weight
+        Reciprocal relative standard uncertainties, shape (n,).
+    nuisances
+        Orthonormal basis of what light, colour and dark level explain in weighted logarithms,
+        shape (n, m).
+    """
+
+    level_dn: FloatArray
+    weight: FloatArray
+    nuisances: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        level_dn: FloatArray,
+        sigma_dn: FloatArray,
+        group: NDArray[np.intp],
+        range_dn: float,
+    ) -> "CardRatios | None":
+        """Return the ratios of frames; None if none has two channels above the read noise.
+
+        Parameters are those of `fit_linearity`.
+        """
+        is_used = np.isfinite(level_dn) & (level_dn > MIN_FRACTION * range_dn)
+        is_used &= (is_used.sum(axis=1) > 1)[:, np.newaxis]
+        if not is_used.any():
+            return None
+        frame, channel = np.nonzero(is_used)
+        level, weight = level_dn[is_used], level_dn[is_used] / sigma_dn[is_used]
+        frames, channels = level_dn.shape
+        groups = int(group.max()) + 1
+        light = np.equal.outer(frame, np.arange(frames)).astype(np.float64)
+        colour = np.zeros((len(level), groups * channels))
+        colour[np.arange(len(level)), group[frame] * channels + channel] = 1.0
+        dark = np.equal.outer(channel, np.arange(channels)) / level[:, np.newaxis]
+        nuisances = np.hstack([light, colour, dark * level.min()]) * weight[:, np.newaxis]
+        left, singular_values, _ = np.linalg.svd(nuisances, full_matrices=False)
+        return cls(level, weight, left[:, singular_values > 1e-10 * singular_values.max()])
+
+    @property
+    def dof(self) -> int:
+        """Number of levels less that of the nuisances."""
+        return len(self.level_dn) - int(self.nuisances.shape[1])
+
+    def without_nuisances(self, design: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return weighted logarithms (n,) and columns of a design (n, k), nuisances taken out."""
+        target = np.log(self.level_dn) * self.weight
+        columns = design * self.weight[:, np.newaxis]
+        basis = self.nuisances
+        return target - basis @ (basis.T @ target), columns - basis @ (basis.T @ columns)
 
 
 def fit_linearity(
@@ -46,37 +108,18 @@ def fit_linearity(
     saturation_dn
         Saturation level in DN, which is passed on to the result.
     """
-    is_used = np.isfinite(level_dn) & (level_dn > MIN_FRACTION * range_dn)
-    is_used &= (is_used.sum(axis=1) > 1)[:, np.newaxis]
-    if not is_used.any():
+    ratios = CardRatios.of(level_dn, sigma_dn, group, range_dn)
+    if ratios is None:
         return None
-    frame, channel = np.nonzero(is_used)
-    level, relative = level_dn[is_used], sigma_dn[is_used] / level_dn[is_used]
-    highest = float(level.max())
+    highest = float(ratios.level_dn.max())
     between = [fraction * range_dn for fraction in KNOTS if fraction * range_dn < highest]
     knots = np.array([0.0, *between, highest])
-    frames, channels = level_dn.shape
-    groups = int(group.max()) + 1
-    bends = hat_functions(knots, level)[:, 1:]
-    light = np.equal.outer(frame, np.arange(frames)).astype(np.float64)
-    colour = np.zeros((len(level), groups * channels))
-    colour[np.arange(len(level)), group[frame] * channels + channel] = 1.0
-    weight = 1 / relative
-    dark = np.equal.outer(channel, np.arange(channels)) / level[:, np.newaxis]
-    nuisance = np.hstack([light, colour, dark * level.min()]) * weight[:, np.newaxis]
-    # What light, colour and dark level explain is taken out; D is what is left.
-    left_vectors, singular_values, _ = np.linalg.svd(nuisance, full_matrices=False)
-    nuisance_basis = left_vectors[:, singular_values > 1e-10 * singular_values.max()]
-    target, design = np.log(level) * weight, bends * weight[:, np.newaxis]
-    target, design = (
-        target - nuisance_basis @ (nuisance_basis.T @ target),
-        design - nuisance_basis @ (nuisance_basis.T @ design),
-    )
+    target, design = ratios.without_nuisances(hat_functions(knots, ratios.level_dn)[:, 1:])
     singular = np.linalg.svd(design, compute_uv=False)
     if singular[-1] < 1e-6 * singular[0]:
         return None
     coefficients, *_ = np.linalg.lstsq(design, target)
-    dof = len(level) - nuisance_basis.shape[1] - len(coefficients)
+    dof = ratios.dof - len(coefficients)
     misfit = np.square(target - design @ coefficients).sum() / max(dof, 1)
     covariance = np.linalg.inv(design.T @ design) * max(misfit, 1.0)
     return Linearity(

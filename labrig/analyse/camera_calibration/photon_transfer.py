@@ -1,7 +1,10 @@
 """Gain and read noise of a sensor from pairs of frames of the same light.
 
-The model is that of `labrig.reduce.photon_transfer`; the gain is the reciprocal of its photons'
-part. The difference of two frames holds no pattern of pixels, card or lens.
+The variance is that of reading and that of photons, which rises with the light by the reciprocal of
+the gain, and bends with the sensor (`labrig.analyse.camera_calibration.bend`): gain and bend are
+fitted together. The difference of two frames holds no pattern of pixels, card or lens. Rounding is
+taken out as `labrig.reduce.rounding` and, where noise is less than a step of the converter's
+numbers, `labrig.analyse.camera_calibration.read_noise` say.
 
 Where pixels share charge with their neighbours, each one scatters less than its photons do. The
 covariances with the eight neighbours compensate for it: a pixel's lost charge is in its neighbours
@@ -13,20 +16,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import chi2
 
+from labrig.analyse.camera_calibration.bend import Bend, photon_terms
+from labrig.analyse.camera_calibration.read_noise import RESOLVED, NumberCounts, counted_noise
 from labrig.calibration import Noise
 from labrig.errors import DataError
 from labrig.record import FrameRecord
 from labrig.reduce import (
     ROUNDING_VARIANCE,
     LinearFrame,
-    NoiseModel,
     RawFrame,
     measure,
-    variance_terms,
 )
 from labrig.region import Region, region_pixels
-from labrig.results import FloatArray, PairScatter, PhotonTransfer
+from labrig.results import FloatArray, Measured, PairScatter, PhotonTransfer
 
 #: Standard deviations beyond which a pixel is hot, or was hit by a cosmic ray.
 OUTLIER_SIGMAS = 6.0
@@ -34,12 +39,32 @@ OUTLIER_SIGMAS = 6.0
 LIT_SIGMAS = 3.0
 #: Most pixels across and down; more take memory without more precision.
 MAX_PIXELS = 1024
+#: Probability of a χ² below which variances scatter by more than their σ, which are then raised:
+#: the numbers of pixels tell σ, and raising it for every χ² above its mean would make it too large.
+BY_CHANCE = 0.01
 #: Offsets of half of the eight neighbours; the others are symmetric.
 _NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
 
 
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two frames of the same light.
+
+    Attributes
+    ----------
+    scatter
+        Their scatter.
+    counts
+        Their numbers, at each position of the colour filter, where these resolve the scatter badly;
+        otherwise empty.
+    """
+
+    scatter: PairScatter
+    counts: tuple[NumberCounts, ...] = ()
+
+
 @dataclass(frozen=True)
-class MeasureScatter:
+class MeasurePair:
     """Measurement of the scatter between the two frames of a pair.
 
     Attributes
@@ -53,17 +78,17 @@ class MeasureScatter:
     region: Region
     dark_dn: float
 
-    def __call__(self, frames: Iterator[RawFrame]) -> tuple[PairScatter, ...]:
-        """Measure the scatter of a pair; there is none if the first frame clips."""
+    def __call__(self, frames: Iterator[RawFrame]) -> tuple[Pair, ...]:
+        """Measure a pair; there is none if the first frame clips."""
         first, second = frames
         if measure(first, self.region).clipped:
             return ()
-        return (scatter(first, second, self.region, self.dark_dn),)
+        return (measure_pair(first, second, self.region, self.dark_dn),)
 
 
-def scatter(
+def measure_pair(
     first_frame: RawFrame, second_frame: RawFrame, region: Region, dark_dn: float
-) -> PairScatter:
+) -> Pair:
     """Measure the scatter between two frames of one exposure in a region.
 
     Parameters
@@ -97,7 +122,31 @@ def scatter(
         difference[slices] = (scaled_difference - scaled_difference.mean()) / np.sqrt(1 + scale**2)
         difference[slices] *= _uncut(first_frame, first_level + dark_dn)
         levels.append((first_level + second_level) / 2)
-    return _difference_scatter(difference, float(np.mean(levels)))
+    step_dn = _step_dn(first_frame, area)
+    scatter = _difference_scatter(difference, levels, step_dn)
+    is_resolved = scatter.total_variance_dn2 > (RESOLVED + ROUNDING_VARIANCE) * step_dn**2
+    counts = () if is_resolved else _counts(first_frame, second_frame, area, step_dn)
+    return Pair(scatter, counts)
+
+
+def _step_dn(frame: RawFrame, area: tuple[int, int, int, int]) -> int:
+    """Return the step of the numbers in DN: 4 of a camera with 12 bits that writes 14."""
+    x, y, width, height = area
+    numbers = np.flatnonzero(np.bincount(frame.mosaic[y : y + height, x : x + width].ravel()))
+    return max(int(np.gcd.reduce(np.diff(numbers))), 1) if len(numbers) > 1 else 1
+
+
+def _counts(
+    first: RawFrame, second: RawFrame, area: tuple[int, int, int, int], step_dn: int
+) -> tuple[NumberCounts, ...]:
+    x, y, width, height = area
+    side = first.cfa_side
+    ends = min(first.black) < step_dn
+    counts = []
+    for row, column in np.ndindex(side, side):
+        plane = np.s_[y + row : y + height : side, x + column : x + width : side]
+        counts.append(NumberCounts.of(first.mosaic[plane], second.mosaic[plane], step_dn, ends))
+    return tuple(counts)
 
 
 def _uncut(frame: RawFrame, level_dn: float) -> float:
@@ -117,9 +166,11 @@ def _central_area(area: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
     return x + (width - wide) // 2, y + (height - high) // 2, wide, high
 
 
-def _difference_scatter(difference: FloatArray, level_dn: float) -> PairScatter:
+def _difference_scatter(
+    difference: FloatArray, levels_dn: Sequence[float], step_dn: int
+) -> PairScatter:
     robust = 1.4826 * float(np.median(np.abs(difference)))
-    kept = np.abs(difference) <= OUTLIER_SIGMAS * max(robust, 1.0)
+    kept = np.abs(difference) <= OUTLIER_SIGMAS * max(robust, step_dn)
     clean = np.where(kept, difference, 0.0)
     columns = clean.shape[1]
     rows = clean.sum(axis=1) / kept.sum(axis=1)
@@ -128,12 +179,16 @@ def _difference_scatter(difference: FloatArray, level_dn: float) -> PairScatter:
     covariances = [_covariance(deviations, down, right) for down, right in _NEIGHBOURS]
     # What its mean has taken from each row: pixels that share noise make more of it.
     row_mean_variance = (variance + 2 * covariances[0]) / columns
+    fourth = float(np.square(np.square(deviations)).sum() / kept.sum())
     return PairScatter(
-        level_dn,
+        float(np.mean(levels_dn)),
+        tuple(levels_dn),
         variance_dn2=variance + row_mean_variance,
         neighbours_dn2=2 * (sum(covariances) + row_mean_variance),
         row_variance_dn2=max(float(np.square(rows).mean()) - row_mean_variance, 0.0),
+        kurtosis=fourth / variance**2 if variance else 3.0,
         pixels=int(kept.sum()),
+        step_dn=step_dn,
     )
 
 
@@ -146,9 +201,18 @@ def _covariance(values: FloatArray, down: int, right: int) -> float:
 
 
 def photon_transfer(
-    iso: float, lit: Sequence[PairScatter], dark: Sequence[PairScatter]
+    iso: float, lit: Sequence[Pair], dark: Sequence[Pair], bend: Bend
 ) -> PhotonTransfer:
-    """Fit the gain to lit pairs, and measure the read noise of dark ones.
+    """Fit gain and bend to lit pairs, and measure the read noise of dark ones.
+
+    Parameters
+    ----------
+    iso
+        The ISO of the frames.
+    lit, dark
+        Pairs of lit frames, and of dark ones.
+    bend
+        The sensor's bend by the ratios of channels.
 
     Raises
     ------
@@ -160,32 +224,128 @@ def photon_transfer(
             f"expected pairs of lit frames at two levels and of dark frames at ISO {iso:g}, got "
             f"{len(lit)} and {len(dark)}; take more"
         )
-    level = np.array([point.level_dn for point in lit])
-    variance = np.array([point.light_variance_dn2 for point in lit])
-    # Of n pixels the variance V has a variance of 2 V²/n, each of the covariances with the four
-    # neighbours, which count twice, V²/n: 9 times as much together.
-    dof = np.array([point.pixels for point in lit]) / 9
-    dark_variance = float(np.mean([point.variance_dn2 for point in dark]))
-    dark_light_variance = float(np.mean([point.light_variance_dn2 for point in dark]))
-    slope, sigma, chi2 = _fit_line(level, variance, dark_light_variance, dof)
-    if not slope > 0:
+    read = _read_noise(dark)
+    every = [_light_variance(pair) for pair in lit]
+    points = [point for point in every if point is not None]
+    if len(points) < 2:
         raise DataError(
-            f"expected noise that rises with the light at ISO {iso:g}, got {slope:.3g} per DN; is "
-            "the card lit, and 'card:' its region?"
+            f"expected noise of at least half a step of the camera's numbers at ISO {iso:g}, got "
+            "less than these resolve; add light, or choose a higher ISO"
         )
-    gain = 1 / slope
-    read = np.sqrt(max(dark_variance - ROUNDING_VARIANCE, 0.0))
-    pixels = sum(point.pixels for point in dark)
-    row = np.sqrt(np.mean([point.row_variance_dn2 for point in dark]))
+    dark_variance = _dark_light_variance(read, dark)
+    line = _fit_line(points, dark_variance, bend)
+    if not line.slope.value > 0:
+        raise DataError(
+            f"expected noise that rises with the light at ISO {iso:g}, got {line.slope.value:.3g} "
+            "per DN; is the card lit, and 'card:' its region?"
+        )
+    gain = 1 / line.slope.value
+    relative = line.slope.sigma / line.slope.value
+    row = np.sqrt(np.mean([pair.scatter.row_variance_dn2 for pair in dark]))
     noise = Noise(
         iso=iso,
         gain_e_per_dn=gain,
-        gain_e_per_dn_sigma=gain * sigma / slope,
-        read_noise_e=float(read * gain),
-        read_noise_e_sigma=float(read * gain * np.hypot(sigma / slope, 1 / np.sqrt(2 * pixels))),
+        gain_e_per_dn_sigma=gain * relative,
+        read_noise_e=read.value_dn * gain,
+        read_noise_e_sigma=gain * float(np.hypot(read.sigma_dn, read.value_dn * relative)),
+        read_noise_is_limit=read.is_limit,
         row_noise_e=float(row * gain),
     )
-    return PhotonTransfer(noise, tuple(lit), *_shared_noise(lit), chi2)
+    scatters = tuple(pair.scatter for pair in lit)
+    photons = tuple(
+        None if point is None else point.variance_dn2 - dark_variance.value for point in every
+    )
+    shared, shared_sigma = _shared_noise(scatters)
+    return PhotonTransfer(
+        noise, scatters, photons, shared, shared_sigma, line.reduced_chi2, line.bend
+    )
+
+
+@dataclass(frozen=True)
+class _ReadNoise:
+    """Read noise of a pixel without the row noise in DN; where `is_limit` it is below the value."""
+
+    value_dn: float
+    sigma_dn: float
+    is_limit: bool = False
+
+
+def _read_noise(dark: Sequence[Pair]) -> _ReadNoise:
+    step_dn = max(pair.scatter.step_dn for pair in dark)
+    row_variance = float(np.mean([pair.scatter.row_variance_dn2 for pair in dark]))
+    counts = [each for pair in dark for each in pair.counts]
+    if not counts:
+        variance = float(np.mean([pair.scatter.variance_dn2 for pair in dark]))
+        kurtosis = float(np.mean([pair.scatter.kurtosis for pair in dark]))
+        pixels = sum(pair.scatter.pixels for pair in dark)
+        value = np.sqrt(variance - ROUNDING_VARIANCE * step_dn**2)
+        return _ReadNoise(
+            float(value), float(variance * np.sqrt((kurtosis - 1) / pixels) / 2 / value)
+        )
+    noise = counted_noise(counts)
+    value, sigma = noise.value * step_dn, noise.sigma * step_dn
+    if noise.is_limit:
+        return _ReadNoise(value, 0.0, is_limit=True)
+    alone = float(np.sqrt(max(value**2 - row_variance, 0.01 * value**2)))
+    return _ReadNoise(alone, sigma * value / alone)
+
+
+def _dark_light_variance(read: _ReadNoise, dark: Sequence[Pair]) -> Measured:
+    """Return what lit frames have of the noise of dark ones in DN²."""
+    neighbours = float(np.mean([pair.scatter.neighbours_dn2 for pair in dark]))
+    pixels = sum(pair.scatter.pixels for pair in dark)
+    variance = float(np.mean([pair.scatter.variance_dn2 for pair in dark]))
+    covariances = 4 * variance / np.sqrt(pixels)
+    if read.is_limit:
+        # Anything up to the limit.
+        half = sigma = read.value_dn**2 / 2
+    else:
+        half, sigma = read.value_dn**2, 2 * read.value_dn * read.sigma_dn
+    return Measured(half + neighbours, float(np.hypot(sigma, covariances)))
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Variance of light at one level.
+
+    Attributes
+    ----------
+    levels_dn
+        Level of each position of the colour filter above dark in DN.
+    variance_dn2
+        Variance of a pixel before its numbers are rounded, in DN².
+    rounding_dn2
+        What rounding adds to the scatter of the numbers in DN².
+    relative_sigma
+        σ of the variance over that of the numbers.
+    """
+
+    levels_dn: tuple[float, ...]
+    variance_dn2: float
+    rounding_dn2: float
+    relative_sigma: float
+
+
+def _light_variance(pair: Pair) -> _Point | None:
+    """Return the variance of light by a pair; None where the numbers do not resolve it."""
+    scatter = pair.scatter
+    # Of n pixels the variance V has a variance of (κ − 1) V²/n, each of the covariances with the
+    # four neighbours, which count twice, V²/n.
+    relative_sigma = float(np.sqrt((scatter.kurtosis - 1 + 16) / scatter.pixels))
+    rounding = ROUNDING_VARIANCE * scatter.step_dn**2
+    if pair.counts:
+        noises = [counted_noise([each]) for each in pair.counts]
+        if any(noise.is_limit for noise in noises):
+            return None
+        value, sigma = np.array([(noise.value, noise.sigma) for noise in noises]).T
+        variance = scatter.step_dn**2 * float(np.square(value).mean())
+        rounding = scatter.total_variance_dn2 - variance
+        counted = scatter.step_dn**2 * float(np.linalg.norm(2 * value * sigma)) / len(noises)
+        relative_sigma = float(
+            np.hypot(counted / scatter.variance_dn2, 4 / np.sqrt(scatter.pixels))
+        )
+    variance = scatter.light_variance_dn2 - rounding
+    return _Point(scatter.levels_dn, variance, rounding, relative_sigma)
 
 
 def _shared_noise(lit: Sequence[PairScatter]) -> tuple[float, float]:
@@ -198,19 +358,56 @@ def _shared_noise(lit: Sequence[PairScatter]) -> tuple[float, float]:
     return float(ratio @ pixels / pixels.sum()), float(sigma)
 
 
-def _fit_line(
-    level: FloatArray, variance: FloatArray, dark_variance: float, dof: FloatArray
-) -> tuple[float, float, float]:
-    """Return slope, its σ and reduced χ² of variance = dark + slope · level."""
-    expected = variance
+@dataclass(frozen=True)
+class _Line:
+    """Photons' variance per DN of faint light, bend at white, and reduced χ²."""
+
+    slope: Measured
+    bend: Measured
+    reduced_chi2: float
+
+
+def _fit_line(points: Sequence[_Point], dark: Measured, bend: Bend) -> _Line:
+    """Fit variance = dark + slope · photons' terms of the bent sensor."""
+    levels = np.array([point.levels_dn for point in points])
+    variance = np.array([point.variance_dn2 for point in points])
+    rounding = np.array([point.rounding_dn2 for point in points])
+    relative = np.array([point.relative_sigma for point in points])
+    whitened = np.linalg.inv(np.linalg.cholesky(bend.covariance))
+    start = float((variance - dark.value).sum() / levels.mean(axis=1).sum())
+
+    def model(parameters: FloatArray) -> FloatArray:
+        slope, first, second, dark_variance = parameters
+        terms = photon_terms(np.array([first, second]), levels, bend.range_dn).mean(axis=1)
+        return np.asarray(dark_variance + slope * terms)
+
+    parameters = np.array([start, *bend.coefficients, dark.value])
+    scale = np.array([abs(start) or 1.0, 0.01, 0.01, dark.sigma])
     for _ in range(3):
-        sigmas = np.maximum(expected, ROUNDING_VARIANCE) * np.sqrt(2 / dof)
-        line = NoiseModel.fit(variance_terms(level)[:, :2], variance, sigmas, dark_variance)
-        expected = np.maximum(line.variance_dn2(level), 1e-3 * variance)
-    residual = (variance - line.variance_dn2(level)) / sigmas
-    misfit = float(residual @ residual) / max(len(level) - 1, 1)
-    sigma = np.sqrt(max(misfit, 1.0) / np.square(level / sigmas).sum())
-    return line.photon_dn, float(sigma), misfit
+        # By the expected variance: a measured one that is too small by chance would count more.
+        sigmas = relative * np.maximum(model(parameters) + rounding, 1e-3 * variance.max())
+
+        def misfit(trial: FloatArray, sigmas: FloatArray = sigmas) -> FloatArray:
+            return np.concatenate(
+                [
+                    (variance - model(trial)) / sigmas,
+                    whitened @ (trial[1:3] - bend.coefficients),
+                    [(trial[3] - dark.value) / dark.sigma],
+                ]
+            )
+
+        fit = least_squares(misfit, parameters, x_scale=scale)
+        parameters = fit.x
+    reduced = float(2 * fit.cost) / (len(points) - 1)
+    jacobian: FloatArray = np.asarray(fit.jac, dtype=np.float64)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    if chi2.sf(2 * fit.cost, len(points) - 1) < BY_CHANCE:
+        covariance *= reduced
+    return _Line(
+        Measured(float(parameters[0]), float(np.sqrt(covariance[0, 0]))),
+        Measured(float(parameters[1:3].sum()), float(np.sqrt(covariance[1:3, 1:3].sum()))),
+        reduced,
+    )
 
 
 def pairs_of(frames: Sequence[FrameRecord]) -> list[tuple[FrameRecord, FrameRecord]]:

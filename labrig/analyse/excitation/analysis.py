@@ -8,6 +8,7 @@ import numpy as np
 from labrig.analyse.excitation.charge_intervals import GLOWING
 from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
+from labrig.analyse.excitation.density import largest_density
 from labrig.analyse.excitation.evenness import evened
 from labrig.analyse.excitation.flicker import common_flicker
 from labrig.analyse.excitation.lamp_light import (
@@ -25,7 +26,7 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.radiometric_scale import RadiometricScale, radiometric_scale
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
-from labrig.analyse.surface import with_layer, with_reflectance
+from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectance
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
@@ -132,6 +133,12 @@ def _patch_excitation(
         by_leds = bool(part.protocol.select.leds)
         charging, fitted = _within_bands(charging, irradiance, choice, by_leds=by_leds)
     fit = fitted(_series(charging), "all" if part.overrides.intervals else "auto")
+    density, basis = largest_density(
+        irradiance.bands_nm,
+        part.protocol.sample.max_optical_density,
+        patch_reflectance(patch.folder, part.inputs.reflectance),
+    )
+    fit = choice.in_a_layer(_series(charging), fit, density, basis)
     closure = predicted_charging(
         charging, relative_sigmas, lambda reduced: fitted(_series(reduced), "none")
     )
@@ -157,6 +164,7 @@ def _patch_excitation(
             # Exponentials are a start only where another law was chosen for all charges.
             *(decay.warnings if fit.is_first_order else ()),
             *fit.warnings,
+            *_layer_warnings(fit),
             *_light_warnings(fit),
             *(course_warnings(fit, irradiance) if irradiance.lights else ()),
             *_closure_warnings(closure),
@@ -210,6 +218,11 @@ def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
             "irradiance is of another bench or filter, excitation changes much within a band (give "
             "narrower bands to irradiance), or the rate equation does not hold"
         )
+
+
+def _layer_warnings(fit: FittedExcitation) -> Iterator[str]:
+    if fit.layer is not None and fit.layer.is_shown:
+        yield f"the charges are those of a layer, not a surface: {fit.layer}; measure a thinner one"
 
 
 def _closure_warnings(closure: Closure | None) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """Material from a fitted excitation and the emission spectrum."""
 
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,7 @@ def excited_material(
                 r0_sigma=_known(at_off.r0_sigma[number]),
                 **_decay_time(fit, number),
                 k_e_per_s=tuple(state.k_e_per_s.tolist()),
+                **_range(fit, number, state),
                 k_e_per_s_sigma=_all_known(state.k_e_sigma_per_s),
                 **_reradiation(fit, number, state, spectrum, bands),
             )
@@ -64,16 +66,25 @@ def _decay_time(fit: FittedExcitation, number: int) -> dict[str, float | None]:
     }
 
 
+def _range(
+    fit: FittedExcitation, number: int, state: ExcitedState
+) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """Return the range of k_e by thickness; nothing where that was not looked at."""
+    if fit.layer is None:
+        return {}
+    return {"k_e_per_s_range": tuple(map(tuple, fit.k_e_range(number).tolist()))}
+
+
 def _reradiation(
     fit: FittedExcitation,
     number: int,
     state: ExcitedState,
     spectrum: EmissionSpectrum | None,
     bands_nm: FloatArray,
-) -> dict[str, tuple[float, ...] | None]:
-    """Return Λ and its σ by band: A_i / k_r,i times the spectrum's mean, with all their errors.
+) -> dict[str, Any]:
+    """Return Λ, its range by thickness and σ: A_i / k_r,i times the spectrum's mean by band.
 
-    Of an order other than 1 Λ is only known where the charge is.
+    σ has all their errors. Of an order other than 1 Λ is only known where the charge is.
     """
     if spectrum is None or not state.is_apart:
         return {}
@@ -86,8 +97,12 @@ def _reradiation(
     shape_sigma = np.sqrt(np.diag(covariance))
     value = level * shape
     sigma = level * np.hypot(shape_sigma, shape * np.sqrt(relative))
+    value = np.maximum(value, 0.0)
+    layer = fit.layer
+    ends = () if layer is None else np.outer(layer.reradiation_factor[:, number], value).tolist()
     return {
-        "reradiation": tuple(np.maximum(value, 0.0).tolist()),
+        "reradiation": tuple(value.tolist()),
+        "reradiation_range": tuple(map(tuple, ends)) or None,
         "reradiation_sigma": _all_known(sigma),
     }
 

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.analyse.overrides import FREE
-from labrig.fit.excitation import IntervalChoice, RelativeSigmas, fit_excitation
+from labrig.fit.excitation import IntervalChoice, RelativeSigmas, fit_excitation, layer_effect
 from labrig.results import (
     AUTO,
     ChargingSeries,
+    DensityBasis,
     ExcitationModel,
     FittedDecay,
     FittedExcitation,
@@ -151,9 +152,7 @@ class ChosenOrders:
         How far the veil differs from site to site is taken in proportion to the veil found. The
         intervals are those of `fit_excitation`.
         """
-        best = self.best
-        veil = 0.0 if best.veil is None else abs(best.veil.value)
-        sigmas = replace(self.relative_sigmas, veil_shape=VEIL_SHAPE * veil)
+        best, sigmas = self.best, self._sigmas
         order = None if best.are_orders_fitted else best.states[0].kinetic_order
         k_r, amplitude = np.array([(state.k_r_per_s, state.amplitude) for state in best.states]).T
         fit = fit_excitation(series, k_r, amplitude, sigmas, best, order, intervals)
@@ -163,6 +162,22 @@ class ChosenOrders:
             order_gain=best.order_gain,
             warnings=(*fit.warnings, *self.doubt),
         )
+
+    def in_a_layer(
+        self,
+        series: Sequence[ChargingSeries],
+        fit: FittedExcitation,
+        largest_density: FloatArray,
+        basis: DensityBasis,
+    ) -> FittedExcitation:
+        """Return a fit of the series with what the sample's thickness may do to its rates."""
+        layer = layer_effect(series, fit, self._sigmas, largest_density, basis)
+        return replace(fit, layer=layer)
+
+    @property
+    def _sigmas(self) -> RelativeSigmas:
+        veil = 0.0 if self.best.veil is None else abs(self.best.veil.value)
+        return replace(self.relative_sigmas, veil_shape=VEIL_SHAPE * veil)
 
 
 def _model(fit: FittedExcitation, order: float | None, enlarged: float = 1.0) -> ExcitationModel:

@@ -19,6 +19,7 @@ from labrig.errors import FitError
 from labrig.fit.charge.intervals import ProfiledState, charge_intervals
 from labrig.fit.charge.model import (
     COMMON_PARAMETERS,
+    ORDER,
     STATE_PARAMETERS,
     level_at_off,
     rates_of,
@@ -28,7 +29,7 @@ from labrig.fit.charge.result import ChargeCandidate, ChargeFit, FittedReadings,
 from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
 from labrig.fit.profile_likelihood import Likelihood
 from labrig.material import MAX_ORDER
-from labrig.results import Measured
+from labrig.results import Measured, OneSided
 
 #: Largest number of states.
 MAX_STATES = 2
@@ -49,6 +50,8 @@ MAX_ITERATIONS = 150
 #: Largest σ of log κ with which κ is known from above, and gain in χ² over the least κ from which
 #: it is known from below: 3 σ.
 KNOWN_LOG_KAPPA, KNOWN_GAIN = 0.5, 9.0
+#: Distance of an order from 1 in σ from which τ = 1/((b − 1) k r(0)^(b − 1)) has a σ of its own.
+ABOVE_FIRST_SIGMAS = 2.0
 #: Chance of noise alone to look like a misfit.
 MISFIT_CHANCE = 1e-3
 #: Relative step of derived quantities' derivatives.
@@ -329,10 +332,10 @@ def _result(
         None if is_given else float(fit.parameters[-COMMON_PARAMETERS]),
     )
     common = [
-        Measured(float(fit.parameters[place]), float(np.sqrt(covariance[place, place])))
+        _measured(problem, fit, model, covariance, place % len(fit.parameters), misfit)
         for place in range(-COMMON_PARAMETERS, 0)
     ]
-    places = sorted(range(model.states), key=lambda place: states[place].decay_time_s.value)
+    places = sorted(range(model.states), key=lambda place: -states[place].rate_at_off_per_s.value)
     profiled = [
         ProfiledState(place, number, model.is_general, states[place].kappa_per_s is not None)
         for number, place in enumerate(places, start=1)
@@ -372,9 +375,17 @@ def _readings(readings: Readings, fit: LeastSquaresFit) -> FittedReadings:
 
 
 def _covariance(problem: _Problem, fit: LeastSquaresFit, model: _Model) -> FloatArray:
-    """Return the covariance of the parameters (p, p), 0 of those that a bound holds."""
+    """Return the covariance of the parameters (p, p), 0 of those that are held.
+
+    Bounds of orders, η and prompt light are those of what is possible: at one of them the mean
+    square distance from it is that of the parameter without a bound, as is its effect on others.
+    """
     low, high = problem.bounds(model)
-    free = np.flatnonzero((low < fit.parameters) & (fit.parameters < high))
+    inside = (low < fit.parameters) & (fit.parameters < high)
+    places = np.arange(len(low))
+    is_common = places >= len(low) - COMMON_PARAMETERS
+    is_possible = is_common | (places % STATE_PARAMETERS == ORDER)
+    free = np.flatnonzero(inside | (is_possible & (low < high)))
     covariance = np.zeros((len(low), len(low)))
     columns = fit.jacobian[:, free]
     lengths = np.linalg.norm(columns, axis=0)
@@ -384,6 +395,23 @@ def _covariance(problem: _Problem, fit: LeastSquaresFit, model: _Model) -> Float
         inverse = np.linalg.pinv(factors, rcond=1e-12) / lengths[:, None]
     covariance[np.ix_(free, free)] = inverse @ inverse.T
     return covariance
+
+
+def _measured(
+    problem: _Problem,
+    fit: LeastSquaresFit,
+    model: _Model,
+    covariance: FloatArray,
+    place: int,
+    misfit: float,
+) -> Measured:
+    """Return a parameter with σ, one-sided where a bound holds it."""
+    value, sigma = float(fit.parameters[place]), float(np.sqrt(covariance[place, place]))
+    low, high = (float(ends[place]) for ends in problem.bounds(model))
+    if sigma == 0 or low < value < high:
+        return Measured(value, sigma)
+    gradient = float(fit.jacobian[:, place] @ fit.residuals)
+    return OneSided.held(value, sigma, abs(gradient) * sigma / misfit, is_upper=value >= high)
 
 
 def _state(
@@ -408,21 +436,30 @@ def _state(
         axis=1,
     )
     sigma = np.sqrt(np.diag(jacobian @ covariance[own, own] @ jacobian.T))
-    order, amplitude, inverse_time, kappa, k_r, r0, reradiation = (
+    _, amplitude, rate, inverse_time, kappa, k_r, r0, reradiation = (
         Measured(float(value), float(each)) for value, each in zip(values, sigma, strict=True)
     )
     log_kappa_sigma = float(np.sqrt(covariance[own, own][0, 0]))
     is_known = 0 < log_kappa_sigma < KNOWN_LOG_KAPPA
     is_known = is_known and problem.gain_of_kappa(fit, model, number) > KNOWN_GAIN * misfit
-    b, time_s = order.value, 1 / inverse_time.value
+    order = _measured(problem, fit, model, covariance, own.start + ORDER, misfit)
+    b = order.value
     # A speed that a bound holds is not determined.
     is_timed = covariance[own, own][1, 1] > 0
-    time_sigma = inverse_time.sigma * time_s**2 if is_timed else np.inf
+    rate_sigma = rate.sigma if is_timed else np.inf
+    time = exponent = None
+    if order.sigma == 0:
+        time = Measured(1 / rate.value, rate_sigma / rate.value**2, "s")
+    elif b - 1 > ABOVE_FIRST_SIGMAS * order.sigma:
+        time_s = 1 / inverse_time.value
+        time = Measured(time_s, inverse_time.sigma * time_s**2 if is_timed else np.inf, "s")
+        exponent = Measured(b / (b - 1), order.sigma / (b - 1) ** 2)
     return OrderState(
         order=order,
         amplitude=amplitude,
-        decay_time_s=Measured(time_s, time_sigma, "s"),
-        exponent=Measured(b / (b - 1), order.sigma / (b - 1) ** 2) if b > 1 else None,
+        rate_at_off_per_s=Measured(rate.value, rate_sigma, "1/s"),
+        decay_time_s=time,
+        exponent=exponent,
         kappa_per_s=Measured(kappa.value, kappa.sigma, "1/s") if is_known else None,
         k_r_per_s=Measured(k_r.value, k_r.sigma, "1/s") if is_known else None,
         r0=r0 if is_known else None,
@@ -431,13 +468,14 @@ def _state(
 
 
 def _quantities(parameters: FloatArray, charge_s: float) -> FloatArray:
-    """Return b, amplitude, 1/τ, κ, k, r(0) and Λ of a state's parameters, (7,)."""
+    """Return b, amplitude, p/τ, (b − 1)/b of that, κ, k, r(0), Λ of a state's parameters, (8,)."""
     rates = rates_of(parameters)
     b, r0 = rates.order, level_at_off(rates, charge_s)
     at_off = rates.k_r * r0 ** (b - 1)
-    inverse_time = at_off * (b - 1 if b > 1 + 1e-3 else 1.0)
+    rate, inverse_time = b * at_off, (b - 1) * at_off
     amplitude = rates.reradiation * at_off * r0
-    return np.array([b, amplitude, inverse_time, rates.kappa, rates.k_r, r0, rates.reradiation])
+    own = rates.kappa, rates.k_r, r0, rates.reradiation
+    return np.array([b, amplitude, rate, inverse_time, *own])
 
 
 def _warnings(
@@ -467,8 +505,8 @@ def _warnings(
     for state in states:
         if state.order.value >= MAX_ORDER:
             yield f"an order reached its bound, {MAX_ORDER:g}: this is no state of general order"
-    if any(np.isinf(state.decay_time_s.sigma) for state in states):
-        yield "the decay time of a state is not determined: record for longer, or more densely"
+    if any(np.isinf(state.rate_at_off_per_s.sigma) for state in states):
+        yield "the rate of a state is not determined: record for longer, or more densely"
     if any(state.kappa_per_s is None for state in states):
         yield (
             "κ, k_r and r(0) of a state are not known apart, since its charge does not saturate "

@@ -17,8 +17,8 @@ import numpy as np
 from labrig.fit.least_squares import FloatArray
 from labrig.material import DECAY_LAWS, becquerel_of, lit_concentration, lit_step
 
-#: Parameters of a state: log κ, log s, b, log g.
-STATE_PARAMETERS = 4
+#: Parameters of a state: log κ, log s, b, log g; and the place of b.
+STATE_PARAMETERS, ORDER = 4, 2
 #: Those of all states, which follow: η, the prompt light and the dark level.
 COMMON_PARAMETERS = 3
 

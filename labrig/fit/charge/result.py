@@ -2,11 +2,18 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from labrig.number_format import aligned
-from labrig.results import FloatArray, Measured, ProfileInterval, interval_lines
+from labrig.results import (
+    FloatArray,
+    Measured,
+    OneSided,
+    ProfileInterval,
+    interval_lines,
+    measured_number,
+)
 
 UNKNOWN = "–"
 #: Version of the JSON: another number means renamed keys or other meanings.
@@ -20,12 +27,14 @@ class OrderState:
     Attributes
     ----------
     order
-        Kinetic order b; its σ is 0 where it is held at 1.
+        Kinetic order b; its σ is 0 where it is held at 1, and it is one-sided at its bounds.
     amplitude
         Light at lamp off Λ k r(0)ᵇ, in the unit of the values.
+    rate_at_off_per_s
+        Rate p/τ in 1/s by which the light falls at lamp off, after *this* charge: k at b = 1.
     decay_time_s, exponent
-        τ and p of (1 + t/τ)^(−p), the light after *this* charge; at b = 1, an exponential, τ is 1/k
-        and there is no p.
+        τ and p of (1 + t/τ)^(−p), the light after this charge, where b is above 1 by more than
+        2 σ; where b is held at 1, an exponential, τ is 1/k and there is no p.
     kappa_per_s, k_r_per_s, r0, reradiation
         Excitation κ and re-radiation rate k in 1/s, concentration at lamp off, and Λ in the unit of
         the values times s; only where the charge saturates enough for κ to be known from both
@@ -34,7 +43,8 @@ class OrderState:
 
     order: Measured
     amplitude: Measured
-    decay_time_s: Measured
+    rate_at_off_per_s: Measured
+    decay_time_s: Measured | None
     exponent: Measured | None
     kappa_per_s: Measured | None
     k_r_per_s: Measured | None
@@ -104,7 +114,7 @@ class ChargeFit:
         States by falling rate of their decay at lamp off.
     light_stimulated
         η, fraction of the carriers that find their trap filled and recombine at once; its σ is 0
-        where it was given.
+        where it was given. As the prompt light it is one-sided at its bounds.
     prompt
         Light that is there only while the lamp is on, in the unit of the values.
     dark
@@ -162,6 +172,8 @@ class ChargeFit:
             f"{_text(self.prompt)}, dark level {_text(self.dark)}"
         )
         lines += interval_lines(self.named_intervals)
+        if self.is_any_one_sided:
+            lines.append("<, >: at a bound of what is possible, limit of 95 % probability")
         lines += aligned(self.model_rows())
         return "\n".join([*lines, *(f"! {line}" for line in self.warnings)])
 
@@ -175,6 +187,13 @@ class ChargeFit:
             symbol, *unit = labels[quantity].split(" / ")
             named[" / ".join((f"{symbol} {number}", *unit))] = interval
         return named
+
+    @property
+    def is_any_one_sided(self) -> bool:
+        """Whether a bound holds a parameter, which then has a limit instead of a σ."""
+        common = (self.light_stimulated, self.prompt, self.dark)
+        own = (getattr(state, each.name) for state in self.states for each in fields(state))
+        return any(isinstance(each, OneSided) for each in (*common, *own))
 
     def state_rows(self) -> list[list[str]]:
         """Return what is known of the states as a table, its head first."""
@@ -201,7 +220,10 @@ class ChargeFit:
         return rows
 
     def to_json(self) -> str:
-        """Return the text of `fit.json`, numbers as `{"value": …, "sigma": …}`."""
+        """Return the text of `fit.json`, numbers as `{"value": …, "sigma": …}`.
+
+        A number that a bound holds has a `limit_95`, too.
+        """
         content: dict[str, Any] = {
             "kind": "charge",
             "schema_version": SCHEMA_VERSION,
@@ -229,6 +251,7 @@ AT_OFF_LABELS = {"rate_at_off_per_s": "p/τ / s⁻¹", "lifetime_at_off_s": "τ/
 COLUMN_LABELS = {
     "order": "b",
     "amplitude": "amplitude",
+    "rate_at_off_per_s": "p/τ / s⁻¹",
     "decay_time_s": "τ / s",
     "exponent": "p",
     "kappa_per_s": "κ / s⁻¹",
@@ -239,7 +262,7 @@ COLUMN_LABELS = {
 
 
 def _text(measured: Measured | None) -> str:
-    return UNKNOWN if measured is None else str(Measured(measured.value, measured.sigma))
+    return UNKNOWN if measured is None else str(replace(measured, unit=""))
 
 
 def _to_dict(state: OrderState) -> dict[str, Any]:
@@ -247,7 +270,4 @@ def _to_dict(state: OrderState) -> dict[str, Any]:
 
 
 def _number(measured: Measured | None) -> dict[str, float | None] | None:
-    if measured is None:
-        return None
-    is_known = measured.sigma < float("inf")
-    return {"value": measured.value, "sigma": measured.sigma if is_known else None}
+    return None if measured is None else measured_number(measured)

@@ -36,6 +36,7 @@ from labrig.results import (
     AUTO,
     EXPONENTIALS,
     LAW_CHOICES,
+    LAW_LABELS,
     RATE_SPECTRUM,
     Candidate,
     FittedRateSpectrum,
@@ -196,7 +197,12 @@ def fit_decay(
     weights, offsets = chosen.joint.weights, chosen.joint.offsets
     student = student_factor(estimated.dof if estimated else np.inf)
     added_square = smooth.added_square(smooth.typical_flicker)
-    laws = fit_laws(likelihood, weights, offsets, added_square, student)
+    laws, unfinished = fit_laws(likelihood, weights, offsets, added_square, student)
+    if law in unfinished:
+        raise FitError(
+            f"expected a fit of {LAW_LABELS[law]} that ends at a minimum, got one that creeps; "
+            "leave out --law, or record longer"
+        )
     spectrum = fit_rate_spectrum(likelihood, weights, student)
     if law == AUTO and n_states is not None:
         law = EXPONENTIALS
@@ -222,6 +228,7 @@ def fit_decay(
             candidates=tuple(tried),
             law=chosen_law,
             laws=laws,
+            unfinished_laws=unfinished,
             rate_spectrum=spectrum,
             all_needed=all_needed,
             asked=n_states,

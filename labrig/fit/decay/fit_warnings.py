@@ -69,6 +69,8 @@ class Evidence:
         Name of the law that describes the decay.
     laws, rate_spectrum
         Other laws, and the spectrum of rates.
+    unfinished_laws
+        Names of the laws whose fit did not end at a minimum and is not compared.
     all_needed
         Whether the data refute one state fewer.
     asked, most_states, n_fixed
@@ -86,6 +88,7 @@ class Evidence:
     law: str
     laws: tuple[LawFit, ...]
     rate_spectrum: FittedRateSpectrum | None
+    unfinished_laws: tuple[str, ...]
     all_needed: bool
     asked: int | None
     most_states: int
@@ -229,6 +232,11 @@ def warnings_about(
             "the fit still creeps: rates and amplitudes may trade off; ask for fewer states "
             "(--states) or record longer"
         )
+    warnings += [
+        f"the fit of {LAW_LABELS[name]} did not end at a minimum: it is not compared with the "
+        "others; record longer, or with less noise"
+        for name in evidence.unfinished_laws
+    ]
     requested = evidence.asked or evidence.n_fixed
     if fit.n_states < requested:
         warnings.append(

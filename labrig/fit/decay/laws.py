@@ -3,11 +3,17 @@
 They are fitted to the same series with the same noise and the same offsets as the exponentials, so
 that their χ² compare. Traps of many depths and the recombination of electrons and holes decay like
 this (Nalbach et al., section 4.4).
+
+The signal at lamp off, long before the first frame, follows the rate as a power: along that curved
+valley a search creeps. The level that is fitted is therefore that at the time about which the
+frames tell it, which hardly depends on rate and shape.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
 from labrig.errors import FitError
 from labrig.fit.decay.joint import JointFit, Shape, covariance_under_flicker, fit_jointly
@@ -22,15 +28,19 @@ from labrig.results import FittedLaw
 #: Largest rate at lamp off in inverse shortest steps between frames, and smallest in spans: laws
 #: other than exponentials fall fast at first, and go on falling.
 FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
-#: Sizes of the grid of rates and shapes, and smallest shape above 0 on it.
-GRID = (20, 8)
-LEAST_SHAPE = 0.05
+#: Sizes of the grid of rates and shapes, smallest shape above 0 on it, and most of its basins from
+#: which a law is fitted.
+GRID = (36, 16)
+LEAST_SHAPE = 1e-5
+MOST_BASINS = 3
 #: Places of the rate and of the shape among the parameters.
 LAW_RATE, LAW_SHAPE = slice(1, 2), 2
-MAX_ITERATIONS = 60
-TOLERANCE = 1e-5
-#: Gain in χ² of a step at which a fit ends: laws are compared by differences of several.
-LEAST_GAIN = 1e-3
+MAX_ITERATIONS = 200
+TOLERANCE = 1e-8
+
+
+class UnfinishedFitError(FitError):
+    """A fit that did not end at a minimum, whose χ² must not be compared."""
 
 
 @dataclass(frozen=True)
@@ -92,37 +102,28 @@ def fit_law(
     -------
     LawFit or None
         The fit; None if the law has no signal.
+
+    Raises
+    ------
+    UnfinishedFitError
+        The lowest fit did not end at a minimum.
     """
-    data = likelihood.data
-    series = data.series
-    low, high = _log_rate_bounds(series)
-    shape = _shape(series, law)
-    start = _best_on_grid(data, law, weights, (low, high))
-    if start[0] == 0:
+    problem = _LawProblem(likelihood.data, law, weights, offsets)
+    series = problem.data.series
+    fits = list(problem.fits())
+    if not fits:
         return None
-    least, largest = law.shapes
-    try:
-        fit = fit_jointly(
-            data,
-            shape,
-            start,
-            weights,
-            offsets,
-            np.array([0.0, low, least]),
-            np.array([np.inf, high, largest]),
-            MAX_ITERATIONS,
-            TOLERANCE,
-            LEAST_GAIN,
-        )
-    except FitError:
-        return None
+    fit = min(fits, key=lambda each: each.chi2)
     if fit.shape[0] == 0:
         return None
+    if fit.least_squares.creeps:
+        raise UnfinishedFitError(f"the fit of {law.label} did not end at a minimum")
     # Near an exponential, retrapping changes the signal as the rate does: its σ has no limit there.
+    least, largest = law.shapes
     if not np.sqrt(fit.least_squares.covariance[LAW_SHAPE, LAW_SHAPE]) <= largest - least:
         fit = _with_shape_held(fit)
-    signal = np.multiply.outer(shape(fit.shape)[0], fit.weights)
-    covariance = covariance_under_flicker(fit, data, signal, added_square)
+    signal = np.multiply.outer(_shape(series, law)(fit.shape)[0], fit.weights)
+    covariance = covariance_under_flicker(fit, problem.data, signal, added_square)
     with np.errstate(invalid="ignore"):
         covariance = np.where(covariance == 0, 0.0, student * covariance)
     return LawFit(fit, covariance, _in_units(law, fit, series, covariance, likelihood.bic(fit)))
@@ -134,13 +135,26 @@ def fit_laws(
     offsets: FloatArray,
     added_square: float,
     student: float,
-) -> tuple[LawFit, ...]:
-    """Fit every law; the arguments are those of `fit_law`."""
-    fits = (
-        fit_law(likelihood, law, weights, offsets, added_square, student)
-        for law in DECAY_LAWS.values()
-    )
-    return tuple(fit for fit in fits if fit is not None)
+) -> tuple[tuple[LawFit, ...], tuple[str, ...]]:
+    """Fit every law; the arguments are those of `fit_law`.
+
+    Returns
+    -------
+    fits
+        Fits of the laws that have a signal and ended at a minimum.
+    unfinished
+        Names of the laws whose fit did not, which must not be compared.
+    """
+    fits, unfinished = [], []
+    for law in DECAY_LAWS.values():
+        try:
+            fit = fit_law(likelihood, law, weights, offsets, added_square, student)
+        except UnfinishedFitError:
+            unfinished.append(law.name)
+            continue
+        if fit is not None:
+            fits.append(fit)
+    return tuple(fits), tuple(unfinished)
 
 
 def _log_rate_bounds(series: DecaySeries) -> tuple[float, float]:
@@ -156,6 +170,102 @@ def _shape(series: DecaySeries, law: DecayLaw) -> Shape:
         return theta[0] * means, np.column_stack([means, theta[0] * slopes])
 
     return shape
+
+
+@dataclass(frozen=True)
+class _LawProblem:
+    """A law, the series that it is fitted to, and start values of the channels (C,)."""
+
+    data: WhitenedSeries
+    law: DecayLaw
+    weights: FloatArray
+    offsets: FloatArray
+
+    def fits(self) -> Iterator[JointFit]:
+        """Yield the fits from the basins of a grid, and from the fit of each simpler law.
+
+        A law never fits worse than one that it contains: a search only descends.
+        """
+        shapes = self.law.shapes
+        for start in _basins(self.data, self.law, self.weights, _grid_shapes(shapes)):
+            yield from self._fit(start, self.weights, self.offsets, shapes)
+        for limit in self.law.limits:
+            for start in _basins(self.data, self.law, self.weights, np.array([limit]))[:1]:
+                for simpler in self._fit(start, self.weights, self.offsets, (limit, limit)):
+                    yield from self._fit(simpler.shape, simpler.weights, simpler.offsets, shapes)
+
+    def _fit(
+        self,
+        start: FloatArray,
+        weights: FloatArray,
+        offsets: FloatArray,
+        shapes: tuple[float, float],
+    ) -> Iterator[JointFit]:
+        """Yield the fit from [amplitude, log rate, shape] within shapes, if there is one."""
+        pivot = self._pivot(start)
+        low, high = _log_rate_bounds(self.data.series)
+        level, _ = self._level(start, pivot)
+        try:
+            fit = fit_jointly(
+                self.data,
+                self._pivoted(pivot),
+                np.array([start[0] * level, *start[1:]]),
+                weights,
+                offsets,
+                np.array([0.0, low, shapes[0]]),
+                np.array([np.inf, high, shapes[1]]),
+                MAX_ITERATIONS,
+                TOLERANCE,
+            )
+        except FitError:
+            return
+        yield self._from_reference(fit, pivot)
+
+    def _pivot(self, theta: FloatArray) -> float:
+        """Return the time about which the frames tell the level of a signal."""
+        series, unit = self.data.series, self.data.constant(self.weights)
+        signal, _ = _shape(series, self.law)(theta)
+        information = np.einsum("fc,fc->f", unit, unit) * signal**2
+        middle = series.t + series.start + series.exposure / 2
+        return float(information @ middle / information.sum())
+
+    def _level(self, theta: FloatArray, pivot: float) -> tuple[float, FloatArray]:
+        """Return the signal at a time over that at the reference, and its slopes (2,)."""
+        rate, shape = float(np.exp(theta[1])), float(theta[2])
+        level, slopes = self.law.means(rate, shape, np.array([pivot]), np.zeros(1))
+        return float(level[0]), slopes[0]
+
+    def _pivoted(self, pivot: float) -> Shape:
+        """Return the law as a function of [level at the pivot, log rate, shape]."""
+        at_reference = _shape(self.data.series, self.law)
+
+        def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+            level, slopes = self._level(theta, pivot)
+            signal, jacobian = at_reference(np.array([theta[0] / level, *theta[1:]]))
+            jacobian[:, 1:] -= np.outer(signal, slopes / level)
+            jacobian[:, 0] /= level
+            return signal, jacobian
+
+        return shape
+
+    def _from_reference(self, fit: JointFit, pivot: float) -> JointFit:
+        """Return a fit of the level at the pivot as one of [amplitude, log rate, shape]."""
+        level, slopes = self._level(fit.shape, pivot)
+        theta = np.array([fit.shape[0] / level, *fit.shape[1:]])
+        solution = fit.least_squares
+        jacobian = solution.jacobian.copy()
+        jacobian[:, 1:3] += np.outer(jacobian[:, 0], theta[0] * slopes)
+        jacobian[:, 0] *= level
+        # What the frames tell nothing of may overflow: that is as good as infinite.
+        with np.errstate(over="ignore"):
+            covariance = parameter_covariance(jacobian)[0]
+        solution = replace(
+            solution,
+            parameters=np.concatenate([theta, solution.parameters[3:]]),
+            jacobian=jacobian,
+            covariance=covariance,
+        )
+        return replace(fit, shape=theta, least_squares=solution)
 
 
 def _with_shape_held(fit: JointFit) -> JointFit:
@@ -174,27 +284,32 @@ def _without_shape(covariance: FloatArray) -> FloatArray:
     return held
 
 
-def _best_on_grid(
-    data: WhitenedSeries, law: DecayLaw, weights: FloatArray, log_rates: tuple[float, float]
+def _grid_shapes(shapes: tuple[float, float]) -> FloatArray:
+    """Return the shapes of the grid between the least and the largest one."""
+    least, largest = shapes
+    return np.geomspace(max(least, LEAST_SHAPE), largest, GRID[1])
+
+
+def _basins(
+    data: WhitenedSeries, law: DecayLaw, weights: FloatArray, shapes: FloatArray
 ) -> FloatArray:
-    """Return the best [amplitude, log rate, shape] of the grid, with exposures as their middles."""
+    """Return [amplitude, log rate, shape] where a grid is better than around there, the best first.
+
+    Shape (m, 3); exposures count as their middles. It is empty where nothing has a signal.
+    """
     series = data.series
     problem = projection(data, weights)
     middle = series.t + series.start + series.exposure / 2
-    least, largest = law.shapes
-    shapes = np.geomspace(max(least, LEAST_SHAPE), largest, GRID[1])
-    log_rate, exponents = (
-        grid.ravel() for grid in np.meshgrid(np.linspace(*log_rates, GRID[0]), shapes)
-    )
-    phase = np.multiply.outer(middle, np.exp(log_rate))
-    values = law.value(phase, exponents)
+    log_rate, shape = np.meshgrid(np.linspace(*_log_rate_bounds(series), GRID[0]), shapes)
+    values = law.value(np.multiply.outer(middle, np.exp(log_rate.ravel())), shape.ravel())
     moments = problem.pull @ values
     norms2 = problem.information @ values**2 - ((problem.shadow @ values) ** 2).sum(axis=0)
-    gains = np.maximum(moments, 0) ** 2 / np.where(norms2 > 0, norms2, np.inf)
-    best = int(np.argmax(gains))
-    if gains[best] == 0:
-        return np.zeros(3)
-    return np.array([float(moments[best]) / float(norms2[best]), log_rate[best], exponents[best]])
+    norms2 = np.where(norms2 > 0, norms2, np.inf)
+    gains = (np.maximum(moments, 0) ** 2 / norms2).reshape(log_rate.shape)
+    is_basin = (gains == maximum_filter(gains, size=3, mode="nearest")) & (gains > 0)
+    starts = np.column_stack([moments / norms2, log_rate.ravel(), shape.ravel()])
+    order = np.argsort(-gains[is_basin], kind="stable")
+    return np.asarray(starts[is_basin.ravel()][order[:MOST_BASINS]])
 
 
 def _in_units(

@@ -14,7 +14,7 @@ from scipy.special import chdtrc, fdtrc
 from labrig.fit.decay.further_state import promising_rate
 from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
-from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states
+from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states, refit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.results import Candidate
@@ -82,6 +82,8 @@ def choose_states(
             fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets)
         else:
             fit = _with_one_more(data, chosen, needed_chi2)
+        if fit is not None and fit.joint.least_squares.creeps and fit.joint.chi2 < needed_chi2:
+            fit = _at_minimum(data, fit)
         if fit is None:
             break
         p_value = None if chosen is None else f_test(likelihood, chosen.joint, fit.joint)
@@ -101,6 +103,12 @@ def choose_states(
     return chosen, tried
 
 
+def _at_minimum(data: WhitenedSeries, fit: StatesFit) -> StatesFit | None:
+    """Return a fit carried to its minimum; None if a state vanishes there."""
+    finished = refit(data, fit)
+    return finished if finished.n_states == fit.n_states else None
+
+
 def _with_one_more(data: WhitenedSeries, fewer: StatesFit, needed_chi2: float) -> StatesFit | None:
     """Fit one state more, from the rate that promises most or, if that is enough, from all.
 
@@ -108,17 +116,18 @@ def _with_one_more(data: WhitenedSeries, fewer: StatesFit, needed_chi2: float) -
     from their best that their misfit outweighs it.
     """
     log_rate, amplitude, gain = promising_rate(data, fewer)
-    if gain < fewer.joint.chi2 - needed_chi2:
-        return fit_one_more(data, fewer, log_rate, amplitude)
-    weights, offsets = fewer.joint.weights, fewer.joint.offsets
-    found = fit_states(data, fewer.n_free + 1, fewer.fixed, weights, offsets, needed_chi2)
-    reached = 0.0 if found is None else fewer.joint.chi2 - found.joint.chi2
-    if gain < reached + MISSED_GAIN:
-        return found
-    other = fit_one_more(data, fewer, log_rate, amplitude)
-    if other is None or (found is not None and found.joint.chi2 <= other.joint.chi2):
-        return found
-    return other
+    tried: list[StatesFit | None] = []
+    reached = 0.0
+    if gain >= fewer.joint.chi2 - needed_chi2:
+        weights, offsets = fewer.joint.weights, fewer.joint.offsets
+        found = fit_states(data, fewer.n_free + 1, fewer.fixed, weights, offsets, needed_chi2)
+        reached = 0.0 if found is None else fewer.joint.chi2 - found.joint.chi2
+        tried = [found]
+    if not tried or reached < 0 or gain >= reached + MISSED_GAIN:
+        tried.append(fit_one_more(data, fewer, log_rate, amplitude))
+    # A fit that is worse than one with fewer states did not end at its minimum.
+    better = [fit for fit in tried if fit is not None and fit.joint.chi2 <= fewer.joint.chi2]
+    return min(better, key=lambda fit: fit.joint.chi2, default=None)
 
 
 def is_needed(

@@ -398,8 +398,8 @@ def _band_warnings(tests: BandTests) -> list[str]:
         messages.append(
             f"light that is absorbed most saturates the glow sooner than other light "
             f"({variance.value / variance.sigma:.1f} σ), as in a layer of optical density "
-            f"{rounded(tests.optical_density, 2)}: Λ is too small, and k_e is a mean over the "
-            "depth; measure a thinner layer"
+            f"{rounded(tests.optical_density, 2)} or more: Λ is too small, and k_e is a mean "
+            "over the depth; measure a thinner layer"
         )
     elif tests.amplitude.differs:
         messages.append(

@@ -1,5 +1,6 @@
 """Concentrations of states at sites of a sample, with their derivatives."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -63,3 +64,8 @@ class Levels(NamedTuple):
             self.by_order,
             self.by_before * decay,
         )
+
+
+def mean_levels(of_parts: Sequence[Levels]) -> Levels:
+    """Return the levels of a sample whose parts, each as large, have these."""
+    return Levels(*(np.mean(values, axis=0) for values in zip(*of_parts, strict=True)))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from labrig.fit.excitation import levels_of_order
-from labrig.fit.excitation.level_slopes import Levels
+from labrig.fit.excitation.level_slopes import Levels, mean_levels
 from labrig.material import relaxation_with_slopes
 from labrig.results import ChargingSeries, FloatArray, IntArray
 
@@ -61,6 +61,8 @@ def levels(
     order
         Kinetic orders (N,); None: all are 1, and no derivative by them is wanted.
     """
+    if series.arriving is not None:
+        return mean_levels([levels(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()])
     if series.across is not None:
         spread_levels = levels(series.spread(), k_r_per_s, k_e_per_s, order)
         return spread_levels.meaned(len(series.across))
@@ -84,6 +86,13 @@ def levels_and_slopes(
         Levels, and their derivatives by ln E of every charge and band, shape (n, K, P, N, B), and
         by the concentrations at the start, shape (n, P, N).
     """
+    if series.arriving is not None:
+        each = [levels_and_slopes(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()]
+        return (
+            mean_levels([level for level, _, _ in each]),
+            np.mean([by_light for _, by_light, _ in each], axis=0),
+            np.mean([by_start for _, _, by_start in each], axis=0),
+        )
     if series.across is not None:
         places = len(series.across)
         level, by_light, by_start = levels_and_slopes(series.spread(), k_r_per_s, k_e_per_s, order)

@@ -93,6 +93,10 @@ class ExcitationProblem:
                 )
             ]
 
+    def whiten_as(self, other: Self) -> None:
+        """Take the flicker's covariance of a problem with the same values."""
+        self._common = other._common
+
     def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return whitened model − values, followed by priors, and the Jacobian."""
         rates = self.parameters.unpack(theta)

@@ -2,19 +2,25 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
+from labrig.analyse.camera_calibration.bend import Bend, fit_bend
 from labrig.analyse.camera_calibration.factors import CardFrame, fit_factors
 from labrig.analyse.camera_calibration.linearity import fit_linearity
-from labrig.analyse.camera_calibration.photon_transfer import photon_transfer, scatter
+from labrig.analyse.camera_calibration.photon_transfer import Pair, measure_pair, photon_transfer
+from labrig.calibration import Noise
 from labrig.errors import DataError
 from labrig.reduce import RawFrame
+from labrig.results import PhotonTransfer
 from tests.pulls import assert_sigma_is_right
 
 FloatArray = NDArray[np.float64]
 
 GAIN, READ_E, BLACK = 2.0, 8.0, 1000.0
 WHOLE = (0.0, 0.0, 1.0, 1.0)
+#: A sensor whose numbers are in proportion to the light.
+LINEAR = Bend(np.zeros(2), 1e-8 * np.eye(2), 12_000.0)
 
 
 def frame(rng: np.random.Generator, electrons: float, fraction: float = 0.0) -> RawFrame:
@@ -28,36 +34,127 @@ def frame(rng: np.random.Generator, electrons: float, fraction: float = 0.0) -> 
     return RawFrame(mosaic, "RGGB", (BLACK,) * 4, 60_000.0)
 
 
-@pytest.mark.parametrize("fraction", [0.0, 0.03])
-def test_gain_is_right_and_as_uncertain_as_it_says(fraction: float) -> None:
-    pulls, read = [], []
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        lit = [
-            scatter(frame(rng, level, fraction), frame(rng, level, fraction), WHOLE, 0.0)
-            for level in (500, 2000, 8000, 20000)
-        ]
-        dark = [
-            scatter(frame(rng, 0, fraction), frame(rng, 0, fraction), WHOLE, 0.0) for _ in range(2)
-        ]
-        found = photon_transfer(100, lit, dark)
-        assert found.neighbours_share_noise == (fraction > 0)
-        pulls.append((found.noise.gain_e_per_dn - GAIN) / found.noise.gain_e_per_dn_sigma)
-        read.append(found.noise.read_noise_e)
-    assert abs(np.mean(pulls)) < 1.0
-    assert 0.5 < np.std(pulls) < 1.7
-    assert np.mean(read) == pytest.approx(READ_E, rel=0.03)
+def measured(one: RawFrame, other: RawFrame) -> Pair:
+    return measure_pair(one, other, WHOLE, 0.0)
+
+
+def calibrated(seed: int, fraction: float) -> PhotonTransfer:
+    rng = np.random.default_rng(seed)
+    lit = [
+        measured(frame(rng, level, fraction), frame(rng, level, fraction)) for level in (800, 16000)
+    ]
+    dark = [measured(frame(rng, 0, fraction), frame(rng, 0, fraction))]
+    return photon_transfer(100, lit, dark, LINEAR)
+
+
+def test_gain_is_right_and_as_uncertain_as_it_says() -> None:
+    noises = [calibrated(seed, 0.0).noise for seed in range(220)]
+    assert_sigma_is_right([(one.gain_e_per_dn - GAIN) / one.gain_e_per_dn_sigma for one in noises])
+    assert np.mean([one.read_noise_e for one in noises]) == pytest.approx(READ_E, rel=0.01)
+
+
+def test_charge_that_neighbours_share_is_no_gain() -> None:
+    """Each of four neighbours gets 3 % of a pixel's charge, and gives of its own."""
+    found = [calibrated(seed, 0.03) for seed in range(40)]
+    assert np.mean([one.shared for one in found]) == pytest.approx(0.24, rel=0.2)
+    assert all(one.neighbours_share_noise for one in found)
+    pulls = [(one.noise.gain_e_per_dn - GAIN) / one.noise.gain_e_per_dn_sigma for one in found]
+    assert abs(np.mean(pulls)) < 0.6
 
 
 def test_light_without_noise_is_no_photon_transfer() -> None:
     rng = np.random.default_rng(1)
-    dark = scatter(frame(rng, 0), frame(rng, 0), WHOLE, 0.0)
+    dark = measured(frame(rng, 0), frame(rng, 0))
     with pytest.raises(DataError, match="at two levels"):
-        photon_transfer(100, [dark], [dark])
+        photon_transfer(100, [dark], [dark], LINEAR)
     flat = RawFrame(np.full((80, 96), 5000, np.uint16), "RGGB", (BLACK,) * 4, 60_000.0)
-    still = scatter(flat, flat, WHOLE, 0.0)
-    with pytest.raises(DataError, match="rises with the light"):
-        photon_transfer(100, [still, still], [dark])
+    still = measured(flat, flat)
+    with pytest.raises(DataError, match="half a step of the camera's numbers"):
+        photon_transfer(100, [still, still], [dark], LINEAR)
+
+
+@pytest.mark.parametrize("loss", [-0.05, 0.03])
+def test_a_bend_near_white_is_no_gain(loss: float) -> None:
+    """Light of other, unknown brightness in every frame; a sensor that loses some at white."""
+    white_dn, pulls, bends = 12_000.0, [], []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+
+        def bent(light_dn: float, rng: np.random.Generator = rng) -> RawFrame:
+            colours = np.tile([[0.6, 1.0], [1.0, 0.4]], (40, 48))
+            light = rng.poisson(GAIN * light_dn * colours * (1 + 0.01 * rng.standard_normal()))
+            signal = light / GAIN * (1 - loss * light / GAIN / white_dn)
+            noise = READ_E / GAIN * rng.standard_normal(signal.shape)
+            return RawFrame(
+                np.rint(signal + noise + BLACK).astype(np.uint16), "RGGB", (BLACK,) * 4, 60_000.0
+            )
+
+        pairs = [(bent(level), bent(level)) for level in (600, 2000, 4000, 6000, 8000)]
+        pixels = [one.mosaic.astype(float) - BLACK for pair in pairs for one in pair]
+        means = np.array([[each[::2, ::2].mean(), each[::2, 1::2].mean(), each[1::2, 1::2].mean()]
+                          for each in pixels])  # fmt: skip
+        sigma = np.sqrt(means / GAIN + 20.0) / np.sqrt(means.size * 64)
+        bend = fit_bend(means, sigma, np.zeros(len(means), np.intp), white_dn)
+        dark = [measured(bent(0.0), bent(0.0))]
+        found = photon_transfer(100, [measured(*pair) for pair in pairs], dark, bend)
+        pulls.append((found.noise.gain_e_per_dn - GAIN) / found.noise.gain_e_per_dn_sigma)
+        bends.append(found.bend.value)
+    assert_sigma_is_right(pulls)
+    assert abs(np.mean(pulls)) < 0.5
+    assert np.mean(bends) == pytest.approx(-loss, rel=0.15)
+
+
+SHAPE = (160, 160)
+SPREADS = {"even": 1.0, "in a part of a step": 0.25, "of all pixels alike": 0.0}
+
+
+def dark_pair(rng: np.random.Generator, noise_dn: float, levels_dn: FloatArray) -> Pair:
+    numbers = [
+        np.rint(BLACK + levels_dn + noise_dn * rng.standard_normal(SHAPE)).astype(np.uint16)
+        for _ in range(2)
+    ]
+    return measured(*(RawFrame(each, "RGGB", (BLACK,) * 4, 60_000.0) for each in numbers))
+
+
+def read_noise(dark: Pair) -> Noise:
+    rng = np.random.default_rng(1)
+    lit = [measured(frame(rng, 9000), frame(rng, 9000)) for _ in range(2)]
+    return photon_transfer(100, lit, [dark], LINEAR).noise
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(0.05, 3.0), st.floats(0.0, 1.0), st.sampled_from(list(SPREADS)), st.integers(0, 10**6)
+)
+def test_read_noise_is_right_or_below_a_limit_wherever_black_lies_in_a_step(
+    noise_dn: float, level_dn: float, spread: str, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    levels = level_dn + SPREADS[spread] * rng.standard_normal(SHAPE)
+    noise = read_noise(dark_pair(rng, noise_dn, levels))
+    read, sigma = noise.read_noise_e, noise.read_noise_e_sigma
+    # σ of the gain is that of the read noise in electrons, too.
+    expected = noise_dn * noise.gain_e_per_dn
+    if noise.read_noise_is_limit:
+        assert read > 0.95 * expected
+        assert read < 0.35 * noise.gain_e_per_dn
+    else:
+        assert abs(read - expected) < 5 * sigma
+        assert sigma < 0.35 * read
+    assert not noise.read_noise_is_limit or noise_dn < 0.3
+    if spread == "even":
+        assert not noise.read_noise_is_limit
+
+
+def test_numbers_in_steps_of_four_are_rounded_to_four() -> None:
+    rng = np.random.default_rng(5)
+    fine = dark_pair(rng, 0.8, rng.standard_normal(SHAPE))
+    numbers = [4 * np.rint((1000 + 5 * rng.standard_normal(SHAPE)) / 4) for _ in range(2)]
+    coarse = measured(*(RawFrame(each.astype(np.uint16), "RGGB", (BLACK,) * 4, 6e4)
+                        for each in numbers))  # fmt: skip
+    assert (fine.scatter.step_dn, coarse.scatter.step_dn) == (1, 4)
+    noise = read_noise(coarse)
+    assert noise.read_noise_e / noise.gain_e_per_dn == pytest.approx(5.0, rel=0.02)
 
 
 def bracket(rng: np.random.Generator, flicker: float) -> list[CardFrame]:
