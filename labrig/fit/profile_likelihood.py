@@ -29,14 +29,14 @@ from labrig.fit.least_squares import (
     least_squares,
     parameter_covariance,
 )
-from labrig.results import ASYMMETRIC, SIGMAS_95, ProfileInterval
+from labrig.results import ASYMMETRIC, NORMAL_95, ProfileInterval
 
 #: Parameters (p,) → value of a quantity, and its derivatives (p,).
 Value = Callable[[FloatArray], tuple[float, FloatArray]]
 
 #: Probabilities of the two intervals: within 1 and 1.96 σ of a normal distribution.
 PROBABILITIES = (math.erf(math.sqrt(0.5)), 0.95)
-SIGMAS = (1.0, SIGMAS_95)
+SIGMAS = (1.0, NORMAL_95)
 #: Weight of a quantity's distance from its target, in units of 1/σ².
 STIFFNESS = 30.0
 #: Steps of a search for a limit, relative precision of √Δχ² at its end, largest ratio of a step to

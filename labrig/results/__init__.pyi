@@ -120,7 +120,7 @@ from .fitted_law import (
 )
 from .interval import (
     ASYMMETRIC as ASYMMETRIC,
-    SIGMAS_95 as SIGMAS_95,
+    NORMAL_95 as NORMAL_95,
     ProfileInterval as ProfileInterval,
     interval_lines as interval_lines,
     interval_rows as interval_rows,

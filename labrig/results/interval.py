@@ -104,8 +104,8 @@ class ProfileInterval:
             self.value,
             moved(self.low_68, 1.0),
             moved(self.high_68, 1.0),
-            moved(self.low_95, SIGMAS_95),
-            moved(self.high_95, SIGMAS_95),
+            moved(self.low_95, NORMAL_95),
+            moved(self.high_95, NORMAL_95),
             self.least,
             self.largest,
         )
@@ -143,7 +143,7 @@ class ProfileInterval:
 
 
 #: Standard deviations from the mean of a normal distribution within which 95 % are.
-SIGMAS_95 = 1.959963984540054
+NORMAL_95 = 1.959963984540054
 
 
 def _digits(low: float, high: float, value: float) -> int:

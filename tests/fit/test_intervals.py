@@ -16,7 +16,7 @@ from tests.fit.charged_samples import Bench, lvf_windows
 
 FloatArray = NDArray[np.float64]
 
-T_S = 0.5 + 4.5 * np.arange(40)
+T_S: FloatArray = 0.5 + 4.5 * np.arange(40.0)
 
 
 def fitted(decay: truths.Decay, sigma: float, seed: int = 1, **options: object) -> DecayFit:
@@ -134,7 +134,7 @@ def test_rates_of_excitation_have_limits_about_the_truth() -> None:
     interval = fit.intervals["k_r_per_s 1"]
     assert interval.low_95 < truth.k_r_per_s < interval.high_95
     assert interval.high_68 - interval.low_68 == pytest.approx(2 * state.k_r_sigma_per_s, rel=0.2)
-    for band, k_e in enumerate(truth.k_e_per_s, start=1):
+    for band, k_e in enumerate(truth.k_e_per_s or (), start=1):
         limits = fit.intervals[f"k_e_per_s 1 {band}"]
         assert 0.0 <= limits.low_95 <= limits.value <= limits.high_95
         assert k_e < 1.5 * limits.high_95 + 1e-4

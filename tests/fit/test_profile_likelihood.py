@@ -18,7 +18,7 @@ from labrig.fit.profile_likelihood import (
     Quantity,
     parameter,
 )
-from labrig.results import SIGMAS_95, ProfileInterval
+from labrig.results import NORMAL_95, ProfileInterval
 
 FloatArray = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def test_limits_of_a_linear_model_are_its_sigma(seed: int, variance: float, dof:
     )
     interval = likelihood.interval(Quantity(parameter(1)), NoiseScale(variance, dof))
     sigma = float(likelihood.fit.sigma[1]) * np.sqrt(variance)
-    quantiles = (1.0, SIGMAS_95) if np.isinf(dof) else (1.11, 2.5706)
+    quantiles = (1.0, NORMAL_95) if np.isinf(dof) else (1.11, 2.5706)
     expected = [interval.value + side * q * sigma for q in quantiles for side in (-1, 1)]
     found = [interval.low_68, interval.high_68, interval.low_95, interval.high_95]
     assert found == pytest.approx(expected, abs=5e-3 * sigma)
@@ -112,7 +112,7 @@ def test_limits_follow_the_quantity() -> None:
     assert of_rate.differs_from(float(likelihood.fit.sigma[0] * of_rate.value))
 
 
-@pytest.mark.parametrize("sigmas", [1.0, SIGMAS_95])
+@pytest.mark.parametrize("sigmas", [1.0, NORMAL_95])
 @pytest.mark.parametrize("mu", [0.0, 0.3, 0.9, 1.7, 3.0])
 def test_limits_near_a_bound_hold_the_truth_as_often_as_they_say(mu: float, sigmas: float) -> None:
     """Of estimates x ≥ 0 of μ with σ 1, in steps of equal probability."""
@@ -141,14 +141,14 @@ def test_a_parameter_with_a_bound_has_the_limits_of_the_normal_distribution(pull
         np.array([0.5, 0.0]), np.array([0.0, -np.inf]), NO_BOUND[:2],
     )  # fmt: skip
     interval = likelihood.interval(Quantity(parameter(0), least=0.0, searched=(0.0, np.inf)))
-    toward = toward_bound(max(pull, 0.0), SIGMAS_95)
+    toward = toward_bound(max(pull, 0.0), NORMAL_95)
     assert interval.low_95 == pytest.approx(
         0.0 if toward is None else 0.3 * (pull - toward), abs=2e-3
     )
     if pull >= 0:
-        assert interval.high_95 == pytest.approx(0.3 * (pull + SIGMAS_95), abs=2e-3)
+        assert interval.high_95 == pytest.approx(0.3 * (pull + NORMAL_95), abs=2e-3)
     else:
-        far = away_from_bound(-pull, SIGMAS_95)
+        far = away_from_bound(-pull, NORMAL_95)
         assert interval.high_95 == pytest.approx(0.3 * (np.sqrt(pull**2 + far**2) + pull), abs=2e-3)
     assert interval.is_one_sided == (toward is None)
 
@@ -216,4 +216,4 @@ def test_a_monotone_function_keeps_the_sides(function: Callable[[float], float])
 def test_an_error_of_the_light_moves_limits_by_its_own_share() -> None:
     widened = POSITIVE.widened(0.1)
     assert widened.high_68 == pytest.approx(2 * np.exp(np.hypot(np.log(1.5), 0.1)))
-    assert widened.low_95 == pytest.approx(2 / np.exp(np.hypot(np.log(2 / 1.1), 0.1 * SIGMAS_95)))
+    assert widened.low_95 == pytest.approx(2 / np.exp(np.hypot(np.log(2 / 1.1), 0.1 * NORMAL_95)))

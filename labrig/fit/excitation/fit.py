@@ -285,9 +285,10 @@ def _result(
     )
     if intervals == "none":
         return fit
-    stated = dict(zip(fit.covariance_parameters, np.sqrt(np.diag(fit.covariance)), strict=True))
+    stated_sigma = np.sqrt(np.diag(fit.covariance)).tolist()
+    by_name = dict(zip(fit.covariance_parameters, stated_sigma, strict=True))
     found = excitation_intervals(
-        problem, solution, uncertain, falling, None if intervals == "all" else stated
+        problem, solution, uncertain, falling, None if intervals == "all" else by_name
     )
     return replace(fit, intervals=found)
 
