@@ -102,7 +102,7 @@ def test_out_has_page_files_and_material(labrig: Labrig, table: Path, tmp_path: 
     again = labrig("fit", "charge", table, *options, "--out", out)
     assert "the same result as before" in again.out
     other = labrig("fit", "charge", table, *options, "--order", "first", "--out", out)
-    assert "; τ 1 " in other.out
+    assert "; p/τ 1 " in other.out
     assert (out / "result-1").is_dir()
 
 

@@ -130,7 +130,8 @@ def _differences(x: FloatArray, ratio: FloatArray) -> tuple[FloatArray, FloatArr
 
 def _of_three(squares: FloatArray, variance: FloatArray) -> FloatArray:
     """Return the variance of differences of neighbours."""
-    return squares[0] * variance[:-2] + squares[1] * variance[1:-1] + squares[2] * variance[2:]
+    neighbours = np.stack([variance[:-2], variance[1:-1], variance[2:]])
+    return np.asarray((squares * neighbours).sum(axis=0))
 
 
 def _sigma_factor(x: FloatArray, light: FloatArray, sigma: FloatArray) -> float:
