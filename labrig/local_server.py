@@ -25,6 +25,10 @@ from labrig.errors import DiskError, LabrigError, UsageError
 LOOPBACK = "127.0.0.1"
 #: No content from other origins, and no embedding in another page.
 CONTENT_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'"
+#: Connections at once: a page needs a few.
+MAX_CONNECTIONS = 64
+#: Digits of the length of a request.
+LENGTH_DIGITS = 9
 KINDS = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -54,6 +58,7 @@ class LocalServer(ThreadingHTTPServer):
 
     def __init__(self, port: int, conversation: type["LocalConversation"]) -> None:
         self.token = secrets.token_urlsafe(18)
+        self._free = threading.BoundedSemaphore(MAX_CONNECTIONS)
         try:
             super().__init__((LOOPBACK, port), conversation)
         except (OSError, OverflowError) as error:
@@ -61,6 +66,20 @@ class LocalServer(ThreadingHTTPServer):
                 f"port {port} cannot be used ({error}); leave --port away for any free one"
             ) from None
         self.names = {f"{name}:{self.server_port}" for name in (LOOPBACK, "localhost")}
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Converse in a thread; one connection too many is closed."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Converse until the connection ends."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
 
     @property
     def url(self) -> str:
@@ -147,7 +166,12 @@ class LocalConversation(BaseHTTPRequestHandler):
         if self.headers.get("Host", "") not in self.server.names:
             self.refuse(HTTPStatus.FORBIDDEN, f"this page is called {LOOPBACK} only")
             return None
-        token, slash, path = urlsplit(self.path).path.removeprefix("/").partition("/")
+        try:
+            whole = urlsplit(self.path).path
+        except ValueError:
+            self.refuse(HTTPStatus.BAD_REQUEST, "this is no address")
+            return None
+        token, slash, path = whole.removeprefix("/").partition("/")
         if not slash or not secrets.compare_digest(token.encode(), self.server.token.encode()):
             self.refuse(HTTPStatus.FORBIDDEN, "use the whole address that labrig printed")
             return None
@@ -161,7 +185,9 @@ class LocalConversation(BaseHTTPRequestHandler):
     def body(self) -> bytes:
         """Read the request's body, also of a refused request, to keep the connection usable."""
         length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > self.max_body_bytes:
+        # Python refuses to convert thousands of digits.
+        is_number = length.isdecimal() and len(length) <= LENGTH_DIGITS
+        if not is_number or int(length) > self.max_body_bytes:
             self.close_connection = True
             return b""
         return self.rfile.read(int(length))

@@ -24,6 +24,7 @@ from labrig.cli import (
     runs,
     schema,
     sim,
+    verify,
     watch,
 )
 
@@ -43,6 +44,7 @@ app.command("compare")(compare.compare)
 app.command("render")(render.render)
 app.command("note")(runs.note)
 app.command("design")(design.design)
+app.command("verify")(verify.verify)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)
 app.add_typer(driver.app, name="driver")

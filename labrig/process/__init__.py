@@ -9,11 +9,13 @@ from labrig.process.run import Processed, draw_figures, process_and_report, proc
 from labrig.process.shared_decay import report_shared_decay
 from labrig.process.table import report_table
 from labrig.process.trap_depths import report_trap_depths
+from labrig.process.verification import Verification, verify_run
 from labrig.process.without_run import describe_without_run, write_with_report
 
 __all__ = [
     "Processed",
     "ReportedCharge",
+    "Verification",
     "describe_without_run",
     "draw_figures",
     "other_settings",
@@ -26,5 +28,6 @@ __all__ = [
     "report_table",
     "report_trap_depths",
     "show_comparison",
+    "verify_run",
     "write_with_report",
 ]

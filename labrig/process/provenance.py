@@ -19,6 +19,7 @@ from labrig.record import (
 )
 from labrig.region import Region
 
+PROVENANCE = "provenance.yaml"
 _LIBRARIES = ("numpy", "scipy", "nlopt", "rawpy", "matplotlib", "colour-science", "h5py")
 
 
@@ -51,6 +52,8 @@ class Provenance(BaseModel):
         Names of the frames that the user excluded.
     optics
         Calibrations that the user named instead of the rig file's.
+    journal
+        Seal of the run's journal, the SHA-256 of its last line.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -67,6 +70,7 @@ class Provenance(BaseModel):
     frames: dict[str, int]
     excluded: tuple[str, ...]
     optics: dict[str, str]
+    journal: str
 
 
 def provenance(
@@ -100,6 +104,7 @@ def provenance(
         frames=dict(Counter(frame.role for frame in frames if not overrides.excludes(frame))),
         excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),
         optics=dict(overrides.optics),
+        journal=run.seal,
     )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from labrig.errors import DataError, UsageError
 from labrig.number_format import plus_minus, rounded
+from labrig.process.provenance import PROVENANCE
 from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
 from labrig.yaml_file import read_yaml
 
@@ -153,7 +154,9 @@ def _same_content(first: Path, second: Path) -> bool:
 def _settings(result: Path) -> dict[str, str]:
     """Return the content of `provenance.yaml` with one text per key; empty if there is none."""
     try:
-        return dict(_flattened(read_yaml(result / "provenance.yaml"), ""))
+        content = read_yaml(result / PROVENANCE)
+        content.pop("journal", None)  # of the run, not of its processing
+        return dict(_flattened(content, ""))
     except UsageError:
         return {}
 

@@ -21,7 +21,7 @@ from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
-from labrig.process.provenance import Provenance, describe_run, provenance
+from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
 from labrig.record import RunLock, read_run
 from labrig.report import (
@@ -77,7 +77,7 @@ def _earlier_results(run: Path) -> list[Path]:
 
 def write_provenance(folder: Path, provenance: Provenance) -> None:
     """Write `provenance.yaml` into `folder`."""
-    write_yaml(folder / "provenance.yaml", provenance)
+    write_yaml(folder / PROVENANCE, provenance)
 
 
 @dataclass(frozen=True)

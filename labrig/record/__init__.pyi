@@ -40,6 +40,7 @@ from .journal import (
     add_note as add_note,
     read_journal as read_journal,
     read_notes as read_notes,
+    sealed_line as sealed_line,
     write_durably as write_durably,
 )
 from .made import (

@@ -1,4 +1,8 @@
-"""The journal: event-model documents, one JSON line each, on the disk before the next step."""
+"""The journal: event-model documents, one JSON line each, on the disk before the next step.
+
+Each line holds the SHA-256 of the line before it, which seals the journal: a value that is changed,
+a line that is left out or moved no longer fits the line that follows.
+"""
 
 import json
 import os
@@ -7,6 +11,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Protocol, Self
@@ -99,6 +104,7 @@ def sync_folder(folder: Path) -> None:
 
 
 JOURNAL = "journal.jsonl"
+_AFTER = "after"
 Document = tuple[str, dict[str, Any]]
 
 
@@ -112,10 +118,45 @@ class JournalContent:
         Event-model documents, each with the name of its kind.
     torn
         Whether the last line is incomplete because of a crash.
+    seal
+        SHA-256 of the last complete line, in hexadecimal digits; empty if there is none.
     """
 
     documents: list[Document]
     torn: bool
+    seal: str = ""
+
+
+def sealed_line(name: str, doc: Mapping[str, Any], seal: str) -> bytes:
+    r"""Return the line of a document in a journal.
+
+    Parameters
+    ----------
+    name
+        Kind of the document, such as `event`.
+    doc
+        Document.
+    seal
+        SHA-256 of the line before; empty for the first line.
+
+    Returns
+    -------
+    bytes
+        Line with its end.
+
+    Examples
+    --------
+    >>> from labrig.record import sealed_line
+    >>> sealed_line("stop", {"time": 0.5}, "")
+    b'{"name": "stop", "doc": {"time": 0.5}, "after": ""}\n'
+    """
+    entry = {"name": name, "doc": doc, _AFTER: seal}
+    return json.dumps(entry, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def _seal(line: bytes) -> str:
+    """Return the seal of a line without its end."""
+    return sha256(line).hexdigest()
 
 
 class Journal:
@@ -146,6 +187,8 @@ class Journal:
         try:
             raw = path.read_bytes() if path.exists() else b""
             self._acknowledged = bytearray(raw[: raw.rfind(b"\n") + 1])
+            *_, last, _ = [b"", *bytes(self._acknowledged).split(b"\n")]
+            self._seal = _seal(last) if last else ""
             write_durably(path, bytes(self._acknowledged), disk)
             self._file: BinaryIO = path.open("ab", buffering=0)
         except OSError as error:
@@ -161,9 +204,8 @@ class Journal:
         return _parse(self.path, bytes(self._acknowledged))
 
     def append(self, name: str, doc: Mapping[str, Any]) -> None:
-        """Write the line `{"name": name, "doc": doc}` and wait until it is on the disk."""
-        text = json.dumps({"name": name, "doc": doc}, ensure_ascii=False, allow_nan=False)
-        line = text.encode() + b"\n"
+        """Write the line of a document and wait until it is on the disk."""
+        line = sealed_line(name, doc, self._seal)
         try:
             if os.fstat(self._file.fileno()).st_size > self.size_bytes:
                 self._file.truncate(self.size_bytes)
@@ -174,6 +216,7 @@ class Journal:
                 "is there and has room"
             ) from None
         self._acknowledged += line
+        self._seal = _seal(line[:-1])
 
     def close(self) -> None:
         """Close the file."""
@@ -235,18 +278,27 @@ def _parse(path: Path, raw: bytes) -> JournalContent:
     lines = raw.split(b"\n")
     torn = lines.pop() != b""
     documents: list[Document] = []
+    seal = ""
     for number, line in enumerate(lines, start=1):
         try:
             entry = json.loads(line, parse_constant=_refuse_constant)
             if b"\\ud" in line.lower():  # perhaps half of a surrogate pair, which is no text
                 json.dumps(entry, ensure_ascii=False).encode()
             documents.append((str(entry["name"]), dict(entry["doc"])))
+            after = entry[_AFTER]
         except (ValueError, KeyError, TypeError, RecursionError):
             raise DataError(
                 f"{path}, line {number}: expected a journal document, got {line[:40]!r}; "
                 "the file was changed after the run"
             ) from None
-    return JournalContent(documents, torn)
+        if after != seal:
+            before = "the beginning" if number == 1 else f"line {number - 1}"
+            raise DataError(
+                f"{path}, line {number}: does not follow {before} as it was written: the file was "
+                "changed after the run"
+            )
+        seal = _seal(line)
+    return JournalContent(documents, torn, seal)
 
 
 def _refuse_constant(constant: str) -> None:

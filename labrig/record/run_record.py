@@ -89,12 +89,15 @@ class RunRecord:
         Whether the last line of the journal is incomplete because of a crash.
     last_time
         Time of the latest document in seconds since 1970.
+    seal
+        SHA-256 of the journal's last complete line, by which it is sealed; empty if there is none.
     """
 
     folder: Path
     attempts: list[Attempt]
     torn: bool
     last_time: float
+    seal: str = ""
 
     @property
     def name(self) -> str:
@@ -230,7 +233,7 @@ def run_record(folder: Path, content: JournalContent) -> RunRecord:
                 f"{folder / JOURNAL}, line {number}: a '{name}' document that does not fit "
                 f"({_error_text(error)}); the file was changed after the run"
             ) from None
-    return RunRecord(folder, list(attempts.values()), content.torn, last_time)
+    return RunRecord(folder, list(attempts.values()), content.torn, last_time, content.seal)
 
 
 def _add_document(

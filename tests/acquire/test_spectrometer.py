@@ -31,6 +31,7 @@ from labrig.optics import read_spectrometer_reading
 from labrig.record import FRAMES, RunFolder, damaged_frames, read_run
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
+from tests.resealed import reseal
 
 from .fakes import Watching
 
@@ -136,6 +137,7 @@ def test_a_journal_that_counts_other_spectra_was_changed(run: Path) -> None:
     kept = [line for line in lines if '"role": "led"' not in line]
     assert len(kept) == len(lines) - 2
     journal.write_text("\n".join(kept) + "\n")
+    reseal(journal)
     with pytest.raises(DataError, match="it counts 2 spectra, there are 1"):
         read_run(run)
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ from labrig.analyse.overrides import Overrides
 from labrig.errors import DataError, LabrigError
 from labrig.record import read_run
 from tests.conftest import Ended
+from tests.resealed import reseal
 
 Labrig = Callable[..., Ended]
 RECORDED = Path(__file__).parent / "data" / "decay"
@@ -70,8 +72,11 @@ def test_a_report_does_without_a_damaged_photograph(run: Path) -> None:
     assert frames.warnings[0].startswith(f"{photograph.name} was changed")
 
 
-def frames_of(run: Path, lines: list[str], end: str = "\n") -> IntactFrames:
-    (run / "journal.jsonl").write_text("\n".join(lines) + end, encoding="utf-8")
+def frames_of(run: Path, lines: list[str], end: str = "\n", sealed: bool = False) -> IntactFrames:
+    journal = run / "journal.jsonl"
+    journal.write_text("\n".join(lines) + end, encoding="utf-8")
+    if sealed:
+        reseal(journal)
     return intact_frames(read_run(run), Overrides())
 
 
@@ -88,8 +93,20 @@ def test_lines_taken_out_or_doubled_are_noticed(run: Path) -> None:
         if '"event"' not in line[:20]:
             continue
         for edited in ([], [line, line]):
+            lines = [*LINES[:number], *edited, *LINES[number + 1 :]]
+            with pytest.raises(DataError, match=r"line \d+: does not follow line \d+ as"):
+                frames_of(run, lines)
             with pytest.raises(DataError, match=r"line \d+: a 'stop' document .* counts"):
-                frames_of(run, [*LINES[:number], *edited, *LINES[number + 1 :]])
+                frames_of(run, lines, sealed=True)
+
+
+def test_a_value_that_was_changed_is_noticed(run: Path) -> None:
+    for number, line in enumerate(LINES[:-1]):
+        for key in ("exposure_s", "iso", "f_number", "start_time", "end_time", "sha256", "time"):
+            edited = re.sub(rf'("{key}": "?)(\d)', lambda m: m[1] + str((int(m[2]) + 1) % 10), line)
+            if edited != line:
+                with pytest.raises(DataError, match=rf"line {number + 2}: does not follow"):
+                    frames_of(run, [*LINES[:number], edited, *LINES[number + 1 :]])
 
 
 def places(content: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -126,7 +143,7 @@ def test_an_edited_journal_is_one_line_or_still_makes_sense(
         inner[key] = data.draw(st.sampled_from(ODD))
     lines = [*LINES[:number], json.dumps(document), *LINES[number + 1 :]]
     try:
-        frames = frames_of(edited_run, lines)
+        frames = frames_of(edited_run, lines, sealed=True)
     except LabrigError as error:
         assert str(edited_run) in str(error)
         assert "\n" not in str(error)

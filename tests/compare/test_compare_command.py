@@ -21,6 +21,7 @@ from labrig.results.phosphor import PhosphorResult
 from tests.analyse.spectral_bench import true_lvf_file
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
+from tests.resealed import reseal
 
 Labrig = Callable[..., Ended]
 
@@ -184,6 +185,7 @@ def test_without_camera_curves_it_says_so_and_does_the_rest(
     (copy / "rig.yaml").write_text(write_quickly(rig))
     journal = copy / "journal.jsonl"
     journal.write_text(journal.read_text().replace("Canon EOS 5D Mark II", "Acme One"))
+    reseal(journal)
     said = compared(labrig, copy)
     assert "linear sRGB" in said["description"]
     assert said["spectra"] == {}

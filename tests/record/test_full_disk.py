@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.errors import DiskError
-from labrig.record import RunFolder, read_run
+from labrig.record import RunFolder, read_run, sealed_line
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import Journal, read_journal
 
@@ -163,7 +163,7 @@ def test_what_an_earlier_process_wrote_is_on_the_disk_before_it_is_relied_upon(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "journal.jsonl"
-    line = b'{"name": "start", "doc": {}}\n'
+    line = sealed_line("start", {}, "")
     path.write_bytes(line + b'{"name": "ev')  # written, but perhaps never synced
     written: list[bytes] = []
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.errors import DataError
+from labrig.record import sealed_line
 from labrig.record.journal import Journal, read_journal
 
 values = st.recursive(
@@ -48,12 +49,14 @@ def test_each_line_is_on_the_disk_when_append_returns(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     with Journal(path) as journal:
         journal.append("start", {"uid": "1"})
-        assert json.loads(path.read_bytes()) == {"name": "start", "doc": {"uid": "1"}}
+        assert json.loads(path.read_bytes()) == {
+            "name": "start", "doc": {"uid": "1"}, "after": "",
+        }  # fmt: skip
 
 
 def test_damage_before_the_last_line_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
-    path.write_text('{"name": "start", "doc": {}}\nrubbish\n{"name": "stop", "doc": {}}\n')
+    path.write_bytes(sealed_line("start", {}, "") + b"rubbish\n" + sealed_line("stop", {}, ""))
     with pytest.raises(DataError, match="line 2"):
         read_journal(path)
 

@@ -13,6 +13,7 @@ from labrig.errors import DataError, DiskError, UsageError
 from labrig.record import ActionRecord, FrameRecord, RunFolder, TemperatureRecord, read_run
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import read_journal
+from tests.resealed import reseal
 
 STARTED = 1_767_225_600.0
 
@@ -83,6 +84,7 @@ def test_a_temperature_that_cannot_be_is_refused(
     path.write_text(
         path.read_text().replace('"temperature_c": 21.25', f'"temperature_c": {written}')
     )
+    reseal(path)
     with pytest.raises(DataError, match="was changed after the run"):
         read_run(folder.path)
 
@@ -105,6 +107,7 @@ def test_a_frame_outside_of_the_run_is_refused(
         photograph(folder.attempt("dark", wall, {}), b"x")
     path = folder.path / "journal.jsonl"
     path.write_text(path.read_text().replace("frames/000001.cr2", name))
+    reseal(path)
     with pytest.raises(DataError, match="was changed after the run"):
         read_run(folder.path)
 
@@ -129,6 +132,7 @@ def test_half_a_surrogate_pair_in_a_journal_is_refused(
     assert len(read_run(folder.path).attempts) == 1
     path = folder.path / "journal.jsonl"
     path.write_text(path.read_text().replace('"dark"', '"\\ud800"'))
+    reseal(path)
     with pytest.raises(DataError, match="was changed after the run"):
         read_run(folder.path)
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -26,7 +27,7 @@ from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import thumbnail
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import UsageError
-from labrig.record import UNDONE, ActionRecord, RunFolder, read_run
+from labrig.record import UNDONE, ActionRecord, RunFolder, read_run, sealed_line
 from labrig.watch.previews import Previews
 from labrig.watch.run_follower import RunFollower, State
 from labrig.watch.server import UpdateFeed, WatchServer, watch_run
@@ -388,12 +389,14 @@ class Written:
         self._time = 1.8e9
         self.frames = self.of_decays = 0
         self._in_unit = self.FRAMES_EACH
-        self._unit = ""
+        self._unit = self._seal = ""
 
     def _append(self, kind: str, /, **doc: object) -> None:
         self._time += 1.0
-        with (self.path / "journal.jsonl").open("a") as journal:
-            journal.write(json.dumps({"name": kind, "doc": {"time": self._time} | doc}) + "\n")
+        line = sealed_line(kind, {"time": self._time} | doc, self._seal)
+        with (self.path / "journal.jsonl").open("ab") as journal:
+            journal.write(line)
+        self._seal = sha256(line[:-1]).hexdigest()
 
     def _event(self, stream: str, **data: object) -> None:
         self._append("event", descriptor=f"{self._unit} {stream}", data=data)
