@@ -233,9 +233,9 @@ def _material(
         states=tuple(
             State(
                 k_r_per_s=state.k_r_per_s,
-                k_r_per_s_sigma=state.k_r_sigma_per_s,
-                amplitude=state.amplitude if math.isfinite(state.amplitude) else None,
-                amplitude_sigma=state.amplitude_sigma,
+                k_r_per_s_sigma=_finite(state.k_r_sigma_per_s),
+                amplitude=_finite(state.amplitude),
+                amplitude_sigma=_finite(state.amplitude_sigma),
                 amplitude_unit=fit.value_unit or None,
             )
             for state in fit.states_at_lamp_off
@@ -248,6 +248,11 @@ def _material(
             temperature_c=temperature_c,
         ),
     )
+
+
+def _finite(number: float) -> float | None:
+    """Return a number; None where the data leave it open, which the file cannot say by infinity."""
+    return number if math.isfinite(number) else None
 
 
 def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:

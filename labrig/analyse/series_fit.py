@@ -130,12 +130,13 @@ def by_clock(reference: DecayReference, clock: TableClock) -> DecayReference:
 
 
 def _is_seen(fit: DecayFit, first_s: float) -> bool:
-    """Whether an amplitude is significant, or the signal of the law taken at the first frame.
+    """Return whether an amplitude is significant, or the signal of some law at the first frame.
 
-    Nearly equal rates share their amplitudes, and exponentials that only describe another law have
-    none that are known.
+    Nearly equal rates share their amplitudes, more states than the data hold leave nothing of them
+    determined, and exponentials that only describe another law have no determined amplitudes.
     """
-    value, variance = fit.signal(np.array([first_s]), np.zeros(1))
-    return bool(value[0] >= SEEN_SIGMA * np.sqrt(variance[0])) or any(
+    first = np.array([first_s]), np.zeros(1)
+    signals = [fit.signal(*first), *(law.signal(*first) for law in fit.laws)]
+    return any(value[0] >= SEEN_SIGMA * np.sqrt(variance[0]) for value, variance in signals) or any(
         state.amplitude >= SEEN_SIGMA * state.amplitude_sigma for state in fit.states
     )

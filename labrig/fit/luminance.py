@@ -19,7 +19,7 @@ from labrig.fit.least_squares import least_squares
 from labrig.quantity import duration_text
 from labrig.results import (
     MARKING_S,
-    SIGMAS_95,
+    NORMAL_95,
     TABLE_S,
     VISIBLE_MCD_PER_M2,
     FloatArray,
@@ -291,7 +291,7 @@ class _Readings:
     def forecast(self, limit: float) -> tuple[ForecastTime | None, tuple[str, ...]]:
         """Return when the luminance falls below a limit after the last reading, or why not."""
         end = self.parabola(float(self.t_s[-1]), at_end=True)
-        if end is not None and end.luminance * (1 + SIGMAS_95 * end.relative_sigma) < limit:
+        if end is not None and end.luminance * (1 + NORMAL_95 * end.relative_sigma) < limit:
             return None, (
                 f"the last readings are below {limit:g} {UNIT}, and no reading before is clearly "
                 "above it: begin earlier after lamp off",

@@ -249,7 +249,7 @@ def _move_texts(moves: list[_Move]) -> Iterator[str]:
     """Yield rates, amplitudes and held parameters one by one and the others in one line."""
     others = []
     for move in moves:
-        if move.name.startswith(("k_r", "a ", "τ ")) or math.isinf(move.in_sigma):
+        if move.name.startswith(("k_r", "a ", "p/τ ")) or math.isinf(move.in_sigma):
             yield str(move)
         else:
             others.append(move)
@@ -261,6 +261,6 @@ def _move_texts(moves: list[_Move]) -> Iterator[str]:
 
 def _states_text(parameters: Parameters) -> str:
     """Return text such as `2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
-    symbol, unit = ("τ", "s") if "τ 1" in parameters else ("k_r", "1/s")
+    symbol = "p/τ" if "p/τ 1" in parameters else "k_r"
     each = [plus_minus(*pair) for name, pair in parameters.items() if name.startswith(symbol)]
-    return f"{len(each)} state{'s' if len(each) > 1 else ''} ({symbol} {', '.join(each)} {unit})"
+    return f"{len(each)} state{'s' if len(each) > 1 else ''} ({symbol} {', '.join(each)} 1/s)"

@@ -102,7 +102,7 @@ def unrounded_variance(variance: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray
-        v in steps².
+        Variance v in steps².
 
     References
     ----------

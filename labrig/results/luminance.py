@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from labrig.number_format import aligned
 from labrig.quantity import TIME_S, duration_text, parse
 from labrig.results.budget import Budget
-from labrig.results.interval import SIGMAS_95
+from labrig.results.interval import NORMAL_95
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.text_files import finite, json_text
 
@@ -196,7 +196,7 @@ class ForecastTime:
         """Time in s that the earliest one exceeds with a probability of 97.5 %; 0 without it."""
         if self.at_least is None:
             return 0.0
-        return max(self.at_least.value - SIGMAS_95 * self.at_least.sigma, 0.0)
+        return max(self.at_least.value - NORMAL_95 * self.at_least.sigma, 0.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -21,13 +21,12 @@ from labrig.errors import FitError
 from labrig.fit import fit_charge_and_decay, fit_decay
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import read_material
-from labrig.results import Measured, ProfileInterval
+from labrig.results import NORMAL_95, Measured, ProfileInterval
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit import truths
 from tests.fit.charged_samples import Bench, lvf_windows
 
-SIGMAS_95 = 1.96
 #: Parameter → its value with σ, and its interval.
 Estimates = Mapping[str, tuple[Measured, ProfileInterval | None]]
 
@@ -143,6 +142,7 @@ def excitation(name: str, order: float, irradiance: float) -> Case:
     material = read_material("blue-paint")
     (state,) = material.states
     k_e = state.k_e_per_s
+    assert k_e is not None
     truth = {"k_r_per_s 1": state.k_r_per_s, "kinetic_order 1": order}
     truth |= {f"k_e_per_s 1 {band}": float(k_e[band - 1]) for band in (1, 2, 3, 5)}
 
@@ -185,6 +185,7 @@ def one_trap(rate_per_s: float, shape: float) -> truths.Decay:
         solved = solve_ivp(
             fall, (0, float(t.max()) + 1), [1.0], rtol=1e-10, atol=1e-14, dense_output=True
         )
+        assert solved.sol is not None
         level = solved.sol(t.ravel())[0].reshape(t.shape)
         return np.asarray(level**2 / (shape + (1 - shape) * level))
 
@@ -260,7 +261,7 @@ def holds(truth: float, estimate: tuple[Measured, ProfileInterval | None]) -> li
     # A limit at a bound is met to the precision of the search.
     slack = 1e-6 * max(abs(truth), 1e-6)
     off = abs(measured.value - truth)
-    by_sigma = [off <= n * measured.sigma + slack for n in (1.0, SIGMAS_95)]
+    by_sigma = [off <= n * measured.sigma + slack for n in (1.0, NORMAL_95)]
     if interval is None:
         return [*by_sigma, False, False]
     return [

@@ -58,7 +58,7 @@ class Table:
     def dof(self, n_shape: int) -> int:
         """Return the degrees of freedom of a shape with so many parameters."""
         channels = self.values.shape[1]
-        return int(self.values.size) - n_shape - (channels - 1) - channels * self.has_offset
+        return int(self.values.size - n_shape - (channels - 1) - channels * self.has_offset)
 
     def residuals(self, signal: FloatArray) -> FloatArray:
         """Return the residuals of the best levels ≥ 0 and backgrounds of a signal (n,)."""

@@ -25,7 +25,7 @@ import numpy as np
 from labrig.errors import FitError
 from labrig.fit import fit_decay, fit_luminance
 from labrig.material import DECAY_LAWS
-from labrig.results import SIGMAS_95, VISIBLE_MCD_PER_M2, FloatArray
+from labrig.results import NORMAL_95, VISIBLE_MCD_PER_M2, FloatArray
 
 PARTS = (0.1, 0.3, 0.5, 0.9)
 LEVEL = 0.05
@@ -185,7 +185,7 @@ def forecast(record: Record) -> tuple[Range | None, float]:
     found = fit_luminance(record.t_s, record.light, record.sigma, scale_sigma=record.scale_sigma)
     if found.visible_s is not None:
         value, sigma = found.visible_s.value, found.visible_s.sigma
-        return (value - SIGMAS_95 * sigma, value + SIGMAS_95 * sigma), 0.0
+        return (value - NORMAL_95 * sigma, value + NORMAL_95 * sigma), 0.0
     if found.visible_forecast is None:
         return None, 0.0
     between_s = found.visible_forecast.between_s

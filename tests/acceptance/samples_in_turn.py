@@ -68,7 +68,7 @@ def protocol_file(folder: Path, materials: Sequence[str], **keys: Any) -> Path:
 
 def planned(folder: Path, rig: Path, materials: Sequence[str], rest: dict[str, str]) -> str:
     """Return the longest lab time in turn and one after the other."""
-    found = find_calibrations(read_rig_file(rig), folder / "runs", 0.0).rig
+    found = find_calibrations(read_rig_file(rig), [folder / "runs"], 0.0).rig
     times = []
     for rests in ("shared", "apart"):
         protocol = read_protocol(protocol_file(folder, materials, rest=rest, rests=rests))

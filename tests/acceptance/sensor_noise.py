@@ -116,7 +116,10 @@ def read_noises(seeds: int) -> None:
     # Bright light tells the gain, which is 1 electron a DN.
     bright = np.random.default_rng(0)
     lit = [
-        measured(*(raw(bright.poisson(level, SHAPE).astype(float)) for _ in range(2)))
+        measured(
+            raw(bright.poisson(level, SHAPE).astype(float)),
+            raw(bright.poisson(level, SHAPE).astype(float)),
+        )
         for level in (4000, 8000, 12000)
     ]
     straight = Bend(np.zeros(2), 1e-12 * np.eye(2), 14_000.0)
@@ -127,7 +130,7 @@ def read_noises(seeds: int) -> None:
                 rng = np.random.default_rng([seed, round(1000 * noise_dn), len(name)])
                 offsets = LEVELS[name](rng)
                 frames = [raw(offsets + noise_dn * rng.standard_normal(SHAPE)) for _ in range(4)]
-                dark = [measured(*frames[:2]), measured(*frames[2:])]
+                dark = [measured(frames[0], frames[1]), measured(frames[2], frames[3])]
                 found = photon_transfer(100, lit, dark, straight).noise
                 gain = found.gain_e_per_dn
                 # The gain's own error is not the read noise's.

@@ -202,7 +202,7 @@ def test_broken_files_are_refused(labrig: Labrig, tmp_path: Path, name: str) -> 
 @pytest.mark.parametrize("name", ["a.csv", "a.exr", "a.bfc"])
 def test_a_folder_is_no_file(labrig: Labrig, tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
-    refused_in_one_line(labrig("material", "show", tmp_path / name), 2, "directory")
+    refused_in_one_line(labrig("material", "show", tmp_path / name), 2, "a folder")
 
 
 def test_broken_images_are_refused(labrig: Labrig, dyed: Path, tmp_path: Path) -> None:

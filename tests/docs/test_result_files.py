@@ -13,6 +13,8 @@ from labrig.fit import fit_decay
 ROOT = Path(__file__).parents[2]
 #: Keys below which names are those of channels, charges or parameters.
 NAMED = {"channel_weights", "channel_weights_sigma", "offsets", "offsets_sigma", "levels"}
+#: Keys of each interval; a fit may have none.
+INTERVAL = ("value", "interval_68", "interval_95", "possible")
 
 
 def documented(file: str) -> set[str]:
@@ -24,12 +26,14 @@ def documented(file: str) -> set[str]:
 
 def keys(content: object, prefix: str = "") -> Iterator[str]:
     if isinstance(content, dict) and content:
-        is_named = prefix.rsplit(".", 1)[-1] in {*NAMED, "parameters"}
+        is_named = prefix.rsplit(".", 1)[-1] in {*NAMED, "parameters", "intervals"}
         for name, value in content.items():
             yield from keys(value, f"{prefix}.{'*' if is_named else name}".lstrip("."))
     elif isinstance(content, list) and content and isinstance(content[0], dict):
         for entry in content:
             yield from keys(entry, f"{prefix}[]")
+    elif prefix.rsplit(".", 1)[-1] == "intervals":
+        yield from (f"{prefix}.*.{key}" for key in INTERVAL)
     else:
         yield prefix
 

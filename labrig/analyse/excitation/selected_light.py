@@ -150,7 +150,11 @@ def with_doubt(fit: FittedExcitation, even: FittedExcitation) -> FittedExcitatio
         for index, state in enumerate(fit.states)
     )
     before = np.sqrt(np.diag(fit.covariance))
-    widening = dict(zip(fit.covariance_parameters, sigma / before, strict=True))
+    # A parameter that is held has no σ, and no interval.
+    ratio = np.divide(
+        sigma, before, out=np.ones_like(sigma), where=(before > 0) & np.isfinite(before)
+    )
+    widening = dict(zip(fit.covariance_parameters, ratio, strict=True))
     intervals = {name: each.scaled(float(widening[name])) for name, each in fit.intervals.items()}
     return replace(fit, states=states, covariance=covariance, intervals=intervals)
 

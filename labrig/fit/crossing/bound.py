@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit.least_squares import FloatArray, least_squares
-from labrig.results import SIGMAS_95, Measured
+from labrig.results import NORMAL_95, Measured
 
 #: Factors in time of the last readings that lines are laid through, and fewest readings of a line.
 WINDOWS = (1.25, 1.6, 2.5, 5.0)
@@ -54,7 +54,7 @@ def earliest_crossing(
         line = _line(t_s, light, sigma, t_s >= t_s[-1] / window)
         if line is not None:
             bounds.append(line.reaches(level, level_sigma))
-    return max(bounds, key=lambda one: one.value - SIGMAS_95 * one.sigma, default=None)
+    return max(bounds, key=lambda one: one.value - NORMAL_95 * one.sigma, default=None)
 
 
 def growing_rate(

@@ -16,7 +16,7 @@ from labrig.fit.crossing.candidates import candidates
 from labrig.fit.crossing.posterior import WALKS, Posterior, posteriors
 from labrig.fit.crossing.readings import LogDecay, reading_sigma
 from labrig.fit.least_squares import FloatArray
-from labrig.results import SIGMAS_95, ForecastTime
+from labrig.results import NORMAL_95, ForecastTime
 
 #: Part of the draws of what the record does not foretell.
 UNFORESEEN = 0.15
@@ -84,7 +84,7 @@ def forecast_crossing(
         drawn = np.concatenate([_crossings(one, decay, part, random) for one, part in parts])
     low, middle, high = np.exp(np.quantile(drawn, [OUTSIDE, 0.5, 1 - OUTSIDE], method="lower"))
     if at_least is not None:
-        earliest = at_least.value - SIGMAS_95 * at_least.sigma
+        earliest = at_least.value - NORMAL_95 * at_least.sigma
         low, middle, high = (max(float(end), earliest) for end in (low, middle, high))
     is_determined = high < NOT_DETERMINED * low
     names = dict.fromkeys(posterior.law.name for posterior in every)

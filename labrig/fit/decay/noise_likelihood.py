@@ -21,8 +21,8 @@ FLICKERS = MAX_FLICKER * np.linspace(0, 1, 100) ** 2
 #: Variance over that assumed where the flicker assumed is all of it and less is tried: rounding
 #: may else make it negative.
 LEAST_FACTOR = 1e-12
-#: χ² of data without any noise.
-TINY = 1e-300
+#: Relative error of values and models by rounding: smaller residuals say nothing of a model.
+ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class NoiseLikelihood:
         chi2 = float(residuals @ residuals)
         if not self.data.series.sigma_given:
             n_values = self.data.series.n_values
-            return n_values * (1 + float(np.log(max(chi2, TINY) / n_values)))
+            of_rounding = ROUNDING**2 * float(self.data.target @ self.data.target)
+            return n_values * (1 + float(np.log(max(chi2, of_rounding) / n_values)))
         return chi2 + float(self._changes(residuals).min())
 
     def likeliest_factors(self, residuals: FloatArray) -> FloatArray:

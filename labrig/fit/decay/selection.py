@@ -82,8 +82,9 @@ def choose_states(
             fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets)
         else:
             fit = _with_one_more(data, chosen, needed_chi2)
-        if fit is not None and fit.joint.least_squares.creeps and fit.joint.chi2 < needed_chi2:
-            fit = _at_minimum(data, fit)
+        if fit is not None and _must_end(likelihood, fit) and fit.joint.chi2 < needed_chi2:
+            # The first number is perhaps the one that was asked for.
+            fit = _at_minimum(data, fit) or (fit if chosen is None else None)
         if fit is None:
             break
         p_value = None if chosen is None else f_test(likelihood, chosen.joint, fit.joint)
@@ -101,6 +102,14 @@ def choose_states(
             penalty = 2 * float(np.log(data.independent_data(fit.joint.weights)))
             needed_chi2 = fit.joint.chi2 - penalty + CREEPING_GAIN
     return chosen, tried
+
+
+def _must_end(likelihood: NoiseLikelihood, fit: StatesFit) -> bool:
+    """Return whether a fit goes on to its minimum before it is compared with others.
+
+    Without σ, models are compared by the ratio of their χ², in which a small rest counts.
+    """
+    return fit.joint.least_squares.creeps or not likelihood.data.series.sigma_given
 
 
 def _at_minimum(data: WhitenedSeries, fit: StatesFit) -> StatesFit | None:
