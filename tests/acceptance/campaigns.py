@@ -162,6 +162,7 @@ CAMPAIGNS = {
         _module("lamp_off_however_it_ends"),
         _module("gphoto2_latency"),
         _module("least_squares_starts"),
+        _module("led_entries"),
         _module("led_matrices", "exact", "per-led", "reflecting", "calibrated"),
         *(
             _module(
