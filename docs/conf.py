@@ -19,6 +19,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
+    "stale_figures",
     "typer_commands",
     "yaml_keys",
 ]

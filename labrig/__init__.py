@@ -12,6 +12,12 @@ The functions that a notebook needs are exported here::
 Names are listed in `__init__.pyi`, and loaded when first used.
 """
 
+import sys
+
+# `python -m labrig` puts the working folder first: nothing in it is imported, whoever put it there.
+if sys.argv[:1] == ["-m"] and not sys.flags.safe_path:
+    del sys.path[0]
+
 import lazy_loader
 
 # Lazy loading lets `labrig --help` answer at once.

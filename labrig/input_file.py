@@ -1,7 +1,10 @@
 """Reading of input files, with messages that name the problem."""
 
 import errno
+import os
+import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from labrig.errors import DiskError, UsageError
 
@@ -10,6 +13,33 @@ DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDO
 
 #: Limit that a table of a year's measurements does not reach, but `/dev/zero` does.
 MAX_TEXT_BYTES = 50_000_000
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open the file at `path` for reading; a pipe or a device is refused and never waited for.
+
+    Raises
+    ------
+    UsageError
+        There is no file, it is not a regular one, or it may not be read.
+    DiskError
+        The disk cannot be read.
+    """
+    # Without waiting: a named pipe would else be opened when somebody writes into it.
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        descriptor = os.open(path, flags)
+    except FileNotFoundError:
+        raise UsageError(f"{path}: no such file") from None
+    except OSError as error:
+        error_class = DiskError if error.errno in DISK_ERRORS else UsageError
+        raise error_class(f"{path}: cannot be read ({error.strerror})") from None
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(descriptor)
+        kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device; save it as a file"
+        raise UsageError(f"{path}: expected a file, got {kind}")
+    return os.fdopen(descriptor, "rb")
 
 
 def read_bytes(path: Path, most_bytes: int) -> bytes:
@@ -23,10 +53,8 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
         The disk cannot be read.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             content = file.read(most_bytes + 1)
-    except FileNotFoundError:
-        raise UsageError(f"{path}: no such file") from None
     except OSError as error:
         error_class = DiskError if error.errno in DISK_ERRORS else UsageError
         raise error_class(f"{path}: cannot be read ({error.strerror})") from None

@@ -19,8 +19,8 @@ from tests.forked import forked
 
 #: A refusal takes no longer, in seconds of computing; nor does anything hang for longer than this.
 QUICK_S, HANG_TIMEOUT_S = 2.0, 60.0
-#: Said beside the one line of complaint: progress, and what a person should know.
-_REMARKS = ("[", "note: ", "warning: ")
+#: Beginnings of lines that are no complaint: progress, notes, and a run that is complete already.
+_REMARKS = ("[", "note: ", "warning: ", "nothing to resume: ")
 
 NASTY = [
     b".inf", b"-.inf", b".nan", b"1e400", b"NaN", b"Infinity", b"100000000", b"-1", b"0", b"1e300",

@@ -9,7 +9,7 @@ from pathlib import Path
 from labrig.catalogue.index import PROTOCOL, read_summaries
 from labrig.catalogue.run_summary import STATUSES, RunSummary
 from labrig.errors import UsageError
-from labrig.record import time_made
+from labrig.record import require_plain_folder, time_made
 
 
 @dataclass(frozen=True)
@@ -103,6 +103,8 @@ def find_run(run: Path, runs: Path) -> Path:
     ------
     UsageError
         If there is no such run, or if several names begin alike.
+    DataError
+        If something in the run folder leads elsewhere, such as a link.
 
     Examples
     --------
@@ -111,6 +113,12 @@ def find_run(run: Path, runs: Path) -> Path:
     >>> find_run(Path("last"), Path("runs")).name
     'decay'
     """
+    folder = _find_folder(run, runs)
+    require_plain_folder(folder)
+    return folder
+
+
+def _find_folder(run: Path, runs: Path) -> Path:
     if (run / PROTOCOL).is_file():
         return run
     if str(run) == "last":

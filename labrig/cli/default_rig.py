@@ -161,15 +161,20 @@ def use(
 def _choose(rig: str) -> None:
     from labrig import resources
     from labrig.acquire import read_rig_file
+    from labrig.cli.consent import command_text, give_consent
+    from labrig.record import write_durably
 
     path = resources.find("config", "rig", rig)
-    read_rig_file(path)  # a mistake in it is better found now
+    on_finish = read_rig_file(path).on_finish  # a mistake in the file is better found now
+    if isinstance(on_finish, tuple):
+        give_consent(on_finish)
+        typer.echo(
+            f"note: runs on it start, when they have ended: {command_text(on_finish)}", err=True
+        )
     is_shipped = resources.names("config").get(rig) == path
     choice = _choice_file()
     choice.parent.mkdir(parents=True, exist_ok=True)
-    part = choice.with_name(f"{choice.name}.{os.getpid()}.part")
-    part.write_text((rig if is_shipped else str(path.absolute())) + "\n", encoding="utf-8")
-    part.replace(choice)
+    write_durably(choice, f"{rig if is_shipped else path.absolute()}\n".encode())
 
 
 def _choice_file() -> Path:

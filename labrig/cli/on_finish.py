@@ -6,7 +6,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
+from labrig.cli.consent import command_text, has_consent
 from labrig.clock import Interrupted
 from labrig.errors import LabrigError
 from labrig.readable_output import spelled
@@ -20,6 +22,33 @@ class Ending:
     """Message about the end of a run."""
 
     message: str = ""
+
+
+def permitted(
+    on_finish: str | Sequence[str] | None, path: Path, *, is_asked_for: bool
+) -> str | Sequence[str] | None:
+    """Return what may happen at the end: a bell always, a command by consent alone.
+
+    Parameters
+    ----------
+    on_finish
+        Entry of the rig file.
+    path
+        Rig file, named in the note about a command that will not be started.
+    is_asked_for
+        Whether `--on-finish` was given.
+    """
+    if on_finish is None or isinstance(on_finish, str):
+        return on_finish
+    if is_asked_for or has_consent(on_finish):
+        return on_finish
+    print(
+        f"note: 'on_finish' in {path} will not be started, in case somebody else wrote it: "
+        f"{command_text(on_finish)}; add --on-finish for this run, or consent for all: "
+        "labrig rig use FILE",
+        file=sys.stderr,
+    )
+    return None
 
 
 @contextmanager

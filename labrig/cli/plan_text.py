@@ -9,6 +9,7 @@ from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
 from labrig.acquire import CAMERA, Plan, Step, shutter_text
+from labrig.cli.consent import command_text, has_consent
 from labrig.cli.wording import counted, measurement
 from labrig.quantity import duration_text
 from labrig.record import PERSON, size_text
@@ -76,7 +77,15 @@ def summary(recording: "Recording", free_bytes: int) -> list[str]:
         f"  disk      about {size_text(size.total_bytes)}, {size_text(free_bytes)} are free",
         f"            frames {size_text(size.frames_bytes)} ({size_text(plan.offers.frame_bytes)} "
         f"each), results {size_text(size.results_bytes)}",
+        *_at_end(rig.on_finish),
     ]
+
+
+def _at_end(on_finish: str | Sequence[str] | None) -> list[str]:
+    if on_finish is None or isinstance(on_finish, str):
+        return []
+    consent = "" if has_consent(on_finish) else ", only with --on-finish or 'labrig rig use FILE'"
+    return [f"  at end    starts {command_text(on_finish)}{consent}"]
 
 
 def folded_units(plan: Plan) -> Iterator[str]:

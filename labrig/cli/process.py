@@ -69,7 +69,8 @@ def process(
         bool,
         typer.Option(
             "--verify",
-            help="Read every frame and compare its checksum, even if its file looks untouched.",
+            help="Read every frame, compare its checksum and reduce it anew, even if its file "
+            "looks untouched.",
         ),
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -81,13 +82,14 @@ def process(
     """
     from labrig.analyse import Overrides, verify_frames
     from labrig.catalogue import find_run
-    from labrig.record import read_run
+    from labrig.record import discard_cache, read_run
 
     overrides = Overrides.parse(
         roi or [], exclude or [], states, rate or [], camera, optics or [], law, method, order
     )
     folder = find_run(run, runs)
     if verify:
+        discard_cache(folder)
         typer.echo(verify_frames(read_run(folder), overrides), err=True)
     process_and_print(folder, overrides, json=json)
     typer.echo(folder)

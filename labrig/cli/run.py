@@ -34,6 +34,14 @@ Yes = Annotated[
     bool,
     typer.Option("--yes", help="Non-interactive: the rig's 'changer' does the manual steps."),
 ]
+OnFinish = Annotated[
+    bool,
+    typer.Option(
+        "--on-finish",
+        help="Start the command in 'on_finish' of the rig file, to which 'labrig rig use' gave no "
+        "consent.",
+    ),
+]
 Verbose = Annotated[
     bool,
     typer.Option(
@@ -50,15 +58,18 @@ def run(
     runs: Runs = Path("runs"),
     yes: Yes = False,
     no_process: NoProcess = False,
+    on_finish: OnFinish = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
-    from labrig.cli.on_finish import notify_at_end
+    from labrig.cli.on_finish import notify_at_end, permitted
     from labrig.cli.progress import progress
 
-    recording = _prepared(protocol, rig, runs)
-    with notify_at_end(recording.rig.on_finish) as ending:
+    path = rig_path(rig)
+    recording = _prepared(protocol, path, runs)
+    at_end = permitted(recording.rig.on_finish, path, is_asked_for=on_finish)
+    with notify_at_end(at_end) as ending:
         has_changer = "changer" in recording.rig.devices
         watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
         folder = recording.record(watch)
@@ -85,7 +96,7 @@ def plan(
     from labrig.bench import free_disk_bytes
     from labrig.cli.plan_text import folded_units, summary
 
-    recording = _prepared(protocol, rig, runs)
+    recording = _prepared(protocol, rig_path(rig), runs)
     if not json:
         typer.echo("\n".join([*summary(recording, free_disk_bytes(runs)), ""]))
     if predict:
@@ -109,10 +120,7 @@ def resume(
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     yes: Yes = False,
     no_process: NoProcess = False,
-    on_finish: Annotated[
-        bool,
-        typer.Option("--on-finish", help="Run the command in 'on_finish' of the run's rig.yaml."),
-    ] = False,
+    on_finish: OnFinish = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> None:
@@ -123,7 +131,7 @@ def resume(
     from labrig.acquire import read_rig_file
     from labrig.bench import resume_run
     from labrig.catalogue import find_run, summarise
-    from labrig.cli.on_finish import notify_at_end
+    from labrig.cli.on_finish import notify_at_end, permitted
     from labrig.cli.progress import progress
 
     folder = find_run(run, runs)
@@ -132,15 +140,8 @@ def resume(
     rig = read_rig_file(path) if path.is_file() else None
     has_changer = rig is not None and "changer" in rig.devices
     watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
-    command = None if rig is None else rig.on_finish
-    if isinstance(command, tuple) and not on_finish:
-        typer.echo(
-            f"note: 'on_finish' in {path} is not run, in case somebody else wrote it: "
-            f"{' '.join(map(ascii, command))}; to run it, add --on-finish",
-            err=True,
-        )
-        command = None
-    with notify_at_end(command) as ending:
+    at_end = permitted(None if rig is None else rig.on_finish, path, is_asked_for=on_finish)
+    with notify_at_end(at_end) as ending:
         resume_run(folder, watch)
         if is_processed:
             _print_processed(folder, json)
@@ -149,10 +150,10 @@ def resume(
         ending.message = str(folder)
 
 
-def _prepared(protocol: str, rig: str | None, runs: Path) -> "Recording":
+def _prepared(protocol: str, rig: Path, runs: Path) -> "Recording":
     from labrig.bench import Recording
 
-    recording = Recording.prepare(protocol_path(protocol), rig_path(rig), runs)
+    recording = Recording.prepare(protocol_path(protocol), rig, runs)
     for note in recording.notes():
         # Nobody may read it: the run goes on.
         print(f"note: {note}", file=DetachableStream(sys.stderr))

@@ -98,7 +98,16 @@ def _separator(header: str) -> str | None:
 
 
 def sorted_columns(wavelength_nm: FloatArray, values: FloatArray) -> Columns:
-    """Return rows sorted by wavelength, without σ."""
+    """Return rows sorted by wavelength, without σ.
+
+    Raises
+    ------
+    ValueError
+        Some wavelength is not one of light.
+    """
+    low, high = PLAUSIBLE_NM
+    if not ((wavelength_nm >= low) & (wavelength_nm <= high)).all():
+        raise ValueError(f"{WAVELENGTH} is expected from {low:g} to {high:g} nm in every row")
     order = np.argsort(wavelength_nm, kind="stable")
     return wavelength_nm[order], values[order], None
 
@@ -164,9 +173,6 @@ def _numbers(rows: list[list[str]]) -> FloatArray:
         raise ValueError(f"something is not a number ({error})") from None
     if table.ndim != 2:
         raise ValueError("there are no rows of numbers")
-    low, high = PLAUSIBLE_NM
-    if not ((table[:, 0] >= low) & (table[:, 0] <= high)).all():
-        raise ValueError(f"{WAVELENGTH} is expected from {low:g} to {high:g} nm in every row")
     return table
 
 

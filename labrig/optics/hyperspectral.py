@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.array_file import read_arrays
 from labrig.errors import DataError, UsageError
 from labrig.input_file import read_text
 from labrig.optics.piecewise import FloatArray
@@ -157,8 +158,11 @@ def read_hyperspectral_cube(path: str | os.PathLike[str]) -> HyperspectralCube:
 
 
 def _read_npz(path: Path) -> tuple[FloatArray, NDArray[Any]]:
-    with np.load(path, allow_pickle=False) as arrays:
-        return np.asarray(arrays["wavelength_nm"], dtype=np.float64), arrays["values"]
+    try:
+        arrays = read_arrays(path)
+    except UsageError as error:  # as of the other formats: the data are at fault
+        raise DataError(str(error)) from None
+    return np.asarray(arrays["wavelength_nm"], dtype=np.float64), arrays["values"]
 
 
 def _read_npy(path: Path) -> tuple[FloatArray, NDArray[Any]]:

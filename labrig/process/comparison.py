@@ -49,14 +49,14 @@ def show_comparison(run: Path, sections: Sequence[Section]) -> bool:
     True
     """
     folder, result = run / FOLDER, run / "result"
-    try:
-        folder.mkdir(exist_ok=True)
-        part = section_page(sections, folder, f"../{FOLDER}")
-        text = f"<!-- of {_checksum(result)} -->\n{part}\n"
-        (folder / PART).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
     with RunLock(run / LOCK, "processing this run"):
+        try:
+            folder.mkdir(exist_ok=True)
+            part = section_page(sections, folder, f"../{FOLDER}")
+            text = f"<!-- of {_checksum(result)} -->\n{part}\n"
+            (folder / PART).write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
         return include_comparison(run, result)
 
 

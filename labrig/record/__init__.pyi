@@ -5,6 +5,7 @@ from .checksums import (
     CACHE as CACHE,
     FRAMES as FRAMES,
     damaged_frames as damaged_frames,
+    discard_cache as discard_cache,
 )
 from .frames import (
     PERSON as PERSON,
@@ -43,6 +44,9 @@ from .journal import (
 )
 from .made import (
     time_made as time_made,
+)
+from .plain_folder import (
+    require_plain_folder as require_plain_folder,
 )
 from .run_folder import (
     CALIBRATIONS_FILE as CALIBRATIONS_FILE,

@@ -6,6 +6,7 @@ file. As long as both stay the same, the file is trusted and not read.
 
 import json
 import os
+import shutil
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -72,6 +73,40 @@ def damaged_frames(
     if unchecked:
         _write_checked(run, checked)
     return damaged
+
+
+def discard_cache(run: Path) -> None:
+    """Delete what was reduced from the frames of a run and which frames were checked.
+
+    Both can be made again from the frames; that nobody changed them cannot be checked.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+
+    Raises
+    ------
+    DiskError
+        Something cannot be deleted, and would be used again.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import discard_cache
+    >>> discard_cache(Path("runs/decay"))
+    >>> Path("runs/decay/cache").exists()
+    False
+    """
+    folder = run / CACHE
+    try:
+        if folder.exists():
+            shutil.rmtree(folder)
+    except OSError as error:
+        raise DiskError(
+            f"{folder}: cannot be deleted ({error.strerror}), though it may have been changed; "
+            "delete it"
+        ) from None
 
 
 def _is_checked(frame: FileRecord, checked: dict[str, _State]) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import secrets
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, Protocol, Self
 
 from labrig.errors import DataError, DiskError, UsageError
+from labrig.record.plain_folder import require_plain_folder
 
 
 class Disk(Protocol):
@@ -38,13 +40,15 @@ class RealDisk:
 
 
 REAL_DISK: Disk = RealDisk()
+#: Ending of files that are being written; a crash may leave one.
+PART = ".part"
 
 
 def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
     """Write a file so that it survives a power cut and is never seen in part.
 
-    The data are written to a file with the suffix `.part` and are on the disk before that file is
-    renamed.
+    The data are written to a new file with a random name, which ends in `.part`, and are on the
+    disk before that file is renamed.
 
     Parameters
     ----------
@@ -68,9 +72,10 @@ def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
     >>> Path("serial-number.txt").read_bytes()
     b'0123456789'
     """
-    part = path.with_name(path.name + ".part")
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART}")
     try:
-        with part.open("wb", buffering=0) as file:
+        # Exclusively: a file or link of this name is never followed or overwritten.
+        with part.open("xb", buffering=0) as file:
             disk.write(file, data)
         part.replace(path)
         sync_folder(path.parent)
@@ -273,6 +278,8 @@ def add_note(run: Path, text: str, time_s: float) -> Path:
     ------
     UsageError
         If the text is empty.
+    DataError
+        If something in the run folder leads elsewhere.
     DiskError
         If the file cannot be written.
 
@@ -286,15 +293,16 @@ def add_note(run: Path, text: str, time_s: float) -> Path:
     """
     if not text.strip():
         raise UsageError("expected a text to note, got nothing; write: labrig note RUN 'the text'")
+    require_plain_folder(run)
     path = run / _NAME
     written = datetime.fromtimestamp(time_s, UTC)
     entry = f"## {written:%Y-%m-%d %H:%M} UTC\n\n{text.strip()}\n\n"
     try:
-        with path.open("ab", buffering=0) as notes:
-            REAL_DISK.write(notes, entry.encode())
-        sync_folder(run)
+        # Written anew: a backup may share the file by a hard link, which would get the note, too.
+        before = path.read_bytes() if path.exists() else b""
     except OSError as error:
-        raise DiskError(f"{path}: the note cannot be written ({error.strerror})") from None
+        raise DiskError(f"{path}: the notes cannot be read ({error.strerror})") from None
+    write_durably(path, before + entry.encode())
     return path
 
 

@@ -17,7 +17,15 @@ from labrig.clock import SystemClock
 from labrig.errors import DiskError
 from labrig.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
-from labrig.record.journal import JOURNAL, REAL_DISK, Disk, Journal, sync_folder, write_durably
+from labrig.record.journal import (
+    JOURNAL,
+    PART,
+    REAL_DISK,
+    Disk,
+    Journal,
+    sync_folder,
+    write_durably,
+)
 from labrig.record.made import MADE, made_text
 from labrig.record.run_lock import RunLock
 from labrig.record.run_record import RunRecord, run_record
@@ -44,6 +52,8 @@ class RunFolder:
     ------
     UsageError
         If another process has the folder open.
+    DataError
+        If something in the folder leads elsewhere, such as a link.
     DiskError
         If the folder cannot be written to.
     """
@@ -53,6 +63,7 @@ class RunFolder:
         self._seed = seed
         self._disk = disk
         self._lock = RunLock(path / ".lock", "writing to this run")
+        _discard_parts(path)
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)
         self._executor = ThreadPoolExecutor(1)
@@ -222,6 +233,13 @@ def _discard(path: Path) -> None:
     with suppress(OSError):
         (path / PROTOCOL).unlink(missing_ok=True)
         shutil.rmtree(path)
+
+
+def _discard_parts(path: Path) -> None:
+    """Delete what a crash left half written beside the journal."""
+    for part in path.glob(f".*{PART}"):
+        with suppress(OSError):
+            part.unlink()
 
 
 def _make_durably(runs: Path) -> None:

@@ -13,6 +13,7 @@ from filelock import FileLock, Timeout
 
 from labrig.clock import SystemClock
 from labrig.errors import DiskError, UsageError
+from labrig.record.plain_folder import require_plain_folder
 
 #: Time to wait for a lock: who only looks whether it is held, holds it for a moment.
 LOCK_TIMEOUT_S = 0.5
@@ -32,6 +33,8 @@ class RunLock:
     ------
     UsageError
         Another process holds the lock; the message names it.
+    DataError
+        Something in the run folder leads elsewhere.
     DiskError
         The folder cannot be written to.
 
@@ -44,6 +47,7 @@ class RunLock:
     """
 
     def __init__(self, path: Path, activity: str) -> None:
+        require_plain_folder(path.parent)
         self._lock = FileLock(path)
         self._holder = path.with_suffix(".holder")
         try:

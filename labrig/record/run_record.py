@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from labrig.errors import DataError, DiskError
+from labrig.errors import DataError
 from labrig.record.frames import (
     UNDONE,
     ActionRecord,
@@ -19,6 +19,7 @@ from labrig.record.frames import (
     unit_within,
 )
 from labrig.record.journal import JOURNAL, Document, JournalContent, read_journal
+from labrig.record.plain_folder import require_plain_folder
 
 #: End of the year 9999 in seconds since 1970, the limit of `datetime`.
 LATEST = 253_402_300_799.0
@@ -190,7 +191,8 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
     Raises
     ------
     DataError
-        If this is not a run folder, or if its journal is damaged or was edited inconsistently.
+        If this is not a run folder, if something in it leads elsewhere, or if its journal is
+        damaged or was edited inconsistently.
     DiskError
         If the journal cannot be read.
 
@@ -204,11 +206,8 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
     18
     """
     folder = Path(run)
-    record = run_record(folder, read_journal(folder / JOURNAL))
-    for attempt in record.attempts:
-        for recorded in attempt.files:
-            _require_file(recorded.path)
-    return record
+    require_plain_folder(folder)
+    return run_record(folder, read_journal(folder / JOURNAL))
 
 
 def run_record(folder: Path, content: JournalContent) -> RunRecord:
@@ -271,21 +270,6 @@ def _frame_name(name: str) -> str:
     if not _FRAME_NAME.fullmatch(name):
         raise ValueError(f"'{name}' is no name of a frame, such as frames/000001.cr2")
     return name
-
-
-def _require_file(frame: Path) -> None:
-    """Refuse a frame that is a link, which leads out of the run folder, or a device.
-
-    A missing file is accepted here; processing reports it.
-    """
-    try:
-        is_something_else = frame.is_symlink() or (frame.exists() and not frame.is_file())
-    except OSError as error:
-        raise DiskError(f"{frame}: cannot be read ({error.strerror})") from None
-    if is_something_else:
-        raise DataError(
-            f"{frame}: expected a file, got a link or a device; put the frame itself there"
-        )
 
 
 def _open_attempt(doc: dict[str, Any]) -> Attempt:

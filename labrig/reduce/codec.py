@@ -33,8 +33,11 @@ def decoded(text: str, kind: Any) -> Any:
     ValueError
         The text is not that of such a value.
     """
-    content = json.loads(text, object_hook=_array_or_object)
-    (value,) = _adapter(kind).validate_python((content,))
+    try:
+        content = json.loads(text, object_hook=_array_or_object)
+        (value,) = _adapter(kind).validate_python((content,))
+    except (TypeError, RecursionError, OverflowError) as error:
+        raise ValueError(f"not the text of a value ({error})") from None
     return value
 
 

@@ -80,7 +80,8 @@ class KeptReductions:
             return {}
         if head != f"{self._identity} {_checksum(content)}":
             return {}
-        return dict(line.split(" ", 1) for line in content.splitlines())
+        pairs = (line.partition(" ") for line in content.splitlines())
+        return {key: text for key, _, text in pairs}
 
 
 def _checksum(text: str) -> str:

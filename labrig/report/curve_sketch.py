@@ -109,7 +109,9 @@ def _describe_curve(name: str, curve: Curve) -> str:
     nm, value = curve.wavelength_nm, curve.value
     steps = np.diff(nm)
     grid = f"step {steps[0]:g}" if np.ptp(steps) < 1e-6 else f"{len(nm)} points"
-    means = band_means(nm, value, np.linspace(nm[0], nm[-1], COLUMNS + 1))
+    # Relative to the largest, since integrals of the largest floating-point numbers are infinite.
+    relative = value / max(float(np.abs(value).max()), 1e-300)
+    means = band_means(nm, relative, np.linspace(nm[0], nm[-1], COLUMNS + 1))
     top = max(float(means.max()), 1e-300)
     levels = np.clip(np.rint(means / top * (len(BARS) - 1)), 0, len(BARS) - 1).astype(int)
     bars = "".join(BARS[level] for level in levels)

@@ -18,6 +18,8 @@ RESERVED = ("iso", "f_number", "frame", "unit", "region", "flag")
 #: Flags of rows that a fit must leave out, and the sign that joins the flags of one row.
 EXCLUDING = frozenset({"clipped", "excluded", "afterglow"})
 FLAG_JOINER = "+"
+#: Values and their σ are no larger: squares of what is larger exceed floating-point numbers.
+LARGEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +209,9 @@ def _check_numbers(series: Series) -> None:
     ):
         if not np.isfinite(column).all():
             raise DataError(f"expected finite numbers in {name}, got NaN or infinity")
+    for name, column in (("values", series.values), ("sigma", series.sigma)):
+        if (largest := np.abs(column).max(initial=0.0, where=~np.isnan(column))) > LARGEST:
+            raise DataError(f"expected {name} up to {LARGEST:g}, got {largest:g}")
     if (series.exposure_s < 0).any():
         raise DataError("expected exposures of 0 s or more, got a negative one")
     if np.isinf(series.sigma).any() or (series.sigma <= 0).any():

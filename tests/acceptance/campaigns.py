@@ -1,5 +1,7 @@
 """The campaigns: commands that measure how good labrig is, and what they printed last."""
 
+import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -9,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from tests.acceptance.manual_examples import EXAMPLES
+from tests.acceptance.sources import digest
 
 ROOT = Path(__file__).parents[2]
 OUTPUTS = Path(__file__).with_name("outputs")
@@ -35,13 +38,33 @@ class Output:
         header = "".join(f"# {key}: {value}\n" for key, value in self.header.items())
         return f"{header}{self.printed}\n"
 
+    @property
+    def date(self) -> str:
+        """Return the day of the run, in ISO 8601."""
+        return self.header["date"]
+
+    @property
+    def cpu_s(self) -> float | None:
+        """Return the processor time of the run, or None where it was not recorded."""
+        recorded = self.header.get("CPU time")
+        return None if recorded is None else float(recorded.removesuffix(" s"))
+
 
 @dataclass(frozen=True)
 class Campaign:
-    """A command that measures; `arguments` follow `python -m`."""
+    """A command that measures.
+
+    Attributes
+    ----------
+    arguments
+        What follows `python -m`.
+    timed
+        Its figures are durations, which depend on the computer.
+    """
 
     name: str
     arguments: tuple[str, ...]
+    timed: bool = False
 
     @property
     def command(self) -> str:
@@ -62,26 +85,54 @@ class Campaign:
         output = Output.of(self.path.read_text(encoding="utf-8"))
         return output if output.header["command"] == self.command else None
 
-    def run(self) -> str:
-        """Run the command, keep what it prints, and return its exit status."""
+    @property
+    def code(self) -> str:
+        """Return a digest of the sources that it uses now."""
+        return digest(self.arguments[0])
+
+    @property
+    def stale(self) -> bool:
+        """Return whether the sources have changed since the kept output was printed."""
+        return self.kept is None or self.kept.header.get("code") != self.code
+
+    def run(self) -> Output:
+        """Run the command and return what it prints."""
+        code, began_s = self.code, _children_cpu_s()
         command = [sys.executable, "-m", *self.arguments]
-        ended = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+        one_thread = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS")}
+        ended = subprocess.run(
+            command,
+            cwd=ROOT,
+            env={**os.environ, **one_thread},
+            stdout=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
         header = {
             "command": self.command,
             "labrig": version("labrig"),
+            "code": code,
             "date": f"{datetime.now(UTC):%Y-%m-%d}",
+            "CPU time": f"{_children_cpu_s() - began_s:.0f} s",
             "exit status": str(ended.returncode),
         }
-        OUTPUTS.mkdir(exist_ok=True)
         # Complaints may name files; where those lay on one computer is of no use to others.
         printed = ended.stdout.rstrip().replace(tempfile.gettempdir(), "TMPDIR")
-        printed = printed.replace(str(ROOT), "CLONE")
-        self.path.write_text(Output(header, printed).text, encoding="utf-8")
-        return header["exit status"]
+        return Output(header, printed.replace(str(ROOT), "CLONE"))
+
+    def keep(self, output: Output) -> None:
+        """Keep an output as the last."""
+        OUTPUTS.mkdir(exist_ok=True)
+        self.path.write_text(output.text, encoding="utf-8")
 
 
-def _module(name: str, *arguments: str, called: str = "") -> Campaign:
-    return Campaign(called or name, (f"tests.acceptance.{name}", *arguments))
+def _children_cpu_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def _module(name: str, *arguments: str, called: str = "", timed: bool = False) -> Campaign:
+    return Campaign(called or name, (f"tests.acceptance.{name}", *arguments), timed)
 
 
 #: How `mixture_colours` scales its mixtures: words of the output's name, and arguments.
@@ -159,8 +210,8 @@ CAMPAIGNS = {
         _module("ptp_fuzz", "--cases", "10000", "--seed", "4"),
         _module("two_labrigs", "--trials", "40"),
         _module("suspended", "--trials", "20"),
-        _module("lamp_off_however_it_ends"),
-        _module("gphoto2_latency"),
+        _module("lamp_off_however_it_ends", timed=True),
+        _module("gphoto2_latency", timed=True),
         _module("least_squares_starts"),
         _module("led_entries"),
         _module("led_matrices", "exact", "per-led", "reflecting", "calibrated"),
@@ -192,6 +243,7 @@ CAMPAIGNS = {
         Campaign(
             "benchmarks",
             ("pytest", "tests/benchmarks", "-n0", "--benchmark-only", "-q", "--no-header"),
+            timed=True,
         ),
     )
 }

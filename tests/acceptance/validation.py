@@ -1,75 +1,75 @@
 """Table of figures that say how good labrig is, made of what its campaigns printed.
 
-    python -m tests.acceptance.validation run NAME ...
+    python -m tests.acceptance.validation run [NAME ...]
+    python -m tests.acceptance.validation turn [NUMBER]
+    python -m tests.acceptance.validation stale
     python -m tests.acceptance.validation table
     python -m tests.acceptance.validation quotes
 
-`run` keeps in `outputs/` what campaigns print; `table` makes `docs/validation.md` of what is kept;
-`quotes` prints what other pages should say of it and do not.
+`run` runs campaigns, or all whose code has changed since they ran, keeps in `outputs/` what they
+print, makes `docs/validation.md` of it and renews what README.md and other pages quote. `turn` runs
+one part of the cheapest third, one part after another with the commits, and keeps nothing. Both
+print the figures that are no longer what was published, and then end with exit status 1. `stale`
+lists the campaigns whose code has changed; `table` makes the page anew; `quotes` prints what other
+pages should quote and do not.
 """
 
+import subprocess
 import sys
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+from collections.abc import Iterable
 
-from tests.acceptance.campaigns import CAMPAIGNS, ROOT, Campaign, Output
-from tests.acceptance.quote import Quote
+from tests.acceptance.campaigns import CAMPAIGNS, ROOT, Campaign
 from tests.acceptance.quoted_figures import QUOTES
-from tests.acceptance.validation_figures import FIGURES
+from tests.acceptance.renewal import changes, renew_quotes, says
+from tests.acceptance.validation_page import PAGE, page
 
-TEMPLATE = Path(__file__).with_name("validation.md")
-PAGE = ROOT / "docs/validation.md"
+#: Processor time of the campaigns that CI runs in one turn, and the fraction that takes turns.
+TURN_CPU_S, CHEAP = 90.0, 1 / 3
 
 
-def page() -> str:
-    """`docs/validation.md`."""
-    kept = {name: output for name, one in CAMPAIGNS.items() if (output := one.kept) is not None}
-    missing = [one for one in CAMPAIGNS.values() if one.name not in kept]
-    return TEMPLATE.read_text(encoding="utf-8").format(
-        table="\n".join(_rows(kept)),
-        missing="\n".join(_missing(missing)),
-        outputs="\n".join(_blocks(kept)),
+def turns() -> list[list[Campaign]]:
+    """Return the parts into which the cheapest third of the campaigns is divided.
+
+    What takes longer than a turn, and what has no recorded time, takes none.
+    """
+    cost_s = {one.name: one.kept.cpu_s for one in CAMPAIGNS.values() if one.kept is not None}
+    known = sorted((s, name) for name, s in cost_s.items() if s is not None and s <= TURN_CPU_S)
+    parts: list[list[Campaign]] = []
+    left_s = 0.0
+    for cpu_s, name in known[: round(CHEAP * len(CAMPAIGNS))]:
+        if cpu_s > left_s or not parts:
+            parts.append([])
+            left_s = TURN_CPU_S
+        parts[-1].append(CAMPAIGNS[name])
+        left_s -= cpu_s
+    return parts
+
+
+def _turn_of_this_commit() -> int:
+    counted = subprocess.run(
+        ["git", "rev-list", "--count", "HEAD"], cwd=ROOT, capture_output=True, check=True
     )
+    return int(counted.stdout)
 
 
-def _rows(kept: dict[str, Output]) -> Iterator[str]:
-    yield "{.figures}"
-    yield "| what | figure | measured |"
-    yield "|---|---|---|"
-    for figure in FIGURES:
-        if figure.campaign in kept:
-            output = kept[figure.campaign]
-            title = figure.campaign.replace("_", " ")
-            link = f"[{title}](#{_anchor(figure.campaign)})"
-            found = figure.extract(output.printed)
-            yield f"| {figure.what} | {found} | {link} {output.header['date']} |"
-
-
-def _missing(campaigns: Iterable[Campaign]) -> Iterator[str]:
+def _run(campaigns: Iterable[Campaign], *, keep: bool) -> bool:
+    """Run campaigns and return whether all that was published still holds."""
+    hold = True
     for campaign in campaigns:
-        yield f"- `{campaign.command}`\n"
-        for figure in FIGURES:
-            if figure.campaign == campaign.name:
-                yield f"  - {figure.what}"
-        for quoting in sorted({quote.page for quote in QUOTES if quote.campaign == campaign.name}):
-            yield f"  - Figures of [](/{quoting.removeprefix('docs/')})"
-        yield ""
-
-
-def _blocks(kept: dict[str, Output]) -> Iterator[str]:
-    for name, output in kept.items():
-        command = f"```sh\n{output.header['command']}\n```"
-        yield f"({_anchor(name)})=\n### {name}\n\n{command}\n\n```text\n{output.text}```\n"
-
-
-def _anchor(name: str) -> str:
-    return f"output-{name.replace('_', '-')}"
-
-
-def says(quote: Quote, output: Output) -> bool:
-    """Whether a page says what the campaign printed."""
-    text = (ROOT / quote.page).read_text(encoding="utf-8")
-    return " ".join(quote.text(output.printed).split()) in " ".join(text.split())
+        published, measured = campaign.kept, campaign.run()
+        changed = [] if published is None else changes(campaign, published, measured)
+        status, cpu = measured.header["exit status"], measured.header["CPU time"]
+        print(f"{campaign.name}: exit status {status}, {cpu} of processor time", flush=True)
+        for one in changed:
+            print(f"  no longer so: {one}", flush=True)
+        if keep:
+            campaign.keep(measured)
+            if published is not None:
+                renew_quotes(campaign, published, measured)
+        hold = hold and not changed
+    if keep:
+        PAGE.write_text(page(), encoding="utf-8")
+    return hold
 
 
 def _print_quotes() -> None:
@@ -81,10 +81,18 @@ def _print_quotes() -> None:
 
 def main(arguments: list[str]) -> None:
     """Run campaigns, or write the page."""
+    stale = [one for one in CAMPAIGNS.values() if one.stale]
     match arguments:
-        case ["run", *names] if names and set(names) <= CAMPAIGNS.keys():
-            for name in names:
-                print(f"{name}: exit status {CAMPAIGNS[name].run()}", flush=True)
+        case ["run", *names] if set(names) <= CAMPAIGNS.keys():
+            wanted = [CAMPAIGNS[name] for name in names] or stale
+            sys.exit(not _run(wanted, keep=True))
+        case ["turn", *number] if len(number) <= 1 and "".join([*number, "1"]).isdecimal():
+            parts = turns()
+            count = int(number[0]) if number else _turn_of_this_commit()
+            sys.exit(not _run(parts[count % len(parts)], keep=False) if parts else 0)
+        case ["stale"]:
+            for one in stale:
+                print(one.name, one.kept.date if one.kept else "never", sep="  ")
         case ["table"]:
             PAGE.write_text(page(), encoding="utf-8")
         case ["quotes"]:

@@ -40,7 +40,7 @@ def test_a_command_is_reported_how_it_ended(
 ) -> None:
     told = tmp_path / "told.json"
     rig = telling(make_rig, [sys.executable, "-c", NOTES, str(told)], faults=faults)
-    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs")
+    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs", "--on-finish")
     assert ended.code == code
     said = json.loads(told.read_text())
     assert said["LABRIG_STATUS"] == status
@@ -55,6 +55,34 @@ def test_a_bell_rings_and_resumed_runs_ring_it_too(
     ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path, "--no-process")
     assert ended.err.count("\a") == 1
     assert labrig("resume", ended.run_folder, "--no-process").err.count("\a") == 1
+
+
+def test_a_command_is_started_by_the_consent_of_rig_use_until_it_changes(
+    labrig: Labrig,
+    make_rig: Make,
+    make_protocol: Make,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+    monkeypatch.setenv("APPDATA", str(tmp_path / "settings"))
+    monkeypatch.setenv("HOME", str(tmp_path / "settings"))
+    told, protocol = tmp_path / "told.json", make_protocol()
+    rig = telling(make_rig, [sys.executable, "-c", NOTES, str(told)])
+    arguments = ("run", protocol, "--rig", rig, "--runs", tmp_path / "runs", "--no-process")
+
+    assert "at end" in labrig("plan", protocol, "--rig", rig).out
+    assert labrig(*arguments).code == 0
+    assert not told.exists()
+
+    assert str(told) in labrig("rig", "use", rig).err
+    assert labrig(*arguments).code == 0
+    assert told.exists()
+
+    told.unlink()
+    telling(make_rig, [sys.executable, "-c", f"{NOTES};", str(told)])
+    assert "--on-finish" in labrig(*arguments).err
+    assert not told.exists()
 
 
 def test_a_command_in_a_folder_from_elsewhere_is_run_only_if_asked_for(
@@ -78,7 +106,8 @@ def test_a_command_that_fails_costs_a_warning_only(
     labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:
     rig = telling(make_rig, ["no-such-command-anywhere"])
-    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path, "--no-process")
+    options = ("--runs", tmp_path, "--no-process", "--on-finish")
+    ended = labrig("run", make_protocol(), "--rig", rig, *options)
     assert ended.code == 0
     assert "labrig: warning: on_finish" in ended.err
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from hashlib import sha256
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from socket import gethostname
@@ -263,6 +264,31 @@ def test_verify_reads_what_looks_untouched(labrig: Labrig, finished: Path) -> No
     ended = labrig("process", finished, "--verify")
     assert ended.code == 0
     assert "checksums" in ended.err
+
+
+def test_verify_trusts_no_reduction_that_lies_beside_the_frames(
+    labrig: Labrig, finished: Path
+) -> None:
+    def rate_per_s() -> float:
+        result = read_result(finished)
+        assert isinstance(result, DecayResult)
+        fit = result.patches["sample"].fit
+        assert fit is not None
+        return fit.rates[0].value
+
+    sound_per_s = rate_per_s()
+    for path in (finished / "cache").glob("*.jsonl"):
+        head, _, content = path.read_text().partition("\n")
+        keys, texts = zip(*(line.split(" ", 1) for line in content.splitlines()), strict=True)
+        # Each frame has another one's values, under a checksum that fits again.
+        pairs = zip(keys, (*texts[1:], texts[0]), strict=True)
+        forged = "".join(f"{key} {text}\n" for key, text in pairs)
+        digest = sha256(forged.encode()).hexdigest()
+        path.write_text(f"{head.rpartition(' ')[0]} {digest}\n{forged}")
+    assert labrig("process", finished).code == 0
+    assert rate_per_s() != sound_per_s
+    assert labrig("process", finished, "--verify").code == 0
+    assert rate_per_s() == sound_per_s
 
 
 def test_a_second_process_of_a_run_is_told_who_has_it(labrig: Labrig, finished: Path) -> None:

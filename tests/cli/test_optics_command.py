@@ -68,6 +68,15 @@ def test_what_is_wrong_is_one_line(
     assert ended.err.count("\n") == 1
 
 
+def test_the_largest_number_is_drawn(labrig: Labrig, tmp_path: Path) -> None:
+    path = tmp_path / "large.csv"
+    path.write_text("wavelength_nm,value\n400,0\n500,1e308\n600,0\n")
+    ended = labrig("optics", "show", path)
+    assert ended.code == 0
+    assert "▁" in ended.out
+    assert ended.err == ""
+
+
 def test_all_that_is_shipped_is_listed(labrig: Labrig) -> None:
     ended = labrig("optics", "list")
     assert ended.code == 0

@@ -107,6 +107,7 @@ WARNED = [
         "falls below zero, by",
     ),
     Case("a flash", with_frame(15, 104.0), 0.3, "the frame at 75.3 s lies"),
+    Case("a lost decimal mark", with_frame(15, 2.1e9), 0.3, "the frame at 75.3 s lies"),
     Case("a frame in the dark", with_frame(20, 0.0), 0.3, "the frame at 100.3 s lies"),
     Case("a disturbed tail", with_frame(34, 8.0), 0.3, "the frame at 170.3 s lies"),
 ]

@@ -127,6 +127,9 @@ def test_a_value_comes_back_to_the_last_bit(value: Anything) -> None:
         '{"dtype":"O","shape":[1],"base64":"AAAA"}',
         '{"dtype":"<f8","shape":[1],"base64":"AAAA"}',
         '{"dtype":"<f8","shape":[1],"base64":"?"}',
+        '{"dtype":"no kind","shape":[1],"base64":"AAAA"}',
+        '{"dtype":"<f8","shape":["x"],"base64":"AAAAAAAAAAA="}',
+        "[" * 100_000,
     ],
 )
 def test_a_text_that_is_no_such_value_is_refused(text: str) -> None:
@@ -208,7 +211,15 @@ def test_what_one_failed_frame_leaves_is_kept(run: Sequence[SeriesFrame]) -> Non
     assert len(reduce_frames(run, MeanLevel())) == len(run)
 
 
-@pytest.mark.parametrize("damage", ["cut off", "one byte", "no text", "empty"])
+def forged(intact: bytes) -> bytes:
+    """The file with its last value replaced by none, under a checksum that fits."""
+    head, _, content = intact.decode().partition("\n")
+    *others, last = content.splitlines(keepends=True)
+    content = "".join([*others, f"{last.split(' ')[0]}\n"])
+    return f"{head.rpartition(' ')[0]} {sha256(content.encode()).hexdigest()}\n{content}".encode()
+
+
+@pytest.mark.parametrize("damage", ["cut off", "one byte", "no text", "empty", "forged"])
 def test_a_damaged_file_is_made_again(run: Sequence[SeriesFrame], damage: str) -> None:
     first = reduce_frames(run, MeanLevel())
     (file,) = kept_files(run)
@@ -220,6 +231,7 @@ def test_a_damaged_file_is_made_again(run: Sequence[SeriesFrame], damage: str) -
             "one byte": intact[:-3] + bytes([intact[-3] ^ 1]) + intact[-2:],
             "no text": b"\xff" * 100,
             "empty": b"",
+            "forged": forged(intact),
         }[damage]
     )
     assert reduce_frames(run, MeanLevel()) == first

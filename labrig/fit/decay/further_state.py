@@ -114,14 +114,14 @@ class FastStates:
     amplitude, sigma
         Mode and σ of the normal distribution, cut off below 0, of the amplitude at the first frame,
         by the data and by what is usual, shape (m,).
-    kept
-        Weight of the data against what is usual, 0 to 1, shape (m,).
+    shrinkage
+        Weight of what is usual against the data, 0 to 1, shape (m,).
     """
 
     further: FurtherState
     amplitude: FloatArray
     sigma: FloatArray
-    kept: FloatArray
+    shrinkage: FloatArray
 
     @property
     def z(self) -> FloatArray:
@@ -170,12 +170,13 @@ def fast_states(data: WhitenedSeries, fit: StatesFit) -> FastStates | None:
     if not len(further.log_rates) or further.gain.max() > SHOWN_GAIN:
         return None
     prior = USUAL_SHARE * float(fit.amplitudes.sum())
-    kept = prior**2 / (prior**2 + further.amplitude_sigma**2)
+    # Not as 1 less the weight of the data, which may be so near 1 that nothing is left.
+    shrinkage = further.amplitude_sigma**2 / (prior**2 + further.amplitude_sigma**2)
     return FastStates(
         further=further,
-        amplitude=kept * further.amplitude,
-        sigma=np.sqrt(kept) * further.amplitude_sigma,
-        kept=kept,
+        amplitude=(1 - shrinkage) * further.amplitude,
+        sigma=np.sqrt(1 - shrinkage) * further.amplitude_sigma,
+        shrinkage=shrinkage,
     )
 
 
@@ -205,7 +206,7 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit, fast: FastStates) -> Hidd
     """Return what a fast state does to the fitted ones; None if the data do not support any."""
     z = fast.z
     # Of a normal distribution cut off below 0: its integral, and its mean square.
-    log_evidence = np.log(2 * PRIOR_ODDS) + np.log1p(-fast.kept) / 2 + log_ndtr(z) + z**2 / 2
+    log_evidence = np.log(2 * PRIOR_ODDS) + np.log(fast.shrinkage) / 2 + log_ndtr(z) + z**2 / 2
     mean_square = fast.sigma**2 + fast.amplitude * fast.mean
     largest = max(float(log_evidence.max()), 0.0)
     evidence = np.exp(log_evidence - largest) / len(z)

@@ -18,6 +18,9 @@ from labrig.fit.least_squares import FloatArray
 
 #: Values of ρ that are tried, dense near zero, where a small one already tells.
 FLICKERS = MAX_FLICKER * np.linspace(0, 1, 100) ** 2
+#: Variance over that assumed where the flicker assumed is all of it and less is tried: rounding
+#: may else make it negative.
+LEAST_FACTOR = 1e-12
 #: χ² of data without any noise.
 TINY = 1e-300
 
@@ -51,7 +54,7 @@ class NoiseLikelihood:
         return cls(
             data,
             signal / length[:, None],
-            1 + np.multiply.outer(added, brightness2),
+            np.maximum(1 + np.multiply.outer(added, brightness2), LEAST_FACTOR),
         )
 
     def deviance(self, residuals: FloatArray) -> float:

@@ -2,7 +2,7 @@
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,8 @@ OF_MATERIALS = "KHR_materials_"
 #: Extensions that change what a node shows, whether a reader has to know them or not.
 OF_NODES = ("EXT_mesh_gpu_instancing", "KHR_node_visibility")
 MOVING = "expected a shape at rest, got {}; bake it into its vertices at one moment"
+#: Vertices and corners of triangles in all places of a scene; a gigabyte of memory holds as many.
+MOST_CORNERS = 20_000_000
 
 
 def gltf_mesh(content: bytes, folder: Path) -> Mesh:
@@ -82,13 +84,33 @@ def gltf_mesh(content: bytes, folder: Path) -> Mesh:
             )
     document = validate(said, GltfDocument, "glTF")
     numbers = GltfNumbers(document, binary, folder)
-    return Mesh.joined([
-        _placed(_mesh(primitive, shape, node, document, numbers), to_scene)
+    parts = [
+        (primitive, shape, node, to_scene)
         for node, to_scene in _shown(document)
         for shape in [part_of(document.meshes, node.mesh or 0, "mesh")]
         for primitive in shape.primitives
         if primitive.mode >= TRIANGLES
+    ]
+    _hold_to_budget([primitive for primitive, *_ in parts], document)
+    return Mesh.joined([
+        _placed(_mesh(primitive, shape, node, document, numbers), to_scene)
+        for primitive, shape, node, to_scene in parts
     ])  # fmt: skip
+
+
+def _hold_to_budget(primitives: Sequence[Primitive], document: GltfDocument) -> None:
+    """Refuse meshes that stand in so many places that the memory would not hold them."""
+    counts = [
+        part_of(document.accessors, number, "accessor").count
+        for primitive in primitives
+        for number in (primitive.attributes.get("POSITION"), primitive.indices)
+        if number is not None
+    ]
+    if sum(counts) > MOST_CORNERS:
+        raise UsageError(
+            f"expected at most {MOST_CORNERS} vertices and corners in all places of its meshes, "
+            f"got {sum(counts)}"
+        )
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:

@@ -21,7 +21,7 @@ T = TypeVar("T")
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 #: Rows without data of their own, which a damaged file states for nothing.
-MOST_ZEROS = 10**8
+MOST_ZEROS = 10**7
 #: Longest name of a file.
 MOST_LETTERS = 1000
 #: Part of the largest number by which others may differ from the least and largest stated: files

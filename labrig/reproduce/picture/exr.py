@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
-from labrig.input_file import read_bytes
+from labrig.input_file import open_regular
 from labrig.material import read_spectral_image
 from labrig.optics import XYZ_TO_SRGB, edges_from_centres
 from labrig.reproduce.draft_file import replaced
@@ -30,7 +30,8 @@ _EDGES_KEY = "bandEdgesNm"
 _TEXT_PREFIX = "text."
 #: R, G, B and white of sRGB, x and y of each.
 _CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-_MOST_BYTES = 4_000_000_000
+#: Numbers of an image of 60 megapixels and three channels.
+_MOST_NUMBERS = 180_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,8 +217,9 @@ def read_linear_exr(path: Path) -> FloatArray:
     # The library is loaded when it is needed.
     import OpenEXR
 
-    read_bytes(path, _MOST_BYTES)
+    open_regular(path).close()
     try:
+        _hold_to_budget(path)
         channels = OpenEXR.File(str(path), separate_channels=True).channels()
         linear = np.stack([channels[name].pixels for name in "RGB"], axis=-1)
     except (RuntimeError, ValueError, TypeError, MemoryError, KeyError):
@@ -259,6 +261,15 @@ def _attributes(path: Path) -> dict[str, Any]:
 
     header: dict[str, Any] = OpenEXR.File(str(path), header_only=True).header()
     return header
+
+
+def _hold_to_budget(path: Path) -> None:
+    """Refuse an image whose header states more pixels than are read, before memory is taken."""
+    header = _attributes(path)
+    low, high = (np.asarray(corner, dtype=np.int64) for corner in header["dataWindow"])
+    numbers = int(np.prod(high - low + 1)) * len(header["channels"])
+    if numbers > _MOST_NUMBERS:
+        raise UsageError(f"{path}: expected at most {_MOST_NUMBERS} numbers, got {numbers}")
 
 
 def _edges(path: Path, written: object, centres_nm: FloatArray) -> FloatArray:

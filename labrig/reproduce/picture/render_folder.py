@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.array_file import read_arrays
 from labrig.errors import DiskError, UsageError
 from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
@@ -175,15 +175,14 @@ class RenderFolder:
         UsageError
             They are not there.
         """
-        path = self._levels_path(number)
         try:
-            with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-                return {name.removeprefix(OF): content[name] for name in content.files}
-        except (OSError, ValueError, TypeError, EOFError, BadZipFile) as error:
+            arrays = read_arrays(self._levels_path(number))
+        except UsageError as error:
             raise UsageError(
-                f"{path}: expected the levels of a finished frame ({error}); remove {self.path} to "
+                f"{error}; these should be the levels of a finished frame: remove {self.path} to "
                 "begin anew"
             ) from None
+        return {name.removeprefix(OF): levels for name, levels in arrays.items()}
 
     def _keep_levels(self, number: int, levels: dict[str, Float32Array]) -> None:
         named: dict[str, Any] = {f"{OF}{name}": level for name, level in levels.items()}

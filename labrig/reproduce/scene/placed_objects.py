@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.array_file import read_arrays
 from labrig.errors import UsageError
 from labrig.reproduce.scene.object_entry import MaterialMap, ObjectEntry
 from labrig.reproduce.scene.placed_mesh import placed_mesh
@@ -124,11 +124,11 @@ def _between(t_s: float, times_s: FloatArray, places_m: FloatArray) -> FloatArra
 
 def _over_time(path: Path, name: str) -> tuple[FloatArray, FloatArray]:
     """Return times (n,) and places (n, points, 3) from a file."""
+    content = read_arrays(path)
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-            times_s = np.asarray(content["t_s"], dtype=np.float64)
-            places_m = np.asarray(content[name], dtype=np.float64)
-    except (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
+        times_s = np.asarray(content["t_s"], dtype=np.float64)
+        places_m = np.asarray(content[name], dtype=np.float64)
+    except (KeyError, ValueError, TypeError) as error:
         raise UsageError(
             f"{path}: expected a .npz file with 't_s' and '{name}' ({error})"
         ) from None

@@ -4,11 +4,11 @@ import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from labrig.array_file import read_arrays
 from labrig.errors import UsageError
 from labrig.reproduce.draft_file import replaced
 
@@ -193,15 +193,8 @@ def read_parameter_texture(path: str | os.PathLike[str]) -> ParameterTexture:
     [[1.0, 0.5], [1.0, 0.5]]
     """
     file = Path(path)
-    try:
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as content:
-            unknown = set(content.files) - set(_AXES)
-            arrays = {} if unknown else {name: content[name] for name in content.files}
-    except (OSError, ValueError, TypeError, EOFError, AttributeError, BadZipFile) as error:
-        raise UsageError(
-            f"{file}: expected a .npz file with a texture of parameters ({error})"
-        ) from None
-    if unknown:
+    arrays = read_arrays(file)
+    if unknown := set(arrays) - set(_AXES):
         raise UsageError(f"{file}: expected arrays of {', '.join(_AXES)}, got '{min(unknown)}'")
     try:
         return ParameterTexture.checked(**arrays)

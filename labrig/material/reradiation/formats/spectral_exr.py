@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from labrig import colour_science
 from labrig.errors import DiskError, UsageError
-from labrig.input_file import read_bytes
+from labrig.input_file import open_regular
 from labrig.material.reradiation.formats.band_fractions import check_is_absolute
 from labrig.material.reradiation.formats.text_rows import (
     check_fractions,
@@ -40,9 +40,8 @@ Pixels = NDArray[np.float32]
 VERSION = "1.0"
 _VERSION_KEY = "spectralLayoutVersion"
 _UNITS_KEY = "emissiveUnits"
-#: Limits: of the file, and of its numbers once they are unpacked.
-_MOST_BYTES = 1_000_000_000
-_MOST_NUMBERS = 250_000_000
+#: Limit of the numbers of an image once they are unpacked.
+_MOST_NUMBERS = 200_000_000
 
 _WAVELENGTH = r"(\d+(?:,\d*)?(?:[Ee][+-]?\d+)?)(da|[YZEPTGMkhdcmunp])?(m|Hz)"
 _CHANNEL = re.compile(rf"(S[0-3]|T)\.{_WAVELENGTH}(?:\.{_WAVELENGTH})?")
@@ -237,7 +236,7 @@ def read_spectral_image(path: str | os.PathLike[str]) -> SpectralImage:
     'yellow paper'
     """
     image_path = Path(path)
-    read_bytes(image_path, _MOST_BYTES)
+    open_regular(image_path).close()
     try:
         return _image(image_path)
     except ValueError as error:
