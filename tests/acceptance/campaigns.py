@@ -231,6 +231,7 @@ CAMPAIGNS = {
         _module("lamp_off_however_it_ends", timed=True),
         _module("gphoto2_latency", timed=True),
         _module("least_squares_starts"),
+        _module("led_entries"),
         _module("led_matrices", "exact", "per-led", "reflecting", "calibrated"),
         *(
             _module(

@@ -184,6 +184,17 @@ def _leds_otherwise(printed: str) -> str:
     )
 
 
+def _entries(printed: str) -> str:
+    """Return rms and worst of entries over σ, and rms of all light, of papers and of dyes."""
+    rms, worst = columns(r"^ +entries +rms +([\d.]+),.* worst +([\d.]+),", printed)
+    (light,) = columns(r"^ +light +rms +([\d.]+),", printed)
+    papers, dyes = (f"{span(rms[k::2], 2)} (worst {max(worst[k::2]):.1f})" for k in (0, 1))
+    return (
+        f"entries are off by {papers} σ rms of measured papers and textiles, and by {dyes} of "
+        f"measured dyes; all light by {span(light, 2)}"
+    )
+
+
 def _led_bench(printed: str) -> str:
     medians, highs = (
         columns(rf"^ *{percent} % +([\d.]+) +([\d.]+) ", printed) for percent in (50, 90)
@@ -279,6 +290,7 @@ QUOTES = (
     Quote(f"{DECISIONS}/0006-own-ptp.md", "gphoto2_latency", _release),
     Quote(f"{DECISIONS}/0010-guard.md", "lamp_off_however_it_ends", _lamp_off),
     Quote(f"{HOW_TO}/fit_a_table.md", "sao_charge_and_decay", _charge_console),
+    Quote(FLUORESCENT, "led_entries", _entries),
     Quote(FLUORESCENT, "led_matrices", _leds_exact),
     Quote(FLUORESCENT, "led_matrices", _leds_calibrated),
     Quote(FLUORESCENT, "led_matrices", _leds_otherwise),

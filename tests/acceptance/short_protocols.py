@@ -38,6 +38,7 @@ SHORTER: dict[str, dict[str, Any]] = {
     "angular_fluorescence": {
         "angles": [30, 60, 90], "directions": ["vertical"], "repositionings": 3, "repeats": 1,
     },
+    "angular_fluorescence-sphere": {"repositionings": 3, "repeats": 1},
     "direct_bispectral": {
         "leds": ["430 nm", "530 nm"], "samples": ["yellow"], "repetitions": 4,
     },
@@ -73,6 +74,7 @@ ANOTHER_DAY = "2026-01-02T00:02:00Z"
 RIGS = {
     "decay-eleven": "sim-eleven",
     "angular_fluorescence": "sim-fluorescent",
+    "angular_fluorescence-sphere": "sim-sphere",
     "direct_bispectral": "sim-fluorescent",
     "led_brightness": "sim-fluorescent",
     "led_fluorescence": "sim-fluorescent",

@@ -1,5 +1,6 @@
 """Angular fluorescence on the simulated bench: none and a planted dependence, faults, pages."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -158,9 +159,74 @@ def test_a_clipped_view_is_left_out(tmp_path: Path) -> None:
     assert result.yarns[0].means.angle_deg.tolist() == [120, 150]
 
 
-def test_a_sphere_is_lambertian_in_re_radiation_and_not_in_reflection(tmp_path: Path) -> None:
-    run = record_sphere(tmp_path, {"reflected_led": "625 nm"}, repositioning=0.01)
-    result = analyse(part_of(run, Inputs(camera=true_camera(run))))
+@pytest.fixture(scope="module")
+def sphere(tmp_path_factory: pytest.TempPathFactory) -> Part:
+    """A run with a sphere of 90 px about (180, 120) in a frame of 360 × 240."""
+    folder = tmp_path_factory.mktemp("sphere")
+    run = record_sphere(folder, {"reflected_led": "625 nm"}, repositioning=0.01)
+    return part_of(run, Inputs(camera=true_camera(run)))
+
+
+def changed(part: Part, **keys: Any) -> Part:
+    """The part with other settings of its protocol."""
+    return replace(part, protocol=part.protocol.model_copy(update=keys))
+
+
+@pytest.mark.parametrize(
+    ("region", "sides"),
+    [
+        ((94, 22, 184, 196), {"left": 4}),
+        ((82, 45, 196, 173), {"above": 14}),
+        ((82, 50, 196, 140), {"above": 20, "below": 20}),
+        ((98, 38, 180, 180), {"left": 8, "above": 8}),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
+)
+def test_a_region_that_cuts_the_outline_is_named_and_no_dependence(
+    sphere: Part, region: tuple[int, ...], sides: dict[str, int]
+) -> None:
+    result = analyse(changed(sphere, region=region))
+    reradiated, _ = result.spheres
+    assert reradiated.circles == pytest.approx(np.array([[180.0, 120.0, 90.0]] * 4), abs=1.0)
+    assert result.p > 0.2
+    line = next(warning for warning in result.warnings if warning.startswith("region: "))
+    for side, px in sides.items():
+        named = re.search(rf"{side} by (\d+) px \((\d+)% of its radius\)", line)
+        assert named is not None
+        assert int(named[1]) == pytest.approx(px, abs=1)
+        assert int(named[2]) == pytest.approx(100 * px / 90, abs=1.5)
+    assert 0.007 < reradiated.shading.by_view.amplitude.sigma < 0.02
+
+
+def test_an_outline_of_which_too_little_is_left_is_refused(sphere: Part) -> None:
+    with pytest.raises(DataError, match=r"in \d+ of 61 directions: the region cuts it off"):
+        analyse(changed(sphere, region=(120, 22, 158, 196)))
+
+
+@pytest.mark.parametrize("off_px", [(0, 0, 2), (-2, 0, -2)])
+def test_a_given_circle_that_is_off_is_named_and_refined(
+    sphere: Part, off_px: tuple[int, int, int]
+) -> None:
+    across, down, wider = off_px
+    circle = Circle(
+        centre=((180 + across) / 360, (120 + down) / 240), radius=(90 + wider) / 360
+    )  # fmt: skip
+    result = analyse(changed(sphere, circle=circle))
+    assert not result.finds_dependence
+    assert result.warnings[0].startswith("circle: expected about the outline that the frames show")
+    assert result.detectable < 0.07
+
+
+def test_a_given_circle_of_another_outline_counts_with_the_difference(sphere: Part) -> None:
+    result = analyse(changed(sphere, circle=Circle(centre=(0.5, 0.5), radius=85 / 360)))
+    assert not result.finds_dependence
+    assert result.spheres[0].circles == pytest.approx(np.array([[180.0, 120.0, 85.0]] * 4))
+    assert "the difference is in σ" in result.warnings[0]
+    assert 0.2 < result.detectable < 1.0
+
+
+def test_a_sphere_is_lambertian_in_re_radiation_and_not_in_reflection(sphere: Part) -> None:
+    result = analyse(sphere)
     reradiated, reflected = result.spheres
     assert not result.finds_dependence
     assert not result.warnings
@@ -185,6 +251,9 @@ def test_what_a_sphere_loses_to_the_side_is_found(tmp_path: Path) -> None:
     assert abs(amplitude.value + 0.06) < 3 * amplitude.sigma
     assert amplitude.sigma < 0.015
     assert not views.shading.by_incidence.finds_dependence
+    cut = analyse(changed(part_of(run, Inputs(camera=true_camera(run))), region=(82, 50, 196, 140)))
+    assert cut.finds_dependence
+    assert cut.warnings
     # Without the lens it could be the lens.
     unknown = analyse(part_of(run))
     assert not unknown.spheres[0].is_lens_known
@@ -193,7 +262,7 @@ def test_what_a_sphere_loses_to_the_side_is_found(tmp_path: Path) -> None:
     assert "The lens is not calibrated" in page.report.read_text()
     part = part_of(run)
     circle = Circle(centre=(0.5, 0.5), radius=0.24)
-    given = analyse(replace(part, protocol=part.protocol.model_copy(update={"circle": circle})))
+    given = analyse(changed(part, circle=circle))
     assert given.spheres[0].circles == pytest.approx(np.array([[180.0, 120.0, 86.4]] * 4))
 
 

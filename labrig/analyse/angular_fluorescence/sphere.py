@@ -12,7 +12,7 @@ from labrig.analyse.angular_fluorescence.channels import (
     reflected_at_most,
     reflected_signal,
 )
-from labrig.analyse.angular_fluorescence.outline import find_circle
+from labrig.analyse.angular_fluorescence.outline import Outline, find_outline
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.inputs import Part
 from labrig.errors import DataError
@@ -33,6 +33,16 @@ SIDES_DEG = {"right": 0.0, "below": 90.0, "left": 180.0, "above": 270.0}
 #: Tangent of the field angle in the corners of a 50 mm lens on a full-format body: what an
 #: uncalibrated lens may do to the light by cos⁴ of that angle is taken for one σ.
 CORNER_TANGENT = 21.6 / 50.0
+#: σ of each number of a circle that is given where the frames show none: of a person who reads it
+#: from a picture, in pixels and as a fraction of the radius, whichever is more.
+GIVEN_SIGMA_PX, GIVEN_SIGMA = 2.0, 0.005
+#: Difference of a given circle from the outline in the frames, as a fraction of the radius, up to
+#: which it is the same one.
+SAME = 0.03
+#: Differences of a given circle from the outline in the frames that are named: in σ and in pixels.
+DIFFERENT_SIGMA, DIFFERENT_PX = 3.0, 1.0
+#: Part of the radius by which the outline may leave the region unnamed.
+CUT = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,10 +90,12 @@ def sphere_views(part: Part) -> tuple[tuple[SphereViews, ...], list[str]]:
         else:
             views.append(view)
     lit = {pose.led: pose.part for pose in part.protocol.poses()}
-    tested = [
-        _tested(part, [view for view in views if view.pose.led == led], led, light_part)
-        for led, light_part in lit.items()
-    ]
+    tested = []
+    for led, light_part in lit.items():
+        own = [view for view in views if view.pose.led == led]
+        sphere, lines = _tested(part, own, led, light_part)
+        tested.append(sphere)
+        warnings += lines
     return tuple(tested), warnings
 
 
@@ -113,7 +125,9 @@ def _mean(frames: Sequence[FrameRecord], window: tuple[slice, slice]) -> FloatAr
     return np.asarray(np.mean(pictures, axis=0), dtype=np.float64)
 
 
-def _tested(part: Part, views: Sequence[View], led: str, light_part: str) -> SphereViews:
+def _tested(
+    part: Part, views: Sequence[View], led: str, light_part: str
+) -> tuple[SphereViews, list[str]]:
     if not views:
         raise DataError(f"{led}: no view is lit and complete; go on with labrig resume")
     channels = views[0].channels
@@ -121,13 +135,16 @@ def _tested(part: Part, views: Sequence[View], led: str, light_part: str) -> Sph
     response = led_response(part.rig, led, channels, part.overrides.camera)
     limits = reflected_at_most(signal, response)
     chosen = chosen_channels(part.protocol.channels, channels, light_part, limits, response)
-    circles = np.array([_circle(part, view, chosen) for view in views])
+    outlines, warnings = _outlines(part, views, chosen)
+    circles = np.array([[outline.x, outline.y, outline.radius] for outline in outlines])
+    mean = _mean_outline(outlines)
     images = [
-        _image(part, view, circle, chosen, response if light_part == "re-radiated" else None)
+        _image(part, view, circle, chosen, response if light_part == "re-radiated" else None, mean)
         for view, circle in zip(views, circles, strict=True)
     ]
+    warnings += _cut_warnings(views[0], mean)
     level = LEVEL / (2 * len(part.protocol.leds))
-    return SphereViews(
+    tested = SphereViews(
         led=led,
         part=light_part,
         channels=tuple(channels[number] for number in chosen),
@@ -136,6 +153,7 @@ def _tested(part: Part, views: Sequence[View], led: str, light_part: str) -> Sph
         circles=circles,
         shading=fit_shading(images, _light(part), level),
     )
+    return tested, warnings
 
 
 def _light(part: Part) -> NearLight:
@@ -146,16 +164,77 @@ def _light(part: Part) -> NearLight:
     return NearLight(direction, light.distance_radii)
 
 
-def _circle(part: Part, view: View, chosen: Sequence[int]) -> tuple[float, float, float]:
-    """Return x, y and radius of the sphere in pixels."""
+def _outlines(
+    part: Part, views: Sequence[View], chosen: Sequence[int]
+) -> tuple[list[Outline], list[str]]:
+    """Return the outline of the sphere in each view in pixels, and warnings.
+
+    One that the protocol gives is refined by the frames where these show one that is about the
+    same. If they show another one, the difference counts as its error.
+    """
     given = part.protocol.circle
-    if given is not None:
-        width, height = view.size
-        return given.centre[0] * width, given.centre[1] * height, given.radius * width
+    if given is None:
+        return [_found(part, view, chosen) for view in views], []
+    width, height = views[0].size
+    x, y, radius = given.centre[0] * width, given.centre[1] * height, given.radius * width
+    try:
+        found = [_found(part, view, chosen) for view in views]
+    except DataError:
+        variance = np.full(3, max(GIVEN_SIGMA_PX, GIVEN_SIGMA * radius) ** 2)
+        return [Outline(x, y, radius, np.diag(variance))] * len(views), []
+    seen = _mean_outline(found)
+    away = np.array([x - seen.x, y - seen.y, radius - seen.radius])
+    is_same = bool((np.abs(away) <= max(GIVEN_SIGMA_PX, SAME * radius)).all())
+    warnings = []
+    if (np.abs(away) > np.maximum(DIFFERENT_SIGMA * seen.sigma, DIFFERENT_PX)).any():
+        taken = "that of the frames is taken" if is_same else "the difference is in σ"
+        warnings.append(
+            f"circle: expected about the outline that the frames show, centre ({seen.x:.1f}, "
+            f"{seen.y:.1f}) and radius {seen.radius:.1f} px, got centre ({x:.1f}, {y:.1f}) and "
+            f"radius {radius:.1f} px; {taken}: correct it, or leave circle out"
+        )
+    if is_same:
+        return found, warnings
+    covariance = seen.covariance + np.diag(away**2)
+    return [Outline(x, y, radius, covariance)] * len(views), warnings
+
+
+def _found(part: Part, view: View, chosen: Sequence[int]) -> Outline:
     side_deg = SIDES_DEG[part.protocol.light.side]
-    x, y, radius = find_circle(view.light[..., chosen].sum(axis=2), side_deg)
+    outline = find_outline(view.light[..., chosen].sum(axis=2), side_deg)
+    return outline.scaled(view.cell, *view.corner)
+
+
+def _mean_outline(outlines: Sequence[Outline]) -> Outline:
+    """Return the mean outline of all views with the covariance of one of them.
+
+    What the region cuts off is the same in all views, and so is the error that comes of it.
+    """
+    x, y, radius = np.mean([[each.x, each.y, each.radius] for each in outlines], axis=0)
+    return Outline(x, y, radius, np.mean([each.covariance for each in outlines], axis=0))
+
+
+def _cut_warnings(view: View, outline: Outline) -> list[str]:
+    """Return a line if the region or the frame cuts the outline, by how much on each side."""
     left, top = view.corner
-    return left + view.cell * x, top + view.cell * y, view.cell * radius
+    high, wide = (count * view.cell for count in view.light.shape[:2])
+    beyond = {
+        "left": left - (outline.x - outline.radius),
+        "right": outline.x + outline.radius - (left + wide),
+        "above": top - (outline.y - outline.radius),
+        "below": outline.y + outline.radius - (top + high),
+    }
+    cut = {side: px for side, px in beyond.items() if px > max(1.0, CUT * outline.radius)}
+    if not cut:
+        return []
+    sides = ", ".join(
+        f"{side} by {px:.0f} px ({px / outline.radius:.0%} of its radius)"
+        for side, px in cut.items()
+    )
+    return [
+        f"region: expected the whole sphere in it, got its outline cut: {sides}; the outline rests "
+        "on what is left of it, and its error is in σ: enlarge the region"
+    ]
 
 
 def _image(
@@ -164,6 +243,7 @@ def _image(
     circle: FloatArray,
     chosen: Sequence[int],
     response: FloatArray | None,
+    outline: Outline,
 ) -> SphereImage:
     """Return the places of the sphere, each the mean of a block of cells.
 
@@ -188,7 +268,8 @@ def _image(
     by_reflection = reflected_sigma[inside] / np.maximum(radiance, 1e-12)
     normal = np.column_stack([across, down, np.sqrt(1 - across**2 - down**2)])
     flat, by_lens = _lens(part, rho_squared(x[inside], y[inside], *view.size), chosen)
-    return SphereImage(normal, radiance / flat, np.stack([by_lens, by_reflection]))
+    covariance = outline.covariance / outline.radius**2
+    return SphereImage(normal, radiance / flat, np.stack([by_lens, by_reflection]), covariance)
 
 
 def _flat(part: Part) -> Flat | None:

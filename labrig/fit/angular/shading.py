@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import optimize, stats
@@ -15,10 +15,13 @@ from labrig.results import LEVEL, DependenceTest, FloatArray, Measured, ShadingF
 LEAST_INCIDENCE, LEAST_VIEW = 0.35, 0.4
 #: Relative uncertainty of the light's distance.
 DISTANCE_SIGMA = 0.02
-#: Uncertainty of the sphere's radius that all views share, as a fraction.
-RADIUS_SIGMA = 0.003
+#: Uncertainty of the outline's centre and radius that all views share, in radii, beside that of
+#: finding it: of a fabric that is no perfect sphere.
+OUTLINE_SIGMA = 0.003
 #: Largest roughness in degrees that is tried.
 MAX_ROUGHNESS_DEG = 60.0
+#: Deviation from even light over that from Lambert's law below which a sample is flat.
+EVEN = 0.5
 _BINS = 12
 
 
@@ -35,11 +38,21 @@ class SphereImage:
     errors
         Relative changes of the signal by one σ of m errors that all views share, such as that of
         the lens, shape (m, k).
+    outline_covariance
+        Covariance of x and y of the centre and of the radius of the outline from which the normals
+        follow, in radii, as far as all views share their errors, shape (3, 3).
     """
 
     normal: FloatArray
     radiance: FloatArray
     errors: FloatArray
+    outline_covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def on_outline(self, x: float, y: float, radius: float) -> "SphereImage":
+        """Return the image with an outline that is off by these fractions of its radius."""
+        lateral = (self.normal[:, :2] - (x, y)) / (1 + radius)
+        depth = np.sqrt(np.maximum(1 - (lateral**2).sum(axis=1), 0.0))
+        return replace(self, normal=np.column_stack([lateral, depth]))
 
 
 @dataclass(frozen=True)
@@ -111,8 +124,8 @@ def fit_shading(
     The light's fall-off, 1/r² from its place, is divided out. In each view, a scale and a small
     turn of the light are free; beside these the radiance over Lambert's law may change with the
     view's cosine and with that of incidence. The views, between which the sphere was put in anew,
-    tell the scatter of both changes; what they share is added: distance of the light, radius of the
-    outline, and the errors of the images.
+    tell the scatter of both changes; what they share is added: distance of the light, centre and
+    radius of the outline, and the errors of the images.
 
     Parameters
     ----------
@@ -131,7 +144,8 @@ def fit_shading(
     Raises
     ------
     DataError
-        There are fewer than three views, or too little of the sphere is lit.
+        There are fewer than three views, too little of the sphere is lit, or the light is as even
+        as that of a flat sample.
 
     Examples
     --------
@@ -161,6 +175,11 @@ def fit_shading(
             "told; go on with labrig resume"
         )
     views = [_View.of(image, light) for image in images]
+    if all(view.is_even for view in views):
+        raise DataError(
+            "expected the shading of a sphere, got light as even as that of a flat sample; correct "
+            "region and circle, or measure a flat sample with shape: yarn"
+        )
     unknowns = np.array([_unknowns(view) for view in views])
     shared = _shared_errors(images[0], light)
     tests = [_test(unknowns[:, term], shared[:, term], level) for term in (0, 1)]
@@ -184,6 +203,7 @@ class _View:
     cos_azimuth: FloatArray
     turns: FloatArray
     excess: FloatArray
+    is_even: bool
 
     @classmethod
     def of(cls, image: SphereImage, light: NearLight) -> "_View":
@@ -208,6 +228,7 @@ class _View:
             cos_azimuth=np.clip((light.direction[2] - lit * seen) / sines, -1, 1),
             turns=normal @ _across(light.direction).T / lit[:, np.newaxis],
             excess=ratio / scale - 1,
+            is_even=_is_even(lambert, image.radiance[used]),
         )
 
     def solved(self) -> FloatArray:
@@ -288,18 +309,24 @@ def _across(direction: Sequence[float]) -> FloatArray:
     return np.stack([first, np.cross(along, first)])
 
 
+def _is_even(lambert: FloatArray, radiance: FloatArray) -> bool:
+    """Return whether the radiance is far closer to a constant than to Lambert's law of a sphere."""
+    scale = float(lambert @ radiance / (lambert @ lambert))
+    away = float(np.linalg.norm(radiance - scale * lambert))
+    return float(np.linalg.norm(radiance - radiance.mean())) < EVEN * away
+
+
 def _shared_errors(image: SphereImage, light: NearLight) -> FloatArray:
-    """Return the change of coefficients and roughness by one σ of shared errors, shape (2 + m, 3).
+    """Return the change of coefficients and roughness by one σ of shared errors, shape (4 + m, 3).
 
     The last column is the roughness in radians.
     """
     farther = NearLight(light.direction, light.distance_radii * (1 + DISTANCE_SIGMA))
-    lateral = image.normal[:, :2] * (1 - RADIUS_SIGMA)
-    depth = np.sqrt(np.maximum(1 - (lateral**2).sum(axis=1), 0.0))
-    wider = replace(image, normal=np.column_stack([lateral, depth]))
+    covariance = image.outline_covariance + OUTLINE_SIGMA**2 * np.eye(3)
+    off = np.linalg.cholesky(covariance).T
     changed = [
         _View.of(image, farther),
-        _View.of(wider, light),
+        *(_View.of(image.on_outline(*(float(part) for part in each)), light) for each in off),
         *(
             _View.of(replace(image, radiance=image.radiance * (1 + error)), light)
             for error in image.errors

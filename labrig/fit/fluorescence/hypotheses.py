@@ -144,8 +144,10 @@ class Hypotheses:
 
     @cached_property
     def modes(self) -> FloatArray:
-        """Relative deviations of an emission, shape (MODES, o)."""
-        return emission_modes(self.system.output_nm, min(MODES, len(self.system.output_nm)))
+        """Deviations of the emission of each shape, shape (s, MODES, o)."""
+        nm = self.system.output_nm
+        count = min(MODES, len(nm))
+        return np.array([emission_modes(nm, emission, count) for emission in self.shapes.value])
 
     @cached_property
     def reflectance_variance(self) -> dict[float, FloatArray]:
@@ -187,8 +189,8 @@ class Hypotheses:
     def deviation_variance(self) -> FloatArray:
         """The same from the deviations of its emission, shape (s, n, n)."""
         variance = np.zeros_like(self.shape_variance)
-        for shape, emission in enumerate(self.shapes.value):
-            designs = self.designs(self.modes * emission)
+        for shape, modes in enumerate(self.modes):
+            designs = self.designs(modes)
             spread = designs @ self.excitation_covariance(shape)
             variance[shape] = np.tensordot(spread, designs, axes=((0, 2), (0, 2)))
         return variance

@@ -23,6 +23,7 @@ from labrig.fit.fluorescence.hypotheses import (
     log_sum,
 )
 from labrig.fit.fluorescence.posterior import Draws, Posterior
+from labrig.fit.fluorescence.prior import EDGE_NM, LOG_EDGE_SIGMA, stokes_edge
 from labrig.fit.fluorescence.result import (
     FluorescenceFit,
     FluorophoreNumber,
@@ -43,6 +44,14 @@ from labrig.optics import Spectrum
 DRAWS = 200
 #: Log-probability below the best at which a hypothesis is dropped.
 HOPELESS = 9.0
+#: Number of hypotheses with each likely number of fluorophores that are drawn from.
+SCATTERED = 60
+#: Power of the evidence by which hypotheses with fluorophores are weighed. It rests on shapes that
+#: no dye has exactly, and would choose too surely among those that are about as good.
+TEMPER = 0.5
+#: Part of the largest re-radiation that any entry may have beside all shapes: measured emissions
+#: have 1 to 2 % of their maximum far from it.
+UNSHAPED = 0.02
 #: What bands of 10 nm leave out: relative error of a value, and relative to the largest.
 RELATIVE_ERROR, ABSOLUTE_ERROR = 1e-3, 2e-4
 #: Reduced χ² that correct errors hardly exceed, and how often errors are made larger where it does.
@@ -118,7 +127,7 @@ class JointEstimator:
         UsageError
             Shapes disagree, a value is not finite, or a variance is not above 0.
         """
-        common, system = self._common, self._common.system
+        system = self._common.system
         values, variances = checked_values(system, value, variance)
         scale = system.brightness[:, np.newaxis]
         target = (values / scale).ravel()
@@ -133,13 +142,15 @@ class JointEstimator:
             measured = replace(measured, misfit=measured.misfit * misfit)
             weighted = self._refined(measured)
             misfit = weighted[0].posterior.reduced_chi2()
-        drawn = self._drawn(weighted, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        drawn = self._drawn(weighted, rng)
         numbers = self._numbers(weighted)
         likely = max(numbers, key=lambda number: number.probability).fluorophores
 
-        reradiation = (
-            np.concatenate([draws.reradiation.sum(axis=1) for _, draws in drawn]) * common.edge
-        )
+        reradiation = np.concatenate([draws.reradiation.sum(axis=1) for _, draws in drawn])
+        edge_nm = EDGE_NM * np.exp(LOG_EDGE_SIGMA * rng.standard_normal(len(reradiation)))
+        for surface, nm in zip(reradiation, edge_nm, strict=True):
+            surface *= stokes_edge(system.input_nm, system.output_nm, float(nm))
         surfaces = Surfaces(
             np.concatenate([draws.reflectance for _, draws in drawn]),
             reradiation.astype(np.float32),
@@ -151,7 +162,10 @@ class JointEstimator:
             surfaces.reflectance.mean(axis=0),
             reradiation.mean(axis=0),
             surfaces.reflectance.std(axis=0, ddof=1),
-            reradiation.std(axis=0, ddof=1),
+            np.hypot(
+                reradiation.std(axis=0, ddof=1),
+                UNSHAPED * reradiation.mean(axis=0).max() * system.is_stokes,
+            ),
         )
         predicted = system.values(matrix.reflectance, matrix.reradiation)
         residual = target - predicted.ravel()
@@ -197,16 +211,27 @@ class JointEstimator:
         by_number: dict[int, list[Scored]] = {}
         for candidate in self._common.scored(measured):
             by_number.setdefault(len(candidate.hypothesis.fluorophores), []).append(candidate)
-        found = []
-        for scored in by_number.values():
-            best = sorted(scored, key=lambda candidate: -candidate.log_posterior)[:REFINED]
-            for candidate in best:
-                posterior = Posterior(self._common, candidate.hypothesis, measured)
-                log_prior = self._common.log_prior(candidate.hypothesis)
-                found.append(
-                    _Weighted(candidate.hypothesis, posterior, posterior.log_evidence(), log_prior)
-                )
-        return sorted(found, key=lambda candidate: -candidate.log_posterior)
+        ranked = {
+            number: sorted(scored, key=lambda candidate: -candidate.log_posterior)
+            for number, scored in by_number.items()
+        }
+        found = {
+            number: [self._weighted(candidate, measured) for candidate in scored[:REFINED]]
+            for number, scored in ranked.items()
+        }
+        best = {n: max(each.log_posterior for each in those) for n, those in found.items()}
+        for number, scored in ranked.items():
+            # The scatter of all that are about as good is the error of the shapes.
+            if best[number] > max(best.values()) - HOPELESS:
+                others = scored[REFINED:SCATTERED]
+                found[number] += [self._weighted(candidate, measured) for candidate in others]
+        every = [candidate for those in found.values() for candidate in those]
+        return sorted(every, key=lambda candidate: -candidate.log_posterior)
+
+    def _weighted(self, candidate: Scored, measured: Measured) -> "_Weighted":
+        posterior = Posterior(self._common, candidate.hypothesis, measured)
+        log_prior = self._common.log_prior(candidate.hypothesis)
+        return _Weighted(candidate.hypothesis, posterior, posterior.log_evidence(), log_prior)
 
     def _numbers(self, weighted: "Sequence[_Weighted]") -> tuple[FluorophoreNumber, ...]:
         total = log_sum([candidate.log_posterior for candidate in weighted])
@@ -230,10 +255,17 @@ class JointEstimator:
         weighted: "Sequence[_Weighted]",
         rng: np.random.Generator,
     ) -> list[tuple[Hypothesis, Draws]]:
-        best = weighted[0].log_posterior
-        kept = [candidate for candidate in weighted if candidate.log_posterior > best - HOPELESS]
-        weight = np.exp([candidate.log_posterior - best for candidate in kept])
-        counts = rng.multinomial(DRAWS, weight / weight.sum())
+        kept: list[_Weighted] = []
+        weight: list[float] = []
+        for has_dyes in (False, True):
+            those = [each for each in weighted if bool(each.hypothesis.fluorophores) == has_dyes]
+            whole = log_sum([each.log_posterior for each in those])
+            tempered = [TEMPER * each.log_posterior for each in those]
+            kept += those
+            weight += [whole + each - log_sum(tempered) for each in tempered]
+        relative = np.array(weight) - max(weight)
+        probability = np.where(relative > -HOPELESS, np.exp(relative), 0.0)
+        counts = rng.multinomial(DRAWS, probability / probability.sum())
         return [
             (candidate.hypothesis, candidate.posterior.draw(int(count), rng))
             for candidate, count in zip(kept, counts, strict=True)

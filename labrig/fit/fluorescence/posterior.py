@@ -73,8 +73,7 @@ class Posterior:
         self._precision_root = block_diag(*(part.precision_root for part in self._parts))
         self._precision = self._precision_root @ self._precision_root.T
         self._deviation_designs = [
-            common.designs(common.modes * common.shapes.value[dye.shape])
-            for dye in hypothesis.fluorophores
+            common.designs(common.modes[dye.shape]) for dye in hypothesis.fluorophores
         ]
         self._deviations = [
             dye.amplitude**2 * common.excitation_covariance(dye.shape)
@@ -185,10 +184,15 @@ class Posterior:
         reradiation = np.empty((count, len(dyes), outputs, inputs))
         deviations = self._draw_deviations(residual, rng)
         for number, excitation in enumerate(self._excitations(solution)):
-            relative = np.einsum("ro,dri->doi", self._common.modes, deviations[number])
-            relative += excitation[:, np.newaxis]
-            emission = self._common.shapes.value[dyes[number].shape]
-            reradiation[:, number] = emission[:, np.newaxis] * np.maximum(relative, 0.0)
+            shape = dyes[number].shape
+            emission = self._common.shapes.value[shape]
+            drawn = emission[:, np.newaxis] * excitation[:, np.newaxis]
+            drawn += np.einsum("ro,dri->doi", self._common.modes[shape], deviations[number])
+            bounded = np.maximum(drawn, 0.0)
+            # What is cut off below 0 is taken from the rest: the light was told by the values.
+            light, bounded_light = drawn.sum(axis=1), bounded.sum(axis=1)
+            kept = np.clip(light / np.maximum(bounded_light, 1e-300), 0.0, 1.0)
+            reradiation[:, number] = kept[:, np.newaxis] * bounded
         return Draws(solution[:, :outputs], reradiation)
 
     def _draw_deviations(self, residual: FloatArray, rng: np.random.Generator) -> list[FloatArray]:
@@ -196,7 +200,7 @@ class Posterior:
 
         Drawn before the values, then moved by what they say (Matheron's rule).
         """
-        count, modes = len(residual), len(self._common.modes)
+        count, modes = len(residual), self._common.modes.shape[1]
         noise = (
             rng.standard_normal(residual.shape)
             @ np.linalg.cholesky(self._noise + self._background).T

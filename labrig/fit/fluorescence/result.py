@@ -150,7 +150,9 @@ class FluorescenceFit:
     method
         "joint" or "per-led".
     matrix
-        The matrix: the mean of `surfaces`, with their standard deviation, of the joint method.
+        The matrix: the mean of `surfaces`, with their standard deviation, of the joint method. σ of
+        an entry is not below 2 % of the largest one: real emissions have some light far from
+        their maximum.
     is_extrapolated
         Whether no light reached an input band, so that its column is extrapolated from others and
         from what dyes usually do, shape (i,), bool.

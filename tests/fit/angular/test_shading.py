@@ -1,5 +1,7 @@
 """Shading of spheres against the formulas, in images with texture and errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,3 +111,21 @@ def test_too_little_is_one_clear_line() -> None:
     behind = NearLight((0.0, 0.0, -1.0), 10.0)
     with pytest.raises(DataError, match="of which much is lit"):
         fit_shading([image(rng)] * 3, behind)
+
+
+def test_an_outline_that_is_off_is_no_dependence_if_its_error_is_given() -> None:
+    views = [image(np.random.default_rng([5, seed])) for seed in range(4)]
+    off = [view.on_outline(0.0, 0.0, -0.03) for view in views]
+    assert fit_shading(off, LIGHT).by_view.finds_dependence
+    known = [replace(view, outline_covariance=np.diag([0.0, 0.0, 0.03**2])) for view in off]
+    by_view = fit_shading(known, LIGHT).by_view
+    assert not by_view.finds_dependence
+    assert 0.5 < abs(by_view.amplitude.value) / by_view.amplitude.sigma < 2
+
+
+def test_a_flat_disc_is_no_sphere() -> None:
+    rng = np.random.default_rng(7)
+    views = [image(rng) for _ in range(4)]
+    even = [replace(view, radiance=500 + 20 * view.normal[:, 0]) for view in views]
+    with pytest.raises(DataError, match="as even as that of a flat sample"):
+        fit_shading(even, LIGHT)
