@@ -39,7 +39,7 @@ def shared_rounding_variance(variance: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray
-        B(v) in steps²: 1/12 without any spread, nothing from 0.75 steps on.
+        Variance B(v) in steps²: 1/12 without any spread, nothing from 0.75 steps on.
 
     References
     ----------
@@ -69,7 +69,7 @@ def rounded_variance(variance: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray
-        V(v) in steps².
+        Variance V(v) in steps².
 
     References
     ----------

@@ -258,7 +258,7 @@ CAMPAIGNS = {
         _module("dark_room"),
         _module("dark_room", "two-states-no-door", called="prediction_beside_photographs"),
         _module("sensor_noise", "--seeds", "100"),
-        _module("phosphor_overhead"),
+        _module("phosphor_overhead", timed=True),
         _module("fluorescent_room"),
         _module("design_recovery"),
         Campaign(
