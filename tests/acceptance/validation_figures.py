@@ -360,8 +360,8 @@ FIGURES = (
         figure.luminance_times,
     ),
     Figure(
-        "The same of real decays (a strontium aluminate, two quartzes, semiconductors; the rates of "
-        "two of the last grow with time, as those of no sum of exponentials do)",
+        "The same of real decays (a strontium aluminate, two quartzes, semiconductors; the rates "
+        "of two of the last grow with time, as those of no sum of exponentials do)",
         "luminance_times_real",
         figure.luminance_times,
     ),
