@@ -247,7 +247,9 @@ def warnings_about(
     is_exponential = evidence.law == EXPONENTIALS
     if not is_exponential or evidence.is_another_better:
         warnings.append(_law_warning(fit, evidence))
-    closer = small_chi2_warnings(joint.chi2, fit.dof(data), evidence.scatter is not None)
+    chosen = joint if evidence.chosen_law is None else evidence.chosen_law.joint
+    dof = fit.dof(data) + joint.n_parameters - chosen.n_parameters
+    closer = small_chi2_warnings(chosen.chi2, dof, evidence.scatter is not None)
     warnings += closer
     # The order of residuals that are far smaller than any scatter is that of rounding errors.
     of_residuals = evidence.scatter is not None and evidence.scatter.is_of_residuals
