@@ -353,11 +353,11 @@ class _Way:
 
         brentq(excess, below.target, above.target)
         # Between the two nearest points, √Δχ² is a straight line.
-        found = sorted(between.values(), key=lambda point: point.root)
-        beyond = next(k for k, point in enumerate(found) if point.root >= root)
-        below, above = found[beyond - 1], found[beyond]
+        by_root = sorted(between.values(), key=lambda point: point.root)
+        beyond = next(k for k, point in enumerate(by_root) if point.root >= root)
+        below, above = by_root[beyond - 1], by_root[beyond]
         part = (root - below.root) / (above.root - below.root)
-        points += [point for point in found if point not in points]
+        points += [point for point in by_root if point not in points]
         return below.value + part * (above.value - below.value)
 
     def _reaches(self, points: list[_Point], end: float, root: float) -> bool:

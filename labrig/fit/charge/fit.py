@@ -340,7 +340,7 @@ def _result(
         ProfiledState(place, number, model.is_general, states[place].kappa_per_s is not None)
         for number, place in enumerate(places, start=1)
     ]
-    found = charge_intervals(
+    intervals = charge_intervals(
         Likelihood(problem.residuals, fit, *problem.bounds(model)),
         readings.times.charge_s,
         profiled,
@@ -362,7 +362,7 @@ def _result(
         chosen=chosen,
         warnings=tuple(doubts),
         readings=_readings(readings, fit),
-        intervals=found,
+        intervals=intervals,
     )
 
 

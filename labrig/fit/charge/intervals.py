@@ -61,7 +61,7 @@ def charge_intervals(
         Whether to return all, not only those that two points of the profile show ±σ to miss by more
         than 20 %.
     """
-    found: dict[str, ProfileInterval] = {}
+    intervals: dict[str, ProfileInterval] = {}
     for state in states:
         for quantity, names in _quantities(state, charge_s):
             shown = names.values()
@@ -72,8 +72,8 @@ def charge_intervals(
             except LowerMinimumError:
                 continue
             for name, function in names.items():
-                found[f"{name} {state.number}"] = interval.mapped(function)
-    return found
+                intervals[f"{name} {state.number}"] = interval.mapped(function)
+    return intervals
 
 
 def _quantities(

@@ -44,7 +44,7 @@ Shown = dict[str, Callable[[float], float]]
 class Intervals:
     """Intervals by the name of their parameter, and names of those whose profile has none."""
 
-    found: dict[str, ProfileInterval]
+    by_name: dict[str, ProfileInterval]
     without: tuple[str, ...]
 
 
@@ -84,7 +84,7 @@ def decay_intervals(
         for part in each
         if part.without
     ]
-    return {name: found for part in each for name, found in part.found.items()}, warnings
+    return {name: interval for part in each for name, interval in part.by_name.items()}, warnings
 
 
 def rate_intervals(
@@ -210,7 +210,7 @@ def _intervals(
     all_of_them: bool,
 ) -> Intervals:
     """Return the intervals of all quantities, or of those that two points show to be asymmetric."""
-    found: dict[str, ProfileInterval] = {}
+    by_name: dict[str, ProfileInterval] = {}
     without: list[str] = []
     for quantity, noise, shown in wanted:
         functions = shown.values()
@@ -221,8 +221,8 @@ def _intervals(
         except LowerMinimumError:
             without += shown
             continue
-        found |= {name: interval.mapped(function) for name, function in shown.items()}
-    return Intervals(found, tuple(without))
+        by_name |= {name: interval.mapped(function) for name, function in shown.items()}
+    return Intervals(by_name, tuple(without))
 
 
 def _log_time(theta: FloatArray) -> tuple[float, FloatArray]:

@@ -287,10 +287,10 @@ def _result(
         return fit
     stated_sigma = np.sqrt(np.diag(fit.covariance)).tolist()
     by_name = dict(zip(fit.covariance_parameters, stated_sigma, strict=True))
-    found = excitation_intervals(
+    profiles = excitation_intervals(
         problem, solution, uncertain, falling, None if intervals == "all" else by_name
     )
-    return replace(fit, intervals=found)
+    return replace(fit, intervals=profiles)
 
 
 def _veil(problem: ExcitationProblem, solution: LeastSquaresFit) -> Measured | None:

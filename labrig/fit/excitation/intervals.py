@@ -67,7 +67,7 @@ def excitation_intervals(
     """
     lower, upper = problem.parameters.bounds()
     likelihood = Likelihood(problem.residuals, solution, lower, upper)
-    found: dict[str, ProfileInterval] = {}
+    intervals: dict[str, ProfileInterval] = {}
     for wanted in _wanted(problem.parameters, solution.parameters, uncertain, falling):
         if stated_sigma is not None:
             first, value = wanted.quantities[0], wanted.value_of_first(solution.parameters)
@@ -81,8 +81,8 @@ def excitation_intervals(
                 continue
             # A fit from which the profile falls is not at its minimum, and has a warning.
             with suppress(LowerMinimumError):
-                found[name] = likelihood.interval(quantity).widened(sigma)
-    return found
+                intervals[name] = likelihood.interval(quantity).widened(sigma)
+    return intervals
 
 
 def _wanted(
