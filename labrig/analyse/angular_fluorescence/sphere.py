@@ -92,8 +92,8 @@ def sphere_views(part: Part) -> tuple[tuple[SphereViews, ...], list[str]]:
     lit = {pose.led: pose.part for pose in part.protocol.poses()}
     tested = []
     for led, light_part in lit.items():
-        own = [view for view in views if view.pose.led == led]
-        sphere, lines = _tested(part, own, led, light_part)
+        under_led = [view for view in views if view.pose.led == led]
+        sphere, lines = _tested(part, under_led, led, light_part)
         tested.append(sphere)
         warnings += lines
     return tuple(tested), warnings
