@@ -11,7 +11,7 @@ from labrig.yaml_file import read_model
 
 @dataclass(frozen=True)
 class Verification:
-    """What a check of a run showed.
+    """Outcome of the check of a run.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Verification:
 
     @property
     def is_intact(self) -> bool:
-        """Whether nothing was changed."""
+        """True if nothing was changed."""
         return not self.changed
 
 

@@ -1,4 +1,4 @@
-"""How far a number may be trusted: its uncertainty by cause, in one type for every result."""
+"""Budget of the uncertainty of a number by its causes, in one type for every result."""
 
 import math
 from collections.abc import Mapping, Sequence

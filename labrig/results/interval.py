@@ -37,7 +37,7 @@ class ProfileInterval:
 
     @property
     def is_one_sided(self) -> bool:
-        """Whether the data exclude nothing below, or nothing above, at 95 %."""
+        """True if the data exclude nothing below, or nothing above, at 95 %."""
         return self.low_95 == self.least or self.high_95 == self.largest
 
     def differs_from(self, sigma: float) -> bool:

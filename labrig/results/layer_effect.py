@@ -1,4 +1,4 @@
-"""What the thickness of a sample may do to rates that were fitted as those of a surface."""
+"""Range that the thickness of a sample leaves to rates that were fitted as those of a surface."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -46,7 +46,7 @@ class LayerEffect:
 
     @property
     def is_shown(self) -> bool:
-        """Whether the charges themselves contradict a surface."""
+        """True if the charges themselves contradict a surface."""
         return self.optical_density[0] > 0
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""How often intervals by profile likelihood, and ±σ, hold the truth: at 68 and 95 %, side by side.
+"""Coverage of intervals by profile likelihood and of ±σ, at 68 and 95 %, side by side.
 
     python -m tests.acceptance.interval_coverage [--seeds 400] [--only decay charge excitation]
 

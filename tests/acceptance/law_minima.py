@@ -1,4 +1,4 @@
-"""Whether fits of the laws of decay end at their lowest χ², and never above a law nested in them.
+"""Fits of the laws of decay against their lowest χ², and against the laws nested in them.
 
     python -m tests.acceptance.law_minima [--seeds 300]
 
@@ -158,7 +158,7 @@ def any_decay(seed: int) -> Table | None:
 
 @dataclass
 class Count:
-    """What was counted over many tables."""
+    """Counts over many tables."""
 
     fits: int = 0
     laws: int = 0

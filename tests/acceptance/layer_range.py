@@ -75,7 +75,7 @@ class Deep(Bench):
 
 
 class Outcome(NamedTuple):
-    """Whether each k_e and Λ is within σ of the fit, within the range; ratio of its ends."""
+    """Each k_e and Λ: is it within σ of the fit, within the range? And the ratio of its ends."""
 
     k_e_before: FloatArray
     k_e: FloatArray

@@ -1,4 +1,4 @@
-"""How much longer a picture takes where its materials phosphoresce.
+"""Time of pictures whose materials phosphoresce, and of the same where they do not.
 
     python -m tests.acceptance.phosphor_overhead [SCENE ...] [--rounds 5] [--pictures 6]
 

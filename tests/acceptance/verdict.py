@@ -1,4 +1,4 @@
-"""Whether a figure that is measured anew still says what was published."""
+"""Comparison of a figure that is measured anew with the published one."""
 
 import re
 

@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 
 from labrig import plugins
-from labrig.cli.exit_codes import guarded
 from labrig.record import RunLock, read_run
 from labrig.results import DecayResult, read_result
-from tests.conftest import Ended, write_short_decay, write_small_rig
+from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 
 Labrig = Callable[..., Ended]
@@ -148,23 +147,6 @@ def test_a_device_that_is_not_there_is_exit_code_3(
         labrig("run", "decay", "--rig", path, "--runs", tmp_path / "runs"), 3, "ttyACM7", "nothing"
     )
     assert list((tmp_path / "runs").iterdir()) == []
-
-
-@pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A processed run, of which tests get copies."""
-    folder = tmp_path_factory.mktemp("finished")
-    write_small_rig(folder / "rig.yaml")
-    write_short_decay(folder / "protocol.yaml")
-    asked = [str(folder / "protocol.yaml"), "--rig", str(folder / "rig.yaml")]
-    assert guarded(["run", *asked, "--runs", str(folder / "runs")]) == 0
-    (run,) = (folder / "runs").iterdir()
-    return run
-
-
-@pytest.fixture
-def finished(kept: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(kept, tmp_path / "runs" / kept.name))
 
 
 def test_a_run_ends_in_a_result_that_agrees_with_itself(labrig: Labrig, finished: Path) -> None:

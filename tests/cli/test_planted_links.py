@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Ended, write_short_decay, write_small_rig
+from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
 #: Names below a run folder that labrig reads or writes, and some that it does not know.
@@ -22,23 +22,10 @@ COMMANDS = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short decay with its result."""
-    folder = tmp_path_factory.mktemp("sound")
-    from labrig.cli import guarded
-
-    rig, protocol = write_small_rig(folder / "rig.yaml"), folder / "decay.yaml"
-    write_short_decay(protocol)
-    assert not guarded(["run", str(protocol), "--rig", str(rig), "--runs", str(folder / "runs")])
-    (made,) = (folder / "runs").iterdir()
-    return made
-
-
-def planted(run: Path, folder: Path, name: str, target: Path) -> Path:
+def planted(kept: Path, folder: Path, name: str, target: Path) -> Path:
     """Return a copy of the run in which `name` is a link to `target`."""
     copy = folder / "run"
-    shutil.copytree(run, copy)
+    shutil.copytree(kept, copy)
     place = copy / name
     if place.is_dir():
         shutil.rmtree(place)
@@ -50,13 +37,13 @@ def planted(run: Path, folder: Path, name: str, target: Path) -> Path:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_link_is_refused_and_what_it_leads_to_stays(
-    labrig: Labrig, run: Path, tmp_path: Path, name: str
+    labrig: Labrig, kept: Path, tmp_path: Path, name: str
 ) -> None:
     outside = tmp_path / "outside"
     outside.mkdir()
     (outside / "mine.txt").write_text("mine")
     target = outside if "." not in name.rpartition("/")[2][1:] else outside / "mine.txt"
-    copy = planted(run, tmp_path, name, target)
+    copy = planted(kept, tmp_path, name, target)
     for command, *rest in COMMANDS:
         arguments = [str(copy) if one == "RUN" else one for one in rest]
         ended = labrig(command, *(arguments if "RUN" in rest else [*arguments, copy]))
@@ -67,18 +54,20 @@ def test_a_link_is_refused_and_what_it_leads_to_stays(
     assert (outside / "mine.txt").read_text() == "mine"
 
 
-def test_a_run_that_is_reached_by_a_link_is_read(labrig: Labrig, run: Path, tmp_path: Path) -> None:
-    (tmp_path / "link").symlink_to(run)
+def test_a_run_that_is_reached_by_a_link_is_read(
+    labrig: Labrig, kept: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "link").symlink_to(kept)
     assert labrig("runs", "show", tmp_path / "link").code == 0
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 @pytest.mark.parametrize("name", ["protocol.yaml", "rig.yaml", "journal.jsonl", "cache/x"])
 def test_a_named_pipe_is_not_waited_for(
-    labrig: Labrig, run: Path, tmp_path: Path, name: str
+    labrig: Labrig, kept: Path, tmp_path: Path, name: str
 ) -> None:
     copy = tmp_path / "run"
-    shutil.copytree(run, copy)
+    shutil.copytree(kept, copy)
     (copy / name).unlink(missing_ok=True)
     (copy / name).parent.mkdir(exist_ok=True)
     os.mkfifo(copy / name)
@@ -88,13 +77,13 @@ def test_a_named_pipe_is_not_waited_for(
 
 
 def test_a_note_leaves_a_backup_that_shares_the_file_alone(
-    labrig: Labrig, run: Path, tmp_path: Path
+    labrig: Labrig, kept: Path, tmp_path: Path
 ) -> None:
     copy, backup = tmp_path / "run", tmp_path / "backup.md"
-    shutil.copytree(run, copy)
+    shutil.copytree(kept, copy)
     assert labrig("note", copy, "before").code == 0
     os.link(copy / "notes.md", backup)
-    kept = backup.read_bytes()
+    shared = backup.read_bytes()
     assert labrig("note", copy, "after").code == 0
-    assert backup.read_bytes() == kept
+    assert backup.read_bytes() == shared
     assert b"after" in (copy / "notes.md").read_bytes()

@@ -1,4 +1,4 @@
-"""What the thickness of a layer does to rates that are fitted as those of a surface."""
+"""Thickness of a layer, and rates that are fitted as those of a surface."""
 
 from dataclasses import dataclass, replace
 

@@ -115,11 +115,11 @@ def test_limits_follow_the_quantity() -> None:
 @pytest.mark.parametrize("sigmas", [1.0, NORMAL_95])
 @pytest.mark.parametrize("mu", [0.0, 0.3, 0.9, 1.7, 3.0])
 def test_limits_near_a_bound_hold_the_truth_as_often_as_they_say(mu: float, sigmas: float) -> None:
-    """Of estimates x ≥ 0 of μ with σ 1, in steps of equal probability."""
+    """The estimates x of μ ≥ 0 with σ 1 are in steps of equal probability."""
     steps = 1000
-    found = ndtri((np.arange(steps) + 0.5) / steps) + mu
+    estimates = ndtri((np.arange(steps) + 0.5) / steps) + mu
     held = 0
-    for x in found.tolist():
+    for x in estimates.tolist():
         if x < 0:
             high = -abs(x) + np.sqrt(x * x + away_from_bound(-x, sigmas) ** 2)
             low = 0.0
@@ -187,7 +187,7 @@ def test_a_profile_that_falls_below_the_fit_is_no_interval() -> None:
 
 
 def test_states_do_not_change_places() -> None:
-    """Where one exponential does as well, the profile of the fast rate is not that of the slow."""
+    """The profile of the fast rate is not that of the slow where one exponential does as well."""
     residuals = two_states(0.3, 4, unit=0.3)
     likelihood = Likelihood.at_minimum(
         residuals,

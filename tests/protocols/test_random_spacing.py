@@ -78,7 +78,7 @@ def test_the_seed_is_in_the_journal_and_gives_the_begins(
     make_protocol: Callable[..., Path],
     tmp_path: Path,
 ) -> None:
-    """Of two repeats each has its own."""
+    """Each of two repeats has its own."""
     ended = labrig(
         "run", make_protocol(repeats=2, exposure="0.5 s"), "--rig", make_rig(), "--no-process",
         "--runs", tmp_path / "runs",

@@ -179,7 +179,7 @@ class ChargeFit:
 
     @property
     def is_any_one_sided(self) -> bool:
-        """Whether a bound holds a parameter, which then has a limit instead of a σ."""
+        """True if a bound holds a parameter, which then has a limit instead of a σ."""
         common = (self.light_stimulated, self.prompt, self.dark)
         own = (getattr(state, each.name) for state in self.states for each in fields(state))
         return any(isinstance(each, OneSided) for each in (*common, *own))

@@ -1,4 +1,4 @@
-"""What absorption in the depth of a sample does to rates that were fitted as those of a surface.
+"""Effect of absorption in the depth of a sample on rates that were fitted as those of a surface.
 
 Light of band b falls in a layer of optical density D_b to E_b 10^(−D_b z) at the fraction z of its
 depth (Beer and Lambert). The layer charges and saturates at its surface first, and the glow is the

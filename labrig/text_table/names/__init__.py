@@ -1,4 +1,4 @@
-"""What the names of columns and their units say."""
+"""Meaning of the names of columns and of their units."""
 
 from labrig.text_table.names.columns import (
     ABSCISSAS,
