@@ -237,14 +237,14 @@ class _LawProblem:
 
     def _pivoted(self, pivot: float) -> Shape:
         """Return the law as a function of [level at the pivot, log rate, shape]."""
-        at_reference = _shape(self.data.series, self.law)
+        series = self.data.series
+        time, exposure = np.append(series.t + series.start, pivot), np.append(series.exposure, 0.0)
 
         def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-            level, slopes = self._level(theta, pivot)
-            signal, jacobian = at_reference(np.array([theta[0] / level, *theta[1:]]))
-            jacobian[:, 1:] -= np.outer(signal, slopes / level)
-            jacobian[:, 0] /= level
-            return signal, jacobian
+            means, slopes = self.law.means(float(np.exp(theta[1])), float(theta[2]), time, exposure)
+            unit = means[:-1] / means[-1]
+            changes = (slopes[:-1] - np.outer(unit, slopes[-1])) / means[-1]
+            return theta[0] * unit, np.column_stack([unit, theta[0] * changes])
 
         return shape
 
