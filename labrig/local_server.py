@@ -55,6 +55,8 @@ class LocalServer(ThreadingHTTPServer):
     daemon_threads = True
     # A browser keeps connections open for minutes; leaving must not wait for them.
     block_on_close = False
+    # A connection that finds the queue full is tried again by the system after a second.
+    request_queue_size = MAX_CONNECTIONS
 
     def __init__(self, port: int, conversation: type["LocalConversation"]) -> None:
         self.token = secrets.token_urlsafe(18)
