@@ -73,3 +73,16 @@ def power_of_ten(exponent: int) -> str:
 
 def _exponent(number: float) -> int:
     return math.floor(math.log10(abs(number)))
+
+
+def digits_of_range(low: float, high: float, value: float) -> int:
+    """Return the number of digits that shows the distance of two limits to two digits.
+
+    An infinite limit counts as `value`.
+    """
+    size = max((abs(limit) for limit in (low, high) if math.isfinite(limit)), default=1.0)
+    ends = [limit if math.isfinite(limit) else value for limit in (low, high)]
+    width = abs(ends[1] - ends[0])
+    if not (0 < width < math.inf and size > 0):
+        return 3
+    return min(max(2 + math.floor(math.log10(size)) - math.floor(math.log10(width)), 2), 8)

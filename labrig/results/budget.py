@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
-from labrig.number_format import plus_minus, rounded
+from labrig.number_format import digits_of_range, plus_minus, rounded
 from labrig.results.measured import Measured
 
 #: Name of noise and calibration where a result has their sum only.
@@ -153,7 +153,8 @@ class Budget:
         """The range by the choice of model as text; empty without one."""
         if self.model_range is None:
             return ""
-        low, high = (rounded(end, 3) for end in self.model_range)
+        digits = digits_of_range(*self.model_range, self.value)
+        low, high = (rounded(end, digits) for end in self.model_range)
         return " ".join(filter(None, (f"{low} to {high}", self.unit, f"by {self.model_of}")))
 
     def __str__(self) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from labrig.number_format import aligned, rounded
+from labrig.number_format import aligned, digits_of_range, rounded
 from labrig.results.text_files import finite
 
 #: Ratio of the distances of both limits, or of the larger one to σ, from which σ misleads.
@@ -122,7 +122,7 @@ class ProfileInterval:
         """Return the limits to the digits that their distance is worth."""
         if low == self.least and high == self.largest:
             return "not determined"
-        digits = _digits(low, high, self.value)
+        digits = digits_of_range(low, high, self.value)
         if low == self.least:
             return f"< {rounded(high, digits)}"
         if high == self.largest:
@@ -144,16 +144,6 @@ class ProfileInterval:
 
 #: Standard deviations from the mean of a normal distribution within which 95 % are.
 NORMAL_95 = 1.959963984540054
-
-
-def _digits(low: float, high: float, value: float) -> int:
-    """Return the number of digits that shows the distance of the limits to two."""
-    size = max((abs(limit) for limit in (low, high) if math.isfinite(limit)), default=1.0)
-    ends = [limit if math.isfinite(limit) else value for limit in (low, high)]
-    width = abs(ends[1] - ends[0])
-    if not (0 < width < math.inf and size > 0):
-        return 3
-    return min(max(2 + math.floor(math.log10(size)) - math.floor(math.log10(width)), 2), 8)
 
 
 def interval_rows(intervals: Mapping[str, ProfileInterval]) -> list[list[str]]:
