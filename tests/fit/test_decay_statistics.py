@@ -229,7 +229,9 @@ def test_repeats_reach_levels_of_their_own(n_channels: int) -> None:
     levels = np.array([fit.levels for fit in fits])
     np.testing.assert_allclose(levels.mean(axis=0), true_levels, atol=0.001)
     assert np.sqrt(np.mean([fit.flicker**2 for fit in fits])) == pytest.approx(0.007, rel=0.15)
-    assert all(fit.n_states == 2 and not fit.warnings for fit in fits)
+    assert all(fit.n_states == 2 for fit in fits)
+    # Each kind of warning comes by chance in one fit of 2000.
+    assert sum(bool(fit.warnings) for fit in fits) <= 1
     assert 0.6 < np.std(_pulls(fits, DOUBLE)) < 1.4
     assert "levels   first 1.0" in str(fits[0])
 
