@@ -25,6 +25,7 @@ from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
+from labrig.process.verification import require_as_sealed
 from labrig.record import RunLock, read_run
 from labrig.report import (
     Rendered,
@@ -185,6 +186,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Processed:
     """Process a run that no other process processes meanwhile."""
     overrides.check_method(protocol)
+    require_as_sealed(folder)
     run = read_run(folder)
     rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]

@@ -38,6 +38,7 @@ from .journal import (
     Disk as Disk,
     Document as Document,
     add_note as add_note,
+    line_seals as line_seals,
     read_journal as read_journal,
     read_notes as read_notes,
     sealed_line as sealed_line,

@@ -1,7 +1,5 @@
 """Writers of results as text files."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from labrig.errors import DiskError
+from labrig.text_table import table_text
 
 
 def write_text(path: Path, text: str) -> None:
@@ -33,11 +32,7 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
     DiskError
         The file cannot be written.
     """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(head)
-    table.writerows(rows)
-    write_text(path, text.getvalue())
+    write_text(path, table_text(head, rows))
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

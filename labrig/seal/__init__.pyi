@@ -3,6 +3,7 @@ from .file_list import (
     list_files as list_files,
 )
 from .lab_key import (
+    PUBLIC as PUBLIC,
     LabKey as LabKey,
     create_key as create_key,
     read_key as read_key,

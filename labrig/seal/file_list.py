@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import file_digest
 from pathlib import Path
@@ -91,13 +91,15 @@ class FileList:
         return cls(sha256=sha256, **heads)
 
 
-def list_files(folder: Path) -> dict[str, str]:
+def list_files(folder: Path, names: Collection[str] = ()) -> dict[str, str]:
     """Return the SHA-256 of every file of a run that a seal covers.
 
     Parameters
     ----------
     folder
         Run folder.
+    names
+        Files of the run folder that alone are read, as far as they are there; by default all.
 
     Returns
     -------
@@ -121,7 +123,8 @@ def list_files(folder: Path) -> dict[str, str]:
     (True, True)
     """
     sha256 = {}
-    for path in _files(folder):
+    paths = [folder / name for name in names if (folder / name).is_file()]
+    for path in paths if names else _files(folder):
         name = path.relative_to(folder).as_posix()
         if name in _DRAWN_LATER:
             continue

@@ -5,9 +5,8 @@ import re
 import shlex
 from base64 import b64decode
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 from labrig.errors import UsageError
 from labrig.input_file import read_text
@@ -27,11 +26,15 @@ class Signers:
         Name by public key.
     """
 
-    names: Mapping[PublicKey, str] = MappingProxyType({})
+    names: Mapping[PublicKey, str] = field(default_factory=dict)
 
     def name_of(self, key: PublicKey) -> str | None:
         """Return the name that belongs to a key; None for an unknown key."""
         return self.names.get(key)
+
+    def text(self) -> str:
+        """Return the file of these keys, one a line."""
+        return "".join(f"{key.line} {name}\n" for key, name in self.names.items())
 
     def __or__(self, other: "Signers") -> "Signers":
         """Return the signers of both; names of the second one have priority."""
