@@ -47,6 +47,9 @@ from .journal import (
 from .made import (
     time_made as time_made,
 )
+from .own_digest import (
+    own_digest as own_digest,
+)
 from .plain_folder import (
     require_plain_folder as require_plain_folder,
 )
