@@ -47,9 +47,6 @@ from .journal import (
 from .made import (
     time_made as time_made,
 )
-from .own_digest import (
-    own_digest as own_digest,
-)
 from .plain_folder import (
     require_plain_folder as require_plain_folder,
 )
@@ -68,4 +65,7 @@ from .run_record import (
 from .run_size import (
     RunSize as RunSize,
     size_text as size_text,
+)
+from .user_secret import (
+    own_digest as own_digest,
 )

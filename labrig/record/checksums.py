@@ -18,7 +18,7 @@ from typing import TypeVar
 from labrig.errors import DiskError
 from labrig.record.frames import FileRecord
 from labrig.record.journal import write_durably
-from labrig.record.own_digest import own_digest
+from labrig.record.user_secret import own_digest
 
 #: Folder of the frames in a run folder.
 FRAMES = "frames"
