@@ -67,9 +67,14 @@ def settings_differences(
     exif = frames_exif(frames)
     exposures = _driver_exposures(rig, run.camera_identity)
     exposure_texts = _exposure_differences(frames, exif, exposures)
+    has_f_numbers = any(frame.f_number is not None for frame in frames)
     differences = {}
     for frame, raw, exposure_text in zip(frames, exif, exposure_texts, strict=True):
-        texts = (exposure_text, _iso_difference(frame, raw), _f_number_difference(frame, raw))
+        texts = (
+            exposure_text,
+            _iso_difference(frame, raw),
+            _f_number_difference(frame, raw, has_f_numbers),
+        )
         if any(texts):
             differences[frame] = " and ".join(filter(None, texts))
     return differences
@@ -266,9 +271,11 @@ def _iso_difference(frame: FrameRecord, raw: Exif) -> str:
     return f"ISO {frame.iso} in the journal, ISO {raw.iso:g} in the RAW file"
 
 
-def _f_number_difference(frame: FrameRecord, raw: Exif) -> str:
-    if raw.f_number is None or frame.f_number is None:
+def _f_number_difference(frame: FrameRecord, raw: Exif, has_f_numbers: bool) -> str:
+    if raw.f_number is None or (frame.f_number is None and not has_f_numbers):
         return ""
+    if frame.f_number is None:
+        return f"no f-number in the journal, unlike others, f/{raw.f_number:g} in the RAW file"
     if math.isclose(frame.f_number, raw.f_number, rel_tol=_SAME_F_NUMBER):
         return ""
     return f"f/{frame.f_number:g} in the journal, f/{raw.f_number:g} in the RAW file"

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.acquire import read_rig_file
-from labrig.analyse import clock_warnings, settings_differences, spectra_differences
+from labrig.analyse import (
+    clock_warnings,
+    read_run_protocol,
+    settings_differences,
+    spectra_differences,
+)
 from labrig.errors import DataError, UsageError
 from labrig.process.comparison import LOCK
 from labrig.process.provenance import PROVENANCE, Provenance
@@ -255,9 +260,15 @@ def _differences(run: RunRecord) -> Iterator[str]:
     spectra = [spectrum for attempt in run.attempts for spectrum in attempt.spectra]
     try:
         rig = read_rig_file(run.folder / "rig.yaml")
+        protocol = read_run_protocol(run.folder)
     except UsageError as error:
         yield str(error)
         return
+    asked = {"protocol": protocol.protocol, "sample": protocol.sample.name, "rig": rig.name}
+    for key, value in asked.items():
+        if others := {attempt.start.get(key, value) for attempt in run.attempts} - {value}:
+            other = others.pop()
+            yield f"{run.folder}: the {key} is {value!r} in its file, {other!r} in the journal"
     for frame, text in settings_differences(run, rig, frames).items():
         yield f"{frame.path} has {text}"
     for spectrum, text in spectra_differences(spectra).items():

@@ -265,7 +265,10 @@ def _add_document(
         attempts[doc["uid"]] = _open_attempt(doc)
     elif name == "descriptor":
         check_descriptor(doc)
-        streams[doc["uid"]] = _Stream(_still_open(attempts, doc["run_start"]), doc["name"])
+        attempt = _still_open(attempts, doc["run_start"])
+        if any(each.attempt is attempt and each.name == doc["name"] for each in streams.values()):
+            raise ValueError(f"the stream '{doc['name']}' is there already")
+        streams[doc["uid"]] = _Stream(attempt, doc["name"])
     elif name == "stop":
         open_attempt = _still_open(attempts, doc["run_start"])
         attempts[doc["run_start"]] = _close_attempt(open_attempt, doc)
