@@ -27,7 +27,8 @@ from labrig.seal import (
 )
 from labrig.yaml_file import read_model
 
-JOURNAL = "journal.jsonl"
+#: Files that grow when a run goes on.
+JOURNAL, LOG = "journal.jsonl", "log.txt"
 #: Lock of who records into a run.
 _RECORDING = ".lock"
 
@@ -277,7 +278,15 @@ def _differences(run: RunRecord) -> Iterator[str]:
 
 def _changes_since(folder: Path, seal: RunSeal, *, went_on: bool) -> Iterator[str]:
     """Yield what was changed since the seal; `went_on`: the sealed journal begins that of now."""
-    for change in seal.changes(list_files(folder)):
-        more = ": the run went on after it was sealed; labrig seal seals it anew"
-        is_growth = went_on and change.startswith(JOURNAL)
-        yield f"{folder}: {change}{more if is_growth else ''}"
+    now = list_files(folder)
+    added = now.keys() - seal.files.sha256.keys()
+    if went_on and now[JOURNAL] != seal.files.sha256.get(JOURNAL):
+        yield (
+            f"{folder}: the run went on after it was sealed, with {len(added)} new files; labrig "
+            "seal seals it anew"
+        )
+        grown = {JOURNAL, LOG}
+        now = {name: sha256 for name, sha256 in now.items() if name not in added}
+        now |= {name: seal.files.sha256[name] for name in grown & seal.files.sha256.keys()}
+    for change in seal.changes(now):
+        yield f"{folder}: {change}"
