@@ -244,10 +244,11 @@ def run_record(folder: Path, content: JournalContent) -> RunRecord:
 
 @dataclass
 class _Stream:
-    """A stream of an attempt, and how many of its events were read."""
+    """A stream of an attempt, the names of its values, and how many of its events were read."""
 
     attempt: Attempt
     name: str
+    values: tuple[str, ...]
     events: int = 0
 
 
@@ -268,14 +269,14 @@ def _add_document(
         attempt = _still_open(attempts, doc["run_start"])
         if any(each.attempt is attempt and each.name == doc["name"] for each in streams.values()):
             raise ValueError(f"the stream '{doc['name']}' is there already")
-        streams[doc["uid"]] = _Stream(attempt, doc["name"])
+        streams[doc["uid"]] = _Stream(attempt, doc["name"], tuple(doc["data_keys"]))
     elif name == "stop":
         open_attempt = _still_open(attempts, doc["run_start"])
         attempts[doc["run_start"]] = _close_attempt(open_attempt, doc)
     elif name == "event":
         opened = streams[doc["descriptor"]]
         opened.events += 1
-        check_event(doc, opened.events)
+        check_event(doc, opened.events, opened.values)
         attempt = _still_open(attempts, opened.attempt.uid)
         stream, data = opened.name, dict(doc["data"])
         if stream == "frames":

@@ -434,7 +434,7 @@ class Written:
         for stream in ("actions", "frames"):
             mine = {"uid": f"{self._unit} {stream}", "run_start": self._unit}
             self._append("descriptor", **self._descriptors[stream] | mine)
-        self._event("actions", device="lamp", action="off", **self._happens())
+        self._event("actions", device="lamp", action="off", task="", **self._happens())
 
     def shoot(self, role: str = "decay") -> None:
         """One frame more."""
@@ -445,7 +445,7 @@ class Written:
         name = f"frames/{self.frames:06d}.dng"
         (self.path / name).hardlink_to(self._frame)
         settings = {"exposure_s": 1.0, "iso": 100, "f_number": 4.0, "role": role}
-        kept = {"frame": name, "sha256": "", "size_bytes": 1}
+        kept = {"frame": name, "sha256": "", "size_bytes": 1, "disk_s": 0.0}
         self._event("frames", **kept, **settings, **self._happens())
 
 
