@@ -284,10 +284,26 @@ def _f_number_difference(frame: FrameRecord, raw: Exif, has_f_numbers: bool) -> 
 def require_recorded_settings(run: RunRecord, rig: RigFile, overrides: Overrides) -> None:
     """Refuse a run whose journal differs from what its frames and spectra say of themselves.
 
+    Parameters
+    ----------
+    run
+        A recorded run.
+    rig
+        Rig file of the run, which names the camera's driver.
+    overrides
+        The user's settings, with the frames to leave out.
+
     Raises
     ------
     DataError
         A frame or a spectrum that is not excluded differs; the message names the first ones.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.analyse import Overrides, require_recorded_settings
+    >>> rig = labrig.read_rig_file("runs/decay/rig.yaml")
+    >>> require_recorded_settings(labrig.read_run("runs/decay"), rig, Overrides())
     """
     frames, spectra = [], []
     for attempt in run.completed().values():

@@ -180,12 +180,14 @@ def seal_run(folder: Path, key: LabKey, time_s: float) -> RunSeal:
 
     Examples
     --------
+    >>> import shutil
     >>> from pathlib import Path
     >>> from labrig.process import seal_run, verify_run
     >>> from labrig.seal import create_key, read_signers
     >>> key = create_key(Path("lab_key"), "Example lab")
-    >>> seal = seal_run(Path("runs/decay"), key, 1_767_225_600.0)
-    >>> verification = verify_run(Path("runs/decay"), read_signers(Path("lab_key.pub")))
+    >>> run = Path(shutil.copytree("runs/decay", "cited"))
+    >>> seal = seal_run(run, key, 1_767_225_600.0)
+    >>> verification = verify_run(run, read_signers(Path("lab_key.pub")))
     >>> verification.status, verification.signer
     ('sealed', 'Example lab')
     """

@@ -116,7 +116,7 @@ def check_event(doc: Mapping[str, Any], number: int, names: Collection[str]) -> 
         raise ValueError("its 'timestamps' are not its 'time'")
     if doc["filled"] != {}:
         raise ValueError("'filled' is not empty")
-    ends_s = data.get("end_time", data.get("time"))
+    ends_s = float(data["end_time"] if "end_time" in data else data["time"])
     if not ends_s <= time_s + _ROUNDING_S:
         raise ValueError(f"it was written {ends_s - time_s:.3g} s before its end")
     if not data.get("start_time", ends_s) <= ends_s + _ROUNDING_S:

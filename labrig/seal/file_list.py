@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from hashlib import file_digest
+from hashlib import sha256
 from pathlib import Path
 
 from labrig.errors import DataError, DiskError
@@ -24,6 +24,7 @@ _FILES = (
 _FOLDERS = ("frames", "result")
 #: What `labrig figures` draws from a result at any time.
 _DRAWN_LATER = ("result/figures/figures.pdf",)
+_BLOCK_BYTES = 1_000_000
 _TITLE = "# labrig seal"
 _LINE = re.compile(r"([0-9a-f]{64})  (\S[^\r\n\\]*)")
 _HEAD = re.compile(r"# (sealed|by|run|journal|labrig): (.*)")
@@ -122,7 +123,7 @@ def list_files(folder: Path, names: Collection[str] = ()) -> dict[str, str]:
     >>> "journal.jsonl" in names, "frames/000001.dng" in names
     (True, True)
     """
-    sha256 = {}
+    sha256_of = {}
     paths = [folder / name for name in names if (folder / name).is_file()]
     for path in paths if names else _files(folder):
         name = path.relative_to(folder).as_posix()
@@ -131,11 +132,14 @@ def list_files(folder: Path, names: Collection[str] = ()) -> dict[str, str]:
         if not _LINE.fullmatch(f"{'0' * 64}  {name}"):
             raise DataError(f"{folder}: expected names of files in one line, got {name!r}")
         try:
+            digest = sha256()
             with open_regular(path) as file:
-                sha256[name] = file_digest(file, "sha256").hexdigest()
+                while block := file.read(_BLOCK_BYTES):
+                    digest.update(block)
+            sha256_of[name] = digest.hexdigest()
         except OSError as error:
             raise DiskError(f"{path}: cannot be read ({error.strerror})") from None
-    return sha256
+    return sha256_of
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -82,10 +82,11 @@ def write_seal(folder: Path, key: LabKey, journal: str, time_s: float) -> RunSea
 
     Examples
     --------
-    >>> import labrig
+    >>> import shutil
     >>> from pathlib import Path
+    >>> import labrig
     >>> from labrig.seal import create_key, write_seal
-    >>> run = labrig.read_run("runs/decay")
+    >>> run = labrig.read_run(shutil.copytree("runs/decay", "signed"))
     >>> key = create_key(Path("settings/of_this_lab"), "Example lab")
     >>> write_seal(run.folder, key, run.seal, 1_767_225_600.0).files.sealed
     '2026-01-01T00:00:00Z'
