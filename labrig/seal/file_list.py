@@ -76,6 +76,9 @@ class FileList:
         heads: dict[str, str] = {}
         sha256: dict[str, str] = {}
         for line in lines[:-1]:
+            # Names from elsewhere are printed, and are to control no terminal.
+            if not line.isprintable():
+                raise DataError(f"expected a list of files in legible text, got {line[:60]!r}")
             if head := _HEAD.fullmatch(line):
                 heads[head[1]] = head[2]
             elif (entry := _LINE.fullmatch(line)) and entry[2] not in sha256:
