@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from labrig.errors import DiskError
-from labrig.text_table import table_text
 
 
 def write_text(path: Path, text: str) -> None:
@@ -32,6 +31,9 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
     DiskError
         The file cannot be written.
     """
+    # Not above: it loads NumPy, and who lists runs needs none.
+    from labrig.text_table import table_text
+
     write_text(path, table_text(head, rows))
 
 
