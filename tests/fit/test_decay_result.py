@@ -9,7 +9,6 @@ import pytest
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.results import with_uncertainty
 from tests.fit import truths
 
 DOUBLE = truths.exponentials((0.08, 1.0), (0.015, 0.4))
@@ -76,22 +75,6 @@ def test_table_shows_rates_with_their_sigma() -> None:
 def test_table_shows_the_offset_of_each_channel() -> None:
     (line,) = [x for x in str(_seen_fit(offset_sigma=[0.01, 0, 0.01])).splitlines() if "offs" in x]
     assert re.fullmatch(r"offsets  R -?[\d.]+\(\d+\), G 0, B -?[\d.]+\(\d+\)", line)
-
-
-@pytest.mark.parametrize(
-    ("value", "sigma", "text"),
-    [
-        (0.08021, 0.00131, "0.0802(13)"),
-        (12.53, 1.31, "12.5(1.3)"),
-        (10851.3, 172.0, "10850(170)"),
-        (0.5, 0.0, "0.5"),
-        (0.5, float("inf"), "0.5(?)"),
-        (0.0802, 0.000996, "0.0802(10)"),
-        (2.5e-10, 3.1e-12, "2.500(31)e-10"),
-    ],
-)
-def test_value_with_uncertainty(value: float, sigma: float, text: str) -> None:
-    assert with_uncertainty(value, sigma) == text
 
 
 def test_prediction_and_residuals_add_up_to_the_values() -> None:
