@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import curve_fit
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
@@ -235,3 +236,22 @@ def test_flicker_cannot_come_from_a_curve_through_all_bright_frames() -> None:
     values = np.where(np.arange(37) == 0, 1.0, 0.0)
     with pytest.raises(FitError, match="frames to spare"):
         fit_decay(T, values, 1e-6, flicker=None)
+
+
+def test_amplitude_at_lamp_off_is_as_uncertain_as_the_rate_that_leads_there() -> None:
+    """The first frame is three lifetimes after lamp off."""
+    t_s, k_per_s = 60.0 + 3.0 * np.arange(30), 0.05
+    sigma = np.full(30, 1e-3)
+    values = np.exp(-k_per_s * t_s) + sigma * np.random.default_rng(5).normal(size=30)
+
+    def signal(t_s: truths.FloatArray, k_per_s: float, amplitude: float) -> truths.FloatArray:
+        return amplitude * np.exp(-k_per_s * t_s)
+
+    best, covariance = curve_fit(
+        signal, t_s, values, p0=(0.05, 1.0), sigma=sigma, absolute_sigma=True
+    )
+    fit = fit_decay(t_s, values, sigma, n_states=1, flicker=0.0)
+    (state,) = fit.states
+    assert state.amplitude == pytest.approx(best[1], rel=1e-4)
+    assert state.amplitude_sigma == pytest.approx(np.sqrt(covariance[1, 1]), rel=0.02)
+    assert state.k_r_sigma_per_s == pytest.approx(np.sqrt(covariance[0, 0]), rel=0.02)
