@@ -38,7 +38,7 @@ def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path
 
 def bench(folder: Path, **simulation: Any) -> dict[str, Any]:
     """The content of that rig file; the LVF's is written into `folder`."""
-    content = shipped_rig("sim-phosphor", WIDTH, HEIGHT)
+    content = shipped_rig("sim-phosphor", 384, 64)
     content["simulation"] |= simulation
     for device in content["devices"].values():
         device.pop("warm_up", None)
