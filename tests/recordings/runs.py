@@ -78,7 +78,7 @@ class Recorded:
         (kept / "rig.yaml").write_text(rig, encoding="utf-8")
 
     def processed(self, into: Path) -> Path:
-        """The result folder of a copy of the kept run, or of the run recorded anew, below `into`."""
+        """The result folder of a copy of the kept run, or of it recorded anew, below `into`."""
         if self.has_frames:
             run = Path(shutil.copytree(self.folder / RUN, into / self.name))
         else:
@@ -102,7 +102,7 @@ def _kept(
     simulation: dict[str, Any],
     beside: Callable[[Path], tuple[str, ...]] = lambda folder: (),
 ) -> Recorded:
-    """A run on the shipped rig for phosphors, its room changed by `simulation`, kept with frames."""
+    """A run on the shipped rig for phosphors, its room changed, kept with its frames."""
 
     def recorded(into: Path) -> Path:
         def change(rig: dict[str, Any]) -> None:
