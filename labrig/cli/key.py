@@ -44,7 +44,7 @@ def show() -> None:
 def trust(
     file: Annotated[Path, typer.Argument(help="Public keys, or OpenSSH's allowed signers.")],
 ) -> None:
-    """Know the laboratories in a file of public keys by their names from now on.
+    """Accept the laboratories in a file of public keys by their names from now on.
 
     Compare the fingerprints with those that a laboratory itself has published.
     """
@@ -67,7 +67,7 @@ def key_file() -> Path:
     return Path(typer.get_app_dir("labrig")) / "seal_key"
 
 
-def known_signers() -> "Signers":
+def trusted_signers() -> "Signers":
     """Return the laboratories whose keys were trusted, and this one."""
     from labrig.seal import PUBLIC, Signers, read_signers
 

@@ -43,12 +43,12 @@ def verify(
     trust', by this PC's own key, and by --signers.
     """
     from labrig.catalogue import find_run
-    from labrig.cli.key import known_signers
+    from labrig.cli.key import trusted_signers
     from labrig.process import verify_run
     from labrig.seal import read_signers
 
     folder = find_run(run, runs)
-    accepted = known_signers() if signers is None else read_signers(signers)
+    accepted = trusted_signers() if signers is None else read_signers(signers)
     verification = verify_run(folder, accepted)
     if json:
         typer.echo(json_text.dumps(_content(folder, verification), ensure_ascii=False, indent=2))
@@ -115,7 +115,7 @@ def _content(folder: Path, verification: "Verification") -> dict[str, object]:
             "sealed": seal.files.sealed,
             "files": len(seal.files.sha256),
             "fingerprint": seal.signer.fingerprint,
-            "is_known": verification.signer is not None,
+            "is_trusted": verification.signer is not None,
             "signer": verification.signer,
             "calls_itself": seal.files.by,
             "journal": seal.files.journal,

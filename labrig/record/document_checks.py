@@ -1,4 +1,4 @@
-"""What documents of a journal have in common, by which an edited one stands out.
+"""Agreement of the documents of a journal with each other, by which an edited one stands out.
 
 A document repeats what others say: an event has the time at which it was written for each of its
 values and its number in its stream, a stop counts the events. Nobody but labrig writes journals.
@@ -83,9 +83,9 @@ def check_descriptor(doc: Mapping[str, Any]) -> None:
     """
     if doc["name"] not in VALUES:
         raise ValueError(f"'{doc['name']}' is no stream")
-    known = described(doc["name"])
+    expected = described(doc["name"])
     # An earlier labrig may have written fewer values.
-    if any(known.get(name) != value for name, value in dict(doc["data_keys"]).items()):
+    if any(expected.get(name) != value for name, value in dict(doc["data_keys"]).items()):
         raise ValueError(f"the values of {doc['name']} are described otherwise")
     if any(doc[key] != {} for key in _EMPTY):
         raise ValueError(f"{', '.join(_EMPTY)} are not empty")
@@ -135,7 +135,7 @@ def check_stop(doc: Mapping[str, Any], counts: Mapping[str, int]) -> None:
         raise ValueError(f"expected a status among {', '.join(_STATUSES)} and a reason")
     if not isinstance(doc["uid"], str) or not math.isfinite(doc["time"]):
         raise ValueError("'uid' or 'time' is of another kind")
-    told = dict(doc["num_events"])
-    for stream in (*counts, *told):
-        if (number := told.get(stream, 0)) != counts.get(stream, 0):
+    stated = dict(doc["num_events"])
+    for stream in (*counts, *stated):
+        if (number := stated.get(stream, 0)) != counts.get(stream, 0):
             raise ValueError(f"it counts {number} {stream}, there are {counts.get(stream, 0)}")

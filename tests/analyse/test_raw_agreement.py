@@ -34,7 +34,9 @@ DIAL = {1 / 60: 1 / 64, 30.0: 32.0, 1 / 125: 1 / 128, 0.3: 2 ** (-5 / 3), 1.0: 1
 
 def recorded(place: Path, body: str, **protocol: object) -> Path:
     place.mkdir()
-    write_small_rig(place / "rig.yaml", camera={"body": body})
+    rig = write_small_rig(place / "rig.yaml", camera={"body": body})
+    at_bulb = "driver: ptp_camera\n    longest_exposure: 64 s\n"
+    rig.write_text(rig.read_text().replace("driver: ptp_camera\n", at_bulb))
     keys = {"for": "30 s", "exposure": "1 s"} | protocol
     write_short_decay(place / "protocol.yaml", **keys)
     asked = [str(place / "protocol.yaml"), "--rig", str(place / "rig.yaml"), "--no-process"]
@@ -76,10 +78,17 @@ def rig_of(run: RunRecord) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("body", "exposure"), [("eos", "0.315 s"), ("standard", "1/60 s"), ("standard", "0.8 s")]
+    ("body", "keys"),
+    [
+        ("eos", {"exposure": "0.315 s"}),
+        ("eos", {"exposure": "64 s", "every": "70 s", "for": "5 min"}),
+        ("standard", {"exposure": "1/60 s"}),
+        ("standard", {"exposure": "0.8 s"}),
+    ],
+    ids=["dial", "bulb", "standard", "standard, labelled"],
 )
-def test_a_clean_run_agrees(tmp_path: Path, body: str, exposure: str) -> None:
-    run = labrig.read_run(recorded(tmp_path / "run", body, exposure=exposure))
+def test_a_clean_run_agrees(tmp_path: Path, body: str, keys: dict[str, object]) -> None:
+    run = labrig.read_run(recorded(tmp_path / "run", body, **keys))
     assert settings_differences(run, rig_of(run), run.frames("decay")) == {}
     assert clock_warnings(run) == ()
     require_recorded_settings(run, rig_of(run), Overrides())

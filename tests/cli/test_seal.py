@@ -76,7 +76,7 @@ def test_who_sealed_a_run_is_named_where_the_key_is_known(
     public = shutil.copy(settings / "seal_key.pub", tmp_path / "lab.pub")
     settings.rename(tmp_path / "elsewhere")
     code, said, seal = status(labrig, sealed)
-    assert (code, said, seal["is_known"], seal["calls_itself"]) == (0, "sealed", False, LAB)
+    assert (code, said, seal["is_trusted"], seal["calls_itself"]) == (0, "sealed", False, LAB)
     assert "unknown key" in labrig("verify", sealed).out
     assert status(labrig, sealed, "--signers", public)[2]["signer"] == LAB
     assert labrig("key", "trust", public).code == 0
