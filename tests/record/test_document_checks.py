@@ -1,8 +1,8 @@
 """Journals that were edited and chained anew: documents no longer agree with each other."""
 
-import copy
 import json
 from collections.abc import Callable
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -97,6 +97,10 @@ def test_an_event_does_not_end_before_it_begins_or_after_it_is_written(
         read_run(journal.parent)
 
 
+def without_or_twice(entries: list[Entry], *, number: int, twice: bool) -> list[Entry]:
+    return [*entries[: number + twice], *entries[number + (not twice) :]]
+
+
 def test_every_line_that_is_removed_or_doubled_is_noticed(journal: Path) -> None:
     sound = journal.read_text()
     lines = len(sound.splitlines())
@@ -104,13 +108,7 @@ def test_every_line_that_is_removed_or_doubled_is_noticed(journal: Path) -> None
     for number in range(lines):
         for doubled in (False, True):
             journal.write_text(sound)
-            edit(
-                journal,
-                lambda entries, n=number, again=doubled: [
-                    *entries[: n + again],
-                    *copy.deepcopy(entries[n + (not again) :]),
-                ],
-            )
+            edit(journal, partial(without_or_twice, number=number, twice=doubled))
             if number in ends and not doubled:
                 # A unit that was not committed is done again.
                 assert len(read_run(journal.parent).completed()) == 1
