@@ -114,7 +114,7 @@ def moment(
     """When a lamp is switched in an undisturbed run of a protocol, seconds after the epoch."""
 
     def find(protocol: Path, unit: str, action: str) -> float:
-        text = protocol.read_text()
+        text = protocol.read_text(encoding="utf-8")
         if text not in undisturbed:
             runs = tmp_path / "undisturbed"
             assert labrig("run", protocol, "--rig", rig(), "--runs", runs, "--no-process").code == 0
@@ -195,7 +195,8 @@ def test_a_fault_that_stays_ends_the_run_which_goes_on_when_it_is_mended(
         ({"camera_busy": {"at": "42 s", "for": "2.5 s"}}, "1 of 4 frames began late"),
         ({"disk_slow": {"takes": "3 s"}}, "the disk cannot keep up, it took up to 3 s for a frame"),
         ({"lamp_dead": {"at": "1 s", "for": "5 s"}}, ""),
-        ({"clock_back": {"at": "30 s"}}, ""),
+        ({"clock_back": {"at": "30 s"}}, "was set back by 1 h: times of day in this run go on"),
+        ({"clock_ahead": {"at": "30 s", "by": "90 s"}}, "was set ahead by 1 min 30 s"),
         ({"pc_asleep": {"at": "2 s"}}, "slept for 1 h (switch its energy saving off)"),
         ({"pc_asleep": {"at": "30 s", "for": "5 s"}}, "the unit decay-1 is done again"),
         ({"pc_asleep": {"at": "30 s", "for": "100 ms"}}, ""),

@@ -48,8 +48,9 @@ class DarkRoomScene:
                 write_fluorescent(folder / name, material)
         for name, light in self.lights.items():
             columns = np.column_stack([light.wavelength_nm, light.value])
+            head = "wavelength_nm,value"
             np.savetxt(
-                folder / name, columns, "%.9g", ",", header="wavelength_nm,value", comments=""
+                folder / name, columns, "%.9g", ",", header=head, comments="", encoding="utf-8"
             )
         path = folder / SCENE_FILE
         content = self.file.model_dump(mode="json", exclude_none=True)

@@ -126,7 +126,9 @@ def _write_readings(path: Path, fit: ChargeFit) -> None:
     readings = fit.readings
     columns = (readings.t_s, readings.values, readings.sigma, readings.light)
     header = "t_after_lamp_on_s,value,value_sigma,fit"
-    np.savetxt(path, np.transpose(columns), "%.9g", ",", header=header, comments="")
+    np.savetxt(
+        path, np.transpose(columns), "%.9g", ",", header=header, comments="", encoding="utf-8"
+    )
 
 
 def _material(table: Path, fit: ChargeFit) -> Material | None:

@@ -10,6 +10,7 @@ import pytest
 import serial
 
 from labrig.clock import VirtualClock
+from labrig.record import REAL_DISK
 from labrig.sim import OpenRoom, open_room
 from labrig.sim.disk import SimulatedDisk
 from labrig.sim.faults import AfterBytes, Slowness
@@ -91,7 +92,7 @@ def test_a_disk_fills_up_in_the_middle_of_a_write_until_room_is_made(
 ) -> None:
     clock = VirtualClock()
     full = AfterBytes.model_validate({"after_bytes": 250, "for": "10 s"})
-    disk = SimulatedDisk(clock, [full], [])
+    disk = SimulatedDisk(REAL_DISK, clock, [full], [])
     assert [write(disk, 100) for _ in range(4)] == [100, 100, 50, 0]
     clock.spend(10.0)
     assert write(disk, 100) == 100
@@ -99,7 +100,8 @@ def test_a_disk_fills_up_in_the_middle_of_a_write_until_room_is_made(
 
 def test_a_slow_disk_takes_its_time(write: Callable[..., int]) -> None:
     clock = VirtualClock()
-    disk = SimulatedDisk(clock, [], [Slowness.model_validate({"takes": "2 s", "for": "3 s"})])
+    slow = Slowness.model_validate({"takes": "2 s", "for": "3 s"})
+    disk = SimulatedDisk(REAL_DISK, clock, [], [slow])
     for expected_s in (2.0, 4.0, 4.0):
         assert write(disk, 100) == 100
         assert clock.now() == expected_s
