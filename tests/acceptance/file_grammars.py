@@ -166,8 +166,9 @@ def _write_exr(rng: random.Random, folder: Path) -> Path:
 
 def _numbers_of_matrix(path: Path) -> Iterator[object]:
     matrix = read_reradiation(path)
-    yield from (matrix.input_nm, matrix.output_nm, matrix.reradiation)
-    yield matrix.reflectance[~np.isnan(matrix.reflectance)]  # NaN: not measured
+    yield from (matrix.input_nm, matrix.output_nm)
+    for values in (matrix.reradiation, matrix.reflectance):
+        yield values[~np.isnan(values)]  # NaN: not measured
 
 
 def _numbers_of_camera(path: Path) -> Iterator[object]:

@@ -227,13 +227,12 @@ def read_linear_exr(path: Path) -> FloatArray:
             f"{path}: expected an OpenEXR image with the channels R, G and B, got another or a "
             "broken one"
         ) from None
-    xyz: FloatArray = linear.astype(np.float64) @ np.linalg.inv(XYZ_TO_SRGB).T
-    if n_broken := int((~np.isfinite(xyz)).any(axis=-1).sum()):
+    if n_broken := int((~np.isfinite(linear)).any(axis=-1).sum()):
         raise UsageError(
-            f"{path}: expected an image of numbers, got {n_broken} of {xyz[..., 0].size} pixels "
+            f"{path}: expected an image of numbers, got {n_broken} of {linear[..., 0].size} pixels "
             "that are infinite or no number; render it again"
         )
-    return xyz
+    return np.asarray(linear.astype(np.float64) @ np.linalg.inv(XYZ_TO_SRGB).T)
 
 
 def _linear_srgb(path: Path, xyz: FloatArray) -> dict[str, Pixels]:
