@@ -404,9 +404,8 @@ FIGURES = (
         figure.kills,
     ),
     Figure(
-        "An I/O error, a loss of power or a read-only disk at every thirtieth write, fsync, close, "
-        "rename … of a run and of the making of its result, 200 disks that are full after a random "
-        "number of bytes, 20 full tmpfs and 20 ext4 that turn read-only; the run is resumed",
+        "An I/O error or a loss of power at every third write, fsync, close, rename … of a run and "
+        "of the making of its result; the run is resumed",
         "disk_failures",
         figure.disk,
     ),
