@@ -107,7 +107,9 @@ def half_done(run: Path, runs: Path) -> Path:
 @contextmanager
 def served(*arguments: str) -> Iterator[str]:
     """Yield the address of a page that a command of labrig serves."""
-    with subprocess.Popen([*LABRIG, *arguments], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [*LABRIG, *arguments], stdout=subprocess.PIPE, encoding="utf-8"
+    ) as process:
         assert process.stdout is not None
         try:
             yield next(

@@ -17,6 +17,9 @@ from typing import Any
 CHECK_INTERVAL_S = 0.05
 #: Difference of clocks that means sleep; on a PC that is awake they agree much better.
 SLEPT_S = 0.3
+#: Steps of the time of day that are noticed, and how far two clocks of a PC may run apart; on
+#: Windows they do by 1e-4.
+STEP_S, DRIFT = 1.0, 3e-4
 #: A clock that includes sleep of the PC, and one that does not, by `sys.platform`.
 SLEEP_CLOCKS = {
     "linux": ("CLOCK_BOOTTIME", "CLOCK_MONOTONIC"),
@@ -50,6 +53,7 @@ class Clock(ABC):
         self._signum: int | None = None
         self._shields = 0
         self._slept_before_s: float | None = None
+        self._compared_s, self._ahead_s = 0.0, 0.0
 
     @abstractmethod
     def now(self) -> float:
@@ -59,6 +63,10 @@ class Clock(ABC):
     def slept_s(self) -> float:
         """Return for how many seconds the PC has slept since an arbitrary time, as far as known."""
 
+    def time_of_day(self) -> float:
+        """Return seconds since 1970 by the clock of the PC, which somebody may step."""
+        return self.wall()
+
     @abstractmethod
     def _pause_until(self, deadline_s: float) -> None:
         """Let time pass until `deadline_s`; an early return allows a check for interruptions."""
@@ -66,6 +74,16 @@ class Clock(ABC):
     def wall(self, at_s: float | None = None) -> float:
         """Return seconds since 1970 at `at_s` (default: now)."""
         return self.epoch_s + (self.now() if at_s is None else at_s)
+
+    def step_s(self) -> float:
+        """Return by how much the PC's time of day was set ahead since the last call; 0 if not.
+
+        Negative if it was set back. Neither `now` nor `wall` follow such a step.
+        """
+        now_s, ahead_s = self.now(), self.time_of_day() - self.wall()
+        step_s, lasted_s = ahead_s - self._ahead_s, now_s - self._compared_s
+        self._ahead_s, self._compared_s = ahead_s, now_s
+        return step_s if abs(step_s) > STEP_S + DRIFT * lasted_s else 0.0
 
     def sleep_until(self, deadline_s: float) -> None:
         """Wait until an absolute time; raise `Interrupted` if a stop was requested."""
@@ -136,6 +154,10 @@ class SystemClock(Clock):
     def __init__(self, platform: str = sys.platform) -> None:
         self._now, self._through_sleep, self._awake = _readings(platform)
         super().__init__(epoch_s=time.time() - self._now())
+        self._compared_s = self._now()
+
+    def time_of_day(self) -> float:
+        return time.time()
 
     def now(self) -> float:
         return self._now()

@@ -4,7 +4,11 @@ Every message states what was expected, what was received and what to do, in one
 line prints that line and ends with the class's exit code.
 """
 
+import errno
 from typing import ClassVar
+
+#: Messages of the loader of shared libraries that lacks memory.
+_LOADER_TEXTS = ("failed to map segment", "annot allocate memory", "cannot create shared object")
 
 
 class LabrigError(Exception):
@@ -62,3 +66,27 @@ class DiskError(LabrigError):
     """A disk that is full, too slow or gone."""
 
     exit_code = 5
+
+
+class MemoryShortageError(LabrigError):
+    """A PC that has too little memory left."""
+
+    exit_code = 5
+
+
+def memory_shortage(error: BaseException) -> MemoryShortageError:
+    """Return the error to raise for an allocation that failed, whose text says what was asked."""
+    asked = f" ({error})" if str(error) else ""
+    return MemoryShortageError(
+        f"this PC has too little memory left{asked}; close other programs, or use a PC with more "
+        "memory"
+    )
+
+
+def is_memory_shortage(error: BaseException) -> bool:
+    """Return whether an error is a lack of memory, also of the system's loader of libraries."""
+    if isinstance(error, OSError):
+        return error.errno == errno.ENOMEM
+    if isinstance(error, ImportError):
+        return any(text in str(error) for text in _LOADER_TEXTS)
+    return isinstance(error, MemoryError)

@@ -54,7 +54,11 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     """
     try:
         with open_regular(path) as file:
-            content = file.read(most_bytes + 1)
+            # A read allocates what it asks for: of a budget of 1 GB only what the file has.
+            size_bytes = min(os.fstat(file.fileno()).st_size, most_bytes)
+            content = file.read(size_bytes + 1)
+            if size_bytes < len(content) <= most_bytes:  # it grows, or the system does not know
+                content += file.read(most_bytes + 1 - len(content))
     except OSError as error:
         error_class = DiskError if error.errno in DISK_ERRORS else UsageError
         raise error_class(f"{path}: cannot be read ({error.strerror})") from None

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import parse_qs, urlsplit
 
-from labrig.errors import DiskError, LabrigError, UsageError
+from labrig.errors import DiskError, LabrigError, UsageError, memory_shortage
 
 LOOPBACK = "127.0.0.1"
 #: No content from other origins, and no embedding in another page.
@@ -158,6 +158,9 @@ class LocalConversation(BaseHTTPRequestHandler):
 
     def _confess(self, error: Exception) -> None:
         """Say that labrig is at fault: without an answer a page would take it for gone."""
+        if isinstance(error, MemoryError):
+            self.refuse(HTTPStatus.INSUFFICIENT_STORAGE, str(memory_shortage(error)))
+            return
         self.refuse(
             HTTPStatus.INTERNAL_SERVER_ERROR,
             f"a fault in labrig itself ({error!r:.200}); please report it",

@@ -3,18 +3,30 @@
 import errno
 import os
 from collections.abc import Sequence
-from typing import BinaryIO
+from typing import Any, BinaryIO, Protocol, cast
 
 from labrig.clock import VirtualClock
 
 from .faults import AfterBytes, Slowness
 
 
+class Disk(Protocol):
+    """Durable writing, as a bench without faults does it."""
+
+    def write(self, file: BinaryIO, data: bytes) -> None:
+        """Append to an unbuffered file and wait until the disk has it."""
+
+
 class SimulatedDisk:
-    """Durable writing to the real disk, limited by the faults.
+    """Durable writing by another disk, to whose files the faults happen.
+
+    The faults lie below the code that writes on a bench: a file on a full disk takes what still
+    fits and returns that number, as the system does, and fails at the next write.
 
     Parameters
     ----------
+    disk
+        Disk that writes.
     clock
         The room's clock.
     full
@@ -24,8 +36,13 @@ class SimulatedDisk:
     """
 
     def __init__(
-        self, clock: VirtualClock, full: Sequence[AfterBytes], slow: Sequence[Slowness]
+        self,
+        disk: Disk,
+        clock: VirtualClock,
+        full: Sequence[AfterBytes],
+        slow: Sequence[Slowness],
     ) -> None:
+        self._disk = disk
         self._clock = clock
         self._full = list(full)
         self._slow = slow
@@ -41,12 +58,16 @@ class SimulatedDisk:
         """
         now_s = self._clock.now()
         self._clock.spend(sum(slow.takes for slow in self._slow if slow.is_on(now_s)))
+        self._disk.write(cast("BinaryIO", _File(self, file)), data)
+
+    def write_once(self, file: BinaryIO, data: Any) -> int:
+        """Append what fits of the data, as one call of the system, and return its bytes."""
         fits = self._fits(len(data))
-        file.write(data[:fits])
-        os.fsync(file.fileno())
-        self._written_bytes += fits
-        if fits < len(data):
+        if fits == 0 < len(data):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        written_bytes = file.write(data[:fits])
+        self._written_bytes += written_bytes
+        return written_bytes
 
     def _fits(self, size: int) -> int:
         """Return how many of that number of bytes the disk has room for."""
@@ -59,3 +80,17 @@ class SimulatedDisk:
                 # From here on it is full until somebody makes room.
                 self._full[number] = fault.model_copy(update={"at": now_s, "after_bytes": None})
         return fits
+
+
+class _File:
+    """A file on the simulated disk: what durable writing asks of one."""
+
+    def __init__(self, disk: SimulatedDisk, file: BinaryIO) -> None:
+        self._disk = disk
+        self._file = file
+
+    def write(self, data: Any) -> int:
+        return self._disk.write_once(self._file, data)
+
+    def fileno(self) -> int:
+        return self._file.fileno()

@@ -122,6 +122,18 @@ class Skipped(FaultTime):
     name: str | None = None
 
 
+class OfBoard(FaultTime):
+    """A fault of one board.
+
+    Attributes
+    ----------
+    board
+        Board by the last part of its address, for example `servo` of `sim://room/servo`.
+    """
+
+    board: str
+
+
 class OfLed(FaultTime):
     """A fault of one LED.
 
@@ -164,6 +176,9 @@ class Fault(_Part):
     relays_unplugged
         The relay board's cable is pulled, and plugged in again. The board has its own power, so
         that the contacts stay as they are.
+    board_unplugged
+        The cable of any board is pulled, and plugged in again. The board has its own power, so that
+        whatever it holds stays as it is.
     relays_silent
         The relay board receives nothing and sends nothing.
     relays_echo_lost
@@ -207,10 +222,10 @@ class Fault(_Part):
         The disk takes its time for everything that is written durably.
     clock_ahead
         The PC's own clock is stepped ahead, by hand, by a time server or for the summer. A program
-        that is running keeps its own time; the next one starts with the new one.
+        that is running keeps its own time, and may notice; the next one starts with the new one.
     clock_back
-        The PC's own clock is stepped back. A program that is running keeps its own time; the next
-        one starts with the new one.
+        The PC's own clock is stepped back. A program that is running keeps its own time, and may
+        notice; the next one starts with the new one.
     pc_asleep
         The PC falls asleep and wakes up again: to save energy, or because its lid was closed.
     """
@@ -221,6 +236,7 @@ class Fault(_Part):
     relay_dead: FaultTime | None = None
     relay_welded: FaultTime | None = None
     relays_unplugged: FaultTime | None = None
+    board_unplugged: OfBoard | None = None
     relays_silent: FaultTime | None = None
     relays_echo_lost: FaultTime | None = None
     door_stuck: FaultTime | None = None

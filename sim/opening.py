@@ -27,7 +27,7 @@ from .boards.dc4100 import OUTPUTS
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
 from .clock import RoomClock
-from .disk import SimulatedDisk
+from .disk import Disk, SimulatedDisk
 from .faults import Fault, FaultTime, given
 from .room import Room
 from .simulation import Simulation
@@ -111,15 +111,19 @@ class OpenRoom:
         changer = ChangerBoard(self.room.tasks)
         for task in simulation.initial.manual_steps:
             changer.do(task)
+        pulled = given(fault.board_unplugged for fault in faults)
+
+        def pulls(board: str) -> tuple[FaultTime, ...]:
+            return tuple(pull for pull in pulled if pull.board == board)
+
         self.boards = {
-            "servo": SerialCable(servo, clock),
-            "changer": SerialCable(changer, clock),
-            **{name: SerialCable(board, clock) for name, board in selectors.items()},
+            name: SerialCable(board, clock, unplugged=pulls(name))
+            for name, board in {"servo": servo, "changer": changer, **selectors}.items()
         } | {
             name: SerialCable(
                 board,
                 clock,
-                unplugged=given(fault.relays_unplugged for fault in faults),
+                unplugged=(*given(fault.relays_unplugged for fault in faults), *pulls(name)),
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
@@ -147,10 +151,15 @@ class OpenRoom:
             silent=given(fault.spectrometer_silent for fault in faults),
             truncated=given(fault.spectrometer_truncated for fault in faults),
         )
-        self.disk = SimulatedDisk(
-            clock,
-            full=given(fault.disk_full for fault in faults),
-            slow=given(fault.disk_slow for fault in faults),
+        self._faults = faults
+
+    def failing(self, disk: Disk) -> SimulatedDisk:
+        """Return the PC's disk, which writes by another one and has the room's faults."""
+        return SimulatedDisk(
+            disk,
+            self.clock,
+            full=given(fault.disk_full for fault in self._faults),
+            slow=given(fault.disk_slow for fault in self._faults),
         )
 
     def usb(self, device: str) -> usb.backend.IBackend | None:
@@ -203,8 +212,13 @@ def open_room(
     ['arduino', 'changer', 'lcus', 'relays', 'servo'] 60.0
     """
     simulation = validate(content, Simulation, f"{source}, simulation").opened_at(not_before_s)
-    naps = given(fault.pc_asleep for fault in simulation.faults)
-    room = OpenRoom(simulation, RoomClock(simulation.wall_at_opening_s, naps))
+    clock = RoomClock(
+        simulation.wall_at_opening_s,
+        given(fault.pc_asleep for fault in simulation.faults),
+        given(fault.clock_ahead for fault in simulation.faults),
+        given(fault.clock_back for fault in simulation.faults),
+    )
+    room = OpenRoom(simulation, clock)
     protocol_sim.open_door(NAME, room)
     try:
         yield room

@@ -265,7 +265,7 @@ def write_small_rig(path: Path, base: str = "sim", **simulation: object) -> Path
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     content["simulation"] |= simulation
-    path.write_text(write_quickly(content))
+    path.write_text(write_quickly(content), encoding="utf-8")
     return path
 
 
@@ -288,7 +288,7 @@ def write_short_decay(path: Path, **keys: object) -> Path:
         "for": "60 s",
         "exposure": "1 s",
     } | keys
-    path.write_text(write_quickly(content))
+    path.write_text(write_quickly(content), encoding="utf-8")
     return path
 
 

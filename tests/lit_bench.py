@@ -75,7 +75,9 @@ class ListedRelay(NumatoRelay):
 
 def _listed_ports() -> list[ListPortInfo]:
     listed = []
-    for device, serial_number in json.loads(Path(os.environ[PORTS_FILE]).read_text()).items():
+    for device, serial_number in json.loads(
+        Path(os.environ[PORTS_FILE]).read_text(encoding="utf-8")
+    ).items():
         port = ListPortInfo(device)
         port.vid, port.pid, port.location = 0x2A19, 0x0C01, "1-1"
         port.serial_number = serial_number

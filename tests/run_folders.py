@@ -38,6 +38,6 @@ def lamp_is_on(stand: Bench) -> bool:
 
 
 def make_folder(protocol: Path, tmp_path: Path) -> Path:
-    texts = {"protocol.yaml": protocol.read_text(), "rig.yaml": ""}
+    texts = {"protocol.yaml": protocol.read_text(encoding="utf-8"), "rig.yaml": ""}
     with RunFolder.create(tmp_path / "runs", "test", 1_767_225_600.0, texts, seed=1) as folder:
         return folder.path

@@ -32,7 +32,7 @@ def rig(make_rig: Callable[..., Path]) -> Callable[..., Path]:
 
 
 def write_curve(path: Path, points: dict[float, float]) -> str:
-    with path.open("w", newline="") as file:
+    with path.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file).writerows([("wavelength_nm", "value"), *points.items()])
     return str(path)
 

@@ -162,6 +162,24 @@ def test_each_system_is_asked_how_long_it_slept(
     assert clock.wall() - before_wall == pytest.approx(3600.0)
 
 
+@pytest.mark.parametrize("by_s", [3600.0, -3600.0, 1.5])
+def test_a_step_of_the_time_of_day_is_noticed_once(
+    monkeypatch: pytest.MonkeyPatch, by_s: float
+) -> None:
+    clock, time_of_day = SystemClock(), time.time
+    assert clock.step_s() == 0.0
+    monkeypatch.setattr(time, "time", lambda: time_of_day() + by_s)
+    assert clock.step_s() == pytest.approx(by_s, abs=0.1)
+    assert clock.step_s() == 0.0
+
+
+def test_a_clock_that_is_adjusted_slowly_was_not_stepped(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, time_of_day = SystemClock(), time.time
+    for adjusted_s in (0.4, 0.8, 1.2, 1.6):
+        monkeypatch.setattr(time, "time", lambda by_s=adjusted_s: time_of_day() + by_s)
+        assert clock.step_s() == 0.0
+
+
 def test_a_system_that_does_not_tell_is_taken_to_be_awake() -> None:
     clock = SystemClock("plan9")
     began_s = clock.now()

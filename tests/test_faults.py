@@ -1,5 +1,6 @@
 """What happens on the bench when something fails: exit code, line, what is kept, the lamp."""
 
+import errno
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -14,10 +15,11 @@ import pytest
 import serial
 
 from labrig.acquire import LAMP, read_rig_file
+from labrig.acquire.rig import device_errors
 from labrig.bench import Bench, open_bench
 from labrig.cli.progress import PlainProgress
 from labrig.clock import SystemClock
-from labrig.record import RunRecord, read_run
+from labrig.record import PC_CLOCK, RunRecord, read_run
 from labrig.record.history import interruptions
 from labrig.record.journal import read_journal
 from labrig.sim.boards import SerialCable
@@ -114,7 +116,7 @@ def moment(
     """When a lamp is switched in an undisturbed run of a protocol, seconds after the epoch."""
 
     def find(protocol: Path, unit: str, action: str) -> float:
-        text = protocol.read_text()
+        text = protocol.read_text(encoding="utf-8")
         if text not in undisturbed:
             runs = tmp_path / "undisturbed"
             assert labrig("run", protocol, "--rig", rig(), "--runs", runs, "--no-process").code == 0
@@ -195,7 +197,8 @@ def test_a_fault_that_stays_ends_the_run_which_goes_on_when_it_is_mended(
         ({"camera_busy": {"at": "42 s", "for": "2.5 s"}}, "1 of 4 frames began late"),
         ({"disk_slow": {"takes": "3 s"}}, "the disk cannot keep up, it took up to 3 s for a frame"),
         ({"lamp_dead": {"at": "1 s", "for": "5 s"}}, ""),
-        ({"clock_back": {"at": "30 s"}}, ""),
+        ({"clock_back": {"at": "30 s"}}, "was set back by 1 h: times of day in this run go on"),
+        ({"clock_ahead": {"at": "30 s", "by": "90 s"}}, "was set ahead by 1 min 30 s"),
         ({"pc_asleep": {"at": "2 s"}}, "slept for 1 h (switch its energy saving off)"),
         ({"pc_asleep": {"at": "30 s", "for": "5 s"}}, "the unit decay-1 is done again"),
         ({"pc_asleep": {"at": "30 s", "for": "100 ms"}}, ""),
@@ -222,6 +225,53 @@ def test_a_fault_that_passes_costs_time_and_no_data(
     times = [doc["time"] for _, doc in read_journal(record.folder / "journal.jsonl").documents]
     assert times == sorted(times)
     assert not lamp_is_on(stands[-1])
+
+
+@pytest.mark.parametrize("error", [MemoryError("74 GB"), OSError(errno.ENOMEM, "no memory")])
+def test_lack_of_memory_with_the_lamp_on_ends_the_run_with_one_line(
+    labrig: Labrig,
+    rig: Make,
+    protocol: Path,
+    stands: list[Bench],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    error: Exception,
+) -> None:
+    doing = PlainProgress.doing
+
+    def short_of_memory(self: PlainProgress, what: str, until_s: float | None = None) -> None:
+        if "charging" in what:
+            assert lamp_is_on(stands[-1])
+            raise error
+        doing(self, what, until_s)
+
+    with monkeypatch.context() as while_charging:
+        while_charging.setattr(PlainProgress, "doing", short_of_memory)
+        runs = tmp_path / "runs"
+        ended = labrig("run", protocol, "--rig", rig(), "--runs", runs, "--no-process")
+    assert ended.code == 5, ended.err
+    assert "too little memory" in complaint(ended)
+    assert not lamp_is_on(stands[-1])
+    assert [attempt.exit_status for attempt in recorded(runs).attempts] == ["success", "fail"]
+    assert labrig("resume", recorded(runs).folder, "--no-process").code == 0
+
+
+def test_a_driver_that_lacks_memory_is_not_blamed() -> None:
+    with pytest.raises(MemoryError), device_errors("camera"):
+        raise MemoryError
+
+
+def test_a_step_of_the_clock_stands_in_the_result(
+    labrig: Labrig, rig: Make, protocol: Path, tmp_path: Path
+) -> None:
+    ahead = {"clock_ahead": {"at": "30 s", "by": "2 h"}}
+    ended = labrig("run", protocol, "--rig", rig(ahead), "--runs", tmp_path / "runs")
+    assert ended.code == 0, ended.err
+    record = recorded(tmp_path / "runs")
+    (step,) = [one for one in record.attempts[-1].actions if one.device == PC_CLOCK]
+    assert step.action == "set ahead by 2 h"
+    summary = (record.folder / "result" / "summary.txt").read_text(encoding="utf-8")
+    assert "set ahead by 2 h in decay-1" in summary
 
 
 def test_a_sleep_is_in_the_record_from_which_the_report_tells_it(

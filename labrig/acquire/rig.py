@@ -155,10 +155,10 @@ class Rig:
 
 @contextmanager
 def device_errors(key: str) -> Iterator[None]:
-    """Turn any exception of a driver, its own faults included, into a `DeviceError`."""
+    """Turn any exception of a driver but lack of memory, faults included, into a `DeviceError`."""
     try:
         yield
-    except LabrigError:
+    except (LabrigError, MemoryError):
         raise
     except Exception as error:
         raise DeviceError(f"{key}: its driver failed ({error!r})") from error

@@ -14,7 +14,10 @@ from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import Frame
 from labrig.clock import Clock
 from labrig.optics import SpectrometerReading
+from labrig.quantity import duration_text
 from labrig.record import (
+    CLOCK_STEPPED,
+    PC_CLOCK,
     UNDONE,
     ActionRecord,
     AttemptWriter,
@@ -152,6 +155,7 @@ def _run_remaining_units(
                 session.read_temperature()
                 unit.run(session)
                 session.read_temperature()
+            recorder.note_clock_step()
         except UndoManualStep:
             recorder.take_back()
             raise
@@ -212,6 +216,15 @@ class _Recorder:
     def last_manual_step(self) -> str | None:
         last = self._last_manual_step()
         return None if last is None else last.action
+
+    def note_clock_step(self) -> None:
+        """Record and tell that somebody stepped the PC's time of day, which `wall` ignores."""
+        step_s, now_s = self._clock.step_s(), self._clock.now()
+        if step_s:
+            direction = "ahead" if step_s > 0 else "back"
+            text = f"set {direction} by {duration_text(abs(step_s))}"
+            self.acted(PC_CLOCK, text, now_s, now_s, 0.0)
+            self._observer.warn(CLOCK_STEPPED.format(text))
 
     def take_back(self) -> None:
         """Record that the unit of the last manual step no longer counts, and abort this attempt."""

@@ -96,6 +96,7 @@ def _mac_programs() -> Iterable[Program]:
             ["/bin/ps", "-axo", "pid=,comm="],
             capture_output=True,
             text=True,
+            encoding="utf-8",
             errors="replace",
             timeout=_LISTING_S,
             check=True,

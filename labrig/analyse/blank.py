@@ -150,7 +150,7 @@ def analyse(part: Part) -> BlankResult:
         ambient_sigma_dn_per_s=tuple(leak_sigma.tolist()),
         first_clean_s=light.first_clean_s,
         source="measured with labrig, blank",
-        run=run.folder.resolve().name,
+        run=run.name,
     )
     return BlankResult(
         calibration=file,

@@ -103,7 +103,7 @@ def _reference(part: Part, picture: CardPicture | None, measured: set[str]) -> R
         temperature_c=round(float(np.mean(temperatures_c)), 2) if temperatures_c else None,
         picture=picture,
         source=f"{', '.join(sorted(measured))}, measured with labrig",
-        run=run.folder.resolve().name,
+        run=run.name,
     )
 
 

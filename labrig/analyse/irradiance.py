@@ -196,7 +196,7 @@ def _file_of_lights(
         illuminance_lux=part.protocol.illuminance_lux,
         illuminance_sigma_lux=_lux_sigma(part.protocol),
         source=f"grey card by itself and by selected lights in {card.rounds} rounds, with labrig",
-        run=part.run.folder.resolve().name,
+        run=part.run.name,
     )
 
 
@@ -302,7 +302,7 @@ def _file(
         illuminance_lux=part.protocol.illuminance_lux,
         illuminance_sigma_lux=_lux_sigma(part.protocol),
         source=f"grey card by itself and through the LVF in {card.rounds} rounds, with labrig",
-        run=part.run.folder.resolve().name,
+        run=part.run.name,
     )
 
 

@@ -157,7 +157,7 @@ def _patch(
         required=protocol.requirements,
         colours=protocol.colours,
         excitation=_text(excitation),
-        origin=part.run.folder.resolve().name,
+        origin=part.run.name,
     )
     last = int(np.searchsorted(counts.t_s, decay.visible_s.value if decay.visible_s else np.inf))
     last = min(last, len(light) - 1)

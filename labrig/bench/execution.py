@@ -35,6 +35,8 @@ from labrig.errors import (
     DiskError,
     LabrigError,
     ProtocolError,
+    is_memory_shortage,
+    memory_shortage,
 )
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
@@ -135,6 +137,13 @@ def execute(
             _close(folder, bench, "fail", str(error))
             error.args = (f"{error}; {_kept_summary(folder, units)}",)
             raise
+        except (MemoryError, ImportError, OSError) as error:
+            if not is_memory_shortage(error):
+                raise
+            shortage = memory_shortage(error)
+            _close(folder, bench, "fail", str(shortage))
+            shortage.args = (f"{shortage}; {_kept_summary(folder, units)}",)
+            raise shortage from None
 
 
 @dataclass

@@ -47,15 +47,18 @@ if TYPE_CHECKING:
 
 SERIAL_WRITE_TIMEOUT_S = 2.0
 TCP_CONNECT_TIMEOUT_S = 5.0
+#: Memory kept for the way to the safe state; the system gives it only once it is used.
+RESERVE_BYTES = 16_000_000
 #: What opening a serial port raises; pyserial says of some wrong addresses that they are no value.
 _NOT_OPENED: tuple[type[Exception], ...] = (*PORT_FAILURES, ValueError)
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig before its devices are opened: file, clock, simulated room, guard and ports.
+    """A rig before its devices are opened: file, clock, simulated room, guard, ports and disk.
 
-    Devices in `left_out`, keys of the rig file, are not opened.
+    Devices in `left_out`, keys of the rig file, are not opened. The disk is that of the PC to which
+    the rig is connected.
     """
 
     file: RigFile
@@ -65,6 +68,7 @@ class Bench:
     guard: Guard | None = None
     ports: SerialPorts = field(default_factory=SerialPorts)
     left_out: frozenset[str] = frozenset()
+    disk: Disk = REAL_DISK
 
     @property
     def guarded_by(self) -> str:
@@ -77,11 +81,6 @@ class Bench:
     def seed(self) -> int | None:
         """Seed of everything random in a simulated rig; `None` on a real bench."""
         return None if self.room is None else self.room.seed
-
-    @property
-    def disk(self) -> Disk:
-        """Disk of the PC to which the rig is connected."""
-        return REAL_DISK if self.room is None else self.room.disk
 
     def kept_awake(self, warn: Callable[[str], None]) -> AbstractContextManager[None]:
         """Keep the PC awake; not for a simulated room, whose time stops while the PC sleeps."""
@@ -112,6 +111,8 @@ class Bench:
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
             stack.callback(rig.disconnect)
             stack.callback(self._make_safe, rig)
+            # Freed first, so that lack of memory does not prevent the safe state.
+            stack.callback(bytearray(RESERVE_BYTES).clear)
             opened = [key for key in self.file.devices if key not in self.left_out]
             for key in in_safe_order(opened):
                 rig.connect(key, partial(_open, self.file, key, connections, self.source))
@@ -167,7 +168,7 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
     from labrig import sim  # a real bench has no need of the room's physics
 
     with sim.open_room(_room(file, source), source, not_before_s) as room:
-        yield Bench(file, source, room.clock, room)
+        yield Bench(file, source, room.clock, room, disk=room.failing(REAL_DISK))
 
 
 def wall_at_start(file: RigFile, source: str) -> float:

@@ -106,7 +106,7 @@ def read_summaries(runs: Path) -> list[RunSummary]:
     for name in (path.name for path in runs.iterdir()):
         if name in index and index[name].holds(f"{runs}/{name}"):
             entries[name] = lasting[name] = index[name]
-        elif (runs / name / PROTOCOL).is_file():
+        elif is_run(runs / name):
             now_s = clock.wall()
             with suppress(FileNotFoundError):  # it is being deleted
                 entries[name] = entry = _Entry.made_from(runs / name)
@@ -116,6 +116,14 @@ def read_summaries(runs: Path) -> list[RunSummary]:
         _write_index(runs, lasting)
     summaries = [entry.summary(runs / name).at_present() for name, entry in entries.items()]
     return sorted(summaries, key=lambda run: (run.made, run.folder.name))
+
+
+def is_run(folder: Path) -> bool:
+    """Return whether a folder is that of a run; one that another user keeps private is not."""
+    try:
+        return (folder / PROTOCOL).is_file()
+    except PermissionError:
+        return False
 
 
 def _stamp(path: str) -> Stamp:

@@ -6,7 +6,7 @@ from datetime import date, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from labrig.catalogue.index import PROTOCOL, read_summaries
+from labrig.catalogue.index import PROTOCOL, is_run, read_summaries
 from labrig.catalogue.run_summary import STATUSES, RunSummary
 from labrig.errors import UsageError
 from labrig.record import require_plain_folder, time_made
@@ -140,7 +140,7 @@ def _run_folders(runs: Path, beginning: str) -> Iterator[Path]:
     """Yield the run folders whose names begin so."""
     if runs.is_dir():
         for path in runs.iterdir():
-            if path.name.startswith(beginning) and (path / PROTOCOL).is_file():
+            if path.name.startswith(beginning) and is_run(path):
                 yield path
 
 

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 from labrig.cli.closed_pipe import DetachableStream
 from labrig.clock import Interrupted
-from labrig.errors import DiskError, LabrigError, UsageError
+from labrig.errors import (
+    DiskError,
+    LabrigError,
+    MemoryShortageError,
+    UsageError,
+    is_memory_shortage,
+    memory_shortage,
+)
 from labrig.readable_output import spelled
 from labrig.signals import STOP_SIGNALS, raise_interrupted
 
@@ -66,7 +73,7 @@ def _run(arguments: Sequence[str]) -> int:
 
     if any(_NO_TEXT.search(argument) for argument in arguments):
         encoding = sys.getfilesystemencoding()
-        remedy = "" if encoding == "utf-8" else f"; {_SET_LOCALE}"
+        remedy = "; rename what is not" if encoding == "utf-8" else f"; {_SET_LOCALE}"
         return _print_error(
             f"expected arguments in {encoding.upper()}, got {' '.join(map(ascii, arguments))}"
             f"{remedy}",
@@ -89,6 +96,8 @@ def _run(arguments: Sequence[str]) -> int:
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
+        if is_memory_shortage(error):
+            return _print_shortage(error)
         name = str(error.filename or "disk")[:MAX_SHOWN]
         kind = UsageError if error.errno == errno.ENAMETOOLONG else DiskError
         return _print_error(f"{name}: {error.strerror or error}", kind.exit_code)
@@ -97,6 +106,8 @@ def _run(arguments: Sequence[str]) -> int:
             return _print_error(_unwritable(error), UsageError.exit_code)
         return _print_error(_fault_message(error), 1)
     except Exception as error:
+        if is_memory_shortage(error):
+            return _print_shortage(error)
         return _print_error(_fault_message(error), 1)
     return 0
 
@@ -126,8 +137,9 @@ def _cannot_be_named(error: UnicodeEncodeError) -> bool:
 
 def _unwritable(error: UnicodeEncodeError) -> str:
     """Return that a path is no text, or that the locale has no such file names."""
-    name = spelled(error.object, "ascii").strip()[:MAX_SHOWN]
-    if _NO_TEXT.search(error.object):
+    # Of a long text with the name in it, the part before it that cannot be written.
+    name = spelled(error.object[max(error.end - MAX_SHOWN, 0) : error.end], "ascii").strip()
+    if error.encoding == "utf-8":
         return f"{name}: expected names of files and folders in UTF-8; rename what is not"
     return f"{name}: the locale has file names in {error.encoding} only; {_SET_LOCALE}"
 
@@ -142,6 +154,10 @@ def _fault_message(error: Exception) -> str:
     ) as file:
         traceback.print_exception(error, file=file)
     return f"a fault in labrig itself ({error!r}); please report it with {file.name}"
+
+
+def _print_shortage(error: Exception) -> int:
+    return _print_error(str(memory_shortage(error)), MemoryShortageError.exit_code)
 
 
 def _print_error(text: str, code: int) -> int:

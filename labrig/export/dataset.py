@@ -180,12 +180,13 @@ def _decay(result: DecayResult, attributes: Mapping[str, str]) -> "Dataset":
 
 def _attributes(folder: Path) -> dict[str, str]:
     """Return the attributes of the whole run from its journal."""
-    completed = read_run(folder).completed()
+    run = read_run(folder)
+    completed = run.completed()
     start = next(iter(completed.values())).start if completed else {}
     values = {
         key: start[key] for key in ("protocol", "sample", "rig", "labrig_version") if key in start
     }
-    return {"run": folder.resolve().name, **values, **start.get("devices", {})}
+    return {"run": run.name, **values, **start.get("devices", {})}
 
 
 def _measured(patches: Sequence[Series]) -> dict[str, Column]:

@@ -124,7 +124,7 @@ def _shipped_illuminants() -> dict[str, Spectrum]:
     with _ILLUMINANTS.open(encoding="utf-8") as lines:
         next(lines)
         names = next(lines).strip().split(",")[1:]
-        nm, *powers = np.loadtxt(lines, delimiter=",", unpack=True)
+        nm, *powers = np.loadtxt(lines, delimiter=",", unpack=True, encoding="utf-8")
     return {name: Spectrum(name, nm, power) for name, power in zip(names, powers, strict=True)}
 
 

@@ -335,7 +335,7 @@ def read_spectrometer_reading(path: str | os.PathLike[str]) -> SpectrometerReadi
         if "" in lines:
             raise ValueError("a line is empty")
         facts = _facts(lines[1])
-        table = np.loadtxt(lines[3:], delimiter=",", comments=None, ndmin=2)
+        table = np.loadtxt(lines[3:], delimiter=",", comments=None, ndmin=2, encoding="utf-8")
         return SpectrometerReading(table[:, 0], table[:, 1:].T, **facts)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise DataError(

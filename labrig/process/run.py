@@ -26,7 +26,7 @@ from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
 from labrig.process.verification import require_as_sealed
-from labrig.record import RunLock, read_run
+from labrig.record import CLOCK_STEPPED, PC_CLOCK, RunLock, RunRecord, read_run
 from labrig.report import (
     Rendered,
     Report,
@@ -203,6 +203,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
         *clock_warnings(run),
         *unknown_camera,
         *temperature_warnings(run, protocol.rate_frames),
+        *_clock_warnings(run),
     )
     result = replace(result, warnings=warnings)
 
@@ -286,6 +287,16 @@ def _render(result: RunResult, source: Source) -> Rendered:
     )
     more = tuple(replace(section, part=part) for section in about_run)
     return replace(rendered, sections=(*rendered.sections, *more))
+
+
+def _clock_warnings(run: RunRecord) -> tuple[str, ...]:
+    """Return a warning of each step of the PC's clock during the completed units of a run."""
+    return tuple(
+        CLOCK_STEPPED.format(f"{action.action} in {attempt.unit}")
+        for attempt in run.completed().values()
+        for action in attempt.actions
+        if action.device == PC_CLOCK
+    )
 
 
 def _without_warnings(text: str, warnings: Sequence[str]) -> str:

@@ -8,6 +8,8 @@ from .checksums import (
     discard_cache as discard_cache,
 )
 from .frames import (
+    CLOCK_STEPPED as CLOCK_STEPPED,
+    PC_CLOCK as PC_CLOCK,
     PERSON as PERSON,
     UNDONE as UNDONE,
     ActionRecord as ActionRecord,

@@ -108,6 +108,12 @@ FileRecord = FrameRecord | SpectrumRecord
 #: Devices of a person's actions: a step done by hand, and the undoing of a unit that was done
 #: wrongly.
 PERSON, UNDONE = "person", "taken back"
+#: Device of a step of the PC's time of day, and the warning of one.
+PC_CLOCK = "clock of the PC"
+CLOCK_STEPPED = (
+    "the clock of this PC was {}: times of day in this run go on by the clock as it was before, "
+    "durations are right"
+)
 
 
 def unit_in(part: str, unit: str) -> str:
@@ -172,7 +178,7 @@ class ActionRecord:
     unit
         Name of the unit.
     device
-        Key of the device, `PERSON`, `UNDONE`, or `protocol` for a choice.
+        Key of the device, `PERSON`, `UNDONE`, `PC_CLOCK`, or `protocol` for a choice.
     action
         Action as text.
     start_time, end_time

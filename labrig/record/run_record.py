@@ -107,8 +107,8 @@ class RunRecord:
 
     @property
     def name(self) -> str:
-        """Name of the run folder, with links resolved."""
-        return self.folder.resolve().name
+        """Name of the run folder, with links resolved; bytes that are not UTF-8 are replaced."""
+        return os.fsencode(self.folder.resolve().name).decode(errors="replace")
 
     @property
     def camera_identity(self) -> str:

@@ -137,6 +137,8 @@ def read_exif(source: bytes | BinaryIO) -> Exif:
     try:
         file = io.BytesIO(source) if isinstance(source, bytes) else source
         tags: dict[str, Any] = exifread.process_file(file, details=False)
+    except MemoryError:
+        raise
     except Exception:  # a damaged file can fail anywhere in exifread, with any exception
         return Exif()
     time_s, time_step_s = _time(tags)
@@ -432,8 +434,10 @@ def _decode(content: bytes) -> RawFrame:
                 mosaic, sensor = _mosaic_and_sensor(raw, rawpy.RawType.Flat, content, exif)
             # LibRaw's own copy of the pixels is freed before more memory is taken.
             return _frame(mosaic, sensor, exif)
-        except FrameError:
+        except (FrameError, MemoryError):
             raise
+        except rawpy.LibRawUnsufficientMemoryError:
+            raise MemoryError(f"a frame of {len(content) / 1e6:.3g} MB") from None
         except (rawpy.LibRawIOError, rawpy.LibRawFileUnsupportedError):
             raise FrameError(
                 f"{_EXPECTED}, got one that is cut off or that LibRaw cannot unpack; transfer it "

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 import cv2
 
-from labrig.errors import LabrigError
+from labrig.errors import LabrigError, memory_shortage
 from labrig.reduce.decoding import reduced_text
 
 _STDOUT, _STDERR = 1, 2
@@ -52,6 +52,8 @@ def _answer(paths: list[Path], reduction: Any) -> str | Exception:
         return reduced_text(paths, reduction)
     except LabrigError as error:
         return error
+    except MemoryError as error:
+        return memory_shortage(error)
     except Exception:  # a defect: the process that asked raises it
         return RuntimeError(traceback.format_exc())
 

@@ -95,6 +95,8 @@ def _orientation(content: bytes) -> Finding:
     logging.getLogger("exifread").setLevel(logging.CRITICAL)
     try:
         tags: dict[str, Any] = exifread.process_file(io.BytesIO(content), details=False)
+    except MemoryError:
+        raise
     except Exception:  # damaged EXIF fails in any way
         return Finding(
             "warn",
@@ -270,6 +272,8 @@ def _checked(key: str, device: Device, context: ExerciseContext) -> DeviceReport
                 findings=(*report.findings, *outcome.findings),
                 suggestions=outcome.suggestions,
             )
+    except MemoryError:
+        raise
     except LabrigError as error:
         report = replace(report, failure=str(error))
     except Exception as error:  # a fault of a driver must not hide what the others do

@@ -1,30 +1,36 @@
 """An I/O error at every write, fsync, close, rename … of a run: what was acknowledged is kept.
 
-    python -m tests.acceptance.disk_failures [--every 1] [--kind lost|done|dead] [--keep DIR]
+    python -m tests.acceptance.disk_failures [--every 1] [--bytes 100] [--mounted 20]
+        [--kind lost|done|dead|read-only|full] [--keep DIR]
 
 A short decay is recorded, and processed, in a process whose disk fails at the n-th call that
 changes something in the run folder; n goes from the first call to the last. `failing_disk.c` says
-in which ways it fails. Then the power goes, and `labrig resume` (or, for a result, `labrig
-process`) is started on a sound disk. Wanted: exit code 5 and one line, or 0 where the failure was
-of no account; then exit code 0, all units complete, all that was acknowledged as it was, and no
-more than one unit done twice. Needs Linux and a C compiler.
+in which ways it fails; it is full after a random number of bytes, of which there are `--bytes`.
+With `--mounted`, for root alone, disks of the system itself fail: a tmpfs that somebody else fills
+but for a random number of pages, and an ext4 that turns read-only at a random write. Then the power
+goes, and `labrig resume` (or, for a result, `labrig process`) is started on a sound disk. Wanted:
+exit code 5 and one line, or 0 where the failure was of no account; then exit code 0, all units
+complete, all that was acknowledged as it was, and no more than one unit done twice. Needs Linux and
+a C compiler.
 """
 
 import argparse
 import ctypes
 import os
+import random
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from hashlib import sha256
 from io import StringIO
 from pathlib import Path
+from typing import BinaryIO
 
 import yaml
 
@@ -32,9 +38,15 @@ from labrig import resources
 from labrig.cli.exit_codes import guarded
 from labrig.errors import LabrigError
 from labrig.record import read_run
+from labrig.record.journal import RealDisk
 from tests.forked import forked
 
-KINDS = {"lost": 0, "done": 1, "dead": 2}
+KINDS = {"lost": 0, "done": 1, "dead": 2, "read-only": 3, "full": 4}
+#: Disks of the system that fail, with `--mounted`.
+MOUNTED = "tmpfs full", "ext4 read-only"
+DISK_BYTES, PAGE_BYTES = 24_000_000, 4096
+#: Frames and journal lines of the run, about.
+WRITES = 80
 PROTOCOL = {
     "protocol": "decay",
     "sample": {"name": "test"},
@@ -49,11 +61,12 @@ _ACKNOWLEDGED = re.compile(r"frame \d+ of \d+: ")
 
 @dataclass(frozen=True)
 class Ended:
-    """End of a process: exit code, messages, and its number of changes on the disk."""
+    """End of a process: exit code, messages, and its changes of the disk, by calls and bytes."""
 
     code: int
     lines: list[str]
     calls: int
+    written_bytes: int
 
     @property
     def complaints(self) -> list[str]:
@@ -85,8 +98,8 @@ class Bench:
     rig: Path
     units: list[str]
     run: Path
-    recording_calls: int
-    processing_calls: int
+    recording: Ended
+    processing: Ended
 
     @classmethod
     def set_up(cls, folder: Path) -> "Bench":
@@ -111,12 +124,12 @@ class Bench:
         if (recording.code, processing.code) != (0, 0):
             sys.exit(f"on a sound disk: {recording}, {processing}")
         units = list(read_run(run).completed())
-        return cls(protocol, rig, units, run, recording.calls, processing.calls)
+        return cls(protocol, rig, units, run, recording, processing)
 
 
 def record(bench: Bench, place: Path, kind: str, at: int, tally: Tally) -> None:
-    """One run whose disk fails at one call, resumed on a sound one."""
-    place.mkdir()
+    """One run whose disk fails at one call or byte, resumed on a sound one."""
+    place.mkdir(exist_ok=True)
 
     def require(right: bool, what: str) -> None:
         if not right:
@@ -129,6 +142,8 @@ def record(bench: Bench, place: Path, kind: str, at: int, tally: Tally) -> None:
     tally.codes[ended.code] += 1
     tally.acknowledged += ended.acknowledged
     _judge(ended, require)
+    if kind in MOUNTED:
+        _mend(place, kind)
     found = [path.parent for path in runs.glob("*/protocol.yaml")]
     kept = {}
     if found and (found[0] / "journal.jsonl").is_file():
@@ -174,8 +189,8 @@ def process(bench: Bench, place: Path, kind: str, at: int, tally: Tally) -> None
 def _judge(ended: Ended, require: Callable[[bool, str], None]) -> None:
     said = ended.complaints
     require(ended.code in (0, 5), f"exit code {ended.code}, {said}")
-    warnings = [line for line in said if line.startswith("warning:")]
-    require(len(said) - len(warnings) == (ended.code != 0), f"exit code {ended.code}, {said}")
+    errors = [line for line in said if not line.startswith(("warning:", "note:"))]
+    require(len(errors) == (ended.code != 0), f"exit code {ended.code}, {said}")
 
 
 def _intact(run: Path) -> int:
@@ -193,27 +208,86 @@ def labrig(arguments: Sequence[object], place: Path, kind: str = "lost", at: int
 
     def run() -> int:
         disk = ctypes.CDLL(None)
-        disk.arm(str(place).encode(), ctypes.c_long(at), KINDS[kind])
+        disk.arm(str(place).encode(), ctypes.c_long(at if kind in KINDS else 0), KINDS.get(kind, 0))
+        if kind in MOUNTED and at:
+            _fail_at_write(place, kind, at)
         code = guarded([str(argument) for argument in arguments])
-        told.write_text(str(disk.cut_power()))
+        told.write_text(f"{disk.cut_power()} {disk.written_bytes()}")
         return code
 
     _, status = os.waitpid(forked(run, said), 0)
+    calls, written_bytes = map(int, told.read_text().split())
     lines = said.read_text().splitlines()
-    return Ended(os.waitstatus_to_exitcode(status), lines, int(told.read_text()))
+    return Ended(os.waitstatus_to_exitcode(status), lines, calls, written_bytes)
 
 
-def campaign(folder: Path, kinds: Sequence[str], every: int) -> dict[str, Tally]:
+def _fail_at_write(place: Path, kind: str, at: int) -> None:
+    """Have the mounted disk fail: full but for `at` bytes, or read-only at the `at`-th write."""
+    whole, writes = RealDisk.write, 0
+
+    def write(disk: RealDisk, file: BinaryIO, data: bytes) -> None:
+        nonlocal writes
+        writes += 1
+        if kind == "tmpfs full" and writes == 1:
+            left_bytes = shutil.disk_usage(place).free - at
+            (place / "of somebody else").write_bytes(bytes(left_bytes))
+        elif kind == "ext4 read-only" and writes == at:
+            _mount("-o", "remount,abort", place)
+        whole(disk, file, data)
+
+    RealDisk.write = write  # type: ignore[method-assign]
+
+
+@contextmanager
+def _mounted(place: Path, kind: str) -> Iterator[None]:
+    """Mount an empty disk of a kind at `place`."""
+    place.mkdir()
+    if kind == "tmpfs full":
+        _mount("-t", "tmpfs", "-o", f"size={DISK_BYTES}", "none", place)
+    else:
+        image = place.with_suffix(".img")
+        with image.open("wb") as file:
+            file.truncate(DISK_BYTES)
+        subprocess.run(["mkfs.ext4", "-q", image], check=True)
+        _mount("-o", "loop,errors=remount-ro", image, place)
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", place], check=True)
+
+
+def _mend(place: Path, kind: str) -> None:
+    """Make room, or have the file system checked and mounted again."""
+    if kind == "tmpfs full":
+        (place / "of somebody else").unlink(missing_ok=True)
+        return
+    image = place.with_suffix(".img")
+    subprocess.run(["umount", place], check=True)
+    subprocess.run(["e2fsck", "-fy", image], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _mount("-o", "loop,errors=remount-ro", image, place)
+
+
+def _mount(*arguments: str | Path) -> None:
+    subprocess.run(["mount", *arguments], check=True)
+
+
+def campaign(
+    folder: Path, kinds: Sequence[str], every: int, n_bytes: int, n_mounted: int
+) -> dict[str, Tally]:
     """All trials; each in a folder of its own, which goes if all was well."""
     bench = Bench.set_up(folder / "bench")
     tallies: dict[str, Tally] = {}
-    for what, trial, calls in (
-        ("run", record, bench.recording_calls),
-        ("result", process, bench.processing_calls),
+    rng = random.Random("disk failures")
+    for what, trial, peace in (
+        ("run", record, bench.recording),
+        ("result", process, bench.processing),
     ):
         for kind in kinds:
             tally = tallies[f"{what}, {kind}"] = Tally()
-            for at in range(1, calls + 1, every):
+            moments = range(1, peace.calls + 1, every)
+            if kind == "full":
+                moments = sorted(rng.sample(range(1, peace.written_bytes), n_bytes))
+            for at in moments:
                 place, wrong = folder / f"{what}-{kind}-{at}", len(tally.wrong)
                 try:
                     trial(bench, place, kind, at, tally)
@@ -221,6 +295,15 @@ def campaign(folder: Path, kinds: Sequence[str], every: int) -> dict[str, Tally]
                     tally.wrong.append(f"{place.name}: {error!r}")
                 if len(tally.wrong) == wrong:
                     shutil.rmtree(place)
+    for kind in MOUNTED if n_mounted else ():
+        tally = tallies[f"run, {kind}"] = Tally()
+        for number in range(n_mounted):
+            at = rng.randint(1, WRITES)
+            if kind == "tmpfs full":
+                at = rng.randint(PAGE_BYTES, bench.recording.written_bytes)
+            place = folder / f"{kind} {number}".replace(" ", "-")
+            with _mounted(place, kind):
+                record(bench, place, kind, at, tally)
     return tallies
 
 
@@ -228,20 +311,24 @@ def main() -> None:
     """Print a table: what came of the failures, by what was done and how it failed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--every", type=int, default=1, help="only every so manieth call")
+    parser.add_argument("--bytes", type=int, default=20, help="full disks, of a run and a result")
+    parser.add_argument("--mounted", type=int, default=0, help="disks of each kind; needs root")
     parser.add_argument("--kind", choices=KINDS, action="append")
     parser.add_argument("--keep", type=Path, help="where trials that went wrong stay")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         _preload(Path(scratch))
         place = asked.keep or Path(scratch)
-        tallies = campaign(place.resolve(), asked.kind or list(KINDS), asked.every)
+        tallies = campaign(
+            place.resolve(), asked.kind or list(KINDS), asked.every, asked.bytes, asked.mounted
+        )
     print(
-        f"{'failed':14}{'calls':>6}{'frames kept':>13}{'units redone':>14}{'wrong':>7}  exit codes"
+        f"{'failed':20}{'calls':>6}{'frames kept':>13}{'units redone':>14}{'wrong':>7}  exit codes"
     )
     for name, tally in tallies.items():
         codes = ", ".join(f"{code}: {count}" for code, count in sorted(tally.codes.items()))
         print(
-            f"{name:14}{tally.trials:6}{tally.acknowledged:13}{tally.redone:14}"
+            f"{name:20}{tally.trials:6}{tally.acknowledged:13}{tally.redone:14}"
             f"{len(tally.wrong):7}  {codes}"
         )
     wrong = [said for tally in tallies.values() for said in tally.wrong]

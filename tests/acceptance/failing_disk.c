@@ -7,6 +7,8 @@
  *       has it, and are zeros after the power cut at the end, if nobody wrote there again.
  * DONE: it fails, although all of it was done.
  * DEAD: as LOST, and every later call fails, too.
+ * READ_ONLY: as DEAD, with EROFS, as a file system that has found an error of its own.
+ * FULL: the disk has room for `fail_at` bytes more; a write takes what fits, the next ones get ENOSPC.
  */
 
 #define _GNU_SOURCE
@@ -21,11 +23,11 @@
 #include <sys/types.h>
 #include <unistd.h>
 
-enum { LOST, DONE, DEAD };
+enum { LOST, DONE, DEAD, READ_ONLY, FULL };
 enum { MOST_FILES = 1024, MOST_CUTS = 64 };
 
 static char folder[PATH_MAX];
-static long fail_at, calls;
+static long fail_at, calls, written;
 static int kind;
 
 /* Of each open file: whether it is written to, how much of it the disk has, and the bytes that a failed fsync has dropped. */
@@ -65,17 +67,24 @@ static off_t size_of(int fd) {
 /* Whether this call, the next one that changes something, is to fail. */
 static int fails(void) {
     calls++;
-    return fail_at && (kind == DEAD ? calls >= fail_at : calls == fail_at);
+    if (!fail_at || kind == FULL) return 0;
+    return kind == DEAD || kind == READ_ONLY ? calls >= fail_at : calls == fail_at;
 }
 
 static int failed(void) {
-    errno = EIO;
+    errno = kind == READ_ONLY ? EROFS : kind == FULL ? ENOSPC : EIO;
     return -1;
+}
+
+/* How much of a write there is room for. */
+static size_t fitting(size_t size) {
+    if (!fail_at || kind != FULL || written + (long)size <= fail_at) return size;
+    return written < fail_at ? fail_at - written : 0;
 }
 
 void arm(const char *where, long at, int how) {
     snprintf(folder, sizeof folder, "%s", where);
-    fail_at = at, kind = how, calls = 0, cut_count = 0;
+    fail_at = at, kind = how, calls = 0, cut_count = 0, written = 0;
     for (int fd = 0; fd < MOST_FILES; fd++) lost_from[fd] = -1;
 }
 
@@ -92,6 +101,9 @@ long cut_power(void) {
     }
     return calls;
 }
+
+/* How many bytes were written since it was armed. */
+long written_bytes(void) { return written; }
 
 static void note_lost(int fd) {
     if (lost_from[fd] < 0 || cut_count == MOST_CUTS || !path_of(fd, cuts[cut_count].path)) return;
@@ -141,15 +153,20 @@ ssize_t write(int fd, const void *data, size_t size) {
     int ours = file_below(fd), fail = ours && fails();
     if (fail && kind != DONE) return failed();
     off_t from = ours ? size_of(fd) : 0; /* labrig appends; a result's files are made anew */
-    ssize_t done = REAL(write)(fd, data, size);
-    if (ours) written_again(fd, from);
+    size_t fits = ours ? fitting(size) : size;
+    if (!fits && size) return failed();
+    ssize_t done = REAL(write)(fd, data, fits);
+    if (ours) written_again(fd, from), written += done;
     return fail ? failed() : done;
 }
 
 ssize_t pwrite(int fd, const void *data, size_t size, off_t at) {
-    int fail = file_below(fd) && fails();
+    int ours = file_below(fd), fail = ours && fails();
     if (fail && kind != DONE) return failed();
-    ssize_t done = REAL(pwrite)(fd, data, size, at);
+    size_t fits = ours ? fitting(size) : size;
+    if (!fits && size) return failed();
+    ssize_t done = REAL(pwrite)(fd, data, fits, at);
+    if (ours) written += done;
     return fail ? failed() : done;
 }
 

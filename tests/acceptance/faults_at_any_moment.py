@@ -299,7 +299,7 @@ def _run(arguments: list[str], report: Path, stop: Stop | None) -> int:
     def tell() -> None:
         rooms = [stand.room.room for stand in stands if stand.room is not None]
         lamp_on = any(room.lamp_on for room in rooms)
-        report.write_text(json.dumps({"lamp_on": lamp_on, "calls": calls}))
+        report.write_text(json.dumps({"lamp_on": lamp_on, "calls": calls}), encoding="utf-8")
 
     def counted(clock: VirtualClock) -> float:
         nonlocal calls

@@ -281,7 +281,9 @@ def kills(printed: str) -> str:
 
 
 def disk(printed: str) -> str:
-    failures, frames, wrong = columns(r"^(?:run|result), \w+ +(\d+) +(\d+) +\d+ +(\d+) ", printed)
+    failures, frames, wrong = columns(
+        r"^(?:run|result), [\w -]+? +(\d+) +(\d+) +\d+ +(\d+) ", printed
+    )
     return (
         f"{sum(wrong):.0f} of {sum(failures):.0f} wrong (run not usable, an acknowledged frame of "
         f"{sum(frames):.0f} lost, more than one unit done again)"

@@ -41,11 +41,11 @@ def furthest_in_sigma(some: Figures, others: Figures) -> tuple[int, float, str]:
 
 def _read(path: Path) -> Any:
     if path.suffix == ".json":
-        return json.loads(path.read_text())
+        return json.loads(path.read_text(encoding="utf-8"))
     if path.suffix == ".yaml":
         return read_yaml(path)
     if path.suffix == ".csv":
-        with path.open(newline="") as file:
+        with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
         return {key: [_number(row[key]) for row in rows] for key in rows[0]}
     return {}

@@ -13,12 +13,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from labrig.bench import Bench, open_bench, recording
 from labrig.cli.exit_codes import guarded
+from tests.forked import forked
 
 LOOK_S = 0.002
 #: Begins of lines of progress, and of those that tell of no failure.
@@ -64,6 +65,29 @@ class Labrig:
         return dict(json.loads(self._bench.read_text())) if self._bench.exists() else {}
 
 
+@dataclass(frozen=True)
+class Ended:
+    """End of a process: exit code, messages beside progress and remarks, and the room it left."""
+
+    code: int
+    complaints: list[str]
+    bench: dict[str, Any]
+
+
+def forked_labrig(folder: Path, arguments: Sequence[object]) -> Ended:
+    """`labrig ARGUMENTS` in a child of this process, which begins at once."""
+    bench, err = folder / "bench.json", folder / "stderr.txt"
+    bench.unlink(missing_ok=True)
+    told = json.dumps({"bench": str(bench), "dies_at_byte": None})
+    _, status = os.waitpid(forked(lambda: _child(told, [*map(str, arguments)]), err), 0)
+    lines = err.read_text(encoding="utf-8").splitlines()
+    return Ended(
+        os.waitstatus_to_exitcode(status),
+        [line for line in lines if not line.startswith(REMARKS)],
+        dict(json.loads(bench.read_text(encoding="utf-8"))) if bench.exists() else {},
+    )
+
+
 def _child(told: str, arguments: list[str]) -> int:
     """`labrig ARGUMENTS`, whose room is looked at in the end; it may die in mid-write."""
     settings = json.loads(told)
@@ -74,11 +98,11 @@ def _child(told: str, arguments: list[str]) -> int:
         with open_bench(*arguments, **keys) as stand:
             assert stand.room is not None
             if left_bytes is not None:
-                _die_writing(stand.room.disk, left_bytes)
+                _die_writing(stand.disk, left_bytes)
             try:
                 yield stand
             finally:
-                bench.write_text(json.dumps(_left(stand)))
+                bench.write_text(json.dumps(_left(stand)), encoding="utf-8")
 
     recording.open_bench = looked_at  # type: ignore[attr-defined]
     return guarded(arguments)

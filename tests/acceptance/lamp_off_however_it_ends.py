@@ -139,7 +139,9 @@ def _off_after(bench: LitBench, began_s: float) -> float:
 
 
 def _children(pid: int) -> list[int]:
-    return [int(n) for n in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return [
+        int(n) for n in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
+    ]
 
 
 def _killed(**keys: Any) -> Callable[[LitBench, random.Random], tuple[float, str]]:

@@ -91,7 +91,10 @@ def test_one_is_lit_at_a_time_recorded_and_read_back(rig: Path, tmp_path: Path) 
 def test_a_lamp_that_is_not_there_and_another_driver_are_named(rig: Path) -> None:
     with pytest.raises(ProtocolError, match="a lamp 'dya', which the rig has not; did you mean"):
         plan(Lit(protocol="lit", lamps=("dya",)), read_rig_file(rig), str(rig))
-    rig.write_text(rig.read_text().replace("numato_lamp_bank", "numato_relay"))
+    rig.write_text(
+        rig.read_text(encoding="utf-8").replace("numato_lamp_bank", "numato_relay"),
+        encoding="utf-8",
+    )
     with pytest.raises(UsageError, match="'numato_relay' is no bank of lamps"):
         plan(Lit(protocol="lit"), read_rig_file(rig), str(rig))
 
@@ -106,10 +109,10 @@ def test_a_lamp_that_is_not_there_and_another_driver_are_named(rig: Path) -> Non
 def test_a_bank_of_the_other_kind_is_refused(
     rig: Path, key: str, driver: str, keys: dict[str, Any], said: str
 ) -> None:
-    content = read_quickly(rig.read_text())
+    content = read_quickly(rig.read_text(encoding="utf-8"))
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     content["devices"][key] = {"driver": driver, "address": "COM3"} | keys
-    rig.write_text(write_quickly(content))
+    rig.write_text(write_quickly(content), encoding="utf-8")
     with pytest.raises(UsageError, match=f"the driver '{driver}' {said}") as caught:
         plan(Lit(protocol="lit"), read_rig_file(rig), str(rig))
     assert "\n" not in str(caught.value)
@@ -124,10 +127,10 @@ def test_a_bank_of_the_other_kind_is_refused(
     ],
 )
 def test_bad_keys_of_a_bank_are_one_clear_line(rig: Path, lamps: object, said: str) -> None:
-    content = read_quickly(rig.read_text())
+    content = read_quickly(rig.read_text(encoding="utf-8"))
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     content["devices"]["illuminants"]["lamps"] = lamps
-    rig.write_text(write_quickly(content))
+    rig.write_text(write_quickly(content), encoding="utf-8")
     with pytest.raises(UsageError, match=said) as caught:
         plan(Lit(protocol="lit", lamps=("a",)), read_rig_file(rig), str(rig))
     assert "\n" not in str(caught.value)
@@ -149,10 +152,10 @@ def test_the_light_is_that_of_file_illuminant_or_band_behind_its_filter(rig: Pat
 
 
 def test_nothing_known_of_a_lamp_and_no_bank_are_one_clear_line(rig: Path, make_rig: Make) -> None:
-    content = read_quickly(rig.read_text())
+    content = read_quickly(rig.read_text(encoding="utf-8"))
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
     content["devices"]["illuminants"]["lamps"] = {"dim": {"relay": 1}}
-    rig.write_text(write_quickly(content))
+    rig.write_text(write_quickly(content), encoding="utf-8")
     with pytest.raises(UsageError, match="nothing is known of the light of lamp 'dim'"):
         illuminant_exposures(read_rig_file(rig), str(rig))
     without = make_rig()

@@ -120,8 +120,8 @@ def test_a_rig_without_them_is_reported_so(make_rig: Make) -> None:
 
 
 def test_another_driver_does_not_do(rig: Path) -> None:
-    text = rig.read_text().replace("numato_led_bank", "numato_relay")
-    rig.write_text(text)
+    text = rig.read_text(encoding="utf-8").replace("numato_led_bank", "numato_relay")
+    rig.write_text(text, encoding="utf-8")
     with pytest.raises(UsageError, match="'numato_relay' is no bank of LEDs"):
         plan(Colours(protocol="colours"), read_rig_file(rig), str(rig))
 
@@ -282,10 +282,10 @@ def test_the_guard_watches_them() -> None:
 
 
 def test_a_rig_with_leds_only_is_guarded(rig: Path) -> None:
-    content = read_quickly(rig.read_text())
+    content = read_quickly(rig.read_text(encoding="utf-8"))
     del content["devices"]["lamp"]
     content |= {"simulation": None}
-    rig.write_text(write_quickly(content))
+    rig.write_text(write_quickly(content), encoding="utf-8")
     with guarding(read_rig_file(rig), str(rig)) as guard:
         assert guard is not None
         assert guard.lights == {"leds"}

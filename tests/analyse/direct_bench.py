@@ -55,7 +55,7 @@ def bench(folder: Path, seed: int = 1, **simulation: Any) -> dict[str, Any]:
 def _write_curve(path: Path, nm: FloatArray, values: FloatArray) -> None:
     rows = [f"{at!r},{value!r}" for at, value in zip(nm.tolist(), values.tolist(), strict=True)
             if np.isfinite(value)]  # fmt: skip
-    path.write_text("\n".join(["wavelength_nm,value", *rows]) + "\n")
+    path.write_text("\n".join(["wavelength_nm,value", *rows]) + "\n", encoding="utf-8")
 
 
 def record(folder: Path, protocol: dict[str, Any], seed: int = 1, **simulation: Any) -> Path:

@@ -85,7 +85,7 @@ def two_colours(path: Path) -> Path:
             )
         ],
     }  # fmt: skip
-    path.write_text(write_quickly(content))
+    path.write_text(write_quickly(content), encoding="utf-8")
     return path
 
 

@@ -76,7 +76,9 @@ def write_cubes(folder: Path, seed: int, **changes: Any) -> Path:
 
 
 def columns_of(path: Path) -> DirectColumns:
-    return matrix_from_cubes(CubeList.model_validate(read_quickly(path.read_text())), path)[0]
+    return matrix_from_cubes(
+        CubeList.model_validate(read_quickly(path.read_text(encoding="utf-8"))), path
+    )[0]
 
 
 def true_columns(output_nm: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

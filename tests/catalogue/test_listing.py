@@ -232,3 +232,20 @@ def test_lists_made_at_the_same_time_agree(tmp_path: Path) -> None:
     assert len(json.loads(listed.pop())) == 5
     assert [path.name for path in tmp_path.glob(f"{INDEX}*")] == [INDEX]
     assert list_runs(tmp_path, RunFilter()) == in_order(summaries(tmp_path))
+
+
+def test_the_private_run_of_another_user_hides_no_other_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    protocol = read_protocol(resources.find("protocols", "protocol", "decay"))
+    private, open_to_all = (record_run(tmp_path, protocol) for _ in range(2))
+    is_file = Path.is_file
+
+    def refused(path: Path) -> bool:  # root, who may run the tests, is refused nothing
+        if path.parent == private:
+            raise PermissionError
+        return is_file(path)
+
+    monkeypatch.setattr(Path, "is_file", refused)
+    assert [run.folder for run in list_runs(tmp_path, RunFilter())] == [open_to_all]
+    assert find_run(Path("last"), tmp_path) == open_to_all

@@ -60,8 +60,8 @@ def test_what_is_wrong_is_one_line(
     said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("bad.csv").write_text("wavelength_nm,a\n400,1\n500,x\n")
-    Path("twice.csv").write_text("wavelength_nm,a\n400,1\n400,2\n500,2\n")
+    Path("bad.csv").write_text("wavelength_nm,a\n400,1\n500,x\n", encoding="utf-8")
+    Path("twice.csv").write_text("wavelength_nm,a\n400,1\n400,2\n500,2\n", encoding="utf-8")
     ended = labrig("optics", "show", *arguments)
     assert ended.code == code
     assert said in ended.err

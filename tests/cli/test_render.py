@@ -227,7 +227,7 @@ def test_a_room_that_is_not_tight_is_told(labrig: Callable[..., Ended]) -> None:
         moved[:4, 0] += slit
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in moved.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (box.faces + 1).tolist()]
-        Path(f"{name}.obj").write_text("\n".join(lines))
+        Path(f"{name}.obj").write_text("\n".join(lines), encoding="utf-8")
         room = {"file": f"{name}.obj", "size_m": 1e-7, "inward": True}
         Path(f"{name}.yaml").write_text(json.dumps({
             "name": name, "kind": "scene", "materials": {"wall": {"albedo": 0.5}},
@@ -235,7 +235,7 @@ def test_a_room_that_is_not_tight_is_told(labrig: Callable[..., Ended]) -> None:
             "objects": {"room": {"material": "wall", "mesh": room}},
             "camera": {"position_m": [0, 0, 0], "look_at_m": [1e-8, 1e-9, 0]},
             "programme": [{"at_s": 0, "lamps": {"lamp": 1}}], "frames_s": [0],
-        }))  # fmt: skip
+        }), encoding="utf-8")  # fmt: skip
         ends[name] = labrig("render", f"{name}.yaml", "--size", "32x24", "--paths", "16")
         assert ends[name].code == 0, ends[name].err
     assert "warning" not in ends["tight"].err
@@ -257,7 +257,7 @@ def test_what_failed_before_its_first_picture_does_not_stand_in_the_way(
             "camera": {"position_m": [0, 0, 1], "look_at_m": [0, 1, 0]},
             "programme": [{"at_s": 0, "lamps": {}}], "frames_s": [0],
             "paths": {"per_place": per_place, "per_pixel": per_place},
-        }))  # fmt: skip
+        }), encoding="utf-8")  # fmt: skip
         size = ["--size", "8192x8192"] if code else ["--size", "8x8"]
         ended = labrig("render", "s.yaml", *size)
         assert ended.code == code, ended.err
@@ -273,13 +273,15 @@ def test_without_the_extra_it_is_one_line(
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, missing, None)
     around = [(0, 0), (5, 0), (5, 4), (4, 4), (4, 1), (1, 1), (1, 4), (0, 4)]
-    Path("a.obj").write_text("".join(f"v {x} {y} 0\n" for x, y in around) + "f 1 2 3 4 5 6 7 8\n")
+    Path("a.obj").write_text(
+        "".join(f"v {x} {y} 0\n" for x, y in around) + "f 1 2 3 4 5 6 7 8\n", encoding="utf-8"
+    )
     Path("s.yaml").write_text(json.dumps({
         "name": "s", "kind": "scene", "materials": {"grey": {"albedo": 0.5}},
         "objects": {"a": {"material": "grey", "mesh": {"file": "a.obj"}, "two_sided": True}},
         "camera": {"position_m": [0, 0, 1], "look_at_m": [0, 1, 0]},
         "programme": [{"at_s": 0, "lamps": {}}], "frames_s": [0],
-    }))  # fmt: skip
+    }), encoding="utf-8")  # fmt: skip
     ended = labrig("render", "s.yaml", *SMALL)
     assert ended.code == 2
     assert len(ended.err.splitlines()) == 1

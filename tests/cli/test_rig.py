@@ -232,9 +232,9 @@ def test_what_is_listed_is_a_rig_file(
 
 
 def with_viewfinder(path: Path, address: str) -> Path:
-    rig = read_quickly(path.read_text())
+    rig = read_quickly(path.read_text(encoding="utf-8"))
     rig["devices"]["viewfinder"] = {"driver": "uvc_preview", "address": address}
-    path.write_text(write_quickly(rig))
+    path.write_text(write_quickly(rig), encoding="utf-8")
     return path
 
 

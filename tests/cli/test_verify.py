@@ -20,10 +20,10 @@ def test_a_run_as_it_was_recorded_is_intact(labrig: Labrig, finished: Path) -> N
 
 
 def lengthen_an_exposure(journal: Path) -> None:
-    lines = journal.read_text().splitlines(keepends=True)
+    lines = journal.read_text(encoding="utf-8").splitlines(keepends=True)
     place = next(n for n, line in enumerate(lines) if '"exposure_s": 1.0' in line)
     lines[place] = lines[place].replace('"exposure_s": 1.0', '"exposure_s": 1.03')
-    journal.write_text("".join(lines))
+    journal.write_text("".join(lines), encoding="utf-8")
 
 
 def test_a_changed_line_is_named_by_every_command(labrig: Labrig, finished: Path) -> None:

@@ -93,7 +93,7 @@ class ReferenceSet:
 
 def read(path: Path) -> ReferenceSet:
     """A set as NIST distributes it."""
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     lines = text.splitlines()
     number = r"[-+]?[\d.]+(?:[eE][-+]?\d+)?"
     parameters = [line.split("=")[1] for line in lines if re.match(r"\s*b\d+ =", line)]

@@ -12,7 +12,7 @@ from tests.quick_yaml import read_quickly, write_quickly
 
 
 def planned(folder: Path, kind: str, **keys: Any) -> Plan:
-    rig = read_quickly(Path("config/sim-phosphor.yaml").read_text())
+    rig = read_quickly(Path("config/sim-phosphor.yaml").read_text(encoding="utf-8"))
     bench(kind)(rig)
     del rig["simulation"]
     (folder / "rig.yaml").write_text(write_quickly(rig))

@@ -60,7 +60,7 @@ class GltfFile:
     def write(self, path: Path) -> Path:
         said = {"buffers": [{"byteLength": len(self.binary)}], **self.said}
         if path.suffix == ".gltf":
-            path.write_text(json.dumps(said))
+            path.write_text(json.dumps(said), encoding="utf-8")
             return path
         text = json.dumps(said).encode()
         text += b" " * (-len(text) % 4)

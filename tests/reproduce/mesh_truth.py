@@ -47,7 +47,7 @@ def truth(path: Path) -> Truth:
 def _obj(path: Path) -> list[FloatArray]:
     places: list[list[float]] = []
     polygons = []
-    for line in path.read_text().replace("\\\n", " ").splitlines():
+    for line in path.read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
         match line.split():
             case ["v", *numbers]:
                 places.append([float(one) for one in numbers[:3]])

@@ -25,7 +25,7 @@ TIMES = 60
 
 def mixture(path: Path) -> None:
     matrix = DYE.to_matrix(INPUT_NM, OUTPUT_NM)
-    path.write_text(fit_mixture(matrix, 1, threshold=1e-9).to_json())
+    path.write_text(fit_mixture(matrix, 1, threshold=1e-9).to_json(), encoding="utf-8")
 
 
 def texture(path: Path) -> None:

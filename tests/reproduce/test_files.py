@@ -163,3 +163,11 @@ def test_a_surface_is_no_light(tmp_path: Path) -> None:
     OpenEXR.File({"spectralLayoutVersion": "1.0"}, {"T.450nm": flat}).write(str(tmp_path / "f.exr"))
     with pytest.raises(UsageError, match="light"):
         read_spectral_exr(tmp_path / "f.exr")
+
+
+def test_a_linear_picture_has_numbers_only(tmp_path: Path) -> None:
+    xyz = np.ones((2, 3, 3))
+    xyz[1, 2, 0] = np.nan
+    write_linear_exr(tmp_path / "c.exr", xyz)
+    with pytest.raises(UsageError, match="1 of 6 pixels"):
+        read_linear_exr(tmp_path / "c.exr")

@@ -342,7 +342,7 @@ def prism(around: FloatArray, turn: list[float]) -> tuple[FloatArray, list[list[
 def write_obj(path: Path, places: FloatArray, faces: list[list[int]]) -> Path:
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in places]
     lines += ["f " + " ".join(str(k + 1) for k in face) for face in faces]
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join(lines), encoding="utf-8")
     return path
 
 
@@ -354,7 +354,7 @@ def write_ply(path: Path, places: FloatArray, faces: list[list[int]], form: str)
     if form == "ascii":
         rows = [f"{x:.9g} {y:.9g} {z:.9g} 0" for x, y, z in places]
         rows += [" ".join(map(str, [len(face), *face])) for face in faces]
-        path.write_text(head + "\n".join(rows) + "\n")
+        path.write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
         return path
     order = ">" if "big" in form else "<"
     data = b"".join(struct.pack(f"{order}4f", *place, 0) for place in places)

@@ -49,7 +49,9 @@ def scene(folder: Path, file: Path, objects: dict[str, Any] | None = None, **key
 def write_obj(path: Path, *bodies: Mesh) -> Path:
     whole = Mesh.joined(bodies)
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in whole.vertices_m]
-    path.write_text("\n".join(lines + [f"f {a} {b} {c}" for a, b, c in whole.faces + 1]))
+    path.write_text(
+        "\n".join(lines + [f"f {a} {b} {c}" for a, b, c in whole.faces + 1]), encoding="utf-8"
+    )
     return path
 
 

@@ -4,12 +4,13 @@ import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 import pytest
 import serial
 
 from labrig.clock import VirtualClock
+from labrig.record import REAL_DISK
 from labrig.sim import OpenRoom, open_room
 from labrig.sim.disk import SimulatedDisk
 from labrig.sim.faults import AfterBytes, Slowness
@@ -91,15 +92,45 @@ def test_a_disk_fills_up_in_the_middle_of_a_write_until_room_is_made(
 ) -> None:
     clock = VirtualClock()
     full = AfterBytes.model_validate({"after_bytes": 250, "for": "10 s"})
-    disk = SimulatedDisk(clock, [full], [])
+    disk = SimulatedDisk(REAL_DISK, clock, [full], [])
     assert [write(disk, 100) for _ in range(4)] == [100, 100, 50, 0]
     clock.spend(10.0)
     assert write(disk, 100) == 100
 
 
+def test_a_cut_write_is_no_whole_one_when_the_disk_below_is_full(tmp_path: Path) -> None:
+    class FullFile:
+        """A file of a disk that takes 60 bytes more, as the system reports it."""
+
+        def __init__(self) -> None:
+            self.left = 60
+
+        def write(self, data: bytes) -> int:
+            if not self.left:
+                raise OSError(errno.ENOSPC, "full")
+            taken = min(len(data), self.left)
+            self.left -= taken
+            return taken
+
+    disk = SimulatedDisk(REAL_DISK, VirtualClock(), [], [])
+    with pytest.raises(OSError, match="full"):
+        disk.write(cast("BinaryIO", FullFile()), bytes(100))
+
+
+def test_the_cable_of_one_board_is_pulled() -> None:
+    with room({"board_unplugged": {"board": "servo", "at": "10 s", "for": "5 s"}}) as opened:
+        relays = opened.boards["relays"]
+        plugged = []
+        for _ in range(3):
+            plugged.append((opened.boards["servo"].is_plugged, relays.is_plugged))
+            opened.clock.spend(10.0)
+        assert plugged == [(True, True), (False, True), (True, True)]
+
+
 def test_a_slow_disk_takes_its_time(write: Callable[..., int]) -> None:
     clock = VirtualClock()
-    disk = SimulatedDisk(clock, [], [Slowness.model_validate({"takes": "2 s", "for": "3 s"})])
+    slow = Slowness.model_validate({"takes": "2 s", "for": "3 s"})
+    disk = SimulatedDisk(REAL_DISK, clock, [], [slow])
     for expected_s in (2.0, 4.0, 4.0):
         assert write(disk, 100) == 100
         assert clock.now() == expected_s

@@ -91,7 +91,7 @@ def analyse(part: Part) -> CameraCalibrationResult:
         aperture=factors.aperture,
         flats=tuple(fitted.flat for fitted in flats),
         source="measured with labrig, camera_calibration",
-        run=run.folder.resolve().name,
+        run=run.name,
     )
     file = file.model_copy(update={"glare": measure_glare(part, file, lit, darks)})
     return CameraCalibrationResult(

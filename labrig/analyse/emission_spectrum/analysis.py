@@ -149,7 +149,7 @@ def _patch_spectrum(
         decisive, stiffest = np.inf, STIFFEST
     charges, dead = _charges(glows)
 
-    run = part.run.folder.resolve().name
+    run = part.run.name
 
     def fitted(frame: CombinedFrame, samples: int) -> SpectrumFit:
         return fit_spectrum(

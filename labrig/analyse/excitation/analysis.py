@@ -145,9 +145,7 @@ def _patch_excitation(
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
     frames = tuple(frame.path.name for role in GLOWING for frame in run.frames(role))
-    material = excited_material(
-        fit, irradiance, spectrum, patch.material, run.folder.resolve().name, frames
-    )
+    material = excited_material(fit, irradiance, spectrum, patch.material, run.name, frames)
     no_spectrum = (
         ("no emission spectrum was found of this patch, so that its material has no Λ",)
         if spectra and spectrum is None

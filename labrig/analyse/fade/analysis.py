@@ -93,7 +93,7 @@ def analyse(part: Part) -> FadeResult:
         rise=tables.get("rise"),
         warming=warm,
         source="measured with labrig, fade",
-        run=part.run.folder.resolve().name,
+        run=part.run.name,
     )
     return FadeResult(
         calibration=file,

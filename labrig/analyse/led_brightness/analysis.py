@@ -227,7 +227,7 @@ class _Calibration:
             common_sigma=fit.scale_sigma if self._is_absolute else 0.0,
             uv_scale=uv_scale,
             source=f"white reference under one LED after another, by {self._by}, with labrig",
-            run=self.part.run.folder.resolve().name,
+            run=self.part.run.name,
         )
         return LedBrightnessResult(
             calibration=calibration,

@@ -123,7 +123,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
         is_brightness_known=~system.is_loose,
         uv_scale=_uv_scale(lit.peak_nm, system),
         patches=patches,
-        run=part.run.folder.resolve().name,
+        run=part.run.name,
         geometry=part.rig.optics.geometry_text,
         lamps=lit.lamps,
         warnings=tuple(warnings),

@@ -91,7 +91,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
         on_sample=stripes.strip if stripes else placed.strip,
         camera=CurveColumns.of(lvf_fit.camera),
         source=f"{len(filters)} colour filters and mercury lines, measured with labrig",
-        run=part.run.folder.resolve().name,
+        run=part.run.name,
     )
     return LvfCalibrationResult(
         calibration=file,

@@ -69,7 +69,7 @@ def analyse(part: Part) -> ReflectanceResult:
     if not both:
         raise DataError("; ".join((*white.refused, *narrow.refused)))
     patches, warnings = for_each_patch(both, lambda patch: _patch(patch, bench))
-    run = part.run.folder.resolve().name
+    run = part.run.name
     return ReflectanceResult(
         lamp=lamp.name,
         patches=patches,

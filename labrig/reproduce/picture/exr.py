@@ -203,7 +203,7 @@ def read_linear_exr(path: Path) -> FloatArray:
     Raises
     ------
     UsageError
-        The file cannot be read or lacks the channels R, G and B.
+        The file cannot be read, lacks the channels R, G and B, or has pixels that are no number.
 
     Examples
     --------
@@ -227,6 +227,11 @@ def read_linear_exr(path: Path) -> FloatArray:
             f"{path}: expected an OpenEXR image with the channels R, G and B, got another or a "
             "broken one"
         ) from None
+    if n_broken := int((~np.isfinite(linear)).any(axis=-1).sum()):
+        raise UsageError(
+            f"{path}: expected an image of numbers, got {n_broken} of {linear[..., 0].size} pixels "
+            "that are infinite or no number; render it again"
+        )
     return np.asarray(linear.astype(np.float64) @ np.linalg.inv(XYZ_TO_SRGB).T)
 
 

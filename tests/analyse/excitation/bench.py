@@ -34,7 +34,9 @@ TILT = np.radians(1.0)
 
 def true_irradiance(width: int = WIDTH, height: int = HEIGHT) -> IrradianceFile:
     """What an irradiance run without error would find on the shipped rig with such a sensor."""
-    lvf_settings = read_quickly(Path("config/sim-phosphor.yaml").read_text())["simulation"]["lvf"]
+    lvf_settings = read_quickly(Path("config/sim-phosphor.yaml").read_text(encoding="utf-8"))[
+        "simulation"
+    ]["lvf"]
     lvf = Lvf(LvfSettings.model_validate(lvf_settings))
     down = 0.42 * width / height * np.tan(TILT)
     strip = Strip(left=(0.08, 0.5 + down), right=(0.92, 0.5 - down), height=0.3, rising=False)

@@ -28,6 +28,8 @@ _HEAD = "VEC_01\t5167\nBFC-450 Matrix File"
 _UNKNOWN = "<none>"
 #: Limit of either grid, which excludes broken headers.
 _MOST_BANDS = 2000
+#: Limit of every integer of the header, above that of its wavelengths and numbers.
+_LARGEST = 1_000_000
 
 
 def parse_bfc(text: str) -> ReradiationMatrix:
@@ -56,9 +58,12 @@ def _grids(line: Line) -> tuple[FloatArray, FloatArray]:
     expected = f"line {line.number}: expected six integers: first, last, step of output, number, "
     expected += "first, step of input"
     try:
-        out_start, out_end, out_step, n_in, in_start, in_step = map(int, line.text.split())
+        integers = [int(cell) for cell in line.text.split()]
+        out_start, out_end, out_step, n_in, in_start, in_step = integers
     except ValueError:
         raise ValueError(f"{expected}; got {shown(line.text)}") from None
+    if max(map(abs, integers)) > _LARGEST:
+        raise ValueError(f"{expected}, up to {_LARGEST}; got {shown(line.text)}")
     if min(out_step, in_step) < 1 or out_end < out_start or (out_end - out_start) % out_step:
         raise ValueError(f"{expected}; got steps that do not fit in {shown(line.text)}")
     n_out = (out_end - out_start) // out_step + 1
