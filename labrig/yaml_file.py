@@ -19,6 +19,7 @@ from yaml.composer import Composer
 from labrig.errors import UsageError
 from labrig.input_file import read_text
 from labrig.model_errors import is_rule, lacks_item, place, refusal
+from labrig.output_file import write_text
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -206,7 +207,7 @@ def _is_indented_by_tab(text: str, line: int) -> bool:
 
 def write_yaml(path: Path, model: BaseModel) -> None:
     """Write `model` so that `read_model` reads it."""
-    path.write_text(model_text(model), encoding="utf-8")
+    write_text(path, model_text(model))
 
 
 def model_text(model: BaseModel) -> str:

@@ -18,6 +18,8 @@ from zlib import crc32
 
 from labrig.catalogue.run_summary import RunSummary
 from labrig.clock import SystemClock
+from labrig.errors import DiskError
+from labrig.output_file import write_durably
 from labrig.results import SUMMARY
 
 FILE = ".runs-index"
@@ -150,13 +152,8 @@ def _read_index(runs: Path) -> dict[str, _Entry]:
 def _write_index(runs: Path, entries: Mapping[str, _Entry]) -> None:
     """Write the index as a whole, so that two processes do not mix theirs; where that may be."""
     content = json.dumps({name: vars(entry) for name, entry in entries.items()}).encode()
-    part = runs / f"{FILE}.{os.getpid()}.part"
-    try:
-        part.write_bytes(_checksum(content) + b"\n" + content)
-        part.replace(runs / FILE)
-    except OSError:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+    with suppress(DiskError):
+        write_durably(runs / FILE, _checksum(content) + b"\n" + content)
 
 
 def _checksum(content: bytes) -> bytes:

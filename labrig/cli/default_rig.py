@@ -161,20 +161,21 @@ def use(
 def _choose(rig: str) -> None:
     from labrig import resources
     from labrig.acquire import read_rig_file
-    from labrig.cli.consent import command_text, give_consent
-    from labrig.record import write_durably
+    from labrig.consent import calls, give_consent, starting
+    from labrig.output_file import make_folder, write_text
 
     path = resources.find("config", "rig", rig)
-    on_finish = read_rig_file(path).on_finish  # a mistake in the file is better found now
-    if isinstance(on_finish, tuple):
-        give_consent(on_finish)
-        typer.echo(
-            f"note: runs on it start, when they have ended: {command_text(on_finish)}", err=True
-        )
+    file = read_rig_file(path)  # a mistake in the file is better found now
+    deeds = list(calls(file.addresses()))
+    if isinstance(file.on_finish, tuple):
+        deeds.append(f"{starting(file.on_finish)}")
+    if deeds:
+        give_consent(deeds)
+        typer.echo(f"note: with your consent, every run on it {', '.join(deeds)}", err=True)
     is_shipped = resources.names("config").get(rig) == path
     choice = _choice_file()
-    choice.parent.mkdir(parents=True, exist_ok=True)
-    write_durably(choice, f"{rig if is_shipped else path.absolute()}\n".encode())
+    make_folder(choice.parent)
+    write_text(choice, f"{rig if is_shipped else path.absolute()}\n")
 
 
 def _choice_file() -> Path:

@@ -7,6 +7,7 @@ from pathlib import Path
 from markupsafe import escape
 
 from labrig.errors import DiskError
+from labrig.output_file import make_folder_in, write_text
 from labrig.record import RunLock
 from labrig.report import Section, section_page, with_later
 
@@ -50,13 +51,9 @@ def show_comparison(run: Path, sections: Sequence[Section]) -> bool:
     """
     folder, result = run / FOLDER, run / "result"
     with RunLock(run / LOCK, "processing this run"):
-        try:
-            folder.mkdir(exist_ok=True)
-            part = section_page(sections, folder, f"../{FOLDER}")
-            text = f"<!-- of {_checksum(result)} -->\n{part}\n"
-            (folder / PART).write_text(text, encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+        make_folder_in(run, FOLDER)
+        part = section_page(sections, folder, f"../{FOLDER}")
+        write_text(folder / PART, f"<!-- of {_checksum(result)} -->\n{part}\n")
         return include_comparison(run, result)
 
 
@@ -79,9 +76,7 @@ def include_comparison(run: Path, result: Path) -> bool:
         page = with_later(report.read_text(encoding="utf-8"), part.strip())
         if page is None:
             return False
-        draft = report.with_name(f".{REPORT}.draft")
-        draft.write_text(page, encoding="utf-8", newline="\n")
-        draft.replace(report)
+        write_text(report, page)
     except OSError as error:
         raise DiskError(f"{report}: cannot be written ({error.strerror})") from None
     return True

@@ -6,13 +6,14 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from labrig.output_file import Disk, write_durably
 from labrig.record.frames import (
     ActionRecord,
     FrameRecord,
     SpectrumRecord,
     TemperatureRecord,
 )
-from labrig.record.journal import Disk, Journal, write_durably
+from labrig.record.journal import Journal
 
 _ACTION_KEYS: dict[str, str] = {
     "device": "string",

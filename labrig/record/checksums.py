@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from labrig.errors import DiskError
+from labrig.output_file import make_folder_in, write_durably
 from labrig.record.frames import FileRecord
-from labrig.record.journal import write_durably
 
 #: Folder of the frames in a run folder.
 FRAMES = "frames"
@@ -145,6 +145,5 @@ def _read_checked(run: Path) -> dict[str, _State]:
 
 def _write_checked(run: Path, checked: dict[str, _State]) -> None:
     """Write the list as far as the disk allows: without it, files are read again."""
-    with suppress(OSError, DiskError):
-        (run / CACHE).mkdir(exist_ok=True)
-        write_durably(run / CACHE / _CHECKED, json.dumps(checked).encode())
+    with suppress(DiskError):
+        write_durably(make_folder_in(run, CACHE) / _CHECKED, json.dumps(checked).encode())

@@ -9,10 +9,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from filelock import FileLock, Timeout
+from filelock import Timeout
 
 from labrig.clock import SystemClock
 from labrig.errors import DiskError, UsageError
+from labrig.file_lock import plain_lock
+from labrig.output_file import write_text
 from labrig.record.plain_folder import require_plain_folder
 
 #: Time to wait for a lock: who only looks whether it is held, holds it for a moment.
@@ -48,10 +50,10 @@ class RunLock:
 
     def __init__(self, path: Path, activity: str) -> None:
         require_plain_folder(path.parent)
-        self._lock = FileLock(path)
+        self._lock = plain_lock(path, LOCK_TIMEOUT_S)
         self._holder = path.with_suffix(".holder")
         try:
-            self._lock.acquire(timeout=LOCK_TIMEOUT_S)
+            self._lock.acquire()
         except Timeout:
             holder = _holder_text(self._holder)
             raise UsageError(
@@ -62,8 +64,8 @@ class RunLock:
                 f"{path.parent}: the run cannot be written to ({error.strerror})"
             ) from None
         content = {"pid": os.getpid(), "host": socket.gethostname(), "since": SystemClock().wall()}
-        with suppress(OSError):  # it only helps others
-            self._holder.write_text(json.dumps(content), encoding="utf-8")
+        with suppress(DiskError):  # it only helps others
+            write_text(self._holder, json.dumps(content))
 
     def release(self) -> None:
         """Release the lock for other processes."""

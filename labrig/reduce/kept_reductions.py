@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from labrig.errors import DiskError
-from labrig.record import CACHE, write_durably
+from labrig.output_file import make_folder_in, write_text
+from labrig.record import CACHE
 from labrig.reduce.codec import encoded
 
 #: Frames after which what is new is written, so that little is lost if the process is killed.
@@ -65,8 +66,8 @@ class KeptReductions:
         content = "".join(f"{key} {text}\n" for key, text in self._texts.items())
         head = f"{self._identity} {_checksum(content)}\n"
         with suppress(OSError, DiskError):
-            self._path.parent.mkdir(exist_ok=True)
-            write_durably(self._path, (head + content).encode())
+            make_folder_in(self._path.parents[1], CACHE)
+            write_text(self._path, head + content)
             for path in self._path.parent.glob(f"{self._name}-*.jsonl"):
                 if not path.name.endswith(self._ending):
                     path.unlink()

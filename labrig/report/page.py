@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 from labrig.errors import DiskError
 from labrig.number_format import plus_minus, rounded
 from labrig.optics import CameraResponse
+from labrig.output_file import write_text
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord, RunDescription
 from labrig.report import parameters
@@ -289,8 +290,5 @@ def write_report(path: Path, report: Report) -> None:
             later=Markup(f"{BEGIN_LATER}{END_LATER}"),
         )
     )
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-        figure_files.write(path.parent)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    write_text(path, text)
+    figure_files.write(path.parent)

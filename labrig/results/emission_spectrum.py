@@ -1,6 +1,5 @@
 """The emission spectrum Λ* of a sample, whether it changes, and its file `emission.yaml`."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +13,11 @@ from scipy.interpolate import CubicSpline
 from labrig.finite import Finite, NotNegative
 from labrig.material import Spectrum
 from labrig.optics import band_means, edges_from_centres
+from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
+from labrig.results.text_files import write_csv
 from labrig.yaml_file import read_model, write_yaml
 
 #: Grid of wavelengths in nm, from section 4.7 of the paper (Nalbach et al.).
@@ -154,12 +155,9 @@ class EmissionSpectrum(BaseModel):
 
     def write_csv(self, path: Path) -> None:
         """Write the columns of the grid as a table."""
-        with path.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(["wavelength_nm", "value", "sigma", "low", "high"])
-            columns = (self.wavelength_nm, self.value, self.sigma, self.low, self.high)
-            for row in zip(*columns, strict=True):
-                table.writerow([f"{number:.6g}" for number in row])
+        columns = (self.wavelength_nm, self.value, self.sigma, self.low, self.high)
+        rows = ([f"{number:.6g}" for number in row] for row in zip(*columns, strict=True))
+        write_csv(path, ["wavelength_nm", "value", "sigma", "low", "high"], rows)
 
 
 def read_emission_spectrum(path: Path) -> EmissionSpectrum:
@@ -345,7 +343,6 @@ class EmissionSpectrumResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write `emission.yaml` and `spectrum.csv`; of several patches in a folder each."""
         for name, patch in self.patches.items():
-            place = folder / name
-            place.mkdir(exist_ok=True)
+            place = make_folder_in(folder, name)
             write_emission_spectrum(place / "emission.yaml", patch.spectrum)
             patch.spectrum.write_csv(place / "spectrum.csv")

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
 from labrig.errors import DataError, UsageError
+from labrig.output_file import write_text
 from labrig.plugins import RESULTS, load
-from labrig.results.text_files import finite, write_text
+from labrig.results.text_files import finite
 
 if TYPE_CHECKING:
     from labrig.results.budget import Budget

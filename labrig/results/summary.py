@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from labrig.results.text_files import write_text
+from labrig.output_file import write_text
 
 SUMMARY = "summary.txt"
 

@@ -13,7 +13,7 @@ import yaml
 
 from labrig.acquire import read_protocol
 from labrig.errors import UsageError
-from labrig.record import write_durably
+from labrig.output_file import write_durably
 from labrig.region import Region
 from labrig.yaml_file import parse_yaml
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.array_file import read_arrays
-from labrig.errors import DiskError, UsageError
-from labrig.reproduce.draft_file import replaced
+from labrig.errors import UsageError
+from labrig.output_file import make_folder, replaced, write_text
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
 from labrig.reproduce.picture.rendering import Frame, Renderer
 from labrig.reproduce.picture.view import Report
@@ -92,17 +92,13 @@ class RenderFolder:
             raise UsageError(
                 f"{path}: expected a new folder, got one without {CONTENT}; give another (--out)"
             )
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            described = {
-                "identity": identity,
-                "notes": scene.notes,
-                "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
-            }
-            with replaced(content) as draft:
-                draft.write_bytes(json.dumps(described, indent=1, ensure_ascii=False).encode())
-        except OSError as error:
-            raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+        make_folder(path)
+        described = {
+            "identity": identity,
+            "notes": scene.notes,
+            "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
+        }
+        write_text(content, json.dumps(described, indent=1, ensure_ascii=False))
         return cls(path, scene.file.frames_s)
 
     @property

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.array_file import read_arrays
 from labrig.errors import UsageError
-from labrig.reproduce.draft_file import replaced
+from labrig.output_file import replaced
 
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int32]
