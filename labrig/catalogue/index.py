@@ -18,7 +18,8 @@ from zlib import crc32
 
 from labrig.catalogue.run_summary import RunSummary
 from labrig.clock import SystemClock
-from labrig.errors import DiskError
+from labrig.errors import DiskError, LabrigError
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.output_file import write_durably
 from labrig.results import SUMMARY
 
@@ -140,13 +141,13 @@ def _measured(parameters: Mapping[str, Mapping[str, Sequence[Any]]]) -> dict[str
 def _read_index(runs: Path) -> dict[str, _Entry]:
     """Return the entries of the index; none if there is no index, a damaged or an older one."""
     try:
-        checksum, content = (runs / FILE).read_bytes().split(b"\n", 1)
+        checksum, content = read_bytes(runs / FILE, MAX_TEXT_BYTES).split(b"\n", 1)
         if checksum != _checksum(content):
             return {}
         index = json.loads(content)
-    except (OSError, ValueError):
+        return {name: _Entry(**entry) for name, entry in index.items()}
+    except (LabrigError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
-    return {name: _Entry(**entry) for name, entry in index.items()}
 
 
 def _write_index(runs: Path, entries: Mapping[str, _Entry]) -> None:
@@ -167,5 +168,5 @@ def _code_checksum() -> int:
     package = Path(__file__).parents[1]
     checksum = crc32(version("labrig").encode())
     for module in _MODULES:
-        checksum = crc32((package / module).read_bytes(), checksum)
+        checksum = crc32(read_bytes(package / module, MAX_TEXT_BYTES), checksum)
     return checksum

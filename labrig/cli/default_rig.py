@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from labrig.cli.completion import complete_rig
-from labrig.errors import UsageError
+from labrig.errors import LabrigError, UsageError
+from labrig.input_file import read_text
 
 #: Environment variable with a rig, which has priority over the one that was chosen.
 VARIABLE = "LABRIG_RIG"
@@ -87,15 +88,12 @@ def default_rig() -> DefaultRig | None:
 def _chosen_rig() -> DefaultRig | None:
     """Return the rig of `labrig rig use`, None if there is none."""
     choice = _choice_file()
-    try:
-        name = choice.read_text(encoding="utf-8").strip()
-    except (FileNotFoundError, NotADirectoryError):
+    if not choice.exists():
         return None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(
-            f"{choice}: the default rig cannot be read ({error}); choose it again: "
-            "labrig rig use FILE"
-        ) from None
+    try:
+        name = read_text(choice).strip()
+    except LabrigError as error:
+        raise UsageError(f"{error}; choose the default rig again: labrig rig use FILE") from None
     return DefaultRig(name, is_of_environment=False) if name else None
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from labrig.analyse import ChargeTableOptions
 from labrig.fit import ChargeFit, OrderState
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.material import Material, Provenance, State, write_material
 from labrig.output_file import make_folder, write_text
 from labrig.process.provenance import library_versions
@@ -90,7 +91,7 @@ def report_charge(
     >>> sorted(path.name for path in reported.report.parent.iterdir())  # doctest: +ELLIPSIS
     ['figures', 'fit.json', 'material.yaml', 'provenance.yaml', 'readings.csv', 'report.html']
     """
-    checksum = hashlib.sha256(table.read_bytes()).hexdigest()
+    checksum = hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest()
     provenance = TableProvenance(
         labrig=version("labrig"),
         libraries=library_versions(),

@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from labrig.analyse import ChargeTableOptions, FittedTable, TableFitOptions
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.output_file import make_folder
 from labrig.process.provenance import library_versions
 from labrig.process.run import Processed, new_result, put_in_place
@@ -115,7 +116,7 @@ def report_table(
         labrig=version("labrig"),
         libraries=library_versions(),
         table=table.name,
-        sha256=hashlib.sha256(table.read_bytes()).hexdigest(),
+        sha256=hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest(),
         options=stated(options, layout),
     )
     sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted)]

@@ -14,7 +14,8 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import TypeVar
 
-from labrig.errors import DiskError
+from labrig.errors import DiskError, LabrigError
+from labrig.input_file import MAX_JSON_BYTES, open_regular, read_text
 from labrig.output_file import make_folder_in, write_durably
 from labrig.record.frames import FileRecord
 
@@ -121,24 +122,24 @@ def _is_checked(frame: FileRecord, checked: dict[str, _State]) -> bool:
 def _checked_state(frame: FileRecord) -> _State | str:
     """Read a frame's file and return its state, or its damage as text."""
     try:
-        with frame.path.open("rb") as file:
+        with open_regular(frame.path) as file:
             status = os.fstat(file.fileno())
             # A file of another size need not be read; a forged one may have no end.
             same_size = status.st_size == frame.size_bytes
             if same_size and file_digest(file, "sha256").hexdigest() == frame.sha256:
                 return [status.st_size, status.st_mtime_ns, frame.sha256]
-    except FileNotFoundError:
-        return "is missing"
-    except OSError as error:
-        return f"cannot be read ({error.strerror})"
+    except (OSError, LabrigError) as error:
+        if not frame.path.exists():
+            return "is missing"
+        return f"cannot be read ({getattr(error, 'strerror', None) or error})"
     return "was changed after the run (its checksum differs)"
 
 
 def _read_checked(run: Path) -> dict[str, _State]:
     """Return the states of the files that were checked before; none if the list is unusable."""
     try:
-        content = json.loads((run / CACHE / _CHECKED).read_bytes())
-    except (OSError, ValueError, RecursionError):
+        content = json.loads(read_text(run / CACHE / _CHECKED, MAX_JSON_BYTES))
+    except (LabrigError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
 

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from labrig.errors import DataError, DiskError, UsageError
+from labrig.input_file import MAX_JOURNAL_BYTES, MAX_TEXT_BYTES, read_bytes
 from labrig.output_file import REAL_DISK, Disk, write_durably
 from labrig.record.plain_folder import require_plain_folder
 
@@ -101,7 +102,7 @@ class Journal:
         self.path = path
         self._disk = disk
         try:
-            raw = path.read_bytes() if path.exists() else b""
+            raw = read_bytes(path, MAX_JOURNAL_BYTES) if path.exists() else b""
             self._acknowledged = bytearray(raw[: raw.rfind(b"\n") + 1])
             *_, last, _ = [b"", *bytes(self._acknowledged).split(b"\n")]
             self._seal = _seal(last) if last else ""
@@ -181,13 +182,9 @@ def read_journal(path: Path) -> JournalContent:
     >>> journal.torn
     False
     """
-    try:
-        if not path.is_file():
-            raise DataError(f"{path}: there is no journal")
-        raw = path.read_bytes()
-    except OSError as error:
-        raise DiskError(f"{path}: the journal cannot be read ({error.strerror})") from None
-    return _parse(path, raw)
+    if not path.is_file():
+        raise DataError(f"{path}: there is no journal")
+    return _parse(path, read_bytes(path, MAX_JOURNAL_BYTES))
 
 
 def _parse(path: Path, raw: bytes) -> JournalContent:
@@ -265,11 +262,8 @@ def add_note(run: Path, text: str, time_s: float) -> Path:
     path = run / _NAME
     written = datetime.fromtimestamp(time_s, UTC)
     entry = f"## {written:%Y-%m-%d %H:%M} UTC\n\n{text.strip()}\n\n"
-    try:
-        # Written anew: a backup may share the file by a hard link, which would get the note, too.
-        before = path.read_bytes() if path.exists() else b""
-    except OSError as error:
-        raise DiskError(f"{path}: the notes cannot be read ({error.strerror})") from None
+    # Written anew: a backup may share the file by a hard link, which would get the note, too.
+    before = read_bytes(path, MAX_TEXT_BYTES) if path.exists() else b""
     write_durably(path, before + entry.encode())
     return path
 
@@ -296,4 +290,4 @@ def read_notes(run: Path) -> str:
     Room light on behind the door.
     """
     path = run / _NAME
-    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    return read_bytes(path, MAX_TEXT_BYTES).decode(errors="replace") if path.is_file() else ""

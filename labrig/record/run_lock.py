@@ -12,8 +12,9 @@ from typing import Self
 from filelock import Timeout
 
 from labrig.clock import SystemClock
-from labrig.errors import DiskError, UsageError
+from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.file_lock import plain_lock
+from labrig.input_file import read_text
 from labrig.output_file import write_text
 from labrig.record.plain_folder import require_plain_folder
 
@@ -89,9 +90,9 @@ class RunLock:
 def _holder_text(path: Path) -> str:
     """Return who holds a lock and since when; empty if that is not known."""
     try:
-        holder = json.loads(path.read_bytes())
+        holder = json.loads(read_text(path, 10_000))
         since = datetime.fromtimestamp(float(holder["since"]), UTC)
         pid, host = int(holder["pid"]), holder["host"]
         return f" (process {pid} on {host}, since {since:%Y-%m-%d %H:%M:%S} UTC)"
-    except (OSError, ValueError, KeyError, TypeError, OverflowError):
+    except (LabrigError, OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return ""

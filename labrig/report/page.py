@@ -12,6 +12,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from labrig.errors import DiskError
+from labrig.input_file import read_text
 from labrig.number_format import plus_minus, rounded
 from labrig.optics import CameraResponse
 from labrig.output_file import write_text
@@ -57,12 +58,12 @@ def environment() -> Environment:
 
 def style() -> str:
     """Return the style sheet of the page, which is labrig's own and needs no escaping."""
-    return (_FOLDER / "report.css").read_text(encoding="utf-8")
+    return read_text(_FOLDER / "report.css")
 
 
 def script() -> str:
     """Return the script of the page."""
-    return (_FOLDER / "report.js").read_text(encoding="utf-8")
+    return read_text(_FOLDER / "report.js")
 
 
 def dated_notes(text: str) -> list[tuple[str, str]]:
