@@ -1,7 +1,8 @@
 """Files that somebody made to do harm, and a watch over the command that opens one.
 
-Each is a run folder, a rig, a protocol, a table, a matrix, a mesh, a picture, a frame or a scene. None may make labrig write outside the case's own folder, start a program, open a
-connection, take a gigabyte or ten seconds, or say more than a line.
+Each is a run folder, a rig, a protocol, a table, a matrix, a mesh, a picture, a frame or a scene.
+None may make labrig write outside the case's own folder, start a program, open a connection, take a
+gigabyte or ten seconds, or say more than a line.
 """
 
 import io

@@ -123,8 +123,9 @@ def main() -> None:
 def _cases(kinds: Iterable[str], every: int) -> Iterator[tuple[str, str, int]]:
     """Yield kind and name of a file, and the number of a command, other ones for each file."""
     count = len(COMMANDS) + len(scenes_of(Path()))
-    for first, (kind, name) in enumerate((kind, name) for kind in kinds for name in MAKERS[kind]):
-        yield from ((kind, name, number) for number in range(first % every, count, every))
+    files = [(kind, name) for kind in kinds for name in MAKERS[kind]]
+    for first, (of_kind, name) in enumerate(files):
+        yield from ((of_kind, name, number) for number in range(first % every, count, every))
 
 
 def _sound(place: Path, run: Path) -> dict[str, str]:
