@@ -294,6 +294,10 @@ def refused(printed: str) -> str:
     return f"{wrong} wrong; longest refusal {max(longest_s):.1f} s"
 
 
+def went_wrong(printed: str) -> str:
+    return f"{match(r'^([0-9]+ of [0-9]+) went wrong', printed)} wrong"
+
+
 def containers(printed: str) -> str:
     cases, failures = columns(r"^.+? +(\d+) cases, (\d+) failures", printed)
     return f"{sum(failures):.0f} failures in {sum(cases):.0f} containers, {len(cases)} ways"
