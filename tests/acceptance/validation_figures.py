@@ -415,9 +415,9 @@ FIGURES = (
         figure.refused,
     ),
     Figure(
-        "Rigs, protocols, tables, matrices, meshes, pictures, frames, scenes and run folders made to "
-        "do harm, 83 of them, each with every thirtieth command that takes a path: something written "
-        "outside, a program started, somebody called, 1 GiB or 10 s taken, more than one line",
+        "Rigs, protocols, tables, matrices, meshes, pictures, frames, scenes and run folders made "
+        "to do harm, 83 of them, each with every thirtieth command that takes a path: something "
+        "written outside, a program started, somebody called, 1 GiB or 10 s taken, more lines",
         "hostile_files",
         figure.went_wrong,
     ),
