@@ -1,7 +1,8 @@
 """A webcam, or a stick on the camera's HDMI output, for aiming: 8 bits, never used to measure.
 
-Addresses: `uvc://0` is the system's first video device; anything else that OpenCV opens, such as
-`http://…/stream.mjpg` or numbered files `frame%03d.png`, is given as it is.
+Addresses: `uvc://0` is the system's first video device; a stream over the network, such as
+`http://…/stream.mjpg`, is given as it is. Nothing else that OpenCV opens is: it also takes files,
+and texts that start plugins.
 """
 
 import cv2
@@ -11,6 +12,7 @@ from labrig.acquire import Connections
 from labrig.errors import DeviceError
 
 SCHEME = "uvc://"
+STREAMS = ("http://", "https://", "rtsp://")
 JPEG_QUALITY = 90
 
 
@@ -29,7 +31,7 @@ class UvcPreview:
     Raises
     ------
     DeviceError
-        `uvc://` is followed by anything but a number.
+        The address is neither.
     """
 
     class Settings(BaseModel):
@@ -40,12 +42,13 @@ class UvcPreview:
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._address = address
         number = address.removeprefix(SCHEME)
-        if number != address and not number.isdigit():
+        is_device = number != address and number.isdecimal() and number.isascii()
+        if not is_device and not address.startswith(STREAMS):
             raise DeviceError(
                 f"'{address}' is no video device; write uvc://0 for the first one, uvc://1 for the "
                 "second, or a stream's own address"
             )
-        self._source: int | str = int(number) if number != address else address
+        self._source: int | str = int(number) if is_device else address
         self._capture: cv2.VideoCapture | None = None
 
     def identity(self) -> str:

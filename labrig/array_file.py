@@ -1,7 +1,9 @@
-"""Reading of arrays in NumPy's files, held to what their headers state before memory is taken."""
+"""Arrays in NumPy's files, held to what their headers state before memory is taken."""
 
+import io
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 from zipfile import BadZipFile, ZipFile
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.input_file import open_regular
+from labrig.output_file import write_durably
 
 #: Arrays that need no more are read whatever their packing; larger ones need no more than
 #: `MAX_UNPACKING` times their file, which no measurement is packed to.
@@ -40,6 +43,67 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
         ) as error:  # fmt: skip
             reason = " ".join(str(error).split())
             raise UsageError(f"{path}: expected arrays in a .npz file ({reason})") from None
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write arrays by name into an `.npz` file, without objects.
+
+    Raises
+    ------
+    DiskError
+        The file cannot be written.
+    """
+    content = io.BytesIO()
+    named: dict[str, Any] = dict(arrays)
+    np.savez(content, allow_pickle=False, **named)
+    write_durably(path, content.getvalue())
+
+
+def map_array(path: Path) -> NDArray[Any]:
+    """Return the array of an `.npy` file, of which only what is used is read.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, is damaged, or has objects.
+    """
+    open_regular(path).close()
+    try:
+        array: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (OSError, ValueError, TypeError, EOFError) as error:
+        raise UsageError(
+            f"{path}: expected an array in a .npy file ({' '.join(str(error).split())})"
+        ) from None
+    return array
+
+
+def map_numbers(
+    path: Path, kind: np.dtype[Any], offset: int, shape: tuple[int, ...]
+) -> NDArray[Any]:
+    """Return plain numbers of a file, of which only what is used is read.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        Kind of the numbers.
+    offset
+        Bytes before the first one.
+    shape
+        Shape of their array.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or is shorter.
+    """
+    with open_regular(path) as stream:
+        file_bytes = os.fstat(stream.fileno()).st_size
+        expected = offset + math.prod(shape) * kind.itemsize
+        if file_bytes < expected:
+            raise UsageError(f"{path}: expected {expected} bytes of numbers, got {file_bytes}")
+        return np.memmap(stream, kind, "r", offset, shape)
 
 
 def _hold_to_budget(archive: ZipFile, most_bytes: int) -> None:

@@ -3,8 +3,8 @@
 import errno
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from labrig.errors import DiskError, UsageError
 
@@ -13,9 +13,17 @@ DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDO
 
 #: Limit that a table of a year's measurements does not reach, but `/dev/zero` does.
 MAX_TEXT_BYTES = 50_000_000
+#: Limit of a JSON text, whose values take up to 25 times its size: of a result of many patches.
+MAX_JSON_BYTES = 20_000_000
+#: Limit of a picture, and of a journal of a day with a frame each second.
+MAX_PICTURE_BYTES, MAX_JOURNAL_BYTES = 200_000_000, 100_000_000
+#: Limit of a mesh, of some million triangles.
+MAX_MESH_BYTES = 200_000_000
+#: Limit of a frame, above the RAW files of 100 megapixels.
+MAX_FRAME_BYTES = 300_000_000
 
 
-def open_regular(path: Path) -> BinaryIO:
+def open_regular(path: Path) -> BufferedReader:
     """Open the file at `path` for reading; a pipe or a device is refused and never waited for.
 
     Raises

@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 from urllib.parse import parse_qs, urlsplit
 
 from labrig.errors import DiskError, LabrigError, UsageError, memory_shortage
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 
 LOOPBACK = "127.0.0.1"
 #: No content from other origins, and no embedding in another page.
@@ -125,7 +126,7 @@ class LocalConversation(BaseHTTPRequestHandler):
         try:
             if path in self.pages:
                 page = self.pages[path]
-                self.send(HTTPStatus.OK, KINDS[page.suffix], page.read_bytes())
+                self.send(HTTPStatus.OK, KINDS[page.suffix], read_bytes(page, MAX_TEXT_BYTES))
             else:
                 self.answer(path)
         except LabrigError as error:

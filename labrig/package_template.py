@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Literal
 
 from labrig import plugins, resources
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
+from labrig.input_file import read_text
+from labrig.output_file import make_folder, write_text
 
 Kind = Literal["driver", "protocol"]
 #: Name of each template's module, and the entry points that must not have the new name yet.
@@ -54,15 +56,11 @@ def create_package(kind: Kind, name: str, folder: Path) -> None:
             f"the name '{name}' is in use by another {kind} or module; give the new {kind} another"
         )
     template = resources.folder(f"config/templates/{kind}")
-    try:
-        for path in sorted(template.rglob("*")):
-            if path.suffix in _SUFFIXES:
-                place = folder / _renamed(path.relative_to(template).as_posix(), module, name)
-                place.parent.mkdir(parents=True, exist_ok=True)
-                text = _renamed(path.read_text(encoding="utf-8"), module, name)
-                place.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+    for path in sorted(template.rglob("*")):
+        if path.suffix in _SUFFIXES:
+            place = folder / _renamed(path.relative_to(template).as_posix(), module, name)
+            make_folder(place.parent)
+            write_text(place, _renamed(read_text(path), module, name))
 
 
 def _renamed(text: str, module: str, name: str) -> str:

@@ -19,14 +19,18 @@ from yaml.composer import Composer
 from labrig.errors import UsageError
 from labrig.input_file import read_text
 from labrig.model_errors import is_rule, lacks_item, place, refusal
+from labrig.output_file import write_text
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 #: Size limit; the longest files are the calibrations that labrig writes, 0.1 MB.
 MAX_BYTES = 5_000_000
-#: Limits of the depth, and of the values that aliases expand to.
+#: Limits of the depth, of the values, and of what aliases expand to.
 MAX_DEPTH = 30
+MAX_VALUES = 200_000
 MAX_ALIASED = 100_000
+#: Letters of a text that count as one value more, where an alias repeats them.
+LETTERS_OF_VALUE = 50
 TOO_DEEP = f"nested more than {MAX_DEPTH} deep"
 #: Largest length of a text quoted in a message.
 MAX_SHOWN = 80
@@ -56,7 +60,7 @@ class _Loader(SafeLoader, Composer):
     def __init__(self, text: str) -> None:
         super().__init__(text)
         Composer.__init__(self)
-        self._depth = 0
+        self._depth = self._values = 0
 
     def get_single_node(self) -> yaml.Node | None:
         # Not libyaml's own composer, which would pass `compose_node` by.
@@ -64,7 +68,7 @@ class _Loader(SafeLoader, Composer):
         if node is not None:
             extents: dict[yaml.Node, tuple[int, int]] = {}
             nodes, depth = _extent(node, extents)
-            if nodes - len(extents) > MAX_ALIASED or depth > MAX_DEPTH + 1:
+            if nodes - sum(map(_own_extent, extents)) > MAX_ALIASED or depth > MAX_DEPTH + 1:
                 raise _problem("its aliases stand for more than fits such a file", node)
         return node
 
@@ -79,6 +83,9 @@ class _Loader(SafeLoader, Composer):
             raise _problem(f"expected text, got {_shortened(ascii(event.value))}", event)
         if self._depth > MAX_DEPTH:
             raise _problem(TOO_DEEP, event)
+        self._values += 1
+        if self._values > MAX_VALUES:
+            raise _problem(f"expected at most {MAX_VALUES} keys and values, got more", event)
         self._depth += 1
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
@@ -123,10 +130,17 @@ def _extent(node: yaml.Node, extents: dict[yaml.Node, tuple[int, int]]) -> tuple
         inner = node.value
     inner_extents = [_extent(part, extents) for part in inner]
     extents[node] = (
-        1 + sum(nodes for nodes, _ in inner_extents),
+        _own_extent(node) + sum(nodes for nodes, _ in inner_extents),
         1 + max((depth for _, depth in inner_extents), default=0),
     )
     return extents[node]
+
+
+def _own_extent(node: yaml.Node) -> int:
+    """Return what a node counts without those within it."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1 + len(node.value) // LETTERS_OF_VALUE
+    return 1
 
 
 def _construct_float(loader: _Loader, node: yaml.ScalarNode) -> float:
@@ -206,7 +220,7 @@ def _is_indented_by_tab(text: str, line: int) -> bool:
 
 def write_yaml(path: Path, model: BaseModel) -> None:
     """Write `model` so that `read_model` reads it."""
-    path.write_text(model_text(model), encoding="utf-8")
+    write_text(path, model_text(model))
 
 
 def model_text(model: BaseModel) -> str:

@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from labrig import resources
 from labrig.errors import UsageError
+from labrig.input_file import read_text
 from labrig.yaml_file import did_you_mean
 
 from .arrangement import USUAL_LAMP_M, Arrangement, Arrangements
@@ -135,11 +136,11 @@ def read_curve(path: Path) -> FloatArray:
         The file is no table of wavelength and value.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = read_text(path).splitlines()
         rows = list(csv.reader(line for line in lines if line.strip() and line[0] != "#"))
         body = rows[1:] if rows[0][0] == "wavelength_nm" else rows
         table = np.array([[float(row[0]), float(row[1])] for row in body])
-    except (OSError, ValueError, IndexError, csv.Error) as error:
+    except (ValueError, IndexError, csv.Error) as error:
         raise UsageError(
             f"{path}: expected wavelength_nm and a value in two columns ({error})"
         ) from None

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from labrig import resources
 from labrig.errors import UsageError
+from labrig.input_file import MAX_JSON_BYTES, read_text
 from labrig.material import Material
 
 from .lamp import CELL_NM, IS_VISIBLE, WAVELENGTH_NM
@@ -88,11 +89,11 @@ def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
     """
     path = resources.find("config/optics/cameras", "camera", name_or_path)
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))["spectral_data"]["data"]["main"]
+        table = json.loads(read_text(path, MAX_JSON_BYTES))["spectral_data"]["data"]["main"]
         wavelength_nm = np.array([float(key) for key in table])
         values = np.array(list(table.values()), dtype=np.float64).reshape(-1, len(CHANNELS))
         curves = PchipInterpolator(wavelength_nm, values, extrapolate=False)(WAVELENGTH_NM).T
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise UsageError(
             f"{path}: expected camera curves in rawtoaces' format, got none ({error!r})"
         ) from None

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from labrig.material import Material
+from labrig.output_file import write_text
 
 from .bench_settings import StripSettings
 from .kinetics_settings import KineticsSettings
@@ -141,7 +142,7 @@ class Truth(_Part):
     def write(self, path: Path) -> None:
         """Write the parameters as JSON, which can be read back: of kinetics the keys given."""
         text = self.model_dump_json(indent=1, exclude_unset=True)
-        path.write_text(f"{text}\n", encoding="utf-8")
+        write_text(path, f"{text}\n")
 
 
 def true_patches(

@@ -37,8 +37,8 @@ class DeviceEntry(BaseModel):
     address
         Address of the device: a serial port (`COM3`, `/dev/ttyACM0`, `/dev/cu.usbmodem…`), a USB
         device (`usb://04a9:3199`, with `/SERIAL` behind it if there are two alike), a network
-        camera (`ptpip://host`), a video device (`uvc://0`), or a device of the simulated room
-        (`sim://room/relays`).
+        camera (`ptpip://host`), a serial board behind a network (`socket://host:port`), a video
+        device (`uvc://0`), or a device of the simulated room (`sim://room/relays`).
     warm_up
         Time after connecting, or for a lamp after switching on, until the device is steady, for
         example `15 min`. A lamp's warm-up time is part of the charge. Default: none.
@@ -66,6 +66,9 @@ def _addresses_within(value: Any) -> Iterator[str]:
                 yield inner
             else:
                 yield from _addresses_within(inner)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from _addresses_within(inner)
 
 
 def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
@@ -259,6 +262,10 @@ class RigFile(BaseModel):
     simulation: dict[str, Any] | None = Field(
         None, description="only in a simulated rig: what is in the simulated room"
     )
+
+    def addresses(self) -> list[str]:
+        """Return the addresses of all devices."""
+        return [each for entry in self.devices.values() for each in entry.addresses()]
 
 
 def read_rig_file(path: str | Path) -> RigFile:

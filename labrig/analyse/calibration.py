@@ -16,6 +16,7 @@ from labrig.calibration import (
     kinds,
 )
 from labrig.fit.lvf import place_means
+from labrig.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.optics import SLICES
 from labrig.protocols.lvf_calibration import LvfFrames, filter_unit
 from labrig.reduce import read_exif, read_raw, strip_profile_in
@@ -95,7 +96,7 @@ def _reference(part: Part, picture: CardPicture | None, measured: set[str]) -> R
     return ReferenceFile(
         bench=part.rig.name,
         camera=run.camera_identity or None,
-        lens=read_exif(frames[-1].path.read_bytes()).lens,
+        lens=read_exif(read_bytes(frames[-1].path, MAX_FRAME_BYTES)).lens,
         lamp=optics.lamp,
         grey_card=optics.grey_card,
         curves=optics.camera,

@@ -8,6 +8,7 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile, CameraFile
 from labrig.errors import DataError, UsageError
+from labrig.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.record import Attempt, FileRecord, FrameRecord, FrameRole, RunRecord, damaged_frames
 from labrig.reduce import SeriesFrame, read_exif
 from labrig.region import Region
@@ -16,7 +17,7 @@ from labrig.results import add_flag
 
 def lens_of(frames: Sequence[FrameRecord]) -> str | None:
     """Return name and focal length of the lens by the first frame's EXIF; None if absent."""
-    return read_exif(frames[0].path.read_bytes()).lens if frames else None
+    return read_exif(read_bytes(frames[0].path, MAX_FRAME_BYTES)).lens if frames else None
 
 
 def require_calibrated_camera(

@@ -5,6 +5,7 @@ from labrig.bench.run_log import LoggedObserver
 from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, ReferenceFile
 from labrig.errors import ProtocolError
+from labrig.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.record import FrameRecord
 from labrig.reduce import read_exif
 
@@ -62,7 +63,7 @@ class LensObserver(LoggedObserver):
         reference, self._reference = self._reference, None
         if reference is None or reference.lens is None:
             return
-        lens = read_exif(record.path.read_bytes()).lens
+        lens = read_exif(read_bytes(record.path, MAX_FRAME_BYTES)).lens
         if lens is None or lens == reference.lens:
             return
         text = f"expected the calibrated lens, {reference.lens}, got {lens}"

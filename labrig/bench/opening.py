@@ -1,5 +1,7 @@
 """Opening of a rig: here drivers and clock meet the simulated room, if there is one."""
 
+import os
+import re
 import socket
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import (
@@ -37,9 +39,10 @@ from labrig.bench.device_lock import held, network_devices, serial_devices, usb_
 from labrig.bench.guard import Guard, guarding
 from labrig.bench.serial_ports import SerialPorts
 from labrig.clock import Clock, SystemClock
+from labrig.consent import NETWORK_SCHEMES, calls, require_consent
 from labrig.errors import DeviceError, LabrigError, UsageError
 from labrig.named_files import with_absolute_paths
-from labrig.record import REAL_DISK, Disk
+from labrig.output_file import REAL_DISK, Disk
 from labrig.signals import interrupting, pausing
 
 if TYPE_CHECKING:
@@ -49,6 +52,11 @@ SERIAL_WRITE_TIMEOUT_S = 2.0
 TCP_CONNECT_TIMEOUT_S = 5.0
 #: Memory kept for the way to the safe state; the system gives it only once it is used.
 RESERVE_BYTES = 16_000_000
+_NETWORK_PORT = "socket://"
+#: Serial ports whose names are no paths: of Windows, in a simulated room, and behind a network.
+_PORT = re.compile(r"(?:\\\\\.\\)?(?i:COM|CNC[AB])\d+|sim://.+|socket://[^/?#@\s]+:\d{1,5}")
+#: Devices that are serial ports, unlike a disk or a watchdog, which opening alone sets off.
+_TERMINAL = re.compile(r"/dev/(tty|cu|pts/|rfcomm)")
 #: What opening a serial port raises; pyserial says of some wrong addresses that they are no value.
 _NOT_OPENED: tuple[type[Exception], ...] = (*PORT_FAILURES, ValueError)
 
@@ -151,6 +159,11 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
     Bench
         The bench with its clock; `Bench.devices` opens the devices.
 
+    Raises
+    ------
+    UsageError
+        An address leads to a network, and this user did not consent to it on this PC.
+
     Examples
     --------
     >>> from pathlib import Path
@@ -161,6 +174,7 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
     ...     print(sorted(rig.devices))
     ['camera', 'changer', 'door', 'lamp', 'shield', 'thermometer']
     """
+    require_consent(calls(file.addresses()), source)
     if file.simulation is None:
         with guarding(file, source) as guard:
             yield Bench(file, source, SystemClock(), None, guard)
@@ -349,7 +363,10 @@ class _Connections:
                 write_timeout=SERIAL_WRITE_TIMEOUT_S,
                 exclusive=True,
             )
-            devices = tuple(serial_devices(str(port.port)))
+            if address.startswith(_NETWORK_PORT):
+                devices = tuple(network_devices(*_host_and_port(address, 0)))
+            else:
+                devices = tuple(serial_devices(str(port.port)))
             if devices not in self._ports:
                 self._lock(devices, address)
                 port.open()
@@ -481,18 +498,18 @@ def _with_serial(
 
 
 def _require_port(address: str) -> None:
-    """Refuse pyserial's own addresses: `spy://` empties a file, `socket://` calls another computer.
+    """Refuse what pyserial would do beside opening a port: `spy://` empties a file, for example.
 
     Raises
     ------
     UsageError
-        The address is neither a port nor in a simulated room.
+        The address is neither a port, nor one behind a network, nor in a simulated room.
     """
-    scheme, separator, _ = address.partition("://")
-    if separator and scheme != "sim":
+    is_terminal = _TERMINAL.match(os.path.realpath(address)) or not Path(address).exists()
+    if not _PORT.fullmatch(address) and ("://" in address or not is_terminal):
         raise UsageError(
-            f"'{address}' is no serial port; write COM3, /dev/… or, in a simulated room, "
-            "sim://room/DEVICE"
+            f"'{address}' is no serial port; write COM3, /dev/…, socket://HOST:PORT for one behind "
+            "a network or, in a simulated room, sim://room/DEVICE"
         )
 
 
@@ -502,9 +519,11 @@ def _host_and_port(address: str, default_port: int) -> tuple[str, int]:
         host, port = url.hostname, url.port
     except ValueError:
         host, port = None, None
-    if not host or url.path.strip("/"):
+    # Of other schemes nobody was asked for consent.
+    if not host or url.path.strip("/") or url.scheme not in NETWORK_SCHEMES:
         raise UsageError(
             f"'{address}' is no network address; write {url.scheme}://HOST or "
-            f"{url.scheme}://HOST:PORT, such as {url.scheme}://192.168.1.20"
+            f"{url.scheme}://HOST:PORT, such as {url.scheme}://192.168.1.20, with one of the "
+            f"schemes {', '.join(NETWORK_SCHEMES)}"
         )
     return host, default_port if port is None else port

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from labrig.calibration.kind import kinds
 from labrig.calibration.reference_file import REFERENCE_KIND, ReferenceFile
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.output_file import make_folder_in, write_durably
 
 #: Name of the folder beside the run folders.
 FOLDER = "calibrations"
@@ -59,13 +61,13 @@ def keep_calibration(run: Path, reference: ReferenceFile | None = None) -> Path 
     result = run / "result"
     if reference is None and not (result / REFERENCE_KIND.file_name).is_file():
         return None
-    folder = run.resolve().parent / FOLDER / run.resolve().name
+    folder = make_folder_in(run.resolve().parent, FOLDER) / run.resolve().name
     new = folder.with_name(f"{folder.name}.part")
     shutil.rmtree(new, ignore_errors=True)
-    new.mkdir(parents=True)
+    new.mkdir()
     for kind in kinds():
         for path in [*result.glob(kind.file_name), *result.glob(f"*/{kind.file_name}")]:
-            shutil.copyfile(path, new / kind.file_name)
+            write_durably(new / kind.file_name, read_bytes(path, MAX_TEXT_BYTES))
     if reference is not None:
         REFERENCE_KIND.write(new, reference)
     if folder.exists():

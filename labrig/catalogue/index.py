@@ -18,6 +18,9 @@ from zlib import crc32
 
 from labrig.catalogue.run_summary import RunSummary
 from labrig.clock import SystemClock
+from labrig.errors import DiskError, LabrigError
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.output_file import write_durably
 from labrig.results import SUMMARY
 
 FILE = ".runs-index"
@@ -146,25 +149,20 @@ def _measured(parameters: Mapping[str, Mapping[str, Sequence[Any]]]) -> dict[str
 def _read_index(runs: Path) -> dict[str, _Entry]:
     """Return the entries of the index; none if there is no index, a damaged or an older one."""
     try:
-        checksum, content = (runs / FILE).read_bytes().split(b"\n", 1)
+        checksum, content = read_bytes(runs / FILE, MAX_TEXT_BYTES).split(b"\n", 1)
         if checksum != _checksum(content):
             return {}
         index = json.loads(content)
-    except (OSError, ValueError):
+        return {name: _Entry(**entry) for name, entry in index.items()}
+    except (LabrigError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
-    return {name: _Entry(**entry) for name, entry in index.items()}
 
 
 def _write_index(runs: Path, entries: Mapping[str, _Entry]) -> None:
     """Write the index as a whole, so that two processes do not mix theirs; where that may be."""
     content = json.dumps({name: vars(entry) for name, entry in entries.items()}).encode()
-    part = runs / f"{FILE}.{os.getpid()}.part"
-    try:
-        part.write_bytes(_checksum(content) + b"\n" + content)
-        part.replace(runs / FILE)
-    except OSError:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+    with suppress(DiskError):
+        write_durably(runs / FILE, _checksum(content) + b"\n" + content)
 
 
 def _checksum(content: bytes) -> bytes:
@@ -178,5 +176,5 @@ def _code_checksum() -> int:
     package = Path(__file__).parents[1]
     checksum = crc32(version("labrig").encode())
     for module in _MODULES:
-        checksum = crc32((package / module).read_bytes(), checksum)
+        checksum = crc32(read_bytes(package / module, MAX_TEXT_BYTES), checksum)
     return checksum

@@ -6,6 +6,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
+from labrig.errors import UsageError
+
 if TYPE_CHECKING:
     from labrig.record import RunRecord
     from labrig.results import Measured
@@ -106,17 +108,19 @@ def status_of(record: "RunRecord", *, is_complete: bool) -> RunStatus:
 
 def is_being_written(folder: Path) -> bool:
     """Whether a process has the run open for writing."""
-    from filelock import FileLock, Timeout
+    from filelock import Timeout
+
+    from labrig.file_lock import plain_lock
 
     lock = folder / ".lock"
     if not lock.exists():
         return False
     try:
-        with FileLock(lock, timeout=LOOK_S, poll_interval=LOOK_S / 20):
+        with plain_lock(lock, LOOK_S, LOOK_S / 20):
             return False
     except Timeout:
         return True
-    except OSError:  # another user's folder: only its owner writes there
+    except (OSError, UsageError):  # another user's folder: only its owner writes there
         return False
 
 

@@ -243,16 +243,17 @@ def _print_section(section: "Section") -> None:
 
 def _save_figures(section: "Section", folder: Path) -> None:
     """Save the figures of a section as PNG and as PDF."""
-    from labrig.report import figure_style
+    from labrig.output_file import make_folder
+    from labrig.report import figure_style, save_picture
 
     if section.figures:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     for picture in section.figures:
         with figure_style():
             figure = picture.figure()
             figure.patch.set(visible=True, facecolor="white")
             for suffix in ("png", "pdf"):
-                figure.savefig(folder / f"{picture.name}.{suffix}", dpi=200)
+                save_picture(figure, folder / f"{picture.name}.{suffix}", dpi=200)
         typer.echo(f"figure: {folder / picture.name}.png")
 
 

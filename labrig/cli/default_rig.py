@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from labrig.cli.completion import complete_rig
-from labrig.errors import UsageError
+from labrig.errors import LabrigError, UsageError
+from labrig.input_file import read_text
 
 #: Environment variable with a rig, which has priority over the one that was chosen.
 VARIABLE = "LABRIG_RIG"
@@ -87,15 +88,12 @@ def default_rig() -> DefaultRig | None:
 def _chosen_rig() -> DefaultRig | None:
     """Return the rig of `labrig rig use`, None if there is none."""
     choice = _choice_file()
-    try:
-        name = choice.read_text(encoding="utf-8").strip()
-    except (FileNotFoundError, NotADirectoryError):
+    if not choice.exists():
         return None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(
-            f"{choice}: the default rig cannot be read ({error}); choose it again: "
-            "labrig rig use FILE"
-        ) from None
+    try:
+        name = read_text(choice).strip()
+    except LabrigError as error:
+        raise UsageError(f"{error}; choose the default rig again: labrig rig use FILE") from None
     return DefaultRig(name, is_of_environment=False) if name else None
 
 
@@ -161,20 +159,21 @@ def use(
 def _choose(rig: str) -> None:
     from labrig import resources
     from labrig.acquire import read_rig_file
-    from labrig.cli.consent import command_text, give_consent
-    from labrig.record import write_durably
+    from labrig.consent import calls, give_consent, starting
+    from labrig.output_file import make_folder, write_text
 
     path = resources.find("config", "rig", rig)
-    on_finish = read_rig_file(path).on_finish  # a mistake in the file is better found now
-    if isinstance(on_finish, tuple):
-        give_consent(on_finish)
-        typer.echo(
-            f"note: runs on it start, when they have ended: {command_text(on_finish)}", err=True
-        )
+    file = read_rig_file(path)  # a mistake in the file is better found now
+    deeds = list(calls(file.addresses()))
+    if isinstance(file.on_finish, tuple):
+        deeds.append(f"{starting(file.on_finish)}")
+    if deeds:
+        give_consent(deeds)
+        typer.echo(f"note: with your consent, every run on it {', '.join(deeds)}", err=True)
     is_shipped = resources.names("config").get(rig) == path
     choice = _choice_file()
-    choice.parent.mkdir(parents=True, exist_ok=True)
-    write_durably(choice, f"{rig if is_shipped else path.absolute()}\n".encode())
+    make_folder(choice.parent)
+    write_text(choice, f"{rig if is_shipped else path.absolute()}\n")
 
 
 def _choice_file() -> Path:

@@ -48,7 +48,7 @@ def trust(
 
     Compare the fingerprints with those that a laboratory itself has published.
     """
-    from labrig.record import write_durably
+    from labrig.output_file import write_durably
     from labrig.seal import Signers, read_signers
 
     new_signers, trusted = read_signers(file), _trusted_file()

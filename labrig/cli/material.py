@@ -238,14 +238,11 @@ def list_materials(
 
 
 def _write_lines(lines: list[str], out: Path | None) -> None:
-    from labrig.errors import DiskError
+    from labrig.output_file import write_text
 
     if out is None:
         for line in lines:
             typer.echo(line)
         return
-    try:
-        out.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise DiskError(f"{out}: cannot be written ({error.strerror})") from None
+    write_text(out, "\n".join(lines) + "\n")
     typer.echo(f"written: {out}")

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig.cli.consent import command_text, has_consent
 from labrig.clock import Interrupted
+from labrig.consent import has_consent, starting
 from labrig.errors import LabrigError
 from labrig.readable_output import spelled
 
@@ -40,11 +40,11 @@ def permitted(
     """
     if on_finish is None or isinstance(on_finish, str):
         return on_finish
-    if is_asked_for or has_consent(on_finish):
+    if is_asked_for or has_consent(starting(on_finish)):
         return on_finish
     print(
-        f"note: 'on_finish' in {path} will not be started, in case somebody else wrote it: "
-        f"{command_text(on_finish)}; add --on-finish for this run, or consent for all: "
+        f"note: 'on_finish' in {path} will not be obeyed, in case somebody else wrote it: it "
+        f"{starting(on_finish)}; add --on-finish for this run, or consent for all: "
         "labrig rig use FILE",
         file=sys.stderr,
     )

@@ -9,8 +9,8 @@ from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
 from labrig.acquire import CAMERA, Plan, Step, shutter_text
-from labrig.cli.consent import command_text, has_consent
 from labrig.cli.wording import counted, measurement
+from labrig.consent import calls, has_consent, starting
 from labrig.quantity import duration_text
 from labrig.record import PERSON, size_text
 
@@ -78,6 +78,7 @@ def summary(recording: "Recording", free_bytes: int) -> list[str]:
         f"  disk      about {size_text(size.total_bytes)}, {size_text(free_bytes)} are free",
         f"            frames {size_text(size.frames_bytes)} ({size_text(plan.offers.frame_bytes)} "
         f"each), results {size_text(size.results_bytes)}",
+        *(_deed("network", sentence, "") for sentence in calls(rig.addresses())),
         *_at_end(rig.on_finish),
     ]
 
@@ -85,8 +86,13 @@ def summary(recording: "Recording", free_bytes: int) -> list[str]:
 def _at_end(on_finish: str | Sequence[str] | None) -> list[str]:
     if on_finish is None or isinstance(on_finish, str):
         return []
-    consent = "" if has_consent(on_finish) else ", only with --on-finish or 'labrig rig use FILE'"
-    return [f"  at end    starts {command_text(on_finish)}{consent}"]
+    return [_deed("at end", starting(on_finish), "--on-finish or ")]
+
+
+def _deed(when: str, sentence: str, other_way: str) -> str:
+    """Return a line about what is done by consent alone."""
+    consent = "" if has_consent(sentence) else f", only with {other_way}'labrig rig use FILE'"
+    return f"  {when:8}  {sentence}{consent}"
 
 
 def folded_units(plan: Plan) -> Iterator[str]:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from labrig.cli.completion import complete_protocol
+from labrig.input_file import read_text
 
 app = typer.Typer(help="The protocols that can be run.")
 
@@ -53,7 +54,7 @@ def list_protocols() -> None:
     for path in resources.names("protocols").values():
         model = read_protocol(path)
         shipped.add(model.protocol)
-        table.add_row(path.stem, model.protocol, _summary(path.read_text(encoding="utf-8")))
+        table.add_row(path.stem, model.protocol, _summary(read_text(path)))
     for name in plugins.names(plugins.PROTOCOLS):
         if name not in shipped:
             described = plugins.load(plugins.PROTOCOLS, name, "protocol list").__doc__ or ""
@@ -106,16 +107,13 @@ def _new_package(name: str, folder: Path) -> None:
 
 
 def _new_file(name: str, path: Path) -> None:
-    from labrig.errors import DiskError, UsageError
+    from labrig.errors import UsageError
+    from labrig.output_file import write_text
 
-    text = protocol_path(name).read_text(encoding="utf-8")
-    try:
-        with path.open("x", encoding="utf-8", newline="\n") as new:
-            new.write(text)
-    except FileExistsError:
-        raise UsageError(f"{path} is there already; give the new file another name") from None
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    text = read_text(protocol_path(name))
+    if path.exists() or path.is_symlink():
+        raise UsageError(f"{path} is there already; give the new file another name")
+    write_text(path, text)
     place = path if path.is_absolute() else f"./{path}"
     typer.echo(f"{path} is yours to change; then: labrig plan {place} --rig sim")
 

@@ -9,10 +9,11 @@ import numpy as np
 from labrig.compare.viewing import FloatArray
 from labrig.material import Material, ReradiationMatrix, write_fluorescent, write_material
 from labrig.optics import Spectrum
+from labrig.output_file import make_folder, write_text
 from labrig.reduce import SensorLayout
 from labrig.region import Region, region_pixels
 from labrig.reproduce import CARD_NAME, DarkRoomPicture, Renderer, Scene, SceneFile
-from labrig.text_table import table_text
+from labrig.results import write_csv
 from labrig.yaml_file import yaml_text
 
 #: Height of the frame in the rendering; its light is even on every sample.
@@ -41,7 +42,7 @@ class DarkRoomScene:
 
     def write(self, folder: Path) -> Path:
         """Write scene, materials and lights into a folder, and return the path of the scene."""
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         for name, material in self.materials.items():
             if isinstance(material, Material):
                 write_material(folder / name, material)
@@ -49,12 +50,11 @@ class DarkRoomScene:
                 write_fluorescent(folder / name, material)
         for name, light in self.lights.items():
             pairs = zip(light.wavelength_nm, light.value, strict=True)
-            rows = ([f"{number:.9g}" for number in pair] for pair in pairs)
-            text = table_text(["wavelength_nm", "value"], rows)
-            (folder / name).write_text(text, encoding="utf-8", newline="")
+            rows = [(f"{nm:.9g}", f"{value:.9g}") for nm, value in pairs]
+            write_csv(folder / name, ("wavelength_nm", "value"), rows)
         path = folder / SCENE_FILE
         content = self.file.model_dump(mode="json", exclude_none=True)
-        path.write_text(yaml_text(content), encoding="utf-8")
+        write_text(path, yaml_text(content))
         return path
 
 

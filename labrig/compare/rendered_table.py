@@ -5,8 +5,8 @@ from pathlib import Path
 
 from labrig.compare.rendered import RenderedComparison
 from labrig.compare.rendered_lamps import LampsComparison
-from labrig.errors import DiskError
-from labrig.text_table import table_text
+from labrig.output_file import make_folder
+from labrig.results import write_csv
 
 Row = tuple[str | float, ...]
 
@@ -66,12 +66,12 @@ def write_rendered(path: Path, comparison: RenderedComparison | LampsComparison)
         head, rows = OF_GLOW, _of_glow(comparison)
     else:
         rows = _of_lamps(comparison)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        cells = ([cell if isinstance(cell, str) else f"{cell:.6g}" for cell in row] for row in rows)
-        path.write_text(table_text(head, cells), encoding="utf-8", newline="")
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    make_folder(path.parent)
+    write_csv(
+        path,
+        head,
+        ([cell if isinstance(cell, str) else f"{cell:.6g}" for cell in row] for row in rows),
+    )
 
 
 def _of_glow(comparison: RenderedComparison) -> Iterator[Row]:

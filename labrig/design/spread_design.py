@@ -24,6 +24,7 @@ from labrig.design.spread_wish import SpreadWish
 from labrig.design.wish_file import Wish
 from labrig.errors import UsageError
 from labrig.material import Material
+from labrig.picture_file import read_picture
 from labrig.reproduce import ParameterTexture
 
 FloatArray = NDArray[np.float64]
@@ -506,9 +507,7 @@ def _colours(path: Path, shape: tuple[int, int]) -> FloatArray:
     """Return the colours of a picture as a screen shows them, 0 to 1, (rows, columns, 3)."""
     import cv2
 
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None
-    if picture is None:
-        raise UsageError(f"{path}: expected a picture for 'appearance_file', got none")
+    picture = read_picture(path, "for 'appearance_file'")
     rows, columns = shape
     resized = cv2.resize(picture, (columns, rows), interpolation=cv2.INTER_AREA)
     return np.asarray(resized, dtype=np.float64) / 255

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.acquire import CAMERA, DARK, LIGHTS
-from labrig.errors import DiskError
+from labrig.output_file import write_durably
 from labrig.record import DeviceLine, RunDescription, RunRecord
 from labrig.results import (
     DecayPatch,
@@ -344,10 +344,7 @@ def write_nexus(path: Path, run: RunRecord, about: RunDescription, result: RunRe
         file.attrs["creator_version"] = about.labrig_version
         file.attrs["default"] = "entry"
         _add_entry(file, run, about, result)
-    try:
-        path.write_bytes(content.getvalue())
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error})") from None
+    write_durably(path, content.getvalue())
 
 
 def _add_entry(file: h5py.File, run: RunRecord, about: RunDescription, result: RunResult) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from labrig import colour_science
 from labrig.errors import UsageError
+from labrig.input_file import read_text
 from labrig.optics.spectrum import Spectrum
 from labrig.yaml_file import did_you_mean
 
@@ -70,7 +71,7 @@ def observer(name: str) -> Observer:
     """
     if name == CIE_1931:
         table_nm, *functions = np.loadtxt(
-            _OBSERVER, delimiter=",", skiprows=2, unpack=True, encoding="utf-8"
+            read_text(_OBSERVER).splitlines(), delimiter=",", skiprows=2, unpack=True
         )
         return Observer(name, table_nm, np.stack(functions, axis=1))
     table = colour_science.load().MSDS_CMFS[name]
@@ -121,10 +122,9 @@ def illuminant(name: str) -> Spectrum:
 @cache
 def _shipped_illuminants() -> dict[str, Spectrum]:
     """Return the illuminants of labrig's own table, by name."""
-    with _ILLUMINANTS.open(encoding="utf-8") as lines:
-        next(lines)
-        names = next(lines).strip().split(",")[1:]
-        nm, *powers = np.loadtxt(lines, delimiter=",", unpack=True, encoding="utf-8")
+    _, head, *lines = read_text(_ILLUMINANTS).splitlines()
+    names = head.split(",")[1:]
+    nm, *powers = np.loadtxt(lines, delimiter=",", unpack=True, encoding="utf-8")
     return {name: Spectrum(name, nm, power) for name, power in zip(names, powers, strict=True)}
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from labrig.errors import UsageError
-from labrig.input_file import read_text
+from labrig.input_file import MAX_JSON_BYTES, read_text
 from labrig.optics.curve_json import curves_from_json
 from labrig.optics.curve_table import Columns, NamedCurve, curves_from_table, is_own_table
 from labrig.optics.foreign_spectra import foreign_spectra
@@ -144,7 +144,7 @@ def read_curve_file(path: str | os.PathLike[str]) -> CurveFile:
     file_path = Path(path)
     if file_path.suffix.lower() == ".json":
         try:
-            content = json.loads(read_text(file_path))
+            content = json.loads(read_text(file_path, MAX_JSON_BYTES))
         except (ValueError, RecursionError) as error:
             raise UsageError(f"{file_path}: not JSON ({' '.join(str(error).split())})") from None
         title, curves = checked(file_path, curves_from_json, content)

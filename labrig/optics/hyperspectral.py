@@ -5,19 +5,22 @@ ENVI is a text header beside a file of plain numbers. Source: NV5 Geospatial, *E
 
 import os
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.array_file import read_arrays
+from labrig.array_file import map_array, map_numbers, read_arrays
 from labrig.errors import DataError, UsageError
 from labrig.input_file import read_text
 from labrig.optics.piecewise import FloatArray
 from labrig.optics.spectrum import Spectrum
 from labrig.region import Region, region_pixels
+
+T = TypeVar("T")
 
 #: Types of numbers by ENVI's `data type`.
 _TYPES = {"1": "u1", "2": "i2", "3": "i4", "4": "f4", "5": "f8", "12": "u2", "13": "u4"}
@@ -157,11 +160,16 @@ def read_hyperspectral_cube(path: str | os.PathLike[str]) -> HyperspectralCube:
         ) from None
 
 
-def _read_npz(path: Path) -> tuple[FloatArray, NDArray[Any]]:
+def _data(read: Callable[[], T]) -> T:
+    """Return what is read of an image; where that is refused, the data are at fault."""
     try:
-        arrays = read_arrays(path)
-    except UsageError as error:  # as of the other formats: the data are at fault
+        return read()
+    except UsageError as error:
         raise DataError(str(error)) from None
+
+
+def _read_npz(path: Path) -> tuple[FloatArray, NDArray[Any]]:
+    arrays = _data(lambda: read_arrays(path))
     return np.asarray(arrays["wavelength_nm"], dtype=np.float64), arrays["values"]
 
 
@@ -170,7 +178,7 @@ def _read_npy(path: Path) -> tuple[FloatArray, NDArray[Any]]:
     if not beside.is_file():
         raise UsageError(f"{path}: expected its wavelengths in the file {beside}, one a line")
     lines = [line for line in read_text(beside).split() if line[:1].isdigit()]
-    return np.array([float(line) for line in lines]), np.load(path, mmap_mode="r")
+    return np.array([float(line) for line in lines]), _data(lambda: map_array(path))
 
 
 def _read_envi(path: Path) -> tuple[FloatArray, NDArray[Any]]:
@@ -191,11 +199,9 @@ def _read_envi(path: Path) -> tuple[FloatArray, NDArray[Any]]:
     order = ">" if header.get("byte order", "0") == "1" else "<"
     numbers = np.dtype(order + _TYPES[kind])
     data = _beside(path)
-    expected = offset + number * numbers.itemsize
-    if data.stat().st_size < expected:
-        raise ValueError(f"{data.name} has {data.stat().st_size} bytes, the header says {expected}")
     axes = _AXES[interleave]
-    stored = np.memmap(data, numbers, "r", offset, tuple(size[axis] for axis in axes))
+    shape = tuple(size[axis] for axis in axes)
+    stored = _data(lambda: map_numbers(data, numbers, offset, shape))
     values = stored.transpose([axes.index(axis) for axis in "lsb"])
     return _envi_wavelengths_nm(header, size["b"]), values
 

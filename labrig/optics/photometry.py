@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from labrig.input_file import read_text
 from labrig.optics.colorimetry import CIE_1931, observer
 from labrig.optics.piecewise import FloatArray
 
@@ -23,7 +24,8 @@ _SCOTOPIC = Path(__file__).with_name("cie_1951_scotopic.csv")
 
 @cache
 def _scotopic_table() -> tuple[FloatArray, FloatArray]:
-    nm, efficiency = np.loadtxt(_SCOTOPIC, delimiter=",", skiprows=2, unpack=True, encoding="utf-8")
+    lines = read_text(_SCOTOPIC).splitlines()
+    nm, efficiency = np.loadtxt(lines, delimiter=",", skiprows=2, unpack=True)
     return nm, efficiency
 
 

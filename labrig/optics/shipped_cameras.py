@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from labrig import resources
+from labrig.input_file import read_text
 
 #: Folder of the files, JSON as rawtoaces writes it.
 FOLDER = "config/optics/cameras"
@@ -69,7 +70,7 @@ def shipped_cameras() -> tuple[ShippedCamera, ...]:
     """
     cameras = []
     for name, path in resources.names(FOLDER).items():
-        header = json.loads(path.read_text(encoding="utf-8"))["header"]
+        header = json.loads(read_text(path))["header"]
         cameras.append(ShippedCamera(name, header["manufacturer"], header["model"], path))
     return tuple(cameras)
 

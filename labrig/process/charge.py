@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from labrig.analyse import ChargeTableOptions
-from labrig.errors import DiskError
 from labrig.fit import ChargeFit, OrderState
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.material import Material, Provenance, State, write_material
+from labrig.output_file import make_folder, write_text
 from labrig.process.provenance import library_versions
 from labrig.process.run import new_result, put_in_place
 from labrig.process.table import TableProvenance, stated
 from labrig.process.without_run import describe_without_run
 from labrig.report import charge_report, write_report
-from labrig.results import TableLayout
-from labrig.text_table import table_text
+from labrig.results import TableLayout, write_csv
 from labrig.yaml_file import write_yaml
 
 
@@ -91,7 +91,7 @@ def report_charge(
     >>> sorted(path.name for path in reported.report.parent.iterdir())  # doctest: +ELLIPSIS
     ['figures', 'fit.json', 'material.yaml', 'provenance.yaml', 'readings.csv', 'report.html']
     """
-    checksum = hashlib.sha256(table.read_bytes()).hexdigest()
+    checksum = hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest()
     provenance = TableProvenance(
         labrig=version("labrig"),
         libraries=library_versions(),
@@ -104,13 +104,10 @@ def report_charge(
         table.stem, "charge", table.name, [("SHA-256", checksum), ("Lamp", lamp)]
     )
     material = _material(table, fit)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        part = new_result(folder)
-        (part / "fit.json").write_text(fit.to_json() + "\n", encoding="utf-8")
-        _write_readings(part / "readings.csv", fit)
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+    make_folder(folder)
+    part = new_result(folder)
+    write_text(part / "fit.json", fit.to_json() + "\n")
+    _write_readings(part / "readings.csv", fit)
     write_yaml(part / "provenance.yaml", provenance)
     if material is not None:
         write_material(part / "material.yaml", material)
@@ -126,9 +123,9 @@ def _write_readings(path: Path, fit: ChargeFit) -> None:
     """Write what was fitted, with σ and the light of the fit."""
     readings = fit.readings
     columns = (readings.t_s, readings.values, readings.sigma, readings.light)
+    header = ("t_after_lamp_on_s", "value", "value_sigma", "fit")
     rows = ([f"{number:.9g}" for number in row] for row in zip(*columns, strict=True))
-    text = table_text(["t_after_lamp_on_s", "value", "value_sigma", "fit"], rows)
-    path.write_text(text, encoding="utf-8", newline="")
+    write_csv(path, header, rows)
 
 
 def _material(table: Path, fit: ChargeFit) -> Material | None:

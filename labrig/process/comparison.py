@@ -6,7 +6,8 @@ from pathlib import Path
 
 from markupsafe import escape
 
-from labrig.errors import DiskError
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes, read_text
+from labrig.output_file import make_folder_in, write_text
 from labrig.record import RunLock
 from labrig.report import Section, section_page, with_later
 
@@ -50,13 +51,9 @@ def show_comparison(run: Path, sections: Sequence[Section]) -> bool:
     """
     folder, result = run / FOLDER, run / "result"
     with RunLock(run / LOCK, "processing this run"):
-        try:
-            folder.mkdir(exist_ok=True)
-            part = section_page(sections, folder, f"../{FOLDER}")
-            text = f"<!-- of {_checksum(result)} -->\n{part}\n"
-            (folder / PART).write_text(text, encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+        make_folder_in(run, FOLDER)
+        part = section_page(sections, folder, f"../{FOLDER}")
+        write_text(folder / PART, f"<!-- of {_checksum(result)} -->\n{part}\n")
         return include_comparison(run, result)
 
 
@@ -66,26 +63,21 @@ def include_comparison(run: Path, result: Path) -> bool:
     Returns whether the report has a place for it, or needs none.
     """
     path, report = run / FOLDER / PART, result / REPORT
-    try:
-        if not path.is_file():
-            return True
-        head, _, part = path.read_text(encoding="utf-8").partition("\n")
-        if head != f"<!-- of {_checksum(result)} -->":
-            part = (
-                '<section><h2>Rendered comparison</h2>\n<p class="text">The comparison with '
-                "rendered pictures is of another result of this run. Make it again: "
-                f"<code>labrig compare {escape(run.name)} --rendered</code></p></section>"
-            )
-        page = with_later(report.read_text(encoding="utf-8"), part.strip())
-        if page is None:
-            return False
-        draft = report.with_name(f".{REPORT}.draft")
-        draft.write_text(page, encoding="utf-8", newline="\n")
-        draft.replace(report)
-    except OSError as error:
-        raise DiskError(f"{report}: cannot be written ({error.strerror})") from None
+    if not path.is_file():
+        return True
+    head, _, part = read_text(path).partition("\n")
+    if head != f"<!-- of {_checksum(result)} -->":
+        part = (
+            '<section><h2>Rendered comparison</h2>\n<p class="text">The comparison with '
+            "rendered pictures is of another result of this run. Make it again: "
+            f"<code>labrig compare {escape(run.name)} --rendered</code></p></section>"
+        )
+    page = with_later(read_text(report), part.strip())
+    if page is None:
+        return False
+    write_text(report, page)
     return True
 
 
 def _checksum(result: Path) -> str:
-    return hashlib.sha256((result / RESULT).read_bytes()).hexdigest()
+    return hashlib.sha256(read_bytes(result / RESULT, MAX_TEXT_BYTES)).hexdigest()

@@ -3,6 +3,7 @@
 import hashlib
 from pathlib import Path
 
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.process.without_run import describe_without_run, write_with_report
 from labrig.report import FittedMatrix, mixture_report
 
@@ -45,7 +46,7 @@ def report_mixture(file: Path, fitted: FittedMatrix, command: str, folder: Path)
     'mixture/report.html'
     """
     sample = [
-        ("SHA-256", hashlib.sha256(file.read_bytes()).hexdigest()),
+        ("SHA-256", hashlib.sha256(read_bytes(file, MAX_TEXT_BYTES)).hexdigest()),
         ("Command", command),
     ]
     about = describe_without_run(fitted.matrix.name, "mixture", file.name, sample)

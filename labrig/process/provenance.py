@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Overrides
+from labrig.input_file import read_text
 from labrig.record import (
     DeviceLine,
     RunDescription,
@@ -142,8 +143,8 @@ def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDe
             for role, entry in rig.devices.items()
         ),
         guard=start.get("guard", ""),
-        protocol_text=(run.folder / "protocol.yaml").read_text(encoding="utf-8"),
-        rig_text=(run.folder / "rig.yaml").read_text(encoding="utf-8"),
+        protocol_text=read_text(run.folder / "protocol.yaml"),
+        rig_text=read_text(run.folder / "rig.yaml"),
         interruptions=interruptions(run),
         notes=read_notes(run.folder),
     )

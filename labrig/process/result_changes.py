@@ -1,5 +1,6 @@
 """Differences between two results of a run, in lines for people."""
 
+import filecmp
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import DataError, UsageError
+from labrig.errors import DataError, LabrigError, UsageError
+from labrig.input_file import MAX_JSON_BYTES, read_text
 from labrig.number_format import plus_minus, rounded
 from labrig.process.provenance import PROVENANCE
 from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
@@ -130,8 +132,8 @@ def _other_changes(before: Path, after: Path) -> Iterator[str]:
 
 def _result(folder: Path) -> Any:
     try:
-        return json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return json.loads(read_text(folder / "result.json", MAX_JSON_BYTES))
+    except (LabrigError, ValueError, RecursionError):
         return None
 
 
@@ -148,7 +150,7 @@ def _numbers(content: Any, place: str) -> Iterator[tuple[str, float]]:
 
 
 def _same_content(first: Path, second: Path) -> bool:
-    return first.is_file() and first.read_bytes() == second.read_bytes()
+    return first.is_file() and filecmp.cmp(first, second, shallow=False)
 
 
 def _settings(result: Path) -> dict[str, str]:
@@ -193,8 +195,8 @@ def _fits(result: Path) -> dict[str, Parameters]:
 def _parameters_of_charge(path: Path) -> Parameters:
     """Return value and σ of every parameter of a fit to charge and decay; none of other fits."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = json.loads(read_text(path, MAX_JSON_BYTES))
+    except (LabrigError, ValueError, RecursionError):
         return {}
     if content.get("kind") != "charge":
         return {}

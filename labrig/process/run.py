@@ -19,14 +19,22 @@ from labrig.analyse import (
 )
 from labrig.bench_optics import camera_curves, with_shipped_camera
 from labrig.calibration import LvfFile, keep_calibration
-from labrig.errors import FitError, UsageError
+from labrig.errors import DiskError, FitError, UsageError
 from labrig.export import write_nexus
 from labrig.optics import CameraResponse
+from labrig.output_file import make_folder_in
 from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
 from labrig.process.verification import require_as_sealed
-from labrig.record import CLOCK_STEPPED, PC_CLOCK, RunLock, RunRecord, read_run
+from labrig.record import (
+    CLOCK_STEPPED,
+    PC_CLOCK,
+    RunLock,
+    RunRecord,
+    read_run,
+    require_plain_folder,
+)
 from labrig.report import (
     Rendered,
     Report,
@@ -45,11 +53,22 @@ _EARLIER = "result-"
 
 
 def new_result(run: Path) -> Path:
-    """Create an empty folder in `run` for `put_in_place`."""
-    folder = run / "result.part"
-    if folder.exists():
+    """Create an empty folder in `run` for `put_in_place`.
+
+    Raises
+    ------
+    DataError
+        Something in the result before is neither a file nor a folder.
+    DiskError
+        The folder cannot be made.
+    """
+    require_plain_folder(run / "result")
+    folder = make_folder_in(run, "result.part")
+    try:
         shutil.rmtree(folder)
-    folder.mkdir()
+        folder.mkdir()
+    except OSError as error:
+        raise DiskError(f"{folder}: cannot be made ({error.strerror})") from None
     return folder
 
 

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.process.without_run import describe_without_run, write_with_report
 from labrig.report import shared_decay_report
 from labrig.results import Series, SharedDecay
@@ -58,7 +59,10 @@ def report_shared_decay(
     """
     sample = [
         *(
-            (f"SHA-256 of {table.name}", hashlib.sha256(table.read_bytes()).hexdigest())
+            (
+                f"SHA-256 of {table.name}",
+                hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest(),
+            )
             for table in tables
         ),
         ("Command", command),

@@ -9,7 +9,8 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from labrig.analyse import ChargeTableOptions, FittedTable, TableFitOptions
-from labrig.errors import DiskError
+from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.output_file import make_folder
 from labrig.process.provenance import library_versions
 from labrig.process.run import Processed, new_result, put_in_place
 from labrig.process.without_run import describe_without_run
@@ -115,17 +116,14 @@ def report_table(
         labrig=version("labrig"),
         libraries=library_versions(),
         table=table.name,
-        sha256=hashlib.sha256(table.read_bytes()).hexdigest(),
+        sha256=hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest(),
         options=stated(options, layout),
     )
     sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted)]
     about = describe_without_run(table.stem, "decay", table.name, sample)
     sections, methods = table_sections(result, about)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        result_folder = new_result(folder)
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+    make_folder(folder)
+    result_folder = new_result(folder)
     write_yaml(result_folder / "provenance.yaml", provenance)
     write_result(result_folder, result)
     report = Report(about, result.warnings, sections, methods)

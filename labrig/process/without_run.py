@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from labrig.errors import DiskError
+from labrig.output_file import make_folder, write_text
 from labrig.process.provenance import library_versions
 from labrig.record import RunDescription
 from labrig.report import Report, write_report
@@ -85,10 +85,7 @@ def write_with_report(folder: Path, name: str, content: str, report: Report) -> 
     'paint/report.html'
     """
     page = folder / "report.html"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(content + "\n", encoding="utf-8")
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+    make_folder(folder)
+    write_text(folder / name, content + "\n")
     write_report(page, report)
     return page

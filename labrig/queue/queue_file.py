@@ -4,10 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.errors import DiskError, UsageError
+from labrig.file_lock import plain_lock
+from labrig.output_file import write_text
 from labrig.yaml_file import read_model, yaml_text
 
 
@@ -111,16 +112,14 @@ def change_queue(path: Path, change: Callable[[Queue], Queue]) -> Queue:
     >>> len(queue.runs)
     1
     """
-    draft = path.with_name(f".{path.name}.draft")
     try:
-        with FileLock(path.with_name(f".{path.name}.lock")):
+        with plain_lock(path.with_name(f".{path.name}.lock")):
             queue = change(read_queue(path) if path.exists() else Queue())
             runs = [
                 run.model_dump(mode="json", by_alias=True, exclude_defaults=True)
                 for run in queue.runs
             ]
-            draft.write_text(yaml_text({"runs": runs}), encoding="utf-8")
-            draft.replace(path)
+            write_text(path, yaml_text({"runs": runs}))
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
     return queue

@@ -5,12 +5,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
-from filelock import FileLock, Timeout
+from filelock import Timeout
 
 from labrig.acquire import SAMPLE_CHANGER, RigFile, driver_and_settings, read_rig_file
 from labrig.bench import Recording, Watch, resume_run
 from labrig.catalogue import summarise
 from labrig.errors import DataError, LabrigError, UsageError
+from labrig.file_lock import plain_lock
 from labrig.process import process_and_report
 from labrig.queue.queue_file import Queue, QueuedRun, change_queue, read_queue
 from labrig.queue.results import QueueEntry, entries, write_results
@@ -161,7 +162,7 @@ def _words(queued: QueuedRun) -> str:
 def _alone(path: Path) -> Iterator[None]:
     """Hold a queue that is being run."""
     try:
-        with FileLock(path.with_name(f".{path.name}.running"), timeout=0):
+        with plain_lock(path.with_name(f".{path.name}.running"), timeout_s=0):
             yield
     except Timeout:
         raise UsageError(f"{path}: another labrig runs this queue") from None

@@ -4,9 +4,8 @@ from collections.abc import Iterable
 from itertools import product
 from typing import Any
 
-import yaml
-
 from labrig.errors import UsageError
+from labrig.yaml_file import parse_yaml
 
 
 def combinations(settings: Iterable[str], sweeps: Iterable[str]) -> list[dict[str, Any]]:
@@ -56,8 +55,8 @@ def _pair(option: str, text: str) -> tuple[str, str]:
 
 def _value(option: str, key: str, text: str) -> Any:
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError:
+        return parse_yaml(f"value: {text}", option)["value"]
+    except (UsageError, KeyError):
         raise UsageError(f"{option} {key}: expected a value in YAML, got '{text}'") from None
 
 

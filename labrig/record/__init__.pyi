@@ -36,15 +36,12 @@ from .history import (
     time_text as time_text,
 )
 from .journal import (
-    REAL_DISK as REAL_DISK,
-    Disk as Disk,
     Document as Document,
     add_note as add_note,
     line_seals as line_seals,
     read_journal as read_journal,
     read_notes as read_notes,
     sealed_line as sealed_line,
-    write_durably as write_durably,
 )
 from .made import (
     time_made as time_made,

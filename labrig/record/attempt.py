@@ -6,6 +6,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from labrig.output_file import Disk, write_durably
 from labrig.record.document_checks import VALUES, described
 from labrig.record.frames import (
     ActionRecord,
@@ -13,7 +14,7 @@ from labrig.record.frames import (
     SpectrumRecord,
     TemperatureRecord,
 )
-from labrig.record.journal import Disk, Journal, write_durably
+from labrig.record.journal import Journal
 
 
 class AttemptWriter:

@@ -15,9 +15,10 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import TypeVar
 
-from labrig.errors import DiskError
+from labrig.errors import DiskError, LabrigError
+from labrig.input_file import MAX_JSON_BYTES, open_regular, read_text
+from labrig.output_file import make_folder_in, write_durably
 from labrig.record.frames import FileRecord
-from labrig.record.journal import write_durably
 from labrig.record.user_secret import own_digest
 
 #: Folder of the frames in a run folder.
@@ -123,27 +124,27 @@ def _is_checked(frame: FileRecord, checked: dict[str, _State]) -> bool:
 def _checked_state(frame: FileRecord) -> _State | str:
     """Read a frame's file and return its state, or its damage as text."""
     try:
-        with frame.path.open("rb") as file:
+        with open_regular(frame.path) as file:
             status = os.fstat(file.fileno())
             # A file of another size need not be read; a forged one may have no end.
             same_size = status.st_size == frame.size_bytes
             if same_size and file_digest(file, "sha256").hexdigest() == frame.sha256:
                 return [status.st_size, status.st_mtime_ns, frame.sha256]
-    except FileNotFoundError:
-        return "is missing"
-    except OSError as error:
-        return f"cannot be read ({error.strerror})"
+    except (OSError, LabrigError) as error:
+        if not frame.path.exists():
+            return "is missing"
+        return f"cannot be read ({getattr(error, 'strerror', None) or error})"
     return "was changed after the run (its checksum differs)"
 
 
 def _read_checked(run: Path) -> dict[str, _State]:
     """Return the states of the files that were checked before; none if the list is unusable."""
     try:
-        digest, _, text = (run / CACHE / _CHECKED).read_bytes().partition(b"\n")
-        if digest != own_digest(text).encode():
+        digest, _, text = read_text(run / CACHE / _CHECKED, MAX_JSON_BYTES).partition("\n")
+        if digest != own_digest(text.encode()):
             return {}
         content = json.loads(text)
-    except (OSError, ValueError, RecursionError):
+    except (LabrigError, OSError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
 
@@ -151,6 +152,6 @@ def _read_checked(run: Path) -> dict[str, _State]:
 def _write_checked(run: Path, checked: dict[str, _State]) -> None:
     """Write the list as far as the disk allows: without it, files are read again."""
     with suppress(OSError, DiskError):
-        (run / CACHE).mkdir(exist_ok=True)
-        text = json.dumps(checked).encode()
-        write_durably(run / CACHE / _CHECKED, own_digest(text).encode() + b"\n" + text)
+        text = json.dumps(checked)
+        content = f"{own_digest(text.encode())}\n{text}".encode()
+        write_durably(make_folder_in(run, CACHE) / _CHECKED, content)

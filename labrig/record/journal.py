@@ -6,7 +6,6 @@ a line that is left out or moved no longer fits the line that follows.
 
 import json
 import os
-import secrets
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,94 +13,12 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Protocol, Self
+from typing import Any, BinaryIO, Self
 
 from labrig.errors import DataError, DiskError, UsageError
+from labrig.input_file import MAX_JOURNAL_BYTES, MAX_TEXT_BYTES, read_bytes
+from labrig.output_file import REAL_DISK, Disk, write_durably
 from labrig.record.plain_folder import require_plain_folder
-
-
-class Disk(Protocol):
-    """Storage for data that must survive a power cut."""
-
-    def write(self, file: BinaryIO, data: bytes) -> None:
-        """Append data to an unbuffered file and wait until they are on the disk.
-
-        Raises
-        ------
-        OSError
-            If the disk is full or gone; part of `data` may be in the file.
-        """
-
-
-class RealDisk:
-    """The disk of this PC."""
-
-    def write(self, file: BinaryIO, data: bytes) -> None:
-        """Append data to an unbuffered file and wait until they are on the disk."""
-        remaining = memoryview(data)
-        while remaining:
-            remaining = remaining[file.write(remaining) :]
-        os.fsync(file.fileno())
-
-
-REAL_DISK: Disk = RealDisk()
-#: Ending of files that are being written; a crash may leave one.
-PART = ".part"
-
-
-def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
-    """Write a file so that it survives a power cut and is never seen in part.
-
-    The data are written to a new file with a random name, which ends in `.part`, and are on the
-    disk before that file is renamed.
-
-    Parameters
-    ----------
-    path
-        File to be written or replaced.
-    data
-        Content of the file.
-    disk
-        Disk that writes the data.
-
-    Raises
-    ------
-    DiskError
-        If the disk is full or gone; `path` then has its old content or the new one.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.record import write_durably
-    >>> write_durably(Path("serial-number.txt"), b"0123456789")
-    >>> Path("serial-number.txt").read_bytes()
-    b'0123456789'
-    """
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART}")
-    try:
-        # Exclusively: a file or link of this name is never followed or overwritten.
-        with part.open("xb", buffering=0) as file:
-            disk.write(file, data)
-        part.replace(path)
-        sync_folder(path.parent)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise DiskError(
-            f"{path}: {len(data) / 1e6:.2g} MB cannot be written ({error.strerror}); see that "
-            "the disk is there and has room"
-        ) from None
-
-
-def sync_folder(folder: Path) -> None:
-    """Make new and renamed entries of a folder durable, where the system can (not on Windows)."""
-    if hasattr(os, "O_DIRECTORY"):
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
 
 JOURNAL = "journal.jsonl"
 _AFTER = "after"
@@ -185,7 +102,7 @@ class Journal:
         self.path = path
         self._disk = disk
         try:
-            raw = path.read_bytes() if path.exists() else b""
+            raw = read_bytes(path, MAX_JOURNAL_BYTES) if path.exists() else b""
             self._acknowledged = bytearray(raw[: raw.rfind(b"\n") + 1])
             *_, last, _ = [b"", *bytes(self._acknowledged).split(b"\n")]
             self._seal = _seal(last) if last else ""
@@ -265,13 +182,9 @@ def read_journal(path: Path) -> JournalContent:
     >>> journal.torn
     False
     """
-    try:
-        if not path.is_file():
-            raise DataError(f"{path}: there is no journal")
-        raw = path.read_bytes()
-    except OSError as error:
-        raise DiskError(f"{path}: the journal cannot be read ({error.strerror})") from None
-    return _parse(path, raw)
+    if not path.is_file():
+        raise DataError(f"{path}: there is no journal")
+    return _parse(path, read_bytes(path, MAX_JOURNAL_BYTES))
 
 
 def line_seals(path: Path) -> list[str]:
@@ -382,11 +295,8 @@ def add_note(run: Path, text: str, time_s: float) -> Path:
     path = run / _NAME
     written = datetime.fromtimestamp(time_s, UTC)
     entry = f"## {written:%Y-%m-%d %H:%M} UTC\n\n{text.strip()}\n\n"
-    try:
-        # Written anew: a backup may share the file by a hard link, which would get the note, too.
-        before = path.read_bytes() if path.exists() else b""
-    except OSError as error:
-        raise DiskError(f"{path}: the notes cannot be read ({error.strerror})") from None
+    # Written anew: a backup may share the file by a hard link, which would get the note, too.
+    before = read_bytes(path, MAX_TEXT_BYTES) if path.exists() else b""
     write_durably(path, before + entry.encode())
     return path
 
@@ -413,4 +323,4 @@ def read_notes(run: Path) -> str:
     Room light on behind the door.
     """
     path = run / _NAME
-    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    return read_bytes(path, MAX_TEXT_BYTES).decode(errors="replace") if path.is_file() else ""

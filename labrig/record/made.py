@@ -3,6 +3,9 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
+from labrig.errors import LabrigError
+from labrig.input_file import read_text
+
 MADE = "made.txt"
 
 
@@ -41,7 +44,7 @@ def time_made(run: Path) -> datetime:
     'UTC'
     """
     try:
-        made = datetime.fromisoformat((run / MADE).read_text(encoding="ascii").strip())
+        made = datetime.fromisoformat(read_text(run / MADE).strip())
         return made.astimezone(UTC)
-    except (OSError, ValueError, OverflowError):
+    except (LabrigError, ValueError, OverflowError):
         return datetime.fromtimestamp((run / "protocol.yaml").stat().st_mtime, UTC)

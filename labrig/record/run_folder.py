@@ -15,17 +15,10 @@ from typing import Any, Self
 
 from labrig.clock import SystemClock
 from labrig.errors import DiskError
+from labrig.output_file import PART, REAL_DISK, Disk, sync_folder, write_durably
 from labrig.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
-from labrig.record.journal import (
-    JOURNAL,
-    PART,
-    REAL_DISK,
-    Disk,
-    Journal,
-    sync_folder,
-    write_durably,
-)
+from labrig.record.journal import JOURNAL, Journal
 from labrig.record.made import MADE, made_text
 from labrig.record.run_lock import RunLock
 from labrig.record.run_record import RunRecord, run_record

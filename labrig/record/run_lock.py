@@ -9,10 +9,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from filelock import FileLock, Timeout
+from filelock import Timeout
 
 from labrig.clock import SystemClock
-from labrig.errors import DiskError, UsageError
+from labrig.errors import DiskError, LabrigError, UsageError
+from labrig.file_lock import plain_lock
+from labrig.input_file import read_text
+from labrig.output_file import write_text
 from labrig.record.plain_folder import require_plain_folder
 
 #: Time to wait for a lock: who only looks whether it is held, holds it for a moment.
@@ -48,10 +51,10 @@ class RunLock:
 
     def __init__(self, path: Path, activity: str) -> None:
         require_plain_folder(path.parent)
-        self._lock = FileLock(path)
+        self._lock = plain_lock(path, LOCK_TIMEOUT_S)
         self._holder = path.with_suffix(".holder")
         try:
-            self._lock.acquire(timeout=LOCK_TIMEOUT_S)
+            self._lock.acquire()
         except Timeout:
             holder = _holder_text(self._holder)
             raise UsageError(
@@ -62,8 +65,8 @@ class RunLock:
                 f"{path.parent}: the run cannot be written to ({error.strerror})"
             ) from None
         content = {"pid": os.getpid(), "host": socket.gethostname(), "since": SystemClock().wall()}
-        with suppress(OSError):  # it only helps others
-            self._holder.write_text(json.dumps(content), encoding="utf-8")
+        with suppress(DiskError):  # it only helps others
+            write_text(self._holder, json.dumps(content))
 
     def release(self) -> None:
         """Release the lock for other processes."""
@@ -87,9 +90,9 @@ class RunLock:
 def _holder_text(path: Path) -> str:
     """Return who holds a lock and since when; empty if that is not known."""
     try:
-        holder = json.loads(path.read_bytes())
+        holder = json.loads(read_text(path, 10_000))
         since = datetime.fromtimestamp(float(holder["since"]), UTC)
         pid, host = int(holder["pid"]), holder["host"]
         return f" (process {pid} on {host}, since {since:%Y-%m-%d %H:%M:%S} UTC)"
-    except (OSError, ValueError, KeyError, TypeError, OverflowError):
+    except (LabrigError, OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return ""

@@ -15,12 +15,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import DiskError
-from labrig.record import CACHE, own_digest, write_durably
+from labrig.errors import DiskError, LabrigError
+from labrig.input_file import read_bytes, read_text
+from labrig.output_file import make_folder_in, write_text
+from labrig.record import CACHE, own_digest
 from labrig.reduce.codec import encoded
 
 #: Frames after which what is new is written, so that little is lost if the process is killed.
 _WRITE_EVERY = 100
+#: Largest file of them that is read, of some 10,000 frames of many patches.
+MAX_CACHE_BYTES = 200_000_000
 #: Libraries whose version changes what is reduced from a frame.
 _LIBRARIES = ("labrig", "numpy", "scipy", "rawpy")
 #: Modules beside those of `labrig.reduce` whose code reduces frames.
@@ -66,8 +70,8 @@ class KeptReductions:
         content = "".join(f"{key} {text}\n" for key, text in self._texts.items())
         head = f"{self._identity} {own_digest(content.encode())}\n"
         with suppress(OSError, DiskError):
-            self._path.parent.mkdir(exist_ok=True)
-            write_durably(self._path, (head + content).encode())
+            make_folder_in(self._path.parents[1], CACHE)
+            write_text(self._path, head + content)
             for path in self._path.parent.glob(f"{self._name}-*.jsonl"):
                 if not path.name.endswith(self._ending):
                     path.unlink()
@@ -76,8 +80,8 @@ class KeptReductions:
     def _read(self) -> dict[str, str]:
         """Return the texts by key; none if the file is missing or damaged."""
         try:
-            head, _, content = self._path.read_text(encoding="utf-8").partition("\n")
-        except (OSError, ValueError):
+            head, _, content = read_text(self._path, MAX_CACHE_BYTES).partition("\n")
+        except LabrigError:
             return {}
         if head != f"{self._identity} {own_digest(content.encode())}":
             return {}
@@ -98,5 +102,5 @@ def _code_checksum(module: str) -> str:
     folder = Path(__file__).parent
     others = [Path(str(import_module(name).__file__)) for name in (*_MODULES, module)]
     for path in (*sorted(folder.glob("*.py")), *others):
-        digest.update(path.read_bytes())
+        digest.update(read_bytes(path, MAX_CACHE_BYTES))
     return digest.hexdigest()

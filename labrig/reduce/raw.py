@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import FrameError
-from labrig.input_file import read_bytes
+from labrig.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.reduce.black_cut_off import BlackCutOff, find_cut_off
 from labrig.reduce.dng import (
     MONOCHROME,
@@ -261,8 +261,10 @@ def _libraw_pattern(raw: Any) -> tuple[Letters, Floats]:
     return colours, np.asarray(levels, dtype=np.float64)[pattern]
 
 
-#: Largest size of a RAW file in bytes.
-MAX_BYTES = 1_000_000_000
+#: Pixels that need no more are unpacked whatever their packing; others need no more than
+#: `MAX_UNPACKING` times their file.
+MAX_UNPACKED_BYTES, MAX_UNPACKING = 50_000_000, 20
+_BYTES_OF_PIXEL = 2
 #: Fewest rows and columns of one position of the CFA from which noise can be estimated.
 _MIN_PIXELS = 3
 _EXPECTED = "expected a RAW file with one colour in every pixel"
@@ -406,7 +408,7 @@ def read_raw(source: str | Path | bytes, name: str = "the frame") -> RawFrame:
         content = source
     else:
         name = str(source)
-        content = read_bytes(Path(source), MAX_BYTES)
+        content = read_bytes(Path(source), MAX_FRAME_BYTES)
     try:
         return _decode(content)
     except FrameError as error:
@@ -431,6 +433,7 @@ def _decode(content: bytes) -> RawFrame:
         try:
             exif = read_exif(content)
             with rawpy.imread(io.BytesIO(content)) as raw:
+                _hold_to_budget(raw.sizes, len(content))
                 mosaic, sensor = _mosaic_and_sensor(raw, rawpy.RawType.Flat, content, exif)
             # LibRaw's own copy of the pixels is freed before more memory is taken.
             return _frame(mosaic, sensor, exif)
@@ -450,6 +453,19 @@ def _decode(content: bytes) -> RawFrame:
             raise FrameError(
                 f"{_EXPECTED}, got a damaged one ({' '.join(text.split())}); transfer it again"
             ) from None
+
+
+def _hold_to_budget(sizes: Any, file_bytes: int) -> None:
+    """Refuse a frame whose header states more pixels than its file holds, before they are unpacked.
+
+    Noise cannot be packed: each pixel of a frame takes bits of its file.
+    """
+    needed = sizes.raw_width * sizes.raw_height * _BYTES_OF_PIXEL
+    if needed > max(MAX_UNPACKED_BYTES, MAX_UNPACKING * file_bytes):
+        raise FrameError(
+            f"{_EXPECTED}, got {file_bytes} bytes whose header states {sizes.raw_width} × "
+            f"{sizes.raw_height} pixels; transfer it again"
+        )
 
 
 class _Sensor(NamedTuple):

@@ -79,6 +79,7 @@ from .phosphor_picture import (
 )
 from .picture_file import (
     require_picture as require_picture,
+    save_picture as save_picture,
 )
 from .renderers import (
     render as render,

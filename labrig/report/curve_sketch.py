@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig import resources
+from labrig.input_file import read_text
 from labrig.number_format import aligned
 from labrig.optics import (
     Curve,
@@ -100,8 +101,8 @@ def describe_shipped_curves() -> str:
 
 def _first_sentence(path: Path) -> str:
     """Return what the comment of a table begins with."""
-    with path.open(encoding="utf-8") as table:
-        return table.readline().removeprefix("# ").partition(". ")[0].strip().rstrip(".")
+    line = read_text(path).partition("\n")[0]
+    return line.removeprefix("# ").partition(". ")[0].strip().rstrip(".")
 
 
 def _describe_curve(name: str, curve: Curve) -> str:

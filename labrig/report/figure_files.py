@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from labrig.output_file import make_folder_in, write_text
 from labrig.report.chart import Chart
 from labrig.report.chart_svg import svg_body
 from labrig.report.figure_style import VARIABLES, figure_style
@@ -99,13 +100,12 @@ class FigureFiles:
 
         Raises
         ------
-        OSError
+        DiskError
             If the files cannot be written.
         """
-        figures_folder = folder / FOLDER
-        figures_folder.mkdir(exist_ok=True)
+        figures_folder = make_folder_in(folder, FOLDER)
         for name, text in self._files.items():
-            (figures_folder / name).write_text(text, encoding="utf-8", newline="\n")
+            write_text(figures_folder / name, text)
 
 
 def chart_element(chart: Chart, description: str) -> Markup:

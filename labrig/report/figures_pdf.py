@@ -1,9 +1,10 @@
 """All figures of a report in one PDF, as publishers take it."""
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 
-from labrig.errors import DiskError
+from labrig.output_file import make_folder, write_durably
 from labrig.report.figure_style import figure_style
 from labrig.report.sections import Section
 
@@ -52,13 +53,12 @@ def write_figures_pdf(path: Path, title: str, sections: Sequence[Section]) -> in
         return 0
     # Without dates and versions the same figures give the same bytes.
     metadata = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with figure_style(), PdfPages(path, metadata=metadata) as pdf:
-            for picture in pictures:
-                figure = picture.figure()
-                figure.patch.set(visible=True, facecolor="white")
-                pdf.savefig(figure)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    content = BytesIO()
+    with figure_style(), PdfPages(content, metadata=metadata) as pdf:
+        for picture in pictures:
+            figure = picture.figure()
+            figure.patch.set(visible=True, facecolor="white")
+            pdf.savefig(figure)
+    make_folder(path.parent)
+    write_durably(path, content.getvalue())
     return len(pictures)

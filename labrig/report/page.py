@@ -12,8 +12,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from labrig.errors import DiskError
+from labrig.input_file import read_text
 from labrig.number_format import plus_minus, rounded
 from labrig.optics import CameraResponse
+from labrig.output_file import write_text
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord, RunDescription
 from labrig.report import parameters
@@ -56,12 +58,12 @@ def environment() -> Environment:
 
 def style() -> str:
     """Return the style sheet of the page, which is labrig's own and needs no escaping."""
-    return (_FOLDER / "report.css").read_text(encoding="utf-8")
+    return read_text(_FOLDER / "report.css")
 
 
 def script() -> str:
     """Return the script of the page."""
-    return (_FOLDER / "report.js").read_text(encoding="utf-8")
+    return read_text(_FOLDER / "report.js")
 
 
 def dated_notes(text: str) -> list[tuple[str, str]]:
@@ -289,8 +291,5 @@ def write_report(path: Path, report: Report) -> None:
             later=Markup(f"{BEGIN_LATER}{END_LATER}"),
         )
     )
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-        figure_files.write(path.parent)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    write_text(path, text)
+    figure_files.write(path.parent)

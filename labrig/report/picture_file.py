@@ -1,9 +1,11 @@
 """Files of pictures that a command draws."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
+from labrig.output_file import write_durably
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:
@@ -36,15 +38,31 @@ def require_picture(path: Path) -> None:
         raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
 
 
-def save_picture(figure: "Figure", path: Path) -> None:
+def save_picture(figure: "Figure", path: Path, dpi: float = DPI) -> None:
     """Write a figure into a file, in the format of its ending.
+
+    Parameters
+    ----------
+    figure
+        Figure of matplotlib.
+    path
+        Path of the file, which ends in `.png`, `.svg` or `.pdf`.
+    dpi
+        Pixels of each inch.
 
     Raises
     ------
     DiskError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.report import new_figure, save_picture
+    >>> save_picture(new_figure(200), Path("empty.png"))
+    >>> Path("empty.png").is_file()
+    True
     """
-    try:
-        figure.savefig(path, dpi=DPI)
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    content = BytesIO()
+    figure.savefig(content, format=path.suffix[1:].lower(), dpi=dpi)
+    write_durably(path, content.getvalue())

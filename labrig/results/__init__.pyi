@@ -250,6 +250,9 @@ from .table_clock import TableClock as TableClock
 from .table_layout import (
     TableLayout as TableLayout,
 )
+from .text_files import (
+    write_csv as write_csv,
+)
 from .trap_depth import (
     StateDepth as StateDepth,
     TrapDepth as TrapDepth,

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import REFERENCE_KIND, ReferenceFile
+from labrig.output_file import make_folder_in
 from labrig.results.run_result import AnyResult, RunResult
 
 
@@ -45,6 +46,5 @@ class CalibrationResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write the files of every part into a folder of its name, and `reference.yaml`."""
         for name, part in self.parts.items():
-            (folder / name).mkdir(exist_ok=True)
-            part.write_files(folder / name)
+            part.write_files(make_folder_in(folder, name))
         REFERENCE_KIND.write(folder, self.reference)

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from labrig.material import Material, write_material
+from labrig.output_file import make_folder
 from labrig.region import Region
 from labrig.results.budget import Budget, named
 from labrig.results.fitted_decay import FittedDecay
@@ -127,7 +128,7 @@ class DecayPatch:
 
     def write_files(self, folder: Path) -> None:
         """Write `series.csv` and, where there is a fit, `fit.json` and `material.yaml`."""
-        folder.mkdir(exist_ok=True)
+        make_folder(folder)
         write_series(folder / "series.csv", [self.series])
         if self.fit is not None:
             write_fitted_decay(folder / "fit.json", self.fit)

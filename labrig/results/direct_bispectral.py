@@ -10,6 +10,7 @@ import numpy as np
 
 from labrig.material import ReradiationMatrix, write_fluorescent, write_reradiation
 from labrig.optics import edges_from_centres
+from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
 from labrig.results.measured import BoolArray, FloatArray, Measured
 from labrig.results.run_result import RunResult
@@ -262,8 +263,7 @@ class DirectBispectralResult(RunResult):
         with its matrix on input bands of 10 nm.
         """
         for name, columns in self.samples.items():
-            place = folder / name if len(self.samples) > 1 else folder
-            place.mkdir(exist_ok=True)
+            place = make_folder_in(folder, name) if len(self.samples) > 1 else folder
             head = (
                 "light", "light_nm", "output_nm", "column", "column_sigma", "share_of_light",
                 "mixed", "reradiated", "reradiated_sigma",

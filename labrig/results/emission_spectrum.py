@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from labrig.finite import Finite, NotNegative
 from labrig.material import Spectrum
 from labrig.optics import band_means, edges_from_centres
+from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
@@ -342,7 +343,6 @@ class EmissionSpectrumResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write `emission.yaml` and `spectrum.csv`; of several patches in a folder each."""
         for name, patch in self.patches.items():
-            place = folder / name
-            place.mkdir(exist_ok=True)
+            place = make_folder_in(folder, name)
             write_emission_spectrum(place / "emission.yaml", patch.spectrum)
             patch.spectrum.write_csv(place / "spectrum.csv")

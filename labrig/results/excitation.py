@@ -9,6 +9,7 @@ import numpy as np
 
 from labrig.calibration import IrradianceFile
 from labrig.material import Material, write_material
+from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
 from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
@@ -252,8 +253,7 @@ class ExcitationResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write `material.yaml` and `excitation.json` of each patch, in a folder of its name."""
         for name, patch in self.patches.items():
-            place = folder / name
-            place.mkdir(exist_ok=True)
+            place = make_folder_in(folder, name)
             write_material(place / "material.yaml", patch.material)
             write_json(place / "excitation.json", finite(self._fit_content(patch)))
 

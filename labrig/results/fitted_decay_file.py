@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from labrig.errors import DataError
+from labrig.errors import DataError, LabrigError
+from labrig.input_file import MAX_JSON_BYTES, read_text
 from labrig.results.decay_reference import DecayReference
 from labrig.results.fitted_decay import (
     SCHEMA_VERSION,
@@ -82,8 +83,10 @@ def read_fitted_decay(path: Path) -> FittedDecay:
     ['0.2 1/s', '0.01 1/s']
     """
     try:
-        return _from_dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        return _from_dict(json.loads(read_text(path, MAX_JSON_BYTES)))
+    except (
+        LabrigError, ValueError, KeyError, TypeError, AttributeError, RecursionError
+    ) as error:  # fmt: skip
         raise DataError(
             f"{path}: expected the fit of a decay as this labrig writes it, got something else "
             f"({error!r}); make it again: labrig process RUN"

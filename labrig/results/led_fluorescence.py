@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from labrig.material import Provenance, ReradiationMatrix, write_fluorescent
+from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
 from labrig.results.measured import BoolArray, FloatArray, Measured
 from labrig.results.reradiation_methods import (
@@ -260,8 +261,7 @@ class LedFluorescenceResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write a material file, its matrix and mixture for each sample, and a table of colours."""
         for name, patch in self.patches.items():
-            place = folder / name if len(self.patches) > 1 else folder
-            place.mkdir(exist_ok=True)
+            place = make_folder_in(folder, name) if len(self.patches) > 1 else folder
             note = f"method: {patch.method}; ultraviolet scale: {self.uv_scale}"
             if self.geometry:
                 note += f"; radiance factors at {self.geometry}"

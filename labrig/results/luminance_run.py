@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from labrig.output_file import make_folder, write_text
 from labrig.results.budget import Budget, named
 from labrig.results.luminance import TABLE_S, LuminanceDecay
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv, write_text
+from labrig.results.text_files import write_csv
 
 #: Columns of `luminance.csv`, which `labrig fit luminance` reads.
 HEAD = ("t_s", "luminance_mcd_per_m2", "luminance_mcd_per_m2_sigma")
@@ -111,7 +112,7 @@ class PatchLuminance:
 
     def write_files(self, folder: Path) -> None:
         """Write `luminance.json`, as `labrig fit luminance --json` prints it, and the readings."""
-        folder.mkdir(exist_ok=True)
+        make_folder(folder)
         write_text(folder / "luminance.json", self.decay.to_json())
         columns = (self.decay.t_s, self.decay.luminance_mcd_per_m2, self.decay.sigma_mcd_per_m2)
         rows = (tuple(f"{number:.8g}" for number in row) for row in zip(*columns, strict=True))

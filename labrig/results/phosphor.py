@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.material import Material, write_material
+from labrig.output_file import make_folder_in
 from labrig.results.run_result import AnyResult, RunResult
 
 
@@ -48,8 +49,6 @@ class PhosphorResult(RunResult):
     def write_files(self, folder: Path) -> None:
         """Write the files of every part into a folder of its name, and the material files."""
         for name, part in self.parts.items():
-            (folder / name).mkdir(parents=True, exist_ok=True)
-            part.write_files(folder / name)
+            part.write_files(make_folder_in(folder, name))
         for patch, material in self.materials.items():
-            (folder / patch).mkdir(exist_ok=True)
-            write_material(folder / patch / "material.yaml", material)
+            write_material(make_folder_in(folder, patch) / "material.yaml", material)

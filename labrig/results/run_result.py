@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
-from labrig.errors import DataError, UsageError
+from labrig.errors import DataError, LabrigError, UsageError
+from labrig.input_file import MAX_JSON_BYTES, read_text
+from labrig.output_file import write_text
 from labrig.plugins import RESULTS, load
-from labrig.results.text_files import finite, write_text
+from labrig.results.text_files import finite
 
 if TYPE_CHECKING:
     from labrig.results.budget import Budget
@@ -197,8 +199,10 @@ def read_result(run: Path | str) -> RunResult:
             f"{place}: expected a run with a result; make it with: labrig process {place}"
         )
     try:
-        return _to_own_type(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        return _to_own_type(json.loads(read_text(path, MAX_JSON_BYTES)))
+    except (
+        LabrigError, ValueError, KeyError, TypeError, AttributeError, RecursionError
+    ) as error:  # fmt: skip
         raise DataError(
             f"{path}: expected a result as this labrig writes it, got something else "
             f"({_first_error(error)}); make it again: labrig process {place}"

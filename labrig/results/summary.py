@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from labrig.results.text_files import write_text
+from labrig.errors import LabrigError
+from labrig.input_file import read_text
+from labrig.output_file import write_text
 
 SUMMARY = "summary.txt"
 
@@ -57,6 +59,6 @@ def read_summary(folder: Path) -> tuple[str, ...]:
     ()
     """
     try:
-        return tuple((folder / SUMMARY).read_text(encoding="utf-8").splitlines())
-    except (OSError, ValueError):
+        return tuple(read_text(folder / SUMMARY).splitlines())
+    except LabrigError:
         return ()

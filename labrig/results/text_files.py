@@ -6,30 +6,33 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import DiskError
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text with the same line ends on every computer.
-
-    Raises
-    ------
-    DiskError
-        The file cannot be written.
-    """
-    try:
-        path.write_text(text, encoding="utf-8", newline="")
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+from labrig.output_file import write_text
 
 
 def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a table whose first line names the columns.
 
+    Parameters
+    ----------
+    path
+        File of the table.
+    head
+        Names of the columns.
+    rows
+        Cells of each row; numbers are written with as many digits as their text has.
+
     Raises
     ------
     DiskError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import write_csv
+    >>> write_csv(Path("light.csv"), ("wavelength_nm", "value"), [(500, "0.25")])
+    >>> Path("light.csv").read_text().split()
+    ['wavelength_nm,value', '500,0.25']
     """
     # Not above: it loads NumPy, and who lists runs needs none.
     from labrig.text_table import table_text

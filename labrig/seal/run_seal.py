@@ -8,7 +8,7 @@ from pathlib import Path
 
 from labrig.errors import DataError, UsageError
 from labrig.input_file import MAX_TEXT_BYTES, read_bytes, read_text
-from labrig.record import write_durably
+from labrig.output_file import write_durably
 from labrig.seal.file_list import FileList, list_files
 from labrig.seal.lab_key import LabKey
 from labrig.seal.signature import PublicKey, signature_text, signer_of

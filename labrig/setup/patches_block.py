@@ -13,7 +13,8 @@ import yaml
 
 from labrig.acquire import read_protocol
 from labrig.errors import UsageError
-from labrig.record import write_durably
+from labrig.input_file import read_text
+from labrig.output_file import write_durably
 from labrig.region import Region
 from labrig.yaml_file import parse_yaml
 
@@ -39,10 +40,8 @@ def write_patches(path: Path, patches: Mapping[str, Region]) -> None:
     DiskError
         If the file cannot be written.
     """
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: cannot be read as UTF-8 text ({error})") from None
+    text = read_text(path)
+    parse_yaml(text, str(path))  # held to the limits of such a file
     changed = with_patches(text, patches, str(path))
     # Beside it, because a protocol may name files relative to its own folder.
     trial_file = path.with_name(f".{path.name}.trial.yaml")

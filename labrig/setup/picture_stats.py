@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DeviceError
+from labrig.picture_file import decoded
 from labrig.region import Region, region_pixels
 
 #: Level from which a pixel counts as clipped; JPEG artefacts lower 255 a little next to edges. For
@@ -64,14 +65,13 @@ def decode(jpeg: bytes) -> Picture:
     DeviceError
         If the camera sent something other than a JPEG.
     """
-    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
+    picture = decoded(jpeg)
     if picture is None:
         raise DeviceError(
             f"expected a JPEG as live picture, got {len(jpeg)} bytes of something else: "
             "switch the camera off and on"
         )
-    rgb: Picture = picture[:, :, ::-1].astype(np.uint8, copy=False)
-    return rgb
+    return picture
 
 
 def picture_stats(picture: Picture, region: Region | None = None) -> PictureStats:

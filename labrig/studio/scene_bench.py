@@ -31,6 +31,7 @@ from labrig.design import (
 )
 from labrig.errors import UsageError
 from labrig.finite import Finite, UnitFraction
+from labrig.input_file import MAX_PICTURE_BYTES, read_bytes
 from labrig.material import Material, material_text
 from labrig.optics import srgb_bytes
 from labrig.report import describe_energy, draw_scene_design
@@ -335,7 +336,7 @@ class SceneBench(Workbench):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "texture.npz"
             write_parameter_texture(path, spread.texture)
-            return path.read_bytes()
+            return read_bytes(path, MAX_PICTURE_BYTES)
 
     def picture(self, content: Mapping[str, Any]) -> bytes:
         """Return a figure of a design over time as a PNG."""
@@ -345,7 +346,7 @@ class SceneBench(Workbench):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "design.png"
             draw_scene_design(spread.rendered(), path)
-            return path.read_bytes()
+            return read_bytes(path, MAX_PICTURE_BYTES)
 
     def _spread_of(self, asked: Asked) -> SpreadDesign | None:
         """Return the materials of dots; None where one is for all, or there is no key."""

@@ -24,6 +24,7 @@ from labrig.design import (
     written_factor,
 )
 from labrig.errors import UsageError
+from labrig.input_file import MAX_PICTURE_BYTES, read_bytes
 from labrig.material import Material, material_text
 from labrig.report import describe_energy, describe_factor, describe_nearest, draw_design
 from labrig.studio.messages import (
@@ -136,7 +137,7 @@ class Workbench:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "design.png"
             draw_design(found.design, found.wish.places, path)
-            return path.read_bytes()
+            return read_bytes(path, MAX_PICTURE_BYTES)
 
     def nearest(self, content: Mapping[str, Any]) -> list[str]:
         """Return the measured materials that come nearest to the wishes, one sentence each."""

@@ -7,6 +7,8 @@ from pathlib import Path
 from labrig.errors import UsageError
 from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 
+#: Limit of the lines, above those of a year with a reading each minute: each takes memory and time.
+MAX_LINES = 600_000
 #: First bytes of a workbook: of a zip archive (Excel, OpenDocument), of an older Excel file.
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 #: Control characters that stand in no text.
@@ -31,7 +33,7 @@ def read_table_text(path: Path) -> str:
     Raises
     ------
     UsageError, DiskError
-        The file is refused by `read_bytes`, is a workbook, or is no text.
+        The file is refused by `read_bytes`, is a workbook, too long, or no text.
 
     Examples
     --------
@@ -44,6 +46,12 @@ def read_table_text(path: Path) -> str:
     content = read_bytes(path, MAX_TEXT_BYTES)
     if content.startswith(_WORKBOOKS):
         raise UsageError(f"{path}: a workbook, not a text; save the sheet as CSV (UTF-8)")
+    lines = max(content.count(b"\n"), content.count(b"\r"))
+    if lines > MAX_LINES:
+        raise UsageError(
+            f"{path}: expected a table of at most {MAX_LINES} lines, got {lines}; leave rows out, "
+            "or average them"
+        )
     for encoding in _encodings(content):
         try:
             return content.rstrip(_END if "16" not in encoding else b"").decode(encoding)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Never
 
 from labrig.clock import Clock
+from labrig.input_file import read_text
 from labrig.local_server import KINDS, LocalConversation, LocalServer
 from labrig.watch.run_follower import RunFollower
 
@@ -158,9 +159,7 @@ class _Conversation(LocalConversation):
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "labrig watch is ending")
             return
         # a name in it must not end the element that it stands in
-        page = _PAGE.read_text(encoding="utf-8").replace(
-            _FIRST_UPDATE, first.replace("<", "\\u003c")
-        )
+        page = read_text(_PAGE).replace(_FIRST_UPDATE, first.replace("<", "\\u003c"))
         self.send(HTTPStatus.OK, KINDS[".html"], page.encode())
 
     def _stream(self) -> None:

@@ -229,6 +229,7 @@ CAMPAIGNS = {
         _module("long_run", "--hours", "24", "--every", "30"),
         _module("mutated_files", "--cases", "10000"),
         _module("edited_journals"),
+        _module("hostile_files", "--every", "30"),
         _module("ptp_fuzz", "--cases", "10000", "--seed", "4"),
         _module("two_labrigs", "--trials", "40"),
         _module("suspended", "--trials", "20"),

@@ -313,6 +313,10 @@ def _edits(printed: str, ways: str) -> tuple[float, ...]:
     return tuple(map(sum, columns(rf"^(?:{ways}) +(\d+) +(\d+) +(\d+) +(\d+)$", printed)))
 
 
+def went_wrong(printed: str) -> str:
+    return f"{match(r'^([0-9]+ of [0-9]+) went wrong', printed)} wrong"
+
+
 def containers(printed: str) -> str:
     cases, failures = columns(r"^.+? +(\d+) cases, (\d+) failures", printed)
     return f"{sum(failures):.0f} failures in {sum(cases):.0f} containers, {len(cases)} ways"

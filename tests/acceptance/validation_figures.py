@@ -426,6 +426,13 @@ FIGURES = (
         figure.edited_without_a_seal,
     ),
     Figure(
+        "Rigs, protocols, tables, matrices, meshes, pictures, frames, scenes and run folders made "
+        "to do harm, 83 of them, each with every thirtieth command that takes a path: something "
+        "written outside, a program started, somebody called, 1 GiB or 10 s taken, more lines",
+        "hostile_files",
+        figure.went_wrong,
+    ),
+    Figure(
         "Damaged PTP containers over USB and network, 10 000 each way: no hang, no traceback",
         "ptp_fuzz",
         figure.containers,

@@ -174,7 +174,7 @@ def test_figures_are_drawn_into_a_pdf_on_demand(labrig: Labrig, finished: Path) 
     assert labrig("figures", finished, "--out", elsewhere).code == 0
     assert elsewhere.read_bytes() == pdf.read_bytes()
     one_line(labrig("figures", finished / "frames"), 2, "run")
-    one_line(labrig("figures", finished, "--out", finished / "journal.jsonl" / "a.pdf"), 5, "a.pdf")
+    one_line(labrig("figures", finished, "--out", finished / "journal.jsonl" / "a.pdf"), 5, "jsonl")
     shutil.rmtree(finished / "result")
     one_line(labrig("figures", finished), 2, "expected a run with a result")
 

@@ -239,12 +239,12 @@ def with_viewfinder(path: Path, address: str) -> Path:
 
 
 def test_a_viewfinder_is_looked_through_once(
-    labrig: Labrig, make_rig: Make, tmp_path: Path
+    labrig: Labrig, make_rig: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert cv2.imwrite(str(tmp_path / "film000.png"), np.full((48, 64, 3), 90, np.uint8))
-    ended = labrig(
-        "rig", "check", with_viewfinder(make_rig(), str(tmp_path / "film%03d.png")), "--json"
-    )
+    film, opened = str(tmp_path / "film%03d.png"), cv2.VideoCapture
+    monkeypatch.setattr(cv2, "VideoCapture", lambda number: opened(film))
+    ended = labrig("rig", "check", with_viewfinder(make_rig(), "uvc://0"), "--json")
     assert (ended.code, ended.err) == (0, "")
     viewfinder = device(json.loads(ended.out), "viewfinder")
     assert "for aiming only" in viewfinder["identity"]

@@ -1,4 +1,4 @@
-"""The webcam that only aims, on files that OpenCV takes for a video device."""
+"""The webcam that only aims, on pictures instead of a stream."""
 
 from pathlib import Path
 from typing import cast
@@ -19,12 +19,14 @@ def eye(address: str) -> UvcPreview:
 
 
 @pytest.fixture
-def film(tmp_path: Path) -> str:
-    """Two pictures, one dark and one bright."""
+def film(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Address of a stream of two pictures, one dark and one bright."""
     for number, value in enumerate((40, 200)):
         picture = np.full((48, 64, 3), value, np.uint8)
         assert cv2.imwrite(str(tmp_path / f"frame{number:03d}.png"), picture)
-    return str(tmp_path / "frame%03d.png")
+    pictures, opened = str(tmp_path / "frame%03d.png"), cv2.VideoCapture
+    monkeypatch.setattr(cv2, "VideoCapture", lambda stream: opened(pictures))
+    return "http://camera/stream.mjpg"
 
 
 def brightness(jpeg: bytes) -> float:
@@ -62,6 +64,9 @@ def test_the_end_of_the_pictures_is_reported(film: str) -> None:
         camera.preview()
 
 
-def test_an_address_without_a_number_is_refused() -> None:
+@pytest.mark.parametrize(
+    "address", ["uvc://webcam", "uvc://²", "frame%03d.png", "/dev/zero", "filesrc ! filesink"]
+)
+def test_an_address_of_anything_else_is_refused(address: str) -> None:
     with pytest.raises(DeviceError, match="uvc://0 for the first"):
-        eye("uvc://webcam")
+        eye(address)

@@ -55,7 +55,7 @@ def test_arrays_are_read_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"lines": "9"}, "bytes, the header says"),
+        ({"lines": "9"}, "bytes of numbers, got"),
         ({"lines": "0"}, "must be 1 or more"),
         ({"lines": "999999999"}, "more than"),
         ({"lines": "x"}, "invalid literal"),

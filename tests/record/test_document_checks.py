@@ -40,9 +40,9 @@ def journal(tmp_path: Path) -> Path:
 
 
 def edit(journal: Path, change: Callable[[list[Entry]], list[Entry] | None]) -> None:
-    entries = [json.loads(line) for line in journal.read_text().splitlines()]
+    entries = [json.loads(line) for line in journal.read_text(encoding="utf-8").splitlines()]
     entries = change(entries) or entries
-    journal.write_text("".join(f"{json.dumps(entry)}\n" for entry in entries))
+    journal.write_text("".join(f"{json.dumps(entry)}\n" for entry in entries), encoding="utf-8")
     reseal(journal)
 
 
@@ -102,12 +102,12 @@ def without_or_twice(entries: list[Entry], *, number: int, twice: bool) -> list[
 
 
 def test_every_line_that_is_removed_or_doubled_is_noticed(journal: Path) -> None:
-    sound = journal.read_text()
+    sound = journal.read_text(encoding="utf-8")
     lines = len(sound.splitlines())
     ends = [n for n, line in enumerate(sound.splitlines()) if '"name": "stop"' in line]
     for number in range(lines):
         for doubled in (False, True):
-            journal.write_text(sound)
+            journal.write_text(sound, encoding="utf-8")
             edit(journal, partial(without_or_twice, number=number, twice=doubled))
             if number in ends and not doubled:
                 # A unit that was not committed is done again.

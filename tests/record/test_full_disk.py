@@ -181,10 +181,10 @@ def test_a_dead_disk_is_no_missing_journal(tmp_path: Path, monkeypatch: pytest.M
     path = tmp_path / "journal.jsonl"
     path.write_bytes(b"")
 
-    def dead(_: Path) -> bytes:
+    def dead(*_: object) -> int:
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
-    monkeypatch.setattr(Path, "read_bytes", dead)
+    monkeypatch.setattr(os, "open", dead)
     with pytest.raises(DiskError, match="Input/output"):
         read_journal(path)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.input_file import read_text
+from labrig.input_file import MAX_JSON_BYTES, read_text
 from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix
 from labrig.material.reradiation.mixture import ReradiationMixture
 
@@ -108,7 +108,7 @@ def read_mixture(path: str | os.PathLike[str]) -> StoredMixture:
     """
     file = Path(path)
     try:
-        content = json.loads(read_text(file))
+        content = json.loads(read_text(file, MAX_JSON_BYTES))
         unit = str(content["unit"])
         stored = _stored(content)
     except (

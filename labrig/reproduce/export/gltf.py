@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
 from labrig.optics import srgb_bytes
-from labrig.reproduce.draft_file import replaced
+from labrig.output_file import write_durably
 from labrig.reproduce.export.exported_scene import (
     ExportedMesh,
     Glow,
@@ -108,8 +108,7 @@ def write_gltf(
     if is_any_glow and frames > 1:
         document.add_animation(times, [mesh.glow for mesh in meshes])
     content = document.binary(camera, up)
-    with replaced(path) as draft:
-        draft.write_bytes(content)
+    write_durably(path, content)
 
 
 class _Document:

@@ -13,7 +13,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
+from labrig.exr_file import write_exr
+from labrig.output_file import make_folder, write_durably, write_text
 from labrig.reproduce.export.exported_scene import (
     ExportedMesh,
     Glow,
@@ -96,31 +98,26 @@ def write_mitsuba_scene(
     _add(integrator, "integer", name="max_depth", value=str(most_vertices))
     _add_camera(scene, camera, samples)
     path = folder / SCENE
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for number, mesh in enumerate(meshes):
-            file = folder / f"mesh_{number:02d}.ply"
-            _write_ply(file, mesh)
-            shape = _add(scene, "shape", type="ply", id=f"mesh_{number:02d}")
-            said = mesh.name if mesh.preview is None else f"{mesh.name}: {mesh.preview.statement}"
-            scene.insert(len(scene) - 1, ElementTree.Comment(f" {_comment(said)} "))
-            _add(shape, "string", name="filename", value=file.name)
-            _add(shape, "boolean", name="face_normals", value="true")
-            both_sides = _add(shape, "bsdf", type="twosided")
-            _add_rgb(_add(both_sides, "bsdf", type="diffuse"), "reflectance", mesh.base_colour)
-            if mesh.glow is not None:
-                texture = folder / f"glow_{number:02d}.exr"
-                _add_glow(shape, mesh.glow, frame, texture)
-        previews = {
-            mesh.name: mesh.preview.to_dict() for mesh in meshes if mesh.preview is not None
-        }
-        if previews:
-            text = json.dumps(previews, indent=2, ensure_ascii=False)
-            (folder / PREVIEWS).write_text(f"{text}\n", encoding="utf-8")
-        ElementTree.indent(scene)
-        ElementTree.ElementTree(scene).write(path, encoding="utf-8", xml_declaration=True)
-    except OSError as error:
-        raise DiskError(f"{folder}: cannot be written ({error.strerror})") from None
+    make_folder(folder)
+    for number, mesh in enumerate(meshes):
+        file = folder / f"mesh_{number:02d}.ply"
+        _write_ply(file, mesh)
+        shape = _add(scene, "shape", type="ply", id=f"mesh_{number:02d}")
+        said = mesh.name if mesh.preview is None else f"{mesh.name}: {mesh.preview.statement}"
+        scene.insert(len(scene) - 1, ElementTree.Comment(f" {_comment(said)} "))
+        _add(shape, "string", name="filename", value=file.name)
+        _add(shape, "boolean", name="face_normals", value="true")
+        both_sides = _add(shape, "bsdf", type="twosided")
+        _add_rgb(_add(both_sides, "bsdf", type="diffuse"), "reflectance", mesh.base_colour)
+        if mesh.glow is not None:
+            texture = folder / f"glow_{number:02d}.exr"
+            _add_glow(shape, mesh.glow, frame, texture)
+    previews = {mesh.name: mesh.preview.to_dict() for mesh in meshes if mesh.preview is not None}
+    if previews:
+        text = json.dumps(previews, indent=2, ensure_ascii=False)
+        write_text(folder / PREVIEWS, f"{text}\n")
+    ElementTree.indent(scene)
+    write_durably(path, ElementTree.tostring(scene, "utf-8", xml_declaration=True))
     return path
 
 
@@ -186,19 +183,12 @@ def _write_ply(path: Path, mesh: ExportedMesh) -> None:
         "property list uchar uint vertex_indices",
         "end_header",
     ]
-    path.write_bytes("\n".join(head).encode() + b"\n" + vertices.tobytes() + faces.tobytes())
+    content = "\n".join(head).encode() + b"\n" + vertices.tobytes() + faces.tobytes()
+    write_durably(path, content)
 
 
 def _write_texture(path: Path, linear: FloatArray) -> None:
-    # The library is loaded when it is needed.
-    import OpenEXR
-
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    rgb = np.ascontiguousarray(linear, dtype=np.float32)
-    try:
-        OpenEXR.File(header, {"RGB": rgb}).write(str(path))
-    except RuntimeError:
-        raise DiskError(f"{path}: cannot be written") from None
+    write_exr(path, {}, {"RGB": linear})
 
 
 def _numbers(values: Sequence[float] | FloatArray) -> str:

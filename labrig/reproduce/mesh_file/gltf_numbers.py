@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.input_file import read_bytes
+from labrig.input_file import MAX_MESH_BYTES, read_bytes
 from labrig.reproduce.mesh_file.gltf_document import Accessor, GltfDocument
 
 FloatArray = NDArray[np.float64]
@@ -160,7 +160,7 @@ class GltfNumbers:
             path = self._folder / name
             if len(name) > MOST_LETTERS or "\0" in name or not path.is_file():
                 raise UsageError(f"buffer {number}: expected a file {name[:60]!r}, got none")
-            content = read_bytes(path, path.stat().st_size)
+            content = read_bytes(path, MAX_MESH_BYTES)
         if len(content) < buffer.byte_length:
             raise UsageError(
                 f"buffer {number}: expected {buffer.byte_length} bytes, got {len(content)}"

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.input_file import read_bytes
+from labrig.input_file import MAX_MESH_BYTES, read_bytes
 from labrig.reproduce.mesh_file.gltf_mesh import gltf_mesh
 from labrig.reproduce.mesh_file.obj_mesh import obj_mesh
 from labrig.reproduce.mesh_file.ply_mesh import ply_mesh
@@ -62,7 +62,7 @@ def read_mesh(path: Path) -> Mesh:
         raise UsageError(f"{path}: expected a mesh as {', '.join(READERS)}, got '{path.suffix}'")
     if not path.is_file():
         raise UsageError(f"{path}: expected a file with a mesh, got no such file")
-    content = read_bytes(path, path.stat().st_size)
+    content = read_bytes(path, MAX_MESH_BYTES)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             mesh = reader(content, path.parent).without_loose_vertices()

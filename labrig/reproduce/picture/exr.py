@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import UsageError
-from labrig.input_file import open_regular
+from labrig.exr_file import read_exr, read_exr_header, write_exr
 from labrig.material import read_spectral_image
 from labrig.optics import XYZ_TO_SRGB, edges_from_centres
-from labrig.reproduce.draft_file import replaced
 from labrig.reproduce.picture.display import tristimulus
 
 FloatArray = NDArray[np.float64]
@@ -30,8 +29,6 @@ _EDGES_KEY = "bandEdgesNm"
 _TEXT_PREFIX = "text."
 #: R, G, B and white of sRGB, x and y of each.
 _CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-#: Numbers of an image of 60 megapixels and three channels.
-_MOST_NUMBERS = 180_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +142,7 @@ def read_spectral_exr(path: Path) -> SpectralFrame:
     'relative'
     """
     image = read_spectral_image(path)
-    attributes = _attributes(path)
+    attributes = read_exr_header(path)
     if not len(image.emissive_nm):
         raise UsageError(f"{path}: expected light (channels S0.…), got a surface")
     edges = _edges(path, attributes.get(_EDGES_KEY), image.emissive_nm)
@@ -214,15 +211,10 @@ def read_linear_exr(path: Path) -> FloatArray:
     >>> read_linear_exr(Path("black.exr")).shape
     (2, 3, 3)
     """
-    # The library is loaded when it is needed.
-    import OpenEXR
-
-    open_regular(path).close()
+    _, channels = read_exr(path)
     try:
-        _hold_to_budget(path)
-        channels = OpenEXR.File(str(path), separate_channels=True).channels()
         linear = np.stack([channels[name].pixels for name in "RGB"], axis=-1)
-    except (RuntimeError, ValueError, TypeError, MemoryError, KeyError):
+    except (ValueError, TypeError, KeyError):
         raise UsageError(
             f"{path}: expected an OpenEXR image with the channels R, G and B, got another or a "
             "broken one"
@@ -244,37 +236,7 @@ def _linear_srgb(path: Path, xyz: FloatArray) -> dict[str, Pixels]:
 
 
 def _write(path: Path, header: Mapping[str, Any], channels: Mapping[str, Pixels]) -> None:
-    # The library is loaded when it is needed.
-    import OpenEXR
-
-    whole = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        "chromaticities": _CHROMATICITIES,
-        **header,
-    }
-    rows = {name: np.ascontiguousarray(pixels) for name, pixels in channels.items()}
-    with replaced(path) as draft:
-        try:
-            OpenEXR.File(whole, rows).write(str(draft))
-        except RuntimeError as error:
-            raise OSError(str(error).partition("\n")[0]) from None
-
-
-def _attributes(path: Path) -> dict[str, Any]:
-    import OpenEXR
-
-    header: dict[str, Any] = OpenEXR.File(str(path), header_only=True).header()
-    return header
-
-
-def _hold_to_budget(path: Path) -> None:
-    """Refuse an image whose header states more pixels than are read, before memory is taken."""
-    header = _attributes(path)
-    low, high = (np.asarray(corner, dtype=np.int64) for corner in header["dataWindow"])
-    numbers = int(np.prod(high - low + 1)) * len(header["channels"])
-    if numbers > _MOST_NUMBERS:
-        raise UsageError(f"{path}: expected at most {_MOST_NUMBERS} numbers, got {numbers}")
+    write_exr(path, {"chromaticities": _CHROMATICITIES, **header}, channels)
 
 
 def _edges(path: Path, written: object, centres_nm: FloatArray) -> FloatArray:

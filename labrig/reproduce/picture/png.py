@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.input_file import read_bytes
-from labrig.reproduce.draft_file import replaced
+from labrig.output_file import write_durably
 
 Bytes = NDArray[np.uint8]
 
@@ -65,8 +65,7 @@ def write_png(path: Path, picture: Bytes, texts: Mapping[str, str]) -> None:
     content = encoded.tobytes()
     chunks = [_chunk(b"sRGB", _RELATIVE_COLORIMETRIC)]
     chunks += [_chunk(b"iTXt", _text(*pair)) for pair in texts.items()]
-    with replaced(path) as draft:
-        draft.write_bytes(content[:_HEAD_BYTES] + b"".join(chunks) + content[_HEAD_BYTES:])
+    write_durably(path, content[:_HEAD_BYTES] + b"".join(chunks) + content[_HEAD_BYTES:])
 
 
 def read_png_texts(path: Path) -> dict[str, str]:

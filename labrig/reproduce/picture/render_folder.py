@@ -5,14 +5,14 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.array_file import read_arrays
-from labrig.errors import DiskError, UsageError
-from labrig.reproduce.draft_file import replaced
+from labrig.array_file import read_arrays, write_arrays
+from labrig.errors import UsageError
+from labrig.input_file import MAX_JSON_BYTES, read_text
+from labrig.output_file import make_folder, write_text
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
 from labrig.reproduce.picture.rendering import Frame, Renderer
 from labrig.reproduce.picture.view import Report
@@ -76,8 +76,8 @@ class RenderFolder:
         identity = _identity(scene)
         if content.is_file():
             try:
-                known = json.loads(content.read_text(encoding="utf-8"))["identity"]
-            except (ValueError, KeyError, TypeError):
+                known = json.loads(read_text(content, MAX_JSON_BYTES))["identity"]
+            except (ValueError, KeyError, TypeError, RecursionError):
                 known = None
             # One that failed before its first frame leaves nothing that is worth keeping.
             is_begun = known is None or any(path.glob("*.exr"))
@@ -92,17 +92,13 @@ class RenderFolder:
             raise UsageError(
                 f"{path}: expected a new folder, got one without {CONTENT}; give another (--out)"
             )
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            described = {
-                "identity": identity,
-                "notes": scene.notes,
-                "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
-            }
-            with replaced(content) as draft:
-                draft.write_bytes(json.dumps(described, indent=1, ensure_ascii=False).encode())
-        except OSError as error:
-            raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+        make_folder(path)
+        described = {
+            "identity": identity,
+            "notes": scene.notes,
+            "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
+        }
+        write_text(content, json.dumps(described, indent=1, ensure_ascii=False))
         return cls(path, scene.file.frames_s)
 
     @property
@@ -185,9 +181,8 @@ class RenderFolder:
         return {name.removeprefix(OF): levels for name, levels in arrays.items()}
 
     def _keep_levels(self, number: int, levels: dict[str, Float32Array]) -> None:
-        named: dict[str, Any] = {f"{OF}{name}": level for name, level in levels.items()}
-        with replaced(self._levels_path(number)) as draft:
-            np.savez(draft, **named)
+        named = {f"{OF}{name}": level for name, level in levels.items()}
+        write_arrays(self._levels_path(number), named)
 
     def _levels_path(self, number: int) -> Path:
         return self.path / f"{number:03d}.levels.npz"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DiskError, UsageError
-from labrig.reproduce.draft_file import replaced
+from labrig.output_file import replaced
 
 Bytes = NDArray[np.uint8]
 

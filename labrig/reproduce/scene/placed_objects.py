@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from labrig.array_file import read_arrays
 from labrig.errors import UsageError
+from labrig.picture_file import read_picture
 from labrig.reproduce.scene.object_entry import MaterialMap, ObjectEntry
 from labrig.reproduce.scene.placed_mesh import placed_mesh
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
@@ -153,11 +154,8 @@ def _mapped(
     """Return the number of the material of each texel, by the nearest colour (rows, columns)."""
     import cv2
 
-    path = folder / entry.file
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None
-    if picture is None:
-        raise UsageError(f"{path}: expected a picture for the material_map of {name}, got none")
-    resized = cv2.resize(picture, samples, interpolation=cv2.INTER_NEAREST)[::-1, :, ::-1]
+    picture = read_picture(folder / entry.file, f"for the material_map of {name}")
+    resized = cv2.resize(picture, samples, interpolation=cv2.INTER_NEAREST)[::-1]
     colours = []
     for text in entry.materials:
         digits = text.removeprefix("#")

@@ -8,9 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.array_file import read_arrays
+from labrig.array_file import read_arrays, write_arrays
 from labrig.errors import UsageError
-from labrig.reproduce.draft_file import replaced
 
 Float32Array = NDArray[np.float32]
 IntArray = NDArray[np.int32]
@@ -161,8 +160,7 @@ def write_parameter_texture(path: Path, texture: ParameterTexture) -> None:
     """
     arrays = {each.name: getattr(texture, each.name) for each in fields(texture)}
     given = {name: array for name, array in arrays.items() if array is not None}
-    with replaced(path) as draft, draft.open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **given)
+    write_arrays(path, given)
 
 
 def read_parameter_texture(path: str | os.PathLike[str]) -> ParameterTexture:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
 from labrig.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.material.reradiation.formats import ark, bfc
 from labrig.material.reradiation.formats.ark import ark_entries, ark_text, parse_ark_matrix
@@ -16,6 +16,7 @@ from labrig.material.reradiation.formats.csv_table import csv_text, is_fraction_
 from labrig.material.reradiation.formats.eem import MatrixLayout, eem_text, parse_eem
 from labrig.material.reradiation.formats.spectral_exr import read_spectral_image, write_exr
 from labrig.material.reradiation.matrix import ReradiationMatrix
+from labrig.output_file import write_durably
 from labrig.text_table import read_table_text
 from labrig.yaml_file import did_you_mean
 
@@ -129,10 +130,7 @@ def write_reradiation(path: str | os.PathLike[str], matrix: ReradiationMatrix) -
     if ending not in _TEXTS:
         raise UsageError(f"{file_path}: expected the ending {_ENDINGS}")
     content = _checked(file_path, _TEXTS[ending], matrix)
-    try:
-        file_path.write_bytes(content)
-    except OSError as error:
-        raise DiskError(f"{file_path}: cannot be written ({error.strerror})") from None
+    write_durably(file_path, content)
 
 
 def _matrices(

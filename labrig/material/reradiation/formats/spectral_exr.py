@@ -7,14 +7,11 @@ and B for other programs; the attributes `spectralLayoutVersion`, `EV` and, of l
 `emissiveUnits`.
 """
 
-import contextlib
-import io
 import itertools
 import math
 import os
 import re
-import sys
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import colour_science
-from labrig.errors import DiskError, UsageError
-from labrig.input_file import open_regular
+from labrig.errors import UsageError
+from labrig.exr_file import read_exr, read_exr_header, write_exr as write_exr_file
 from labrig.material.reradiation.formats.band_fractions import check_is_absolute
 from labrig.material.reradiation.formats.text_rows import (
     check_fractions,
@@ -40,8 +37,6 @@ Pixels = NDArray[np.float32]
 VERSION = "1.0"
 _VERSION_KEY = "spectralLayoutVersion"
 _UNITS_KEY = "emissiveUnits"
-#: Limit of the numbers of an image once they are unpacked.
-_MOST_NUMBERS = 200_000_000
 
 _WAVELENGTH = r"(\d+(?:,\d*)?(?:[Ee][+-]?\d+)?)(da|[YZEPTGMkhdcmunp])?(m|Hz)"
 _CHANNEL = re.compile(rf"(S[0-3]|T)\.{_WAVELENGTH}(?:\.{_WAVELENGTH})?")
@@ -53,8 +48,6 @@ _PREFIXES = dict(
         strict=True,
     )
 )
-#: File descriptor of the process's standard error.
-STDERR = 2
 _LIGHT_M_PER_S = 299_792_458.0
 
 
@@ -236,17 +229,14 @@ def read_spectral_image(path: str | os.PathLike[str]) -> SpectralImage:
     'yellow paper'
     """
     image_path = Path(path)
-    open_regular(image_path).close()
     try:
-        return _image(image_path)
+        _check_header(read_exr_header(image_path))
+        return _image(image_path, *read_exr(image_path))
     except ValueError as error:
         raise UsageError(f"{image_path}: {error}") from None
 
 
-def _image(path: Path) -> SpectralImage:
-    header = _header(path)
-    _check_header(header)
-    channels = _channels(path)
+def _image(path: Path, header: Mapping[str, Any], channels: Mapping[str, Any]) -> SpectralImage:
     spectral = [
         _SpectralChannel(match[1], _wavelengths(match), _pixels(channels[name]))
         for name in channels
@@ -320,67 +310,12 @@ def _stacked(
     return nm, np.stack([channel.pixels for channel in found], axis=-1)
 
 
-def _header(path: Path) -> dict[str, Any]:
-    """Return the attributes of an image, its pixels unread."""
-    # The library is loaded when it is needed.
-    import OpenEXR
-
-    try:
-        file = OpenEXR.File(str(path), separate_channels=True, header_only=True)
-        parts = len(file.parts)
-        header: dict[str, Any] = file.header() if parts == 1 else {}
-    except (RuntimeError, ValueError, TypeError, MemoryError):
-        raise ValueError("not an OpenEXR image, or a broken one") from None
-    if parts != 1:
-        raise ValueError(f"expected an image of one part, got {parts}")
-    return header
-
-
-def _channels(path: Path) -> dict[str, Any]:
-    """Return the channels of an image by name."""
-    import OpenEXR
-
-    try:
-        with _silenced():
-            channels: dict[str, Any] = OpenEXR.File(str(path), separate_channels=True).channels()
-    except (RuntimeError, ValueError, TypeError, MemoryError, IndexError):
-        raise ValueError("the image's pixels cannot be read; the file is cut or broken") from None
-    return channels
-
-
-@contextlib.contextmanager
-def _silenced() -> Iterator[None]:
-    """Keep back what the library writes of broken pixels, in the midst of what labrig says.
-
-    Pixels are compressed: that some are broken is known only while the library reads them. It
-    writes to Python's standard output, and past Python to the process's standard error.
-    """
-    sys.stderr.flush()
-    kept = os.dup(STDERR)
-    try:
-        with Path(os.devnull).open("wb") as nowhere:
-            os.dup2(nowhere.fileno(), STDERR)
-        with contextlib.redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        os.dup2(kept, STDERR)
-        os.close(kept)
-
-
-def _check_header(header: dict[str, Any]) -> None:
+def _check_header(header: Mapping[str, Any]) -> None:
     version = header.get(_VERSION_KEY)
     if not isinstance(version, str):
         raise ValueError(f"expected the attribute {_VERSION_KEY} of a spectral image, got none")
     if version != VERSION:
         raise ValueError(f"expected {_VERSION_KEY} {VERSION}, got {shown(version)}")
-    low, high = (np.asarray(corner, dtype=np.int64) for corner in header["dataWindow"])
-    width, height = (int(size) for size in high - low + 1)
-    numbers = width * height * len(header["channels"])
-    if width < 1 or height < 1 or numbers > _MOST_NUMBERS:
-        raise ValueError(
-            f"expected at most {_MOST_NUMBERS} numbers, got {width} × {height} pixels "
-            f"of {len(header['channels'])} channels"
-        )
 
 
 def _wavelengths(match: re.Match[str]) -> tuple[float, ...]:
@@ -403,7 +338,7 @@ def _nanometres(value: str, prefix: str, unit: str) -> float:
     return round(nm, 6)
 
 
-def _name(header: dict[str, Any], stem: str) -> str:
+def _name(header: Mapping[str, Any], stem: str) -> str:
     name = header.get("name")
     return one_line(name) or stem if isinstance(name, str) else stem
 
@@ -422,8 +357,6 @@ def write_exr(path: Path, matrix: ReradiationMatrix) -> None:
     DiskError
         The file cannot be written.
     """
-    import OpenEXR
-
     check_is_absolute(matrix)
     input_nm, output_nm = (np.round(nm, 6) for nm in (matrix.input_nm, matrix.output_nm))
     for nm in (input_nm, output_nm):
@@ -445,18 +378,13 @@ def write_exr(path: Path, matrix: ReradiationMatrix) -> None:
             pair = f"T.{_channel(input_nm[column])}.{_channel(output_nm[row])}"
             channels[pair] = np.float32(fractions[row, column])
     header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
         "EV": 0.0,
         _VERSION_KEY: VERSION,
     }
     if matrix.name:
         header["name"] = one_line(matrix.name)
     pixels = {name: np.full((1, 1), value, np.float32) for name, value in channels.items()}
-    try:
-        OpenEXR.File(header, pixels).write(str(path))
-    except RuntimeError:
-        raise DiskError(f"{path}: cannot be written") from None
+    write_exr_file(path, header, pixels)
 
 
 def _channel(nm: float) -> str:

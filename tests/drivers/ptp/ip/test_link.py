@@ -42,6 +42,12 @@ def data(transaction_id: int, announced: int, *pieces: bytes) -> bytes:
     return start + between + encode(PacketKind.END_DATA, head + pieces[-1])
 
 
+@pytest.fixture(autouse=True)
+def permitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The user consented to the network: `tests/test_consent.py` has those who did not."""
+    monkeypatch.setattr("labrig.consent.has_consent", lambda sentence: True)
+
+
 @pytest.fixture
 def rig(tmp_path: Path) -> Callable[[str], Path]:
     """Writes a rig with one camera at an address."""
