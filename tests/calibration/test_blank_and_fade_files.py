@@ -54,6 +54,10 @@ def test_a_written_blank_reads_back_as_itself(
 
 def test_when_a_blank_is_clean_and_what_leaks() -> None:
     assert BLANK.is_clean(2.1)
+    # A frame that was planned for that time begins microseconds before or after it.
+    assert BLANK.is_clean(2.0)
+    assert BLANK.is_clean(2.0 - 1e-6)
+    assert not BLANK.is_clean(1.9)
     assert not BLANK.is_clean(0.5)
     assert BLANK.leaks() == ()
     leaking = BLANK.model_copy(update={"ambient_dn_per_s": (0.0, 3.0)})
