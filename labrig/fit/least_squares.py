@@ -548,7 +548,7 @@ def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
     scale = _or_1(_column_lengths(jacobian))
     scaled = jacobian / scale
     if scaled.size >= LARGE_JACOBIAN:
-        scaled = np.linalg.qr(scaled, mode="r")
+        scaled = np.asarray(np.linalg.qr(scaled, mode="r"))
     _, s, vt = np.linalg.svd(scaled, full_matrices=False)
     kept = s > _rank_tolerance(jacobian) * s[0]
     inverse = vt[kept].T / s[kept]

@@ -78,7 +78,7 @@ class _Part:
         return np.asarray(scaled + np.diag(self.rest[:n_values] + INDEPENDENT))
 
     def effects_of(self, effect: FloatArray) -> FloatArray:
-        """Return A V Aᵀ of A (p, n) of the other noise, and of every φ > 0 with c = 1, (k, p, p)."""
+        """Return A V Aᵀ of A (p, n): of the other noise, and of every φ > 0 with c = 1."""
         sized = effect * self.size
         correlated = [sized @ _correlated(phi, sized.T) for phi in CORRELATIONS[1:]]
         return np.stack([(effect * self.rest) @ effect.T, *correlated])
