@@ -8,7 +8,7 @@ from typing import Any
 
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.process import process_run
-from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
+from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import record
 from tests.analyse.small_runs import RECORD
 from tests.analyse.spectral_bench import true_lvf_file

@@ -12,7 +12,7 @@ from labrig.analyse.excitation.lamp_light import (
     mode_kinds,
     site_modes,
 )
-from tests.analyse.excitation.test_excitation_run import true_irradiance
+from tests.analyse.excitation.bench import true_irradiance
 
 
 def test_across_a_place_the_light_runs_as_along_the_filter() -> None:
