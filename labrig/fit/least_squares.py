@@ -56,7 +56,8 @@ INITIAL_DAMPING = 1e-3
 #: Smallest factor of the damping after a step as good as predicted; Nielsen's 1/3 takes 50 % more
 #: steps.
 MIN_DAMPING_FACTOR = 1 / 10
-#: Number of entries of the Jacobian from which the search uses the normal equations.
+#: Number of entries of the Jacobian from which the search uses the normal equations, and the
+#: covariance a triangle.
 LARGE_JACOBIAN = 100_000
 POLISH_STEPS = 60
 #: Fall of χ² that matters: it moves no parameter by more than a tenth of its σ.
@@ -545,7 +546,10 @@ def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
     The singular values (p,) are those of J with its columns scaled to length 1.
     """
     scale = _or_1(_column_lengths(jacobian))
-    _, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
+    scaled = jacobian / scale
+    if scaled.size >= LARGE_JACOBIAN:
+        scaled = np.asarray(np.linalg.qr(scaled, mode="r"))
+    _, s, vt = np.linalg.svd(scaled, full_matrices=False)
     kept = s > _rank_tolerance(jacobian) * s[0]
     inverse = vt[kept].T / s[kept]
     covariance = (inverse @ inverse.T) / np.outer(scale, scale)

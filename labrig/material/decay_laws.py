@@ -38,9 +38,18 @@ TINY = 1e-300
 _NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)
 NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
 
+#: Argument below which log(1 + x)/x and its derivative are summed as series, and the coefficients
+#: of both, the highest power first.
+LOG_SERIES_BELOW = 0.01
+_LOG_SERIES = (-1.0) ** np.arange(6, -1, -1) / np.arange(7, 0, -1)
+_LOG_SERIES = np.stack([_LOG_SERIES, np.append(0.0, np.polyder(_LOG_SERIES))], axis=1)
+
 #: (rate in 1/s, shape, begins in s (n,), exposures in s (n,)) → means (n,), and their derivatives
-#: by the logarithm of the rate and by the shape (n, 2).
-Means = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+#: by the logarithm of the rate and by the shape (n, 2). Rates and shapes of some laws, shape
+#: (k, 1), give means (k, n).
+Means = Callable[
+    [float | FloatArray, float | FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray]
+]
 
 
 @dataclass(frozen=True)
@@ -78,7 +87,10 @@ def becquerel_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
 
 
 def becquerel_means(
-    rate_per_s: float, shape: float, t_s: FloatArray, exposure_s: FloatArray
+    rate_per_s: float | FloatArray,
+    shape: float | FloatArray,
+    t_s: FloatArray,
+    exposure_s: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Average (1 + u k t)^(−1/u) over each exposure, u = 1/p and k = p/τ; at u = 0 it is e^(−k t).
 
@@ -94,7 +106,7 @@ def becquerel_means(
     psi, psi_slope = _growth((shape - 1) * z * ell)
     mean = np.exp(-phase * ratio) * ell * psi
     # Derivatives of log(mean), by log k and by u, through z, y = u z and (u − 1) z ℓ(y).
-    slopes = np.empty((len(t_s), 2))
+    slopes = np.empty((*mean.shape, 2))
     z_slopes = z / growth, -z * phase / growth
     y_slopes = shape * z_slopes[0], z / growth
     begins = -phase / growth, -(phase**2) * ratio_slope
@@ -105,7 +117,7 @@ def becquerel_means(
             + (shape - 1) * ell * z_slopes[column]
             + (shape - 1) * z * ell_slope * y_slopes[column]
         )
-        slopes[:, column] = mean * (
+        slopes[..., column] = mean * (
             begins[column] + ell_slope / ell * y_slopes[column] + psi_slope * exponent
         )
     return mean, slopes
@@ -118,7 +130,10 @@ def otor_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
 
 
 def otor_means(
-    rate_per_s: float, shape: float, t_s: FloatArray, exposure_s: FloatArray
+    rate_per_s: float | FloatArray,
+    shape: float | FloatArray,
+    t_s: FloatArray,
+    exposure_s: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Average the light of one trap with retrapping over each exposure.
 
@@ -126,21 +141,25 @@ def otor_means(
     Wright's ω function. The light is −dm/dt over its value k at lamp off; its mean over an exposure
     is the fall of the level over k T.
     """
-    begin, end = (_trap(rate_per_s, shape, at_s) for at_s in (t_s, t_s + exposure_s))
-    middle = _trap(rate_per_s, shape, t_s + exposure_s / 2)
-    length = rate_per_s * exposure_s
+    n, length = len(t_s), rate_per_s * exposure_s
     is_short = length < SHORT_EXPOSURE
+    short = np.flatnonzero(is_short.reshape(-1, n).any(axis=0))
+    middle_s = t_s[short] + exposure_s[short] / 2
+    trap = _trap(rate_per_s, shape, np.concatenate([t_s, t_s + exposure_s, middle_s]))
     safe = np.where(is_short, 1.0, length)
-    mean = np.where(is_short, middle.light, (begin.level - end.level) / safe)
-    by_log_rate = np.where(
-        is_short,
-        middle.light_by_log_rate,
-        (begin.level_by_log_rate - end.level_by_log_rate) / safe - mean,
-    )
-    by_shape = np.where(
-        is_short, middle.light_by_shape, (begin.level_by_shape - end.level_by_shape) / safe
-    )
-    return mean, np.stack([by_log_rate, by_shape], axis=1)
+
+    def fall(level: FloatArray) -> FloatArray:
+        return np.asarray((level[..., :n] - level[..., n : 2 * n]) / safe)
+
+    mean, by_shape = fall(trap.level), fall(trap.level_by_shape)
+    by_log_rate = fall(trap.level_by_log_rate) - mean
+    if len(short):
+        light = trap.light, trap.light_by_log_rate, trap.light_by_shape
+        for of_fall, of_middle in zip((mean, by_log_rate, by_shape), light, strict=True):
+            of_fall[..., short] = np.where(
+                is_short[..., short], of_middle[..., 2 * n :], of_fall[..., short]
+            )
+    return mean, np.stack([by_log_rate, by_shape], axis=-1)
 
 
 def stretched_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
@@ -150,17 +169,22 @@ def stretched_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
 
 
 def stretched_means(
-    rate_per_s: float, shape: float, t_s: FloatArray, exposure_s: FloatArray
+    rate_per_s: float | FloatArray,
+    shape: float | FloatArray,
+    t_s: FloatArray,
+    exposure_s: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Average exp(−(k t)^β) over each exposure by Gauss's rule with eight points."""
-    time = rate_per_s * (t_s[:, None] + exposure_s[:, None] * NODES)
+    nodes, fractions = (NODES, FRACTIONS) if exposure_s.any() else (np.zeros(1), np.ones(1))
+    beta = np.asarray(shape)[..., None]
+    time = np.asarray(rate_per_s)[..., None] * (t_s[:, None] + exposure_s[:, None] * nodes)
     # x^β log x → 0 as x → 0.
     log_time = np.log(np.maximum(time, TINY))
-    power = np.exp(shape * log_time)
-    falling = np.exp(-power) * FRACTIONS
-    by_log_rate = -shape * (falling * power).sum(axis=1)
-    by_shape = -(falling * power * log_time).sum(axis=1)
-    return falling.sum(axis=1), np.stack([by_log_rate, by_shape], axis=1)
+    power = np.exp(beta * log_time)
+    falling = np.exp(-power) * fractions
+    rising = falling * power
+    slopes = -shape * rising.sum(axis=-1), -(rising * log_time).sum(axis=-1)
+    return falling.sum(axis=-1), np.stack(slopes, axis=-1)
 
 
 @dataclass(frozen=True)
@@ -187,7 +211,7 @@ def _trap_level(phase: FloatArray, shape: FloatArray) -> FloatArray:
     return np.where(shape < NEAR_LIMIT, np.exp(-phase), level)
 
 
-def _trap(rate_per_s: float, shape: float, t_s: FloatArray) -> _Trap:
+def _trap(rate_per_s: float | FloatArray, shape: float | FloatArray, t_s: FloatArray) -> _Trap:
     phase = rate_per_s * t_s
     retrapped, escaped = shape, 1 - shape
     level = _trap_level(phase, np.asarray(shape))
@@ -211,16 +235,12 @@ def _trap(rate_per_s: float, shape: float, t_s: FloatArray) -> _Trap:
 
 def log_ratio(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return ℓ(x) = log(1 + x)/x and its derivative, x > −1."""
-    small = np.abs(x) < SERIES_BELOW
+    small = np.abs(x) < LOG_SERIES_BELOW
     safe = np.where(small, 1.0, x)
-    y = np.clip(x, -SERIES_BELOW, SERIES_BELOW)
-    powers = y[..., None] ** np.arange(9)
-    series = powers @ ((-1.0) ** np.arange(9) / np.arange(1, 10))
-    series_slope = powers[..., :8] @ (
-        (-1.0) ** np.arange(1, 9) * np.arange(1, 9) / np.arange(2, 10)
-    )
-    ratio = np.where(small, series, np.log1p(safe) / safe)
-    slope = np.where(small, series_slope, (1 / (1 + safe) - np.log1p(safe) / safe) / safe)
+    y = np.where(small, x, 0.0)
+    series = np.polyval(_LOG_SERIES.reshape(-1, 2, *(1,) * y.ndim), y)
+    ratio = np.where(small, series[0], np.log1p(safe) / safe)
+    slope = np.where(small, series[1], (1 / (1 + safe) - ratio) / safe)
     return ratio, slope
 
 

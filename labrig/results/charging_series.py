@@ -64,6 +64,17 @@ class Transient:
         """Construct the transient of a lamp that switches instantly."""
         return cls(np.zeros(1), np.ones((1, bands)))
 
+    def in_parts(self, most: int) -> Self:
+        """Return the transient in at most so many steps, each with its mean light."""
+        steps = np.arange(len(self.duration_s))
+        if len(steps) <= most:
+            return self
+        parts = np.array_split(steps, most)
+        means = [np.average(self.fraction[p], axis=0, weights=self.duration_s[p]) for p in parts]
+        return type(self)(
+            np.array([self.duration_s[part].sum() for part in parts]), np.array(means)
+        )
+
     @property
     def total_s(self) -> float:
         """Duration of the transient in seconds."""

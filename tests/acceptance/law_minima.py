@@ -25,7 +25,7 @@ from scipy.optimize import least_squares
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.fit.decay.laws import FASTEST_STEPS, SLOWEST_SPANS
+from labrig.fit.decay.law_search import FASTEST_STEPS, SLOWEST_SPANS
 from labrig.material import DECAY_LAWS
 from tests.fit import truths
 

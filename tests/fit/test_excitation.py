@@ -302,6 +302,7 @@ def test_the_jacobian_is_that_of_the_residuals(order: float | None) -> None:
         charges=charges,
         site_modes=modes,
         across=across,
+        arriving=np.stack([np.ones(8), np.linspace(0.3, 0.8, 8)]),
         frame_light=0.4 * through.values,
         veil_shapes=np.linspace(-1.0, 1.0, len(LVF))[None],
     )
@@ -341,15 +342,15 @@ def test_the_jacobian_is_that_of_the_residuals(order: float | None) -> None:
     theta[columns.start] = 0.002, 0.004
     problem.rewhiten(theta)
     _, jacobian = problem.residuals(theta)
-    for column in range(len(theta)):
-        h = 1e-6 * max(abs(theta[column]), 1e-3)
-        up, down = theta.copy(), theta.copy()
-        up[column] += h
-        down[column] -= h
-        slope = (problem.residuals(up)[0] - problem.residuals(down)[0]) / (2 * h)
-        assert slope == pytest.approx(
-            jacobian[:, column], rel=1e-4, abs=1e-5 * np.abs(jacobian[:, column]).max()
-        )
+    # Of each kind of parameter, along a direction in which all of them change.
+    for place in columns:
+        direction = np.zeros_like(theta)
+        size = 1e-6 * np.maximum(np.abs(theta[place]), 1e-3)
+        direction[place] = size * random.uniform(0.5, 1.5, len(size))
+        after, before = (problem.residuals(theta + step)[0] for step in (direction, -direction))
+        expected = jacobian @ direction
+        change = (after - before) / 2
+        assert change == pytest.approx(expected, rel=1e-4, abs=1e-5 * np.abs(expected).max())
 
 
 def test_what_earlier_charges_left_is_not_evenness() -> None:
@@ -467,6 +468,16 @@ def test_transients_that_are_none() -> None:
     for t_s, left in (([0.0], [[1.0]]), ([0.1, 0.2], [[1.0], [0.0]]), ([0.0, 0.1], [1.0, 0.0])):
         with pytest.raises(FitError, match="that rise from 0 s"):
             Transient.sampled(t_s, left)
+
+
+def test_a_transient_in_fewer_parts_gives_the_same_light() -> None:
+    falling = np.stack([np.exp(-np.linspace(0, 3, 51)), np.linspace(1, 0, 51)], axis=1)
+    whole = Transient.sampled(np.linspace(0, 0.2, 51) ** 2, falling)
+    few = whole.in_parts(4)
+    assert len(few.duration_s) == 4
+    assert few.total_s == pytest.approx(whole.total_s)
+    np.testing.assert_allclose(few.duration_s @ few.fraction, whole.duration_s @ whole.fraction)
+    assert whole.in_parts(50) is whole
 
 
 def test_a_site_under_uneven_light_has_the_mean_level_of_its_places() -> None:

@@ -56,6 +56,17 @@ def test_a_law_has_its_value_at_any_time(name: str, shape: float) -> None:
     np.testing.assert_allclose(means, expected, rtol=1e-8)
 
 
+@pytest.mark.parametrize("name", sorted(DECAY_LAWS))
+def test_several_rates_and_shapes_at_once_are_those_one_by_one(name: str) -> None:
+    law = DECAY_LAWS[name]
+    rates, shapes = np.array([0.01, 0.3, 2.0]), np.array([law.shapes[0], 0.4, law.shapes[1]])
+    means, slopes = law.means(rates[:, None], shapes[:, None], T_S, EXPOSURE_S)
+    for row, (rate, shape) in enumerate(zip(rates, shapes, strict=True)):
+        mean, slope = law.means(float(rate), float(shape), T_S, EXPOSURE_S)
+        np.testing.assert_allclose(means[row], mean, rtol=1e-13)
+        np.testing.assert_allclose(slopes[row], slope, rtol=1e-13, atol=1e-300)
+
+
 @pytest.mark.parametrize(("name", "shape"), CASES)
 @pytest.mark.parametrize("rate_per_s", [0.01, 0.3])
 def test_an_exposure_averages_the_value(name: str, shape: float, rate_per_s: float) -> None:

@@ -9,30 +9,20 @@ valley a search creeps. The level that is fitted is therefore that at the time a
 frames tell it, which hardly depends on rate and shape.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter
 
 from labrig.errors import FitError
 from labrig.fit.decay.joint import JointFit, Shape, covariance_under_flicker, fit_jointly
+from labrig.fit.decay.law_search import law_minima, log_rate_bounds
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
-from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray, parameter_covariance
 from labrig.material import DECAY_LAWS, DecayLaw
 from labrig.results import FittedLaw
 
-#: Largest rate at lamp off in inverse shortest steps between frames, and smallest in spans: laws
-#: other than exponentials fall fast at first, and go on falling.
-FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
-#: Sizes of the grid of rates and shapes, smallest shape above 0 on it, and most of its basins from
-#: which a law is fitted.
-GRID = (36, 16)
-LEAST_SHAPE = 1e-5
-MOST_BASINS = 3
 #: Places of the rate and of the shape among the parameters.
 LAW_RATE, LAW_SHAPE = slice(1, 2), 2
 MAX_ITERATIONS = 200
@@ -83,7 +73,7 @@ def fit_law(
     added_square: float,
     student: float,
 ) -> LawFit | None:
-    """Fit a law from the best place of a grid of rates and shapes.
+    """Fit a law from the places that may be its best at given channel weights.
 
     Parameters
     ----------
@@ -110,7 +100,7 @@ def fit_law(
     """
     problem = _LawProblem(likelihood.data, law, weights, offsets)
     series = problem.data.series
-    fits = list(problem.fits())
+    fits = problem.fits()
     if not fits:
         return None
     fit = min(fits, key=lambda each: each.chi2)
@@ -157,10 +147,6 @@ def fit_laws(
     return tuple(fits), tuple(unfinished)
 
 
-def _log_rate_bounds(series: DecaySeries) -> tuple[float, float]:
-    return -float(np.log(SLOWEST_SPANS)), float(np.log(FASTEST_STEPS / series.shortest_step))
-
-
 def _shape(series: DecaySeries, law: DecayLaw) -> Shape:
     """Return the law as a function of [amplitude, log rate, shape]."""
     time = series.t + series.start
@@ -181,45 +167,33 @@ class _LawProblem:
     weights: FloatArray
     offsets: FloatArray
 
-    def fits(self) -> Iterator[JointFit]:
-        """Yield the fits from the basins of a grid, and from the fit of each simpler law.
+    def fits(self) -> list[JointFit]:
+        """Return the fits from the minima that may be the lowest."""
+        minima = law_minima(self.data, self.law, self.weights)
+        fits = (self._fit(minimum) for minimum in minima)
+        return [fit for fit in fits if fit is not None]
 
-        A law never fits worse than one that it contains: a search only descends.
-        """
-        shapes = self.law.shapes
-        for start in _basins(self.data, self.law, self.weights, _grid_shapes(shapes)):
-            yield from self._fit(start, self.weights, self.offsets, shapes)
-        for limit in self.law.limits:
-            for start in _basins(self.data, self.law, self.weights, np.array([limit]))[:1]:
-                for simpler in self._fit(start, self.weights, self.offsets, (limit, limit)):
-                    yield from self._fit(simpler.shape, simpler.weights, simpler.offsets, shapes)
-
-    def _fit(
-        self,
-        start: FloatArray,
-        weights: FloatArray,
-        offsets: FloatArray,
-        shapes: tuple[float, float],
-    ) -> Iterator[JointFit]:
-        """Yield the fit from [amplitude, log rate, shape] within shapes, if there is one."""
+    def _fit(self, start: FloatArray) -> JointFit | None:
+        """Return the fit from [amplitude, log rate, shape], if there is one."""
         pivot = self._pivot(start)
-        low, high = _log_rate_bounds(self.data.series)
+        low, high = log_rate_bounds(self.data.series)
+        least, largest = self.law.shapes
         level, _ = self._level(start, pivot)
         try:
             fit = fit_jointly(
                 self.data,
                 self._pivoted(pivot),
                 np.array([start[0] * level, *start[1:]]),
-                weights,
-                offsets,
-                np.array([0.0, low, shapes[0]]),
-                np.array([np.inf, high, shapes[1]]),
+                self.weights,
+                self.offsets,
+                np.array([0.0, low, least]),
+                np.array([np.inf, high, largest]),
                 MAX_ITERATIONS,
                 TOLERANCE,
             )
         except FitError:
-            return
-        yield self._from_reference(fit, pivot)
+            return None
+        return self._from_reference(fit, pivot)
 
     def _pivot(self, theta: FloatArray) -> float:
         """Return the time about which the frames tell the level of a signal."""
@@ -282,34 +256,6 @@ def _without_shape(covariance: FloatArray) -> FloatArray:
     held = covariance.copy()
     held[LAW_SHAPE, :] = held[:, LAW_SHAPE] = 0.0
     return held
-
-
-def _grid_shapes(shapes: tuple[float, float]) -> FloatArray:
-    """Return the shapes of the grid between the least and the largest one."""
-    least, largest = shapes
-    return np.geomspace(max(least, LEAST_SHAPE), largest, GRID[1])
-
-
-def _basins(
-    data: WhitenedSeries, law: DecayLaw, weights: FloatArray, shapes: FloatArray
-) -> FloatArray:
-    """Return [amplitude, log rate, shape] where a grid is better than around there, the best first.
-
-    Shape (m, 3); exposures count as their middles. It is empty where nothing has a signal.
-    """
-    series = data.series
-    problem = projection(data, weights)
-    middle = series.t + series.start + series.exposure / 2
-    log_rate, shape = np.meshgrid(np.linspace(*_log_rate_bounds(series), GRID[0]), shapes)
-    values = law.value(np.multiply.outer(middle, np.exp(log_rate.ravel())), shape.ravel())
-    moments = problem.pull @ values
-    norms2 = problem.information @ values**2 - ((problem.shadow @ values) ** 2).sum(axis=0)
-    norms2 = np.where(norms2 > 0, norms2, np.inf)
-    gains = (np.maximum(moments, 0) ** 2 / norms2).reshape(log_rate.shape)
-    is_basin = (gains == maximum_filter(gains, size=3, mode="nearest")) & (gains > 0)
-    starts = np.column_stack([moments / norms2, log_rate.ravel(), shape.ravel()])
-    order = np.argsort(-gains[is_basin], kind="stable")
-    return np.asarray(starts[is_basin.ravel()][order[:MOST_BASINS]])
 
 
 def _in_units(

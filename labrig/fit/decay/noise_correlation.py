@@ -77,16 +77,11 @@ class _Part:
         scaled = self.factors[None, :, None, None] ** 2 * powers[:, None]
         return np.asarray(scaled + np.diag(self.rest[:n_values] + INDEPENDENT))
 
-    def effect_of(self, effect: FloatArray, weights: FloatArray, squares: FloatArray) -> FloatArray:
-        """Return A V Aᵀ (p, p) of A (p, n), summed with weights of all φ > 0 and c (k − 1, m).
-
-        The squares are those of c, broadcast to the weights.
-        """
-        total = float(weights.sum()) * (effect * self.rest) @ effect.T
+    def effects_of(self, effect: FloatArray) -> FloatArray:
+        """Return A V Aᵀ of A (p, n): of the other noise, and of every φ > 0 with c = 1."""
         sized = effect * self.size
-        for phi, weight in zip(CORRELATIONS[1:], (weights * squares).sum(axis=1), strict=True):
-            total += weight * sized @ _correlated(phi, sized.T)
-        return np.asarray(total)
+        correlated = [sized @ _correlated(phi, sized.T) for phi in CORRELATIONS[1:]]
+        return np.stack([(effect * self.rest) @ effect.T, *correlated])
 
 
 def _correlated(phi: float, columns: FloatArray) -> FloatArray:
@@ -182,10 +177,13 @@ class NoiseCorrelation:
         typical = np.diag(added).copy()
         for name, probabilities in self.probabilities.items():
             part, total = parts[name], probabilities.sum(axis=1)
-            added += part.effect_of(effect, probabilities, part.factors**2)
+            rest, *correlated = part.effects_of(effect)
+            mean_square = probabilities @ part.factors**2
+            added += float(total.sum()) * rest + np.tensordot(mean_square, correlated, 1)
             log_square = probabilities @ np.log(part.factors**2) / np.maximum(total, TINY)
-            square = np.exp(log_square)[:, None]
-            typical += np.diag(part.effect_of(effect, total[:, None], square))
+            usual = float(total.sum()) * rest
+            usual += np.tensordot(total * np.exp(log_square), correlated, 1)
+            typical += np.diag(usual)
         added = _positive(added, solution.covariance)
         own = np.diag(solution.covariance)
         factors = _tail_factors(own, np.diag(added), typical, probability)

@@ -38,17 +38,34 @@ LEFT_OUT, COURSE_ERROR = 9.0, 0.1
 FAR_OUT = 10.0
 #: Number of densities in the range from 0 to the largest at which χ² is looked up.
 LOOKED_UP = 81
-TOLERANCE, MAX_ITERATIONS = 1e-4, 40
+#: Steps into which a transient of the lamp is divided.
+PARTS = 4
+#: Gains in χ² of a step at which a fit ends that only tells the absorption, and another one.
+ROUGH_GAIN, LEAST_GAIN = 0.1, 0.01
+TOLERANCE = 1e-4
+#: Numbers of evaluations after which a fit ends that is far out, and any other.
+FAR_ITERATIONS, MAX_ITERATIONS = 10, 40
 
 
 @dataclass(frozen=True)
 class _Layer:
-    """Rates by a layer of one density: θ, χ², k_e (N, B) in 1/s, and A/k_r (N,)."""
+    """Rates by a layer of one density.
+
+    Attributes
+    ----------
+    theta, chi2
+        θ of the fit, and χ².
+    k_e_per_s, reradiation
+        k_e in 1/s, shape (N, B), and A/k_r, shape (N,).
+    mean_light
+        Mean light over the depth over that at the surface, shape (B,).
+    """
 
     theta: FloatArray
     chi2: float
     k_e_per_s: FloatArray
     reradiation: FloatArray
+    mean_light: FloatArray
 
     def absorption(self) -> FloatArray:
         """Return the absorption by excitation relative to that of the largest band, (B,)."""
@@ -104,17 +121,20 @@ def layer_effect(
     enlarged = max(1.0, fit.reduced_chi2)
     density: list[float] = [0.0]
     courses = [[surface] for _ in COURSES]
+    far_out = FAR_OUT * LEFT_OUT * enlarged
+    best = surface.chi2
     for tried in largest * np.array(fractions):
         for course, absorption in zip(courses, COURSES, strict=True):
             layer = course[-1]
             # Absorption follows k_e, which follows from absorption.
-            for _ in range(1 if absorption is _grey else 2):
+            for gain in (LEAST_GAIN,) if absorption is _grey else (ROUGH_GAIN, LEAST_GAIN):
                 by_band = np.minimum(tried * absorption(layer), largest_density)
-                layer = layers.fitted(by_band, layer)
+                layer = layers.fitted(by_band, layer, gain, best + far_out)
             course.append(layer)
         density.append(float(tried))
-        best = min(one.chi2 for course in courses for one in course)
-        if min(course[-1].chi2 for course in courses) - best > FAR_OUT * LEFT_OUT * enlarged:
+        lowest = min(course[-1].chi2 for course in courses)
+        best = min(best, lowest)
+        if lowest > best + far_out:
             break
     at = np.linspace(0.0, density[-1], LOOKED_UP)
     rise = np.min(
@@ -176,6 +196,8 @@ class _Layers:
                 values=one.values[..., own],
                 sigma=one.sigma[..., own],
                 frame_light=None if one.frame_light is None else one.frame_light[..., own],
+                rise=one.rise.in_parts(PARTS),
+                fade=one.fade.in_parts(PARTS),
             )
             for one in series
         ]
@@ -194,34 +216,56 @@ class _Layers:
         problem = ExcitationProblem(seen, len(k_r), 0, scatter, order)
         theta = problem.parameters.as_stated(k_r, amplitude, fit.k_e(), np.ones(1), each_order)
         problem.rewhiten(theta)
-        return cls(seen, scatter, order, problem, _minimum(problem, theta))
+        surface = _minimum(problem, theta, np.ones(problem.parameters.bands))
+        return cls(seen, scatter, order, problem, surface)
 
-    def fitted(self, density: FloatArray, near: _Layer) -> _Layer:
-        """Return the fit of a layer of a density in each band, shape (B,)."""
+    def fitted(
+        self, density: FloatArray, near: _Layer, least_gain: float, far_chi2: float
+    ) -> _Layer:
+        """Return the fit of a layer of a density in each band, shape (B,), from a near one.
+
+        It ends at a step of a gain in χ² below `least_gain`, or soon if χ² stays above `far_chi2`.
+        """
         arriving = 10.0 ** -np.outer(DEPTHS, density)
         series = [replace(one, arriving=arriving) for one in self.series]
         states = self.problem.parameters.states
         problem = ExcitationProblem(series, states, 0, self.uncertain, self.order)
         problem.whiten_as(self.problem)
-        return _minimum(problem, near.theta)
+        # Weak light excites in proportion to its mean over the depth.
+        theta, mean = near.theta.copy(), arriving.mean(axis=0)
+        growth = problem.parameters.columns.growth
+        theta[growth] *= np.tile(near.mean_light / mean, states)
+        return _minimum(problem, theta, mean, least_gain, far_chi2)
 
 
-def _minimum(problem: ExcitationProblem, theta: FloatArray) -> _Layer:
+def _minimum(
+    problem: ExcitationProblem,
+    theta: FloatArray,
+    mean_light: FloatArray,
+    least_gain: float = LEAST_GAIN,
+    far_chi2: float = np.inf,
+) -> _Layer:
     lower, upper = problem.parameters.bounds()
-    solution = least_squares(
-        problem.residuals,
-        theta,
-        lower=lower,
-        upper=upper,
-        max_iterations=MAX_ITERATIONS,
-        tolerance=TOLERANCE,
-    )
+    for most in (FAR_ITERATIONS, MAX_ITERATIONS):
+        solution = least_squares(
+            problem.residuals,
+            theta,
+            lower=lower,
+            upper=upper,
+            max_iterations=most,
+            tolerance=TOLERANCE,
+            least_gain=least_gain,
+        )
+        theta = solution.parameters
+        if solution.iterations < most or solution.chi2 > far_chi2:
+            break
     rates = problem.parameters.unpack(solution.parameters)
     # The states of a fit are those of its θ by falling rate.
     falling = np.argsort(-rates.k_r_per_s, kind="stable")
     return _Layer(
-        solution.parameters,
+        theta,
         solution.chi2,
         rates.k_e_per_s[falling],
         (rates.amplitude / rates.k_r_per_s)[falling],
+        mean_light,
     )

@@ -6,6 +6,7 @@ series are computed at once, each from r = 0, and then chained. Other orders are
 `levels_of_order`.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -86,24 +87,40 @@ def levels_and_slopes(
         Levels, and their derivatives by ln E of every charge and band, shape (n, K, P, N, B), and
         by the concentrations at the start, shape (n, P, N).
     """
-    if series.arriving is not None:
+    # Of first order the light of parts is that of their mean concentration, of other orders it is
+    # not.
+    if order is not None and series.arriving is not None:
         each = [levels_and_slopes(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()]
-        return (
-            mean_levels([level for level, _, _ in each]),
-            np.mean([by_light for _, by_light, _ in each], axis=0),
-            np.mean([by_start for _, _, by_start in each], axis=0),
-        )
-    if series.across is not None:
+        of_levels, by_light, by_start = zip(*each, strict=True)
+        return mean_levels(of_levels), _mean(by_light), _mean(by_start)
+    if order is not None and series.across is not None:
         places = len(series.across)
         level, by_light, by_start = levels_and_slopes(series.spread(), k_r_per_s, k_e_per_s, order)
-        shots, charges, _, *others = by_light.shape
-        return (
-            level.meaned(places),
-            by_light.reshape(shots, charges, places, -1, *others).mean(axis=2),
-            by_start.reshape(shots, places, -1, *by_start.shape[2:]).mean(axis=1),
-        )
-    after = _levels_after_charges(series, k_r_per_s, k_e_per_s, order)
+        return level.meaned(places), _meaned(by_light, 2, places), _meaned(by_start, 1, places)
+    after, by_each, by_start = _left_by_charges(series, k_r_per_s, k_e_per_s, order)
     level = _photographed(series, after, k_r_per_s, order)
+    of_charge, by_after = _charge_of_shots(series, len(after.value)), level.by_before
+    return level, by_after[:, None, ..., None] * by_each[of_charge], by_after * by_start[of_charge]
+
+
+def _left_by_charges(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray, order: FloatArray | None
+) -> tuple[Levels, FloatArray, FloatArray]:
+    """Return concentrations when the lamp is dark after every charge, and derivatives.
+
+    Of parts of a sample and of places within the sites they are means. The derivatives are those of
+    `levels_and_slopes`, shape (K, K, P, N, B) and (K, P, N); `by_before` is 1, so that of a
+    photograph it is that by what its charge has left.
+    """
+    if series.arriving is not None:
+        each = [_left_by_charges(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()]
+        of_levels, of_light, of_start = zip(*each, strict=True)
+        return mean_levels(of_levels), _mean(of_light), _mean(of_start)
+    if series.across is not None:
+        places = len(series.across)
+        after, by_light, by_begin = _left_by_charges(series.spread(), k_r_per_s, k_e_per_s, order)
+        return after.meaned(places), _meaned(by_light, 2, places), _meaned(by_begin, 1, places)
+    after = _levels_after_charges(series, k_r_per_s, k_e_per_s, order)
     charges = len(after.value)
     # By all light until then, by that of each charge, and by the start, before every charge.
     by_all = np.zeros((charges + 1, *after.by_k_e.shape[1:]))
@@ -114,12 +131,17 @@ def levels_and_slopes(
         by_each[number + 1] = kept[..., None] * by_each[number]
         by_each[number + 1, number] = by_all[number + 1] - kept[..., None] * by_all[number]
         by_start[number + 1] = kept * by_start[number]
-    of_charge = _charge_of_shots(series, charges)
-    kept = level.by_before[..., None]
-    by_light = kept[:, None] * by_each[of_charge]
-    own = level.by_k_e * k_e_per_s - kept * by_all[of_charge]
-    by_light[np.arange(len(of_charge)), of_charge] += own
-    return level, by_light, level.by_before * by_start[of_charge]
+    return after._replace(by_before=np.ones_like(after.value)), by_each[1:], by_start[1:]
+
+
+def _mean(parts: Sequence[FloatArray]) -> FloatArray:
+    return np.asarray(sum(parts) / len(parts))
+
+
+def _meaned(values: FloatArray, axis: int, places: int) -> FloatArray:
+    """Average over `places` per site, given all sites for one place after the other in an axis."""
+    shape = (*values.shape[:axis], places, -1, *values.shape[axis + 1 :])
+    return np.asarray(values.reshape(shape).mean(axis=axis))
 
 
 def levels_at_off(

@@ -9,8 +9,9 @@ Rasmussen, C. K. I. Williams, *Gaussian Processes for Machine Learning*, 2006, e
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -29,6 +30,7 @@ from labrig.fit.fluorescence.prior import (
 )
 from labrig.fit.fluorescence.shapes import EmissionShapes
 from labrig.fit.fluorescence.system import FluorescenceSystem
+from labrig.fit.fluorescence.unknowns import Unknowns
 from labrig.fit.least_squares import FloatArray
 
 MOST_FLUOROPHORES = 3
@@ -48,6 +50,8 @@ SEARCHED_DEVIATION = 0.1
 MODES = 10
 #: Number of independent courses of an excitation in which errors of lights and curves are summed.
 COURSES = 8
+#: Number of shapes whose designs and priors are kept for the next hypothesis.
+KEPT = 128
 #: Larger than any squared length of whitened values.
 _HUGE = 1e300
 
@@ -148,6 +152,31 @@ class Hypotheses:
         nm = self.system.output_nm
         count = min(MODES, len(nm))
         return np.array([emission_modes(nm, emission, count) for emission in self.shapes.value])
+
+    @cached_property
+    def deviation_designs(self) -> Callable[[int], FloatArray]:
+        """Function that returns values per excitation of a shape's deviations, (MODES, n, i)."""
+        return lru_cache(KEPT)(lambda shape: self.designs(self.modes[shape]))
+
+    @cached_property
+    def reflectance_part(self) -> Callable[[float], Unknowns]:
+        """Function that returns the reflectance of some variation before the values."""
+
+        def part(sigma: float) -> Unknowns:
+            covariance = reflectance_covariance(self.system.output_nm, sigma)
+            return Unknowns.normal(self.reflectance_design, REFLECTANCE, covariance)
+
+        return lru_cache(KEPT)(part)
+
+    @cached_property
+    def dye_part(self) -> Callable[[int], Unknowns]:
+        """Function that returns the excitation of a dye of a shape and amplitude 1."""
+
+        def part(shape: int) -> Unknowns:
+            covariance = self.excitation_covariance(shape)
+            return Unknowns.normal(self.excitation_designs[shape], 0.0, covariance)
+
+        return lru_cache(KEPT)(part)
 
     @cached_property
     def reflectance_variance(self) -> dict[float, FloatArray]:
