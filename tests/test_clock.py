@@ -84,9 +84,11 @@ def test_nobody_is_reported_of_sleep_who_did_not_ask_or_of_a_hiccup() -> None:
     clock = SleepyClock()
     clock.asleep_s += 3600.0
     clock.sleep(5.0)
+    assert clock.now() == 5.0
     with clock.noticing_sleep():
         clock.asleep_s += 0.1
         clock.sleep(5.0)
+    assert clock.now() == 10.0
 
 
 def test_what_went_wrong_is_more_than_the_sleep() -> None:
@@ -162,5 +164,7 @@ def test_each_system_is_asked_how_long_it_slept(
 
 def test_a_system_that_does_not_tell_is_taken_to_be_awake() -> None:
     clock = SystemClock("plan9")
+    began_s = clock.now()
     with clock.noticing_sleep():
         clock.sleep(0.01)
+    assert clock.now() - began_s >= 0.01

@@ -1,13 +1,11 @@
 """The paper's bench with trap door, lamp shield and a mute relay board: checked, planned, run."""
 
-import io
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
-import rawpy
 
 from labrig.acquire import (
     DOOR_CLOSE,
@@ -33,6 +31,7 @@ from labrig.record import RunFolder, RunRecord
 from labrig.sim.door import FRAME_S
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended
+from tests.frame_middle import middle_dn
 from tests.quick_yaml import read_quickly, write_quickly
 
 Make = Callable[..., Path]
@@ -95,11 +94,6 @@ class ShotProtocol(ProtocolModel):
 
     def units(self) -> Sequence[Unit]:
         return [TimedShot()]
-
-
-def middle(path: Path) -> float:
-    with rawpy.imread(io.BytesIO(path.read_bytes())) as raw:
-        return float(raw.raw_image_visible[20:44, 30:66].mean()) - 1024
 
 
 def recorded(rig: Path, runs: Path, unit: Unit | None = None) -> tuple[RunRecord, Any]:
@@ -182,7 +176,7 @@ def test_the_journal_has_the_times_at_which_the_true_door_moved(rig: Make, tmp_p
     for (begin_s, end_s), start_s in zip(asked, started, strict=True):
         assert begin_s <= start_s <= end_s + FRAME_S
     assert all(action.late_s < 1e-3 for action in attempt.actions)
-    opened_late, opened, closed = (middle(frame.path) for frame in attempt.frames)
+    opened_late, opened, closed = (middle_dn(frame.path) for frame in attempt.frames)
     assert opened_late > opened > 20
     assert closed < 0.5 * opened, "the door closes in the first 280 ms of that frame"
 
@@ -194,7 +188,7 @@ def test_a_stuck_and_a_slow_door_hide_the_sample(rig: Make, tmp_path: Path) -> N
             "none": [], "stuck": ["door_stuck"], "slow": [{"door_slow": {"takes": "1.5 s"}}],
         }[fault]  # fmt: skip
         record, _ = recorded(rig(faults=faults), tmp_path / fault)
-        first[fault] = middle(record.completed()["shot"].frames[0].path)
+        first[fault] = middle_dn(record.completed()["shot"].frames[0].path)
     assert first["stuck"] == pytest.approx(0, abs=3)
     assert 3 < first["slow"] < 0.7 * first["none"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-HOME = Path(__file__).parents[1]
+HOME, TESTS = Path(__file__).parents[1], Path(__file__).parent
 BESIDE = ("drivers", "protocols", "sim")
 #: A protocol's module is its face: its model, units and frame roles, for its analysis.
 OPEN = ("labrig.protocols",)
@@ -75,3 +75,14 @@ def test_no_import_goes_past_a_face() -> None:
 def test_an_import_past_a_face_is_seen(line: str, is_past: bool) -> None:
     packages = {"labrig.reduce", "labrig.fit.decay", "labrig.report"}
     assert bool(list(past_faces(line, "labrig.report.decay", packages))) == is_past
+
+
+def test_a_test_imports_no_other_test() -> None:
+    """What several tests need is in a module of its own."""
+    found = [
+        f"{path.relative_to(TESTS)}: {line}"
+        for path in sorted(TESTS.rglob("*.py"))
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if re.match(r"from (tests|\.)[\w.]*\btest_\w+ import ", line)
+    ]
+    assert not found, "\n".join(found)

@@ -12,33 +12,23 @@ from labrig.process import process_run
 from labrig.results import CalibrationCheckResult, CalibrationResult, PhosphorResult
 from tests.acceptance.whole_phosphor import errors
 from tests.analyse.recorded import record
+from tests.analyse.small_runs import IRRADIANCE, LVF_CALIBRATION, calibration, small_bench
 from tests.quick_yaml import read_quickly
 from tests.results.made import assert_read_back
 
-LVF = {
-    "protocol": "lvf_calibration", "stripes": "none", "longest": "4 s", "repeats": 1,
-    "filters": ["longpass-440", "longpass-490", "longpass-540", "longpass-600",
-                "shortpass-430", "shortpass-520"],
-}  # fmt: skip
-IRRADIANCE = {"protocol": "irradiance", "longest": "4 s", "repeats": 1, "rounds": 1}
 SPECTRUM = {"protocol": "emission_spectrum", "times": ["2 s", "10 s"], "longest": "10 s",
             "charge": "3 min"}  # fmt: skip
 
 
-def small(rig: dict[str, Any]) -> None:
-    rig["simulation"]["sensor"] = {"width": 128, "height": 48}
-
-
 @pytest.mark.campaign
 def test_what_a_calibration_finds_is_used_by_the_next_run(tmp_path: Path) -> None:
-    bench = {"protocol": "calibration", "sample": {"name": "bench"}, "parts": [LVF, IRRADIANCE]}
-    calibrated = process_run(record(tmp_path, bench, small))
+    calibrated = process_run(calibration(tmp_path))
     assert isinstance(calibrated, CalibrationResult)
     assert list(calibrated.parts) == ["lvf_calibration", "irradiance"]
     assert calibrated.reference.lens == "EF75mm, 75 mm"
     assert_read_back(calibrated)
     chain = {"protocol": "phosphor", "sample": {"name": "blue-paint"}}
-    run = record(tmp_path, chain | {"parts": [LVF, IRRADIANCE, SPECTRUM]}, small)
+    run = record(tmp_path, chain | {"parts": [LVF_CALIBRATION, IRRADIANCE, SPECTRUM]}, small_bench)
     result = process_run(run)
     assert isinstance(result, PhosphorResult)
     assert list(result.parts) == ["calibration_check", "emission_spectrum"]

@@ -7,54 +7,27 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import event_model
 import pytest
 
-from labrig.acquire import LAMP, Plan, RunObserver, plan, read_protocol, read_rig_file
-from labrig.bench import Bench, Recording, open_bench, resume_run
-from labrig.bench.execution import execute
-from labrig.clock import Clock, Interrupted, VirtualClock
-from labrig.errors import DeviceError
-from labrig.record import RunFolder, read_run
+from labrig.acquire import LAMP, read_rig_file
+from labrig.bench import Recording, open_bench, resume_run
+from labrig.clock import VirtualClock
+from labrig.record import read_run
 from labrig.record.journal import read_journal
-from tests.acquire.fakes import Watching
 from tests.conftest import Ended
+from tests.run_folders import lamp_after, lamp_is_on, make_folder, quietly
 
 CAMPAIGN = pytest.mark.campaign
 UNITS = ["dark", "decay-1", "decay-2"]
 
 
-@contextmanager
-def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
-    yield Watching()
-
-
 @pytest.fixture
 def quick(make_protocol: Callable[..., Path]) -> Path:
     return make_protocol(repeats=2, charge="60 s", **{"for": "20 s"})
-
-
-def lamp_after(folder: Path, rig: Path, stop: Callable[[], None]) -> bool:
-    """Begin or go on with the run in `folder`, stopped by `stop`; is the lamp on in the end?"""
-    protocol, rig_file = read_protocol(folder / "protocol.yaml"), read_rig_file(rig)
-    with open_bench(rig_file, str(rig)) as stand, RunFolder(folder, stand.seed) as run:
-        stop()
-        try:
-            execute(run, protocol, stand, plan(protocol, rig_file, str(rig)), quietly)
-        except (Interrupted, DeviceError) as error:
-            assert "\n" not in str(error)
-            assert f"labrig resume {folder}" in str(error) or "nothing was" in str(error)
-        return lamp_is_on(stand)
-
-
-def lamp_is_on(stand: Bench) -> bool:
-    """What the room knows, whatever relay and driver say."""
-    assert stand.room is not None
-    return stand.room.room.lamp_on
 
 
 def outline(value: object) -> object:
@@ -255,9 +228,3 @@ def assert_stopped_in_one_line(err: str) -> None:
     assert len(complaints) == 1, err
     assert "safe state reached" in complaints[0]
     assert "labrig resume" in complaints[0]
-
-
-def make_folder(protocol: Path, tmp_path: Path) -> Path:
-    texts = {"protocol.yaml": protocol.read_text(), "rig.yaml": ""}
-    with RunFolder.create(tmp_path / "runs", "test", 1_767_225_600.0, texts, seed=1) as folder:
-        return folder.path

@@ -92,7 +92,9 @@ def test_what_labrig_takes_an_editor_takes(
 ) -> None:
     rig = read_yaml(resources.folder("config") / "sim.yaml")
     rig["simulation"]["faults"] = faults
-    validators["rig"].validate(rig)
+    assert validators["rig"].is_valid(rig)
+    rig["simulation"]["faults"] = [*faults, "lamp_daed"]
+    assert not validators["rig"].is_valid(rig)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -107,9 +109,11 @@ def test_every_key_is_described(kind: str, validators: dict[str, Draft202012Vali
 def test_every_default_may_be_written(
     kind: str, validators: dict[str, Draft202012Validator]
 ) -> None:
-    for _, key in properties(validators[kind].schema):
-        if "default" in key:
-            validators[kind].evolve(schema=key).validate(key["default"])
+    described = properties(validators[kind].schema)
+    defaults = [(name, key) for name, key in described if "default" in key]
+    assert defaults
+    for name, key in defaults:
+        assert validators[kind].evolve(schema=key).is_valid(key["default"]), name
 
 
 def test_keys_are_described_by_the_models_and_their_base_classes(

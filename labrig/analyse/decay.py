@@ -132,7 +132,7 @@ def analyse(part: Part) -> DecayResult:
         law=overrides.law,
         intervals=overrides.intervals,
     )
-    fits = _fit_all(series, fit)
+    fits = fit_patches(series, fit)
     temperature_c = glow_temperature_c(run, part.protocol.rate_frames)
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(
@@ -164,13 +164,25 @@ def analyse(part: Part) -> DecayResult:
     )
 
 
-def _fit_all(
+def fit_patches(
     series: Mapping[str, Series], fit: Callable[..., DecayFit]
 ) -> dict[str, DecayFit | str]:
-    """Fit every patch, and return the fit or the reason why there is none, by patch.
+    """Fit the decays of patches that were photographed together.
 
     Shutter and aperture flicker alike for all patches of a frame. The flicker is taken from the
     patch that determines it best, for those that are dim or fade within a few frames.
+
+    Parameters
+    ----------
+    series
+        Series of each patch, by its name.
+    fit
+        Fits one series; its keyword `flicker` takes a relative flicker that is known.
+
+    Returns
+    -------
+    dict
+        Fit of each patch, or the reason why there is none, by the patch's name.
     """
     fits = {name: _fitted(partial(fit, patch_series)) for name, patch_series in series.items()}
     measured = [fit for fit in fits.values() if isinstance(fit, DecayFit) and fit.flicker > 0]

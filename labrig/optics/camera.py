@@ -59,8 +59,8 @@ class CameraResponse:
 
     def response(self, spectrum: FloatArray) -> FloatArray:
         """Return the relative signal of a spectrum given at `wavelength_nm`, shape (channels,)."""
-        values: FloatArray = (spectrum * np.gradient(self.wavelength_nm)) @ self.sensitivity
-        return values
+        seen = spectrum[:, np.newaxis] * self.sensitivity
+        return np.asarray(np.trapezoid(seen, self.wavelength_nm, axis=0))
 
     def at(self, wavelength_nm: ArrayLike) -> FloatArray:
         """Return the sensitivity at (q,) wavelengths in nm, shape (q, channels)."""

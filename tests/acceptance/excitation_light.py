@@ -45,7 +45,7 @@ from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.lvf import Lvf
 from tests.fit.charged_samples import Bench
-from tests.fit.test_excitation_light import Layer
+from tests.fit.layers import Layer
 
 PAINTS = ("blue-paint", "white-paint", "orange-paint", "pink-paint", "purple-paint", "red-paint")
 #: What the calibration states, and draws.

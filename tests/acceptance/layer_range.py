@@ -40,7 +40,7 @@ from tests.acceptance.excitation_light import (
     irradiance_file,
 )
 from tests.fit.charged_samples import Bench, two_states
-from tests.fit.test_excitation_light import Layer
+from tests.fit.layers import Layer
 
 COURSES = ("as excitation", "half", "grey", "host", "pigment")
 DEPTHS = 24

@@ -15,7 +15,7 @@ from labrig.material import (
     with_sigma,
 )
 from tests.material.reradiation.bfc450 import INPUT_NM, samples, tiles
-from tests.material.reradiation.test_noise import REGIONS, ULTRAVIOLET, band_sigma
+from tests.material.reradiation.noisy_bands import REGIONS, ULTRAVIOLET, band_sigma
 
 #: Columns over which sums are compared, in nm.
 SUMMED_NM = (430, 600)

@@ -39,7 +39,7 @@ from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import BURNING_K, Lamp, filament_spectrum
 from labrig.sim.phosphor import band_cells, phosphor
 from labrig.sim.simulation import LampSettings
-from tests.analyse.excitation.test_excitation_run import HEIGHT, true_irradiance
+from tests.analyse.excitation.bench import HEIGHT, true_irradiance
 from tests.analyse.recorded import record
 
 FloatArray = NDArray[np.float64]

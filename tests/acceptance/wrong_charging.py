@@ -21,7 +21,7 @@ from labrig.sim.phosphor import band_cells
 from labrig.sim.simulation import LampSettings
 from labrig.sim.truth import Truth
 from tests.acceptance.decays_of_all_materials import shipped_rig
-from tests.analyse.excitation.test_excitation_run import HEIGHT, QUICK, WIDTH, true_irradiance
+from tests.analyse.excitation.bench import HEIGHT, QUICK, WIDTH, true_irradiance
 
 #: The room's usual lamp, in multiples of the irradiance to which Table 1's rates belong.
 LAMP = 4.0

@@ -142,3 +142,36 @@ def test_a_door_that_fails_does_not_keep_the_rest_from_being_safe() -> None:
     assert refusal.value.unsafe == ("door",)
     assert bench.notes == ["lamp off", "shield uncovered", "camera safe"]
     assert isinstance(bench.door, TrapDoor)
+
+
+class TwoFrames:
+    """A frame that the camera refuses, and one at the settings of before."""
+
+    name = "shot"
+
+    def run(self, session: Session) -> None:
+        session.perform(FRAME)
+        with pytest.raises(DeviceError, match="refused"):
+            session.perform(Shoot("decay", ExposureSettings(1.0, 100, 4.0)))
+        session.perform(FRAME)
+
+
+class RefusingCamera(NotingCamera):
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        super().configure(settings)
+        if settings.iso == 100:
+            raise DeviceError("refused half of it")
+        return settings
+
+
+def test_settings_that_a_camera_refused_are_made_anew_for_the_next_frame(
+    folder: RunFolder,
+) -> None:
+    bench = Bench()
+    bench.rig.devices["camera"] = RefusingCamera(bench.clock, bench.notes.append)
+    with folder:
+        run_units([TwoFrames()], bench.rig, folder, bench.watching, {})
+    configured = [note for note in bench.notes if note.startswith("configure")]
+    assert configured == [f"configure {s}" for s in (
+        FRAME.settings, ExposureSettings(1.0, 100, 4.0), FRAME.settings,
+    )]  # fmt: skip

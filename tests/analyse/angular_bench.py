@@ -6,37 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from labrig import resources
-from labrig.bench import Recording
 from labrig.calibration import CameraFile
 from labrig.optics import Flat
 from labrig.record import read_run
 from labrig.sim.optics import vignetting
-from tests.analyse.recorded import quietly
-from tests.quick_yaml import read_quickly, write_quickly
+from tests.analyse.recorded import recorded, shipped_rig
 
 #: What a camera sees nothing of, what it sees with what it excites, and what excites nothing.
 LEDS = ("365 nm", "455 nm", "625 nm")
-
-
-def write_rig(
-    folder: Path, change: Callable[[dict[str, Any]], None] = lambda rig: None, **simulation: Any
-) -> Path:
-    """The shipped rig for fluorescent materials, small, as told."""
-    folder.mkdir(parents=True, exist_ok=True)
-    rig = read_quickly((resources.folder("config") / "sim-fluorescent.yaml").read_text())
-    rig["devices"]["camera"]["warm_up"] = "1 min"
-    # PyYAML takes this one for a date, as labrig's loader does not.
-    rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z"}
-    rig["simulation"] |= {
-        "sensor": {"width": 96, "height": 64},
-        "sample": [{"material": "yellow-textile", "region": [0.05, 0.08, 0.8, 0.8]}],
-    }
-    rig["simulation"] |= simulation
-    change(rig)
-    path = folder / "rig.yaml"
-    path.write_text(write_quickly(rig))
-    return path
 
 
 def record_angular(
@@ -45,12 +22,13 @@ def record_angular(
     change: Callable[[dict[str, Any]], None] = lambda rig: None,
     **simulation: Any,
 ) -> Path:
-    """The folder of an angular run."""
-    rig = write_rig(folder, change, **simulation)
-    (folder / "protocol.yaml").write_text(
-        write_quickly({"protocol": "angular_fluorescence", **protocol})
-    )
-    return Recording.prepare(folder / "protocol.yaml", rig, folder / "runs").record(quietly)
+    """The folder of an angular run on the shipped rig for fluorescent materials, as told."""
+    rig = shipped_rig("sim-fluorescent")
+    rig["devices"]["camera"]["warm_up"] = "1 min"
+    textile = {"material": "yellow-textile", "region": [0.05, 0.08, 0.8, 0.8]}
+    rig["simulation"] |= {"sample": [textile]} | simulation
+    change(rig)
+    return recorded(folder, {"protocol": "angular_fluorescence", **protocol}, rig)
 
 
 def record_sphere(folder: Path, protocol: dict[str, Any], **simulation: Any) -> Path:

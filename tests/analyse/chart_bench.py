@@ -7,15 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig import resources
-from labrig.bench import Recording
 from labrig.calibration import LVF_KIND
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from labrig.sim.optics import bent_curves, measured_curves
-from tests.analyse.recorded import quietly
+from tests.analyse.recorded import recorded, shipped_rig
 from tests.analyse.spectral_bench import true_lvf_of
-from tests.quick_yaml import read_quickly, write_quickly
 
 FloatArray = NDArray[np.float64]
 WIDTH, HEIGHT = 240, 160
@@ -27,10 +24,7 @@ def record(
     change: Callable[[dict[str, Any]], None] = lambda rig: None,
 ) -> Path:
     """The folder of a run of `protocol` on the shipped rig with a chart, as `change` leaves it."""
-    rig = read_quickly((resources.folder("config") / "sim-chart.yaml").read_text())
-    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
-    rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-    rig["simulation"]["sensor"] = {"width": WIDTH, "height": HEIGHT}
+    rig = shipped_rig("sim-chart", WIDTH, HEIGHT)
     rig["devices"]["camera"].pop("warm_up")
     rig["devices"]["lamp"]["warm_up"] = "10 min"
     rig["optics"]["lvf"] = "lvf.yaml"
@@ -39,11 +33,7 @@ def record(
     change(rig)
     folder.mkdir(parents=True, exist_ok=True)
     LVF_KIND.write(folder, true_lvf_of(settings, WIDTH, HEIGHT))
-    (folder / "rig.yaml").write_text(write_quickly(rig))
-    (folder / "protocol.yaml").write_text(write_quickly(protocol))
-    return Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", folder / "runs").record(
-        quietly
-    )
+    return recorded(folder, protocol, rig)
 
 
 def with_camera(name: str) -> Callable[[dict[str, Any]], None]:

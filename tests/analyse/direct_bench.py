@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import resources
-from labrig.bench import Recording
 from labrig.material import read_any_material
 from labrig.optics import band_integrals, edges_from_centres
 from labrig.sim.bench_settings import LedSettings
@@ -17,7 +16,7 @@ from labrig.sim.leds import Leds
 from labrig.sim.opening import PIXEL_STREAM
 from labrig.sim.spectrometer import Detector
 from labrig.sim.surfaces import Surfaces
-from tests.analyse.recorded import quietly
+from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly
 
 FloatArray = NDArray[np.float64]
@@ -32,9 +31,15 @@ SETTLED_S = 125.0
 
 def write_bench(folder: Path, seed: int = 1, **simulation: Any) -> Path:
     """The shipped rig without a camera, changed as told."""
-    content = read_quickly((resources.folder("config") / "sim-fluorescent.yaml").read_text())
-    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "seed": seed} | simulation
-    content["simulation"]["sensor"] = {"width": 96, "height": 64}
+    path = folder / "rig.yaml"
+    path.write_text(write_quickly(bench(folder, seed, **simulation)))
+    return path
+
+
+def bench(folder: Path, seed: int = 1, **simulation: Any) -> dict[str, Any]:
+    """The content of that rig file; the files that it names are written into `folder`."""
+    content = shipped_rig("sim-fluorescent")
+    content["simulation"] |= {"seed": seed} | simulation
     del content["devices"]["camera"]
     content["devices"]["lamp"] = {
         "driver": "numato_relay", "address": "sim://room/relays", "relay": 0, "warm_up": "15 min",
@@ -44,9 +49,7 @@ def write_bench(folder: Path, seed: int = 1, **simulation: Any) -> Path:
     _write_curve(folder / "card.csv", ROOM_NM, reflectances("grey card", 0.18)[1])
     content["devices"]["spectrometer"]["calibration"] = "./scale.csv"
     content["optics"]["grey_card"] = "./card.csv"
-    path = folder / "rig.yaml"
-    path.write_text(write_quickly(content))
-    return path
+    return content
 
 
 def _write_curve(path: Path, nm: FloatArray, values: FloatArray) -> None:
@@ -55,17 +58,10 @@ def _write_curve(path: Path, nm: FloatArray, values: FloatArray) -> None:
     path.write_text("\n".join(["wavelength_nm,value", *rows]) + "\n")
 
 
-def recording(
-    folder: Path, protocol: dict[str, Any], seed: int = 1, **simulation: Any
-) -> Recording:
-    path = folder / "protocol.yaml"
-    path.write_text(write_quickly({"protocol": "direct_bispectral"} | protocol))
-    return Recording.prepare(path, write_bench(folder, seed, **simulation), folder / "runs")
-
-
 def record(folder: Path, protocol: dict[str, Any], seed: int = 1, **simulation: Any) -> Path:
     """The folder of a run of that protocol."""
-    return recording(folder, protocol, seed, **simulation).record(quietly)
+    keys = {"protocol": "direct_bispectral"} | protocol
+    return recorded(folder, keys, bench(folder, seed, **simulation))
 
 
 def shipped_leds() -> tuple[LedSettings, ...]:

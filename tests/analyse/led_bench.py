@@ -4,10 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from labrig import resources
-from labrig.bench import Recording
-from tests.analyse.recorded import quietly
-from tests.quick_yaml import read_quickly, write_quickly
+from tests.analyse.recorded import recorded, shipped_rig
 
 #: The shipped samples by the names of their patches.
 SAMPLES = {
@@ -35,17 +32,9 @@ def record(
     change: Callable[[dict[str, Any]], None] = lambda rig: None,
 ) -> Path:
     """The folder of a run of `protocol` on the shipped rig with LEDs, as `change` leaves it."""
-    rig = read_quickly((resources.folder("config") / "sim-fluorescent.yaml").read_text())
-    # PyYAML takes it for a date, as labrig's loader does not.
-    rig["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
-    rig["simulation"]["sensor"] = {"width": 96, "height": 64}
+    rig = shipped_rig("sim-fluorescent")
     rig["devices"]["camera"].pop("warm_up")
     if not protocol.get("lamps") and protocol["protocol"] != "validate_illuminants":
         rig["devices"].pop("illuminants")
     change(rig)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "rig.yaml").write_text(write_quickly(rig))
-    (folder / "protocol.yaml").write_text(write_quickly(protocol))
-    return Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", folder / "runs").record(
-        quietly
-    )
+    return recorded(folder, protocol, rig)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from labrig import resources
 from labrig.acquire import RigFile, read_rig_file
-from labrig.bench import Recording, open_bench
+from labrig.bench import open_bench
 from labrig.protocols.luminance import LuminanceFrames
 from labrig.record import PERSON, read_run
-from tests.analyse.recorded import quietly
+from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly
 
 FloatArray = NDArray[np.float64]
@@ -65,24 +65,29 @@ def write_rig(
     **simulation: Any,
 ) -> Path:
     """The shipped rig for luminances, changed as told."""
-    content = read_quickly((resources.folder("config") / "sim-luminance.yaml").read_text())
-    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
-    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-    content["simulation"] |= {"sensor": {"width": 64, "height": 48}} | simulation
+    path = folder / "rig.yaml"
+    path.write_text(write_quickly(bench(reading, optics, **simulation)))
+    return path
+
+
+def bench(
+    reading: dict[str, Any] | None = None,
+    optics: dict[str, Any] | None = None,
+    **simulation: Any,
+) -> dict[str, Any]:
+    """The content of that rig file."""
+    content = shipped_rig("sim-luminance", 64, 48)
+    content["simulation"] |= simulation
     content["devices"]["lamp"]["warm_up"] = "10 min"
     content["devices"]["camera"].pop("warm_up")
     content["optics"] |= optics or {}
     content["optics"]["luminance"] |= reading or {}
-    path = folder / "rig.yaml"
-    path.write_text(write_quickly(content))
-    return path
+    return content
 
 
 def record(folder: Path, protocol: dict[str, Any], **changed: Any) -> Path:
     """The folder of a run of that protocol on `write_rig`'s rig."""
-    path = folder / "protocol.yaml"
-    path.write_text(write_quickly({"sample": {"name": "test"}} | protocol))
-    return Recording.prepare(path, write_rig(folder, **changed), folder / "runs").record(quietly)
+    return recorded(folder, {"sample": {"name": "test"}} | protocol, bench(**changed))
 
 
 def true_luminance(run: Path) -> Callable[[Sequence[float]], FloatArray]:

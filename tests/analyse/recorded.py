@@ -36,25 +36,41 @@ def record(
     change: Callable[[dict[str, Any]], None] = lambda rig: None,
     watch: Watch = quietly,
 ) -> Path:
-    """The folder of a run of `protocol` on the shipped rig for phosphors, as `change` leaves it.
+    """The folder of a run of `protocol` on the shipped rig for phosphors, as `change` leaves it."""
+    rig = shipped_rig("sim-phosphor")
+    rig["devices"]["lamp"]["warm_up"] = "10 min"
+    rig["devices"]["camera"]["warm_up"] = "1 min"
+    change(rig)
+    return recorded(folder, protocol, rig, watch)
+
+
+def shipped_rig(name: str, width: int = 96, height: int = 64) -> dict[str, Any]:
+    """The content of a shipped rig file, its camera's sensor that small."""
+    rig: dict[str, Any] = read_quickly((resources.folder("config") / f"{name}.yaml").read_text())
+    room = rig["simulation"]
+    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
+    room["epoch"] = "2026-01-01T00:00:00Z"
+    if "initial" in room:
+        room["initial"] = {"lamp": "off"}
+    room["sensor"] = {"width": width, "height": height}
+    return rig
+
+
+def recorded(
+    folder: Path, protocol: dict[str, Any], rig: dict[str, Any], watch: Watch = quietly
+) -> Path:
+    """The folder of a run of `protocol` on a rig; both lie in `folder`, as what the rig names may.
 
     In one run of the tests what is the same is recorded once, and copied.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    rig = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
-    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
-    rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
-    rig["simulation"]["sensor"] = {"width": 96, "height": 64}
-    rig["devices"]["lamp"]["warm_up"] = "10 min"
-    rig["devices"]["camera"]["warm_up"] = "1 min"
-    change(rig)
     (folder / "rig.yaml").write_text(write_quickly(rig))
     (folder / "protocol.yaml").write_text(write_quickly(protocol))
     runs = folder / "runs"
     recording = Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", runs)
     if watch is not quietly or SHARED is None:
         return recording.record(watch)
-    asked = b"".join(path.read_bytes() for path in sorted(folder.glob("*.yaml")))
+    asked = b"".join(path.read_bytes() for path in sorted(folder.iterdir()) if path.is_file())
     place = SHARED / sha256(asked.replace(bytes(folder), b"")).hexdigest()
     with FileLock(place.with_suffix(".lock")):
         if not place.is_dir():

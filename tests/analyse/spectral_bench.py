@@ -1,7 +1,5 @@
 """The simulated bench for spectra, its LVF calibrated without error."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,11 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig import resources
-from labrig.acquire import Plan, RunObserver
-from labrig.bench import Recording
 from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
-from labrig.clock import Clock
 from labrig.material import read_material
 from labrig.optics import Bands, Strip
 from labrig.optics.piecewise import band_means, edges_from_centres
@@ -24,7 +19,7 @@ from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from labrig.sim.lvf import PIECES, Lvf, pieces
 from labrig.sim.optics import emission
-from tests.acquire.fakes import Watching
+from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly
 
 FloatArray = NDArray[np.float64]
@@ -36,17 +31,20 @@ WIDTH, HEIGHT = 96, 64
 
 def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path:
     """The shipped rig for phosphors, changed as told, with its true LVF beside it."""
-    content = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
-    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
-    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    path = folder / name
+    path.write_text(write_quickly(bench(folder, **simulation)))
+    return path
+
+
+def bench(folder: Path, **simulation: Any) -> dict[str, Any]:
+    """The content of that rig file; the LVF's is written into `folder`."""
+    content = shipped_rig("sim-phosphor", 384, 64)
     content["simulation"] |= simulation
     for device in content["devices"].values():
         device.pop("warm_up", None)
     content["optics"]["lvf"] = "lvf.yaml"
     LVF_KIND.write(folder, true_lvf_file())
-    path = folder / name
-    path.write_text(write_quickly(content))
-    return path
+    return content
 
 
 @cache
@@ -96,17 +94,9 @@ def true_lvf_of(settings: LvfSettings, width: int, height: int) -> LvfFile:
     )
 
 
-@contextmanager
-def _quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
-    yield Watching()
-
-
 def record(folder: Path, protocol: dict[str, Any], **simulation: Any) -> Path:
     """The folder of a run of that protocol on `write_bench`'s rig."""
-    path = folder / "protocol.yaml"
-    path.write_text(write_quickly({"sample": {"name": "test"}} | protocol))
-    rig = write_bench(folder, **simulation)
-    return Recording.prepare(path, rig, folder / "runs").record(_quietly)
+    return recorded(folder, {"sample": {"name": "test"}} | protocol, bench(folder, **simulation))
 
 
 def emitted(material: str) -> FloatArray:

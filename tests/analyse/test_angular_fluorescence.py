@@ -17,21 +17,20 @@ from labrig.record import Attempt
 from labrig.results import AngularFluorescenceResult
 from tests.analyse.angular_bench import record_angular, record_sphere, true_camera
 from tests.analyse.recorded import part_of
+from tests.analyse.small_runs import ANGULAR
 from tests.results.made import assert_read_back
 
+
 #: Few views, of angles far apart.
-QUICK = {"angles": [30, 60, 90, 120], "directions": ["vertical"], "region": [0.2, 0.2, 0.5, 0.5]}
-
-
 def yarn(folder: Path, keys: dict[str, Any] | None = None, **simulation: Any) -> Part:
-    return part_of(record_angular(folder, QUICK | (keys or {}), **simulation))
+    return part_of(record_angular(folder, ANGULAR | (keys or {}), **simulation))
 
 
 @pytest.fixture(scope="module")
 def planted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run with a dependence."""
     return record_angular(
-        tmp_path_factory.mktemp("planted"), QUICK, reradiation_anisotropy=0.06, repositioning=0.01
+        tmp_path_factory.mktemp("planted"), ANGULAR, reradiation_anisotropy=0.06, repositioning=0.01
     )
 
 
@@ -87,7 +86,7 @@ def test_reflected_light_that_a_channel_sees_is_no_re_radiation(tmp_path: Path) 
 
 
 def test_without_curves_channels_have_to_be_named(tmp_path: Path) -> None:
-    keys = QUICK | {"angles": [30, 90], "repositionings": 3}
+    keys = ANGULAR | {"angles": [30, 90], "repositionings": 3}
     run = record_angular(tmp_path, keys, lambda rig: rig["optics"].pop("camera"))
     part = part_of(run)
     with pytest.raises(UsageError, match=r"expected 'channels' in the protocol, for example \[R\]"):

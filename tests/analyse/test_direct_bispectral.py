@@ -25,6 +25,7 @@ from tests.analyse.direct_bench import (
     true_reflectance,
 )
 from tests.analyse.recorded import part_of
+from tests.analyse.small_runs import DIRECT
 from tests.results.made import assert_read_back
 
 pytest.importorskip("seabreeze")
@@ -33,10 +34,6 @@ FloatArray = NDArray[np.float64]
 
 #: Two that tell one another's reflectance, and one far off.
 LEDS = ["430 nm", "455 nm", "625 nm"]
-QUICK: dict[str, Any] = {
-    "leds": ["365 nm", "430 nm", "490 nm"], "samples": ["yellow-textile"], "order_seed": 4,
-    "repetitions": 4,
-}  # fmt: skip
 
 
 def misfit(columns: DirectColumns, material: str, of_sigma: float = 1.0) -> FloatArray:
@@ -60,7 +57,7 @@ def are_right(chi2: FloatArray) -> bool:
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of one sample under three LEDs."""
-    return record(tmp_path_factory.mktemp("quick"), QUICK)
+    return record(tmp_path_factory.mktemp("quick"), DIRECT)
 
 
 def test_columns_are_the_true_matrix_over_the_real_lights_within_sigma(tmp_path: Path) -> None:
@@ -251,7 +248,7 @@ def test_a_white_that_fluoresces_is_noticed(tmp_path: Path, quick: Path) -> None
 
 
 def test_what_the_room_adds_is_said_and_subtracted(tmp_path: Path) -> None:
-    run = record(tmp_path, QUICK | {"leds": ["430 nm"]}, ambient=1e-3)
+    run = record(tmp_path, DIRECT | {"leds": ["430 nm"]}, ambient=1e-3)
     result = analyse(part_of(run))
     (line,) = result.warnings
     assert "with all lights off the spectrometer sees light" in line
@@ -262,7 +259,7 @@ def test_what_the_room_adds_is_said_and_subtracted(tmp_path: Path) -> None:
 @pytest.mark.campaign
 def test_light_that_comes_after_the_dark_is_said_and_subtracted(tmp_path: Path) -> None:
     leak = {"ambient_light": {"level": "0.5 %", "at": "1 min"}}
-    run = record(tmp_path, QUICK | {"leds": ["430 nm"]}, faults=[leak])
+    run = record(tmp_path, DIRECT | {"leds": ["430 nm"]}, faults=[leak])
     result = analyse(part_of(run))
     (line,) = result.warnings
     assert "white: with all LEDs off the light was another than in the dark before" in line
@@ -272,7 +269,7 @@ def test_light_that_comes_after_the_dark_is_said_and_subtracted(tmp_path: Path) 
 
 def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Path) -> None:
     stuck = {"led_stuck": {"relay": 5}}
-    run = record(tmp_path, QUICK | {"leds": ["490 nm", "430 nm"]}, faults=[stuck])
+    run = record(tmp_path, DIRECT | {"leds": ["490 nm", "430 nm"]}, faults=[stuck])
     result = analyse(part_of(run))
     assert sum("with all LEDs off the light was another" in line for line in result.warnings) == 1
     (columns,) = result.samples.values()

@@ -41,6 +41,7 @@ from labrig.results.emission_spectrum import (
     write_emission_spectrum,
 )
 from tests.analyse.recorded import part_of, source_of
+from tests.analyse.small_runs import EMISSION
 from tests.analyse.spectral_bench import (
     HEIGHT,
     WIDTH,
@@ -50,9 +51,6 @@ from tests.analyse.spectral_bench import (
 )
 from tests.fit import lvf_pictures as made
 from tests.quick_yaml import read_quickly, write_quickly
-
-QUICK = {"protocol": "emission_spectrum", "charge": "2 min", "times": ["2 s", "20 s"],
-         "longest": "8 s"}  # fmt: skip
 
 
 def analysed(run: Path, excluded: frozenset[str] = frozenset()) -> EmissionSpectrumResult:
@@ -94,7 +92,7 @@ def two_colours(path: Path) -> Path:
 @pytest.fixture(scope="module")
 def blue(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Blue paint, charged by both lamps."""
-    return record(tmp_path_factory.mktemp("blue"), QUICK | {"lamps": ["halogen", "mercury"]})
+    return record(tmp_path_factory.mktemp("blue"), EMISSION | {"lamps": ["halogen", "mercury"]})
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +170,7 @@ def test_damaged_frames_are_named(blue: Path) -> None:
 
 def test_states_of_different_colours_are_reported(tmp_path: Path) -> None:
     material = two_colours(tmp_path / "two-colours.yaml")
-    run = record(tmp_path, QUICK | {"white": False}, sample=str(material))
+    run = record(tmp_path, EMISSION | {"white": False}, sample=str(material))
     found = analysed(run)
     assert found.patches[""].changes_with_time
     assert any("the spectrum changes with time" in warning for warning in found.warnings)
@@ -180,7 +178,7 @@ def test_states_of_different_colours_are_reported(tmp_path: Path) -> None:
 
 @pytest.mark.campaign
 def test_a_mercury_lamp_that_did_not_light_is_reported(tmp_path: Path) -> None:
-    keys = QUICK | {"lamps": ["halogen", "mercury"], "white": False, "times": ["2 s", "12 s"]}
+    keys = EMISSION | {"lamps": ["halogen", "mercury"], "white": False, "times": ["2 s", "12 s"]}
     run = record(tmp_path, keys, faults=["mercury_dead"])
     found = analysed(run)
     assert any("did not light" in warning for warning in found.warnings)
@@ -194,7 +192,7 @@ def test_lines_narrower_than_the_band_are_reported(tmp_path: Path) -> None:
         "wavelength_nm": [380.0, 541.0, 545.0, 549.0, 720.0], "value": [0.0, 0.0, 1.0, 0.0, 0.0],
     }  # fmt: skip
     (tmp_path / "lines.yaml").write_text(write_quickly(content))
-    keys = QUICK | {"white": False, "times": ["2 s"]}
+    keys = EMISSION | {"white": False, "times": ["2 s"]}
     found = analysed(record(tmp_path, keys, sample=str(tmp_path / "lines.yaml")))
     (warning,) = (one for one in found.warnings if "lines much narrower" in one)
     assert "540 to 550 nm" in warning
@@ -226,7 +224,7 @@ def test_a_white_picture_mends_the_curves_of_another_laboratory(
 
 
 def assert_mended_by_a_white_picture(tmp_path: Path, curves: Path) -> None:
-    keys = QUICK | {"times": ["2 s"]}
+    keys = EMISSION | {"times": ["2 s"]}
     run = record(tmp_path, keys, sensor={"width": 96, "height": 64, "curves": str(curves)})
     white = frozenset(frame.path.name for frame in read_run(run).frames("white"))
     errors = []

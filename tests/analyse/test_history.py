@@ -46,6 +46,18 @@ def test_looks_at_the_glow_are_no_charge() -> None:
     assert charge_durations_s(run_of(plateau)) == pytest.approx([300 + 397])
 
 
+def test_a_lamp_that_is_switched_on_twice_has_burnt_since_the_first_time() -> None:
+    twice = attempt([taken("decay", 301.0)], [lamp("on", 0), lamp("on", 100), lamp("off", 300)])
+    assert charge_durations_s(run_of(twice)) == pytest.approx([300])
+
+
+def test_a_relay_switches_in_the_middle_of_its_transaction() -> None:
+    slow = ActionRecord("decay-1", "lamp", "off", 299.0, 301.0, 0.0)
+    assert slow.middle_time == 300
+    one = attempt([taken("decay", 301.0)], [lamp("on", 0), slow])
+    assert charge_durations_s(run_of(one)) == pytest.approx([300])
+
+
 def test_units_without_a_decay_and_failed_ones_have_no_charge() -> None:
     dark = attempt([taken("dark", 0.0)], [lamp("off", 0)])
     failed = attempt([taken("decay", 11.0)], [lamp("on", 0), lamp("off", 10)], "fail")

@@ -2,26 +2,24 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from labrig.analyse.irradiance import in_bands, mean_ratio, strip_scale
-from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
+from labrig.calibration import IRRADIANCE_KIND
 from labrig.errors import DataError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
-from labrig.optics import CameraResponse, Lvf, Strip, Transmittance, nominal_lvf, read_camera
+from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
 from labrig.process import process_run
 from labrig.results.irradiance import CardRatio, IrradianceResult
 from labrig.results.lvf_calibration import SliceValues
 from tests.analyse.lvf_calibration.room_truth import simulation_of, true_irradiance
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
-from tests.analyse.recorded import record
-from tests.analyse.spectral_bench import true_lvf_file
+from tests.analyse.small_runs import irradiance
 from tests.results.made import assert_read_back
 
 CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))
@@ -107,18 +105,7 @@ def test_rounds_are_averaged_and_their_scatter_is_reported() -> None:
 
 def test_on_the_simulated_bench_it_is_the_rooms(tmp_path: Path) -> None:
     """With a filter calibrated without error: what is left is the card's and the camera's."""
-    width, height = 128, 64
-    on_sample = Strip(left=(0.08, 0.5), right=(0.92, 0.5), height=0.25, rising=False)
-    calibrated = true_lvf_file(width, height).model_copy(update={"on_sample": on_sample})
-    LVF_KIND.write(tmp_path, calibrated)
-
-    def change(rig: dict[str, Any]) -> None:
-        rig["optics"]["lvf"] = str(tmp_path / "lvf.yaml")
-        rig["simulation"]["sensor"] = {"width": width, "height": height}
-
-    protocol = {"protocol": "irradiance", "sample": {"name": "lamp"}, "longest": "4 s",
-                "repeats": 1}  # fmt: skip
-    run = record(tmp_path, protocol, change)
+    run = irradiance(tmp_path)
     result = process_run(run)
     assert isinstance(result, IrradianceResult)
     file = result.calibration

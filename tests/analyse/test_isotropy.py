@@ -11,16 +11,14 @@ from labrig.errors import DataError
 from labrig.process import process_and_report
 from labrig.results.isotropy import IsotropyResult
 from tests.analyse.recorded import part_of
+from tests.analyse.small_runs import ISOTROPY
 from tests.analyse.spectral_bench import record
 from tests.results.made import assert_read_back
-
-QUICK = {"protocol": "isotropy", "charge": "2 min", "frames": 2, "angles": [40, 80],
-         "first": "30 s"}  # fmt: skip
 
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.15])
 def test_what_the_sample_loses_to_the_side_is_found(tmp_path: Path, anisotropy: float) -> None:
-    part = part_of(record(tmp_path, QUICK, anisotropy=anisotropy))
+    part = part_of(record(tmp_path, ISOTROPY, anisotropy=anisotropy))
     result = analyse(part)
     (glow,) = result.patches.values()
     true = 1 - anisotropy * (1 - np.cos(np.radians(glow.angle_deg)))
@@ -37,7 +35,7 @@ def test_what_the_sample_loses_to_the_side_is_found(tmp_path: Path, anisotropy: 
 
 
 def test_around_a_whole_sample_the_cosine_is_divided_out(tmp_path: Path) -> None:
-    done = process_and_report(record(tmp_path, QUICK | {"patch": "around"}))
+    done = process_and_report(record(tmp_path, ISOTROPY | {"patch": "around"}))
     assert isinstance(done.result, IsotropyResult)
     (glow,) = done.result.patches.values()
     assert glow.ratio * np.cos(np.radians(glow.angle_deg)) == pytest.approx(1.0, abs=0.03)
@@ -51,6 +49,6 @@ def test_around_a_whole_sample_the_cosine_is_divided_out(tmp_path: Path) -> None
 
 
 def test_the_report_tells_how_late_shield_and_door_were(tmp_path: Path) -> None:
-    page = process_and_report(record(tmp_path, QUICK | {"angles": [80]})).report.read_text()
+    page = process_and_report(record(tmp_path, ISOTROPY | {"angles": [80]})).report.read_text()
     assert "shield cover at most" in page
     assert "door open at most 0 ms" in page

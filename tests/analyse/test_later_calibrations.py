@@ -10,7 +10,7 @@ from labrig.calibration import BLANK_KIND
 from labrig.errors import UsageError
 from labrig.process import process_run
 from tests.analyse.recorded import record
-from tests.calibration.test_blank_and_fade_files import BLANK
+from tests.calibration.blanks import BLANK
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly
 

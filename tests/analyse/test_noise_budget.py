@@ -59,6 +59,11 @@ def test_a_budget_is_relative_to_the_signal_and_complete() -> None:
     signal = FIT.predict(SERIES.t_s, SERIES.exposure_s)[:, BRIGHTEST] - FIT.offset
     own = np.sqrt(budget.photon**2 + budget.read**2 + budget.uneven**2)
     np.testing.assert_allclose(own * signal, SERIES.sigma[:, BRIGHTEST])
+    light = SERIES.values[:, BRIGHTEST] * SERIES.exposure_s
+    in_dn = signal * SERIES.exposure_s
+    np.testing.assert_allclose(budget.read * in_dn, READING_DN, rtol=0.05)
+    np.testing.assert_allclose(budget.photon * in_dn, np.sqrt(PHOTON_GAIN * light), rtol=0.05)
+    np.testing.assert_allclose(budget.uneven * in_dn, UNEVEN * light, rtol=0.05)
     np.testing.assert_allclose(budget.dark_level * signal, SERIES.dark_sigma[BRIGHTEST])
     np.testing.assert_allclose(budget.flicker, FIT.flicker)
     np.testing.assert_allclose(budget.total**2, own**2 + budget.flicker**2 + budget.dark_level**2)

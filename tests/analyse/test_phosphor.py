@@ -18,7 +18,7 @@ from labrig.number_format import plus_minus
 from labrig.process import process_and_report
 from labrig.record import read_run
 from labrig.results.phosphor import PhosphorResult
-from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
+from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, record
 from tests.quick_yaml import write_quickly
 from tests.results.made import assert_read_back

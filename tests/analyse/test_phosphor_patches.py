@@ -24,7 +24,7 @@ from labrig.reduce import SensorLayout
 from labrig.region import Region
 from labrig.results import read_fitted_decays
 from labrig.results.emission_spectrum import read_emission_spectrum
-from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
+from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import record
 from tests.analyse.spectral_bench import emitted, true_lvf_file
 from tests.quick_yaml import write_quickly

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,15 +17,11 @@ from labrig.process import process_and_report
 from labrig.results import Measured, PatchSaturation, Series
 from labrig.results.saturation import Curve, SaturationResult
 from tests.analyse.recorded import part_of
+from tests.analyse.small_runs import HALF, SATURATION
 from tests.analyse.spectral_bench import record
 from tests.results.made import assert_read_back
 
-QUICK: dict[str, Any] = {
-    "protocol": "saturation", "charges": ["30 s", "10 min", "20 min"], "first": "800 ms",
-    "for": "60 s",
-}  # fmt: skip
 T_S = np.arange(1.0, 120.0, 4.0)
-HALF = {"weaker": {"filter": "neutral-50", "fraction": "50 %"}}
 
 
 def true_level(rig: Path, charge_s: float) -> float:
@@ -43,7 +38,7 @@ def true_level(rig: Path, charge_s: float) -> float:
 
 
 def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
-    done = process_and_report(record(tmp_path, QUICK | HALF, seed=2))
+    done = process_and_report(record(tmp_path, SATURATION | HALF, seed=2))
     assert isinstance(done.result, SaturationResult)
     (patch,) = done.result.patches.values()
     assert patch.time_saturation == "saturated in time"
@@ -73,7 +68,7 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
 @pytest.mark.campaign
 def test_a_power_laws_rates_depend_on_the_charge(tmp_path: Path) -> None:
     part = part_of(
-        record(tmp_path, QUICK | {"charges": ["20 s", "60 min"], "for": "150 s"},
+        record(tmp_path, SATURATION | {"charges": ["20 s", "60 min"], "for": "150 s"},
                sample="power-law")
     )  # fmt: skip
     result = analyse(part)

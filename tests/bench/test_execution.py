@@ -17,7 +17,7 @@ from labrig.record import read_run
 from labrig.sim.camera.usb.backend import CameraBackend
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended
-from tests.test_run import lamp_after, make_folder
+from tests.run_folders import lamp_after, make_folder
 
 Make = Callable[..., Path]
 Labrig = Callable[..., Ended]

@@ -34,7 +34,7 @@ from labrig.protocols.phosphor import Phosphor
 from labrig.record import CALIBRATIONS_FILE, read_run
 from labrig.reduce import find_strip, read_hdr_frame, strip_profile
 from labrig.results import CalibrationCheckResult
-from tests.analyse.excitation.test_excitation_run import true_irradiance
+from tests.analyse.excitation.bench import true_irradiance
 from tests.analyse.led_bench import record as record_leds
 from tests.analyse.recorded import record
 from tests.protocols.protocol_files import written

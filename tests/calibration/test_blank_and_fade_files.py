@@ -15,21 +15,8 @@ from labrig.calibration import (
 )
 from labrig.errors import DataError, UsageError
 from labrig.results import Transient
+from tests.calibration.blanks import BLANK
 from tests.quick_yaml import write_quickly
-
-BLANK = BlankFile(
-    iso=400,
-    f_number=4.0,
-    channels=("R", "G"),
-    t_s=(0.5, 1.5),
-    rate_dn_per_s=((10.0, 20.0), (0.0, 2.0)),
-    sigma_dn_per_s=((1.0, 1.0), (1.0, 1.0)),
-    constant_dn_per_s=(0.5, 0.25),
-    constant_sigma_dn_per_s=(0.25, 0.25),
-    ambient_dn_per_s=(0.0, 0.0),
-    ambient_sigma_dn_per_s=(0.1, 0.1),
-    first_clean_s=2.0,
-)
 
 number = st.floats(-1e6, 1e6)
 
@@ -54,6 +41,10 @@ def test_a_written_blank_reads_back_as_itself(
 
 def test_when_a_blank_is_clean_and_what_leaks() -> None:
     assert BLANK.is_clean(2.1)
+    # A frame that was planned for that time begins microseconds before or after it.
+    assert BLANK.is_clean(2.0)
+    assert BLANK.is_clean(2.0 - 1e-6)
+    assert not BLANK.is_clean(1.9)
     assert not BLANK.is_clean(0.5)
     assert BLANK.leaks() == ()
     leaking = BLANK.model_copy(update={"ambient_dn_per_s": (0.0, 3.0)})

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.calibration import CAMERA_KIND, CameraFile, Linearity, Noise
+from labrig.calibration import CAMERA_KIND, Linearity, Noise
 from labrig.errors import DataError, UsageError
 from labrig.optics import Factor, Flat
+from tests.calibration.cameras import BODY, camera
 from tests.quick_yaml import write_quickly
-
-BODY = "Canon EOS 5D Mark II, serial 7, firmware 2.1.2"
 
 positive = st.floats(1e-6, 1e6)
 sigma = st.floats(0, 1)
@@ -26,15 +25,6 @@ flats = st.builds(
     gradient=st.just(((0.1, -0.2),)),
     sigma=sigma,
 )
-
-
-def camera(**changes: object) -> CameraFile:
-    content: dict[str, object] = {
-        "camera": BODY, "iso": 100.0, "f_number": 4.0, "channels": ("R", "G", "B"),
-        "flicker": 0.007, "flicker_sigma": 0.001,
-        "flats": (Flat(f_number=4.0, falloff=((-0.2,), (-0.2,), (-0.1,))),),
-    }  # fmt: skip
-    return CameraFile.model_validate(content | changes)
 
 
 @settings(max_examples=20)

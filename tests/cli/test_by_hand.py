@@ -27,8 +27,8 @@ from labrig.cli.prompt import Terminal
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
 from labrig.record import read_run
+from tests.frame_middle import middle_dn
 from tests.quick_yaml import read_quickly, write_quickly
-from tests.test_doors import middle
 
 STEP = ManualStep("put filter 37 in", "its transmission is measured", "filter 37")
 
@@ -140,8 +140,8 @@ def test_simulated_hands_change_the_sample(recording: Callable[..., Recording]) 
     folder = prepared.record(partial(progress, yes=True, has_changer=True))
     record = read_run(folder)
     before, after = record.frames("before"), record.frames("after")
-    assert [middle(frame.path) for frame in before] == pytest.approx([0, 0], abs=3)
-    assert all(middle(frame.path) > 300 for frame in after)
+    assert [middle_dn(frame.path) for frame in before] == pytest.approx([0, 0], abs=3)
+    assert all(middle_dn(frame.path) > 300 for frame in after)
     (asked,) = [a for a in record.completed()["sample-2"].actions if a.is_manual]
     assert asked.end_time - asked.start_time == pytest.approx(40.0, abs=0.1)
 

@@ -14,7 +14,7 @@ from labrig.report import ComparedLeds, describe_leds, led_study_report
 from labrig.report.chart import Chart, Points
 from tests.conftest import Ended
 from tests.material.reradiation.synthetic import YELLOW, measurement
-from tests.report.test_mixture_page import ABOUT
+from tests.report.about import ABOUT
 
 Labrig = Callable[..., Ended]
 

@@ -20,8 +20,8 @@ from labrig.sim.camera.ptpip.connection import Connection
 from labrig.sim.camera.ptpip.packets import Packet, PacketType
 
 from . import transcript
+from .gphoto2_commands import MAX_S, READY, STANDARD_READY, TO_CARD, TO_HOST, command
 from .served import EOS, EPOCH_S, STANDARD, Film, served
-from .test_gphoto2_host import MAX_S, READY, STANDARD_READY, TO_CARD, TO_HOST, command
 from .transcript import CAMERA, COMMAND, EVENT, HOST, Line
 
 SESSIONS = {

@@ -54,6 +54,16 @@ def test_targets_errors_and_pulses_on_the_wire() -> None:
     assert port.script == []
 
 
+def test_it_is_safe_when_the_servo_has_had_the_time_to_turn() -> None:
+    clock = VirtualClock()
+    board = MaestroBoard(clock, {2: 1500e-6})
+    driver = MaestroDoor("COM6", settings(), Wired(clock, BoardPort(clock, board)))
+    began_s = clock.now()
+    driver.make_safe()
+    # A pulse is sent at once; the door arrives after its travel.
+    assert clock.now() - began_s >= 0.28
+
+
 def test_safe_is_closed_whatever_was_interrupted() -> None:
     driver, port = door(
         [

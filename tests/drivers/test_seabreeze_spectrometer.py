@@ -121,6 +121,8 @@ def test_light_that_was_there_before_is_not_in_a_reading() -> None:
         room.room.switch_led(1, True)
         room.clock.spend(3.3)
         driver.read(0.5, 1)
+        # In the middle of an integration, whose spectrum is the next that is read.
+        room.clock.spend(0.4)
         room.room.switch_led(1, False)
         after = driver.read(0.5, 4).corrected(dark)
     assert after.sigma is not None

@@ -258,6 +258,25 @@ def test_a_unit_that_is_missing_leaves_no_light_on_the_others() -> None:
     assert not any(heads.lit.values())
 
 
+def test_an_output_that_stays_on_does_not_keep_the_others_lit() -> None:
+    stays_on = [*told("o 1 0"), *asked("o? 1", "1"), *SYNC]
+    driver, port = bank([*OPENED, *SYNC, *off(0), *stays_on, *off(2), *off(3)])
+    with pytest.raises(UnclearAnswerError, match=r"output 2 .* reads on; switch it off by hand"):
+        driver.make_safe()
+    assert port.script == []
+
+
+def test_the_limit_of_current_is_that_of_the_output_that_is_lit() -> None:
+    dimmed = {"455 nm": {"output": 1}, "530 nm": {"output": 4, "brightness": "50 %"}}
+    driver, _ = bank([*OPENED, *lit(3, 50, str(0x200000 << 6))], channels=dimmed)
+    with pytest.raises(DeviceError, match=r"output 4 .* has reached its current limit at 50 %"):
+        driver.light("530 nm")
+    # Output 1's limit says nothing about output 4.
+    driver, port = bank([*OPENED, *lit(3, 50, str(0x200000))], channels=dimmed)
+    driver.light("530 nm")
+    assert port.script == []
+
+
 def test_a_missing_head_is_told_and_the_others_go_on() -> None:
     clock, heads = VirtualClock(), Heads()
     unit = Dc4100Board(heads, {0: 455.0})

@@ -37,6 +37,11 @@ def lvf_windows(centres_nm: FloatArray, fwhm_nm: float = 25.0, peak: float = 0.4
     return peak * line + 1e-4
 
 
+#: Windows of a filter, and a sample without one.
+LVF = lvf_windows(np.array([420.0, 450.0, 490.0, 540.0, 600.0, 670.0]))
+BARE: FloatArray = np.ones((1, len(WAVELENGTH_NM)))
+
+
 @dataclass
 class Bench:
     """One material under one lamp.

@@ -15,6 +15,7 @@ from labrig.fit.decay import laws
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.material import DECAY_LAWS, DecayLaw, exponential_means
 from labrig.results import FORECAST_SPANS, FittedDecay, FloatArray, OneSided
+from tests.fit import truths
 from tests.pulls import assert_sigma_is_right
 
 T_S = np.concatenate([np.arange(0.0, 60.0, 1.5), np.arange(60.0, 400.0, 12.0)])
@@ -243,3 +244,14 @@ def test_a_signal_without_retrapping_is_predicted_with_a_small_sigma(seed: int) 
     true = np.exp(-truth * forecast.t_s)
     assert np.all(abs(forecast.value - true) < 4.5 * forecast.sigma)
     assert np.all(forecast.sigma < 0.01 * forecast.value + READ / 4)
+
+
+def test_a_spectrum_that_contains_all_laws_has_to_be_clearly_better() -> None:
+    seen = truths.observe(truths.exponentials((0.08, 1.0), (0.015, 0.4)), 5, snr=100)
+    fit = fit_decay(
+        seen.t_s, seen.values, seen.sigma, exposure_s=seen.exposure_s, channels="RGB", flicker=None
+    )
+    best, second, *_ = fit.compared_laws
+    assert best.name == "rate-spectrum"
+    assert 0 < second.bic_above_best < 3
+    assert fit.law == second.name == "exponentials"

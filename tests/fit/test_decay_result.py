@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import curve_fit
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.results import with_uncertainty
 from tests.fit import truths
 
 DOUBLE = truths.exponentials((0.08, 1.0), (0.015, 0.4))
@@ -76,22 +76,6 @@ def test_table_shows_rates_with_their_sigma() -> None:
 def test_table_shows_the_offset_of_each_channel() -> None:
     (line,) = [x for x in str(_seen_fit(offset_sigma=[0.01, 0, 0.01])).splitlines() if "offs" in x]
     assert re.fullmatch(r"offsets  R -?[\d.]+\(\d+\), G 0, B -?[\d.]+\(\d+\)", line)
-
-
-@pytest.mark.parametrize(
-    ("value", "sigma", "text"),
-    [
-        (0.08021, 0.00131, "0.0802(13)"),
-        (12.53, 1.31, "12.5(1.3)"),
-        (10851.3, 172.0, "10850(170)"),
-        (0.5, 0.0, "0.5"),
-        (0.5, float("inf"), "0.5(?)"),
-        (0.0802, 0.000996, "0.0802(10)"),
-        (2.5e-10, 3.1e-12, "2.500(31)e-10"),
-    ],
-)
-def test_value_with_uncertainty(value: float, sigma: float, text: str) -> None:
-    assert with_uncertainty(value, sigma) == text
 
 
 def test_prediction_and_residuals_add_up_to_the_values() -> None:
@@ -252,3 +236,22 @@ def test_flicker_cannot_come_from_a_curve_through_all_bright_frames() -> None:
     values = np.where(np.arange(37) == 0, 1.0, 0.0)
     with pytest.raises(FitError, match="frames to spare"):
         fit_decay(T, values, 1e-6, flicker=None)
+
+
+def test_amplitude_at_lamp_off_is_as_uncertain_as_the_rate_that_leads_there() -> None:
+    """The first frame is three lifetimes after lamp off."""
+    t_s, k_per_s = 60.0 + 3.0 * np.arange(30), 0.05
+    sigma = np.full(30, 1e-3)
+    values = np.exp(-k_per_s * t_s) + sigma * np.random.default_rng(5).normal(size=30)
+
+    def signal(t_s: truths.FloatArray, k_per_s: float, amplitude: float) -> truths.FloatArray:
+        return amplitude * np.exp(-k_per_s * t_s)
+
+    best, covariance = curve_fit(
+        signal, t_s, values, p0=(0.05, 1.0), sigma=sigma, absolute_sigma=True
+    )
+    fit = fit_decay(t_s, values, sigma, n_states=1, flicker=0.0)
+    (state,) = fit.states
+    assert state.amplitude == pytest.approx(best[1], rel=1e-4)
+    assert state.amplitude_sigma == pytest.approx(np.sqrt(covariance[1, 1]), rel=0.02)
+    assert state.k_r_sigma_per_s == pytest.approx(np.sqrt(covariance[0, 0]), rel=0.02)

@@ -12,12 +12,10 @@ from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.material import Material, dark_step, read_material
 from labrig.results import Charge, ChargingSeries, EarlierCharges, FittedExcitation, Transient
-from labrig.sim.lamp import WAVELENGTH_NM
-from tests.fit.charged_samples import DOOR_S, WEIGHTS, Bench, lvf_windows, two_states
+from tests.fit.charged_samples import BARE, DOOR_S, WEIGHTS, Bench, lvf_windows, two_states
 from tests.pulls import assert_sigma_is_right
 
 LVF = lvf_windows(np.linspace(405, 695, 12))
-BARE = np.ones((1, len(WAVELENGTH_NM)))
 CHARGES_S = (8, 32, 64, 128, 256)
 LAMP = 0.01
 

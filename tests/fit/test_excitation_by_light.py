@@ -10,8 +10,7 @@ from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.results import ChargingSeries
-from tests.fit.charged_samples import Bench, FloatArray, lvf_windows, two_states
-from tests.fit.test_excitation import BARE
+from tests.fit.charged_samples import BARE, Bench, FloatArray, lvf_windows, two_states
 
 #: Band-pass filters of about the width of the bands.
 WINDOWS = lvf_windows(np.array([420.0, 455.0, 495.0, 530.0, 570.0, 605.0, 645.0, 680.0]), 30.0)

@@ -7,12 +7,10 @@ import pytest
 
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import Material, read_material
-from labrig.results import ChargingSeries, FittedExcitation, FloatArray
-from labrig.sim.kinetics import layers_of
-from labrig.sim.kinetics_settings import KineticsSettings
-from labrig.sim.lamp import WAVELENGTH_NM, Lamp
-from labrig.sim.phosphor import phosphor
+from labrig.results import ChargingSeries, FittedExcitation
+from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import Bench, lvf_windows
+from tests.fit.layers import Layer
 
 #: Places at which three bands excite blue paint.
 WINDOWS = lvf_windows(np.linspace(405, 560, 24))
@@ -68,21 +66,6 @@ def test_sigma_of_rates_is_their_errors_whatever_the_lights_errors_are() -> None
     assert 0.9 < rms < 1.25
     assert np.mean(sizes[:10]) == pytest.approx(0.01, rel=0.35)
     assert np.mean(sizes[10:]) == pytest.approx(0.04, rel=0.35)
-
-
-class Layer(Bench):
-    """A layer of an optical density, where light of each band is absorbed as much as it excites."""
-
-    optical_density = 1.0
-
-    def _glow(self, windows: FloatArray, lamp: Lamp, charges: object) -> FloatArray:
-        bare = phosphor([self.material], [None], self.irradiance)
-        settings = KineticsSettings(optical_density=self.optical_density)
-        passed, share = layers_of(settings, bare.excitation)
-        each = (windows[:, None, :] * passed).reshape(-1, windows.shape[1])
-        glow = super()._glow(each, lamp, charges)  # type: ignore[arg-type]
-        mean: FloatArray = glow.reshape(len(glow), len(windows), -1) @ share
-        return mean
 
 
 def through_and_bare(bench: Bench) -> FittedExcitation:

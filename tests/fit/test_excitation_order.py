@@ -23,13 +23,10 @@ from labrig.results import (
     Series,
 )
 from labrig.sim.kinetics_settings import KineticsSettings
-from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.simulation import LampSettings
-from tests.fit.charged_samples import Bench, lvf_windows, two_states
+from tests.fit.charged_samples import BARE, LVF, Bench, lvf_windows, two_states
 from tests.results.made import decay_result
 
-LVF = lvf_windows(np.array([420.0, 450.0, 490.0, 540.0, 600.0, 670.0]))
-BARE = np.ones((1, len(WAVELENGTH_NM)))
 UNCERTAIN = RelativeSigmas(0.005, 0.01)
 B = 1.5
 

@@ -39,6 +39,18 @@ def test_units_do_not_matter(exponent: float, x_unit: float, y_unit: float) -> N
     assert law.exponent.sigma == pytest.approx(fit_power_law(x, values).exponent.sigma)
 
 
+def test_an_error_common_to_all_values_has_no_part_in_the_slope() -> None:
+    x, own = np.array([1.0, 3.0, 11.0, 40.0]), np.array([0.01, 0.02, 0.05, 0.01])
+    y = x**0.7 * np.array([1.01, 0.98, 1.03, 1.0])
+    alone = fit_power_law(x, [Measured(*each) for each in zip(y, own * y, strict=True)])
+    both = y * np.hypot(own, 0.1)
+    scaled = [Measured(*each) for each in zip(1.1 * y, 1.1 * both, strict=True)]
+    found = fit_power_law(x, scaled, common_sigma=0.1)
+    assert found.exponent.value == pytest.approx(alone.exponent.value)
+    assert found.exponent.sigma == pytest.approx(alone.exponent.sigma)
+    assert found.p_value == pytest.approx(alone.p_value)
+
+
 @pytest.mark.parametrize(
     ("x", "values"),
     [

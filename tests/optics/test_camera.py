@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from labrig.errors import UsageError
-from labrig.optics import read_camera
+from labrig.optics import CameraResponse, read_camera
 
 NAME = "canon_eos_5d_mark_ii"
 
@@ -101,3 +101,19 @@ def test_sigma_of_curves_is_read_beside_them(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="some σ is negative") as caught:
         read_camera(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_signal_is_an_integral_over_wavelength_whatever_the_grid() -> None:
+    coarse = np.array([400.0, 410.0, 420.0, 440.0, 480.0, 560.0, 720.0])
+    fine = np.linspace(400.0, 720.0, 2000)
+    signals = []
+    for nm in (coarse, fine):
+        curves = np.stack([(nm - 300) / 500, np.ones_like(nm)], axis=1)
+        camera = CameraResponse("linear", nm, curves, ("R", "G"))
+        signals.append(camera.response(nm / 500))
+    expected = [
+        (720**3 - 400**3) / 3 / 250_000 - 300 * (720**2 - 400**2) / 2 / 250_000,
+        (720**2 - 400**2) / 1000,
+    ]
+    np.testing.assert_allclose(signals[1], expected, rtol=1e-6)
+    np.testing.assert_allclose(signals[0], expected, rtol=0.02)

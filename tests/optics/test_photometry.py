@@ -1,6 +1,7 @@
 """Photometry of dim light, against CIE 191 and the definitions."""
 
 import numpy as np
+import pytest
 from hypothesis import given, strategies as st
 
 from labrig.optics import (
@@ -22,6 +23,8 @@ def test_the_limits_are_those_of_cie_191() -> None:
     assert mesopic_adaptation(0.005, 1.0) < 0.01
     # White light of S/P 1 has the same luminance for all eyes.
     assert mesopic_ratio(0.3, 1.0) == 1.0
+    # At half adaptation, by V′(555 nm) = 683/1699: equation 2 of CIE 191 written out.
+    assert mesopic_ratio(0.5, 2.0) == pytest.approx((1 + 2 * 683 / 1699) / (1 + 683 / 1699))
 
 
 @given(st.floats(1e-4, 50), st.floats(0.2, 6))

@@ -216,3 +216,11 @@ def test_a_damaged_file_is_told_in_one_line(
 def test_a_missing_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(LabrigError, match=r"missing\.csv"):
         read_spectrometer_reading(tmp_path / "missing.csv")
+
+
+def test_the_offset_is_the_mean_of_the_dark_pixels() -> None:
+    raw = np.full((1, len(GRID_NM)), 1500.0)
+    raw[0, list(DARK_PIXELS)] = 1000.0 + 10.0 * np.arange(len(DARK_PIXELS))
+    counts = reading(raw).corrected().counts
+    mean = 1000.0 + 10.0 * (len(DARK_PIXELS) - 1) / 2
+    assert counts[100] == pytest.approx(1500.0 - mean)

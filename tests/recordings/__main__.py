@@ -29,7 +29,7 @@ def main() -> int:
     changed = False
     for run in (run for run in RUNS if run.name in asked.names):
         with tempfile.TemporaryDirectory() as folder:
-            if asked.record:
+            if asked.record and run.has_frames:
                 run.keep(run.record(Path(folder) / "bench"))
             result = run.processed(Path(folder) / "runs")
             found = run.differences(result)

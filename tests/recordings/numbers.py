@@ -14,8 +14,10 @@ from tests.quick_yaml import read_quickly
 #: What changes of labrig that do not say otherwise may move a number by: in σ, or relative to it.
 #: Linear algebra for other processors moves covariances that nearly cancel by up to 4e-8.
 MAX_SIGMAS, MAX_RELATIVE = 1e-6, 1e-6
-#: Which program made a result is no number of it; `result.json` repeats what other files say.
-_LEFT_OUT = frozenset({"provenance.yaml", "result.json"})
+#: Which program made a result is no number of it.
+_LEFT_OUT = "provenance.yaml"
+#: Repeats what other files say, where there are others.
+_SUMMARY = "result.json"
 
 
 @dataclass(frozen=True)
@@ -88,11 +90,12 @@ def keep_numbers(result: Path, kept: Path) -> None:
 
 def _number_files(folder: Path) -> list[Path]:
     """The files in a result folder that hold numbers, relative to it."""
-    return sorted(
+    files = sorted(
         path.relative_to(folder)
         for path in folder.rglob("*")
-        if path.suffix in _READERS and path.name not in _LEFT_OUT
+        if path.suffix in _READERS and path.name != _LEFT_OUT
     )
+    return [file for file in files if file.name != _SUMMARY] or files
 
 
 def _same(one: float, other: float | None) -> bool:

@@ -2,14 +2,15 @@
 
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.process import process_run
-from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
+from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import record
+from tests.analyse.small_runs import RECORD
 from tests.analyse.spectral_bench import true_lvf_file
 
 from .numbers import Difference, differences, keep_numbers
@@ -41,40 +42,29 @@ CHAIN: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Recorded:
-    """A run to record.
+    """A run whose numbers are kept.
 
-    Parameters
+    Attributes
     ----------
     name
-        Of its folder.
-    protocol
-        What is measured.
-    simulation
-        Keys of the room that differ from those of the shipped rig for phosphors.
-    calibrations
-        Writes the files that the rig names under `optics:` into the run's folder, and names them.
+        Name of its folder.
+    record
+        Function that records the run in the simulated room, below a folder.
+    has_frames
+        Whether the run itself is kept, too, so that what records it may change.
+    beside
+        Function that writes the calibrations that the rig names into a folder, and names them.
     """
 
     name: str
-    protocol: dict[str, Any]
-    simulation: dict[str, Any] = field(default_factory=dict)
-    calibrations: Callable[[Path], tuple[str, ...]] = lambda folder: ()
+    record: Callable[[Path], Path]
+    has_frames: bool = False
+    beside: Callable[[Path], tuple[str, ...]] = lambda folder: ()
 
     @property
     def folder(self) -> Path:
         """Where the run, `run/`, and the files of numbers of its result, `result/`, are kept."""
         return HERE / self.name
-
-    def record(self, into: Path) -> Path:
-        """Record the run in the simulated room, below `into`; its folder is returned."""
-
-        def change(rig: dict[str, Any]) -> None:
-            rig["simulation"] |= {"sensor": {"width": WIDTH, "height": HEIGHT}} | self.simulation
-            rig["devices"]["lamp"]["warm_up"] = "0 s"
-            rig["optics"] |= {name: str(into / f"{name}.yaml") for name in self.calibrations(into)}
-
-        into.mkdir(parents=True, exist_ok=True)
-        return record(into, self.protocol, change)
 
     def keep(self, run: Path) -> None:
         """Keep a run that was recorded, with its calibrations beside it."""
@@ -83,13 +73,17 @@ class Recorded:
         shutil.copytree(run, kept)
         # A rig file names them relative to itself, wherever it lies.
         rig = (kept / "rig.yaml").read_text(encoding="utf-8")
-        for name in self.calibrations(kept):
+        for name in self.beside(kept):
             rig = rig.replace(str(run.parents[1] / f"{name}.yaml"), f"{name}.yaml")
         (kept / "rig.yaml").write_text(rig, encoding="utf-8")
 
     def processed(self, into: Path) -> Path:
-        """The result folder of a copy of the kept run below `into`, made by this labrig."""
-        run = Path(shutil.copytree(self.folder / RUN, into / self.name))
+        """The result folder of a copy of the kept run, or of it recorded anew, below `into`."""
+        if self.has_frames:
+            run = Path(shutil.copytree(self.folder / RUN, into / self.name))
+        else:
+            into.mkdir(exist_ok=True)
+            run = self.record(into)
         process_run(run)
         return run / "result"
 
@@ -102,6 +96,26 @@ class Recorded:
         return differences(self.folder / RESULT, result)
 
 
+def _kept(
+    name: str,
+    protocol: dict[str, Any],
+    simulation: dict[str, Any],
+    beside: Callable[[Path], tuple[str, ...]] = lambda folder: (),
+) -> Recorded:
+    """A run on the shipped rig for phosphors, its room changed, kept with its frames."""
+
+    def recorded(into: Path) -> Path:
+        def change(rig: dict[str, Any]) -> None:
+            rig["simulation"] |= simulation
+            rig["devices"]["lamp"]["warm_up"] = "0 s"
+            rig["optics"] |= {name: str(into / f"{name}.yaml") for name in beside(into)}
+
+        into.mkdir(parents=True, exist_ok=True)
+        return record(into, protocol, change)
+
+    return Recorded(name, recorded, has_frames=True, beside=beside)
+
+
 def _calibrations(folder: Path) -> tuple[str, ...]:
     IRRADIANCE_KIND.write(folder, true_irradiance(WIDTH, HEIGHT))
     LVF_KIND.write(folder, true_lvf_file(WIDTH, HEIGHT))
@@ -109,8 +123,8 @@ def _calibrations(folder: Path) -> tuple[str, ...]:
 
 
 RUNS = (
-    Recorded("decay", DECAY, {"sample": "double-wide"}),
-    Recorded(
+    _kept("decay", DECAY, {"sample": "double-wide"}),
+    _kept(
         "patches",
         DECAY
         | {
@@ -124,8 +138,8 @@ RUNS = (
             ]
         },
     ),
-    Recorded("chain", CHAIN, {}, _calibrations),
-    Recorded(
+    _kept("chain", CHAIN, {}, _calibrations),
+    _kept(
         "camera-unplugged",
         DECAY,
         {
@@ -133,9 +147,10 @@ RUNS = (
             "faults": [{"camera_unplugged": {"at": "11 min", "for": "20 s"}}],
         },
     ),
-    Recorded(
+    _kept(
         "ambient-light",
         DECAY,
         {"sample": "power-law", "faults": [{"ambient_light": {"at": "12 min"}}]},
     ),
+    *(Recorded(name, record) for name, record in RECORD.items()),
 )

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from labrig.errors import DataError, FrameError
+from labrig.optics import CameraModel, Flat
 from labrig.reduce import SeriesFrame, reduce_patches, reduce_series
 from labrig.reduce.series import TWO_DEGREES
 from labrig.results import Series
@@ -153,3 +154,17 @@ def test_what_does_not_fit_together_is_refused(
     broken.write_bytes(frame.path.read_bytes()[:900])
     with pytest.raises(FrameError, match=r"broken\.dng"):
         reduce_series([replace(frame, path=broken)], PAINT)
+
+
+def test_what_a_lens_darkens_keeps_its_relative_sigma(take: Take) -> None:
+    """A corner that gets half of the light is made as bright as the middle, σ and all."""
+    frames = [take(t_s, 2.0) for t_s in (1, 10, 40)]
+    darks = [take(0, 2.0, lit=False) for _ in range(2)]
+    flat = Flat(f_number=None, falloff=((-0.5, 0.0, 0.0),) * 3)
+    camera = CameraModel(iso=100, f_number=None, channels=("R", "G", "B"), flats=(flat,))
+    plain = reduce_series(frames, PAINT, darks, name="paint")
+    corrected = reduce_patches(frames, {"paint": PAINT}, darks, camera=camera)["paint"]
+    gain = corrected.values / plain.values
+    assert (gain > 1.05).all()
+    np.testing.assert_allclose(corrected.sigma / plain.sigma, gain)
+    np.testing.assert_allclose(corrected.dark_sigma / plain.dark_sigma, gain[0])

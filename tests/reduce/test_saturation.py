@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.reduce.saturation import clip_level, is_clipped
+from labrig.reduce.saturation import clip_level, count_levels, is_clipped
 
 Levels = npt.NDArray[np.float64]
 BLACK, WHITE = 1000.0, 15000.0
@@ -124,3 +125,17 @@ def test_a_region_is_clipped_if_its_mean_suffers() -> None:
         if not clipped:
             assert light.mean() - np.minimum(light, white).mean() < 3e-4 * 10.0
     assert is_clipped([0, 1, 2], [1000, 1000, 1000]).tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize("side", [50, 400])
+def test_levels_are_counted_without_what_is_left_out(side: int) -> None:
+    """Small planes and large ones are counted in ways of their own."""
+    rng = np.random.default_rng(side)
+    plane = rng.integers(1000, 1020, (side, side)).astype(np.uint16)
+    plane[0, :7] = 65535
+    for left_out in (None, plane > 1015):
+        kept = plane.ravel() if left_out is None else plane[~left_out]
+        levels, pixels = count_levels(plane, left_out)
+        assert dict(zip(levels.tolist(), pixels.tolist(), strict=True)) == {
+            level: int((kept == level).sum()) for level in set(kept.tolist())
+        }

@@ -17,18 +17,14 @@ from labrig.material import (
 )
 from labrig.optics import read_light
 from labrig.process import report_mixture
-from labrig.record import RunDescription
 from labrig.report import FittedMatrix, Section, mixture_report
 from labrig.report.chart import Chart, ErrorBars, Line, Points
 from labrig.report.mixture_figures import noise_floor
 from labrig.report.reradiation_spectra import emission_spectra, excitation_spectra
 from tests.material.reradiation.synthetic import ORANGE, YELLOW, measurement
+from tests.report.about import ABOUT
 
 LIGHTS = tuple(read_light(name) for name in ("D65", "A", "450nm", "395nm"))
-ABOUT = RunDescription(
-    title="paper", protocol="mixture", run="paper.csv", started="", ended="", rig="",
-    simulated=False, labrig_version="0",
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

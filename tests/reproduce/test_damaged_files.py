@@ -18,7 +18,7 @@ from labrig.reproduce import (
     write_parameter_texture,
 )
 from tests.mutated_files import mutated
-from tests.reproduce.test_mixture_material import DYE, INPUT_NM, OUTPUT_NM
+from tests.reproduce.dyes import DYE, INPUT_NM, OUTPUT_NM
 
 TIMES = 60
 

@@ -21,15 +21,8 @@ from labrig.material import (
 )
 from labrig.optics import delta_e, illuminant, lab
 from labrig.reproduce import Bands, Renderer, of_matrix, of_mixture, tristimulus
-from tests.reproduce.test_rendering import scene
-
-INPUT_NM, OUTPUT_NM = np.arange(305.0, 780, 10), np.arange(385.0, 780, 10)
-DYE = ReradiationMixture(
-    15.0,
-    np.array([0.7, 0.3]),
-    np.array([[400.0, 560.0], [450.0, 620.0]]),
-    np.array([[[900.0, 100.0], [100.0, 600.0]], [[700.0, -50.0], [-50.0, 900.0]]]),
-)
+from tests.reproduce.dyes import DYE, INPUT_NM, OUTPUT_NM
+from tests.reproduce.small_scenes import scene
 
 
 def written(folder: Path, dye: ReradiationMixture = DYE, **changed: Any) -> Path:

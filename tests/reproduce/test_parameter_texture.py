@@ -15,7 +15,7 @@ from labrig.reproduce import (
     read_parameter_texture,
     write_parameter_texture,
 )
-from tests.reproduce.test_rendering import LUX, kappa_of, scene
+from tests.reproduce.small_scenes import LUX, kappa_of, scene
 
 PAINT = {"file": "blue-paint", "assume_albedo": 0.6, "assume_scale": 0.5}
 LEFT = {"corner_m": [0, 0, 0], "edge_u_m": [0.5, 0, 0], "edge_v_m": [0, 1, 0]}

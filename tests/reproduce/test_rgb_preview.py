@@ -20,7 +20,7 @@ from labrig.reproduce import (
     tristimulus,
     write_gltf,
 )
-from tests.reproduce.test_gltf import Read
+from tests.reproduce.gltf_reader import Read
 
 FloatArray = NDArray[np.float64]
 BANDS = Bands.even()

@@ -21,7 +21,7 @@ from labrig.reproduce import (
 from labrig.reproduce.transport.wavelength_shift import Start
 from tests.material.reradiation import bfc450
 from tests.material.reradiation.formats.matrices import two_dyes
-from tests.material.reradiation.test_mixture import random_mixture
+from tests.material.reradiation.mixtures import random_mixture
 
 FloatArray = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from labrig.results.excitation import (
     PatchCharging,
     PatchExcitation,
 )
-from tests.analyse.excitation.test_excitation_run import true_irradiance
+from tests.analyse.excitation.bench import true_irradiance
 from tests.fit.charged_samples import Bench, lvf_windows
 from tests.results.made import decay_result
 

@@ -135,3 +135,27 @@ def test_measured_quantities() -> None:
     assert math.isnan(one.sigmas_from(Measured(2.0, math.inf)))
     with pytest.raises(ValueError, match="expected two values in s"):
         one.over(Measured(1.0, 0.1, "DN"))
+
+
+def test_sigma_of_a_law_s_own_parameters_is_that_of_small_changes(fit: DecayFit) -> None:
+    """σ of 1/k, τ and p by differences along the covariance's own axes."""
+    for law in fit.laws:
+        if law.shape in (0.0, 1.0) or law.shape**2 <= law.covariance[2, 2]:
+            continue
+        lengths, axes = np.linalg.eigh(law.covariance[1:3, 1:3])
+        for name, stated in law.parameters.items():
+            changes = []
+            for length, axis in zip(lengths, axes.T, strict=True):
+                by = 1e-4 * np.sqrt(max(length, 0.0)) * axis
+                moved = [
+                    replace(
+                        law,
+                        rate_per_s=law.rate_per_s + sign * by[0],
+                        shape=law.shape + sign * by[1],
+                    )
+                    .parameters[name]
+                    .value
+                    for sign in (-1, 1)
+                ]
+                changes.append((moved[1] - moved[0]) / 2e-4)
+            assert stated.sigma == pytest.approx(float(np.linalg.norm(changes)), rel=1e-3), name

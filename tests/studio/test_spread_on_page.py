@@ -13,7 +13,7 @@ from labrig.errors import UsageError
 from labrig.studio.scene_bench import SceneBench
 from labrig.yaml_file import parse_yaml
 from tests.design.small_scene import corner
-from tests.design.test_spread_design import OBJECTS, PIXELS, keys
+from tests.design.spread_keys import OBJECTS, PIXELS, keys
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from labrig.studio.server import StudioServer
 from labrig.studio.workbench import Workbench
 from labrig.yaml_file import parse_yaml
 from tests.design.small_scene import corner
-from tests.design.test_spread_design import OBJECTS, PIXELS, keys
+from tests.design.spread_keys import OBJECTS, PIXELS, keys
 
 #: Where screenshots are kept for a person to look at.
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError, camera_modes
@@ -367,10 +368,12 @@ class _Model:
         precision: FloatArray = np.ones(size)
         precision[:m] = UNKNOWN_BRIGHTNESS**-2
         precision[m] = UNKNOWN_GAIN**-2 if self.has_spectrometer else FIXED
-        design, target = np.concatenate(rows), np.concatenate(targets)
-        normal = design.T @ design + np.diag(precision)
-        covariance = np.asarray(np.linalg.inv(normal))
-        return covariance @ (design.T @ target + precision * prior_mean), covariance
+        root = np.sqrt(precision)
+        # By QR, since normal equations lose half of the digits.
+        orthogonal, upper = np.linalg.qr(np.concatenate([*rows, np.diag(root)]))
+        inverse = solve_triangular(upper, np.eye(size))
+        mean = inverse @ (orthogonal.T @ np.concatenate([*targets, root * prior_mean]))
+        return mean, inverse @ inverse.T
 
     def _centroid_changes(self, number: int) -> list[float]:
         """Return the change of an LED's centroid in nm with one σ of shift, width and skew."""

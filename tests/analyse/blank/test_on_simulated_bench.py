@@ -16,15 +16,8 @@ from labrig.errors import DataError
 from labrig.process import process_run
 from labrig.record import read_run
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
+from tests.analyse.small_runs import BLANK
 from tests.results.made import assert_read_back
-
-PROTOCOL: dict[str, Any] = {
-    "protocol": "blank",
-    "sample": {"name": "blank"},
-    "charge": "30 s",
-    "for": "40 s",
-    "later_by": ["0 s", "400 ms"],
-}
 
 
 def without_door(rig: dict[str, Any]) -> None:
@@ -41,7 +34,7 @@ def with_light(**simulation: Any) -> Callable[[dict[str, Any]], None]:
 
 
 def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
-    run = record(tmp_path, PROTOCOL, without_door)
+    run = record(tmp_path, BLANK, without_door)
     result = process_run(run)
     blank = BLANK_KIND.read(run / "result" / "blank.yaml")
     assert blank.first_clean_s is not None
@@ -60,11 +53,11 @@ def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
 
 def test_a_hot_pixel_is_no_light_that_leaks_in(tmp_path: Path) -> None:
     """This sensor has one in blue, which makes 0.7 DN/s of the mean of that colour."""
-    assert process_run(record(tmp_path, PROTOCOL, with_light(seed=4))).warnings == ()
+    assert process_run(record(tmp_path, BLANK, with_light(seed=4))).warnings == ()
 
 
 def test_a_leak_is_found_and_reported_and_a_decay_is_warned(tmp_path: Path) -> None:
-    leaking = record(tmp_path / "leak", PROTOCOL, with_light(ambient=1e-6))
+    leaking = record(tmp_path / "leak", BLANK, with_light(ambient=1e-6))
     result = process_run(leaking)
     blank = BLANK_KIND.read(leaking / "result" / "blank.yaml")
     green = blank.channels.index("G")
@@ -83,7 +76,7 @@ def test_a_leak_is_found_and_reported_and_a_decay_is_warned(tmp_path: Path) -> N
 def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     # Half as much is within the noise of one run in eight.
     lamp = {"afterglow": 2e-5, "afterglow_fades": "20 s"}
-    run = record(tmp_path, PROTOCOL, with_light(lamp=lamp))
+    run = record(tmp_path, BLANK, with_light(lamp=lamp))
     result = process_run(run)
     blank = BLANK_KIND.read(run / "result" / "blank.yaml")
     assert blank.first_clean_s is None
@@ -105,7 +98,7 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
 
 
 def test_frames_that_were_changed_are_refused(tmp_path: Path) -> None:
-    run = record(tmp_path, PROTOCOL, without_door)
+    run = record(tmp_path, BLANK, without_door)
     first, *_, last = sorted((run / "frames").iterdir())
     shutil.copy(last, first)
     with pytest.raises(Exception, match="was changed after the run"):

@@ -20,29 +20,13 @@ from labrig.results.camera_calibration import CameraCalibrationResult
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
+from tests.analyse.small_runs import CAMERA_CALIBRATION, unlike_the_model
 from tests.results.made import assert_read_back
-
-PROTOCOL = {
-    "protocol": "camera_calibration",
-    "sample": {"name": "camera"},
-    "isos": [100, 400],
-    "f_numbers": [4, 11],
-    "card": [0.05, 0.05, 0.9, 0.9],
-    "levels": 4,
-    "repeats": 12,
-    "cycles": 2,
-    "every_nth_shutter_time": 5,
-}
-
-
-def unlike_the_model(rig: dict[str, Any]) -> None:
-    rig["simulation"]["sensor"] |= {"crosstalk": 0.02, "row_noise": 0.5}
-    rig["simulation"]["lamp"] = {"drift_per_hour": 0.1}
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(tmp_path_factory.mktemp("camera"), PROTOCOL, unlike_the_model)
+    return record(tmp_path_factory.mktemp("camera"), CAMERA_CALIBRATION, unlike_the_model)
 
 
 @pytest.fixture(scope="module")

@@ -17,15 +17,9 @@ from labrig.process import process_and_report
 from labrig.results import CameraCurvesResult
 from tests.analyse.chart_bench import record, true_curves, with_camera
 from tests.analyse.recorded import part_of
+from tests.analyse.small_runs import UNKNOWN_CAMERA, curves_protocol
 from tests.fit.unknown_cameras import rms_of_curves
 from tests.results.made import assert_read_back
-
-#: In the room's camera, and in no family from which its curves are concluded.
-UNKNOWN = "nikon_d850"
-
-
-def asked(name: str, **changes: Any) -> dict[str, Any]:
-    return {"protocol": "camera_curves", "repeats": 2, "leave_out": [name]} | changes
 
 
 def asked_anew(part: Part, **change: Any) -> Part:
@@ -36,7 +30,9 @@ def asked_anew(part: Part, **change: Any) -> Part:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("curves")
-    return record(folder, asked(UNKNOWN, through=True), with_camera(UNKNOWN))
+    return record(
+        folder, curves_protocol(UNKNOWN_CAMERA, through=True), with_camera(UNKNOWN_CAMERA)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +47,9 @@ def error_of(result: CameraCurvesResult, name: str | None) -> float:
 
 def test_an_unknown_camera_is_told_by_its_chart(by_chart: CameraCurvesResult) -> None:
     family = replace(by_chart, sensitivity=by_chart.family_mean)
-    assert error_of(by_chart, UNKNOWN) < 0.03
-    assert error_of(by_chart, UNKNOWN) < 0.5 * error_of(family, UNKNOWN)
-    assert by_chart.left_out == ("canon_eos_5d_mark_ii", UNKNOWN)
+    assert error_of(by_chart, UNKNOWN_CAMERA) < 0.03
+    assert error_of(by_chart, UNKNOWN_CAMERA) < 0.5 * error_of(family, UNKNOWN_CAMERA)
+    assert by_chart.left_out == ("canon_eos_5d_mark_ii", UNKNOWN_CAMERA)
     assert by_chart.family_count == 50
     assert not by_chart.warnings
 
@@ -62,7 +58,7 @@ def test_the_filter_halves_the_error(run: Path, by_chart: CameraCurvesResult) ->
     done = process_and_report(run)
     assert isinstance(done.result, CameraCurvesResult)
     assert done.result.through_filter
-    assert error_of(done.result, UNKNOWN) < 0.6 * error_of(by_chart, UNKNOWN)
+    assert error_of(done.result, UNKNOWN_CAMERA) < 0.6 * error_of(by_chart, UNKNOWN_CAMERA)
     assert done.result.mean_sigma < 0.5 * by_chart.mean_sigma
     assert_read_back(done.result)
     # A rig file names the run, as it does for calibrations.
@@ -77,7 +73,7 @@ def test_the_filter_halves_the_error(run: Path, by_chart: CameraCurvesResult) ->
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", ["nikon_d850", "sony_ilce_7m3", "fujifilm_x_t3", "canon_eos_r5"])
 def test_more_cameras_are_told_within_two_per_cent(tmp_path: Path, name: str) -> None:
-    part = part_of(record(tmp_path, asked(name, through=True), with_camera(name)))
+    part = part_of(record(tmp_path, curves_protocol(name, through=True), with_camera(name)))
     assert error_of(analyse(asked_anew(part, through=False)), name) < 0.025
     assert error_of(analyse(part), name) < 0.012
 
@@ -130,5 +126,5 @@ def test_a_chart_that_is_not_seen_stops_the_run(tmp_path: Path) -> None:
         rig["simulation"]["chart"] = [0.4, 0.4, 0.08, 0.08]
 
     with pytest.raises(LabrigError, match="expected a ColorChecker, found none") as caught:
-        record(tmp_path, asked(UNKNOWN, card=False), tiny)
+        record(tmp_path, curves_protocol(UNKNOWN_CAMERA, card=False), tiny)
     assert "\n" not in str(caught.value)

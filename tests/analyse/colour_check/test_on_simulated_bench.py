@@ -16,16 +16,8 @@ from labrig.process import process_and_report
 from labrig.results import ColourCheckResult
 from tests.analyse.chart_bench import record, with_camera
 from tests.analyse.recorded import part_of
+from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera
 from tests.results.made import assert_read_back
-
-#: Green and white.
-SOME: dict[str, Any] = {"protocol": "colour_check", "through": [14, 19], "repeats": 1}
-#: The curves that labrig has of the room's camera, as its own body calls itself.
-CAMERA = "canon_eos_5d_mark_ii"
-
-
-def with_known_camera(rig: dict[str, Any]) -> None:
-    rig["optics"]["camera"] = CAMERA
 
 
 def with_optics(part: Part, **changed: str) -> Part:
@@ -36,7 +28,7 @@ def with_optics(part: Part, **changed: str) -> Part:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(tmp_path_factory.mktemp("check"), SOME, with_known_camera)
+    return record(tmp_path_factory.mktemp("check"), COLOUR_CHECK, with_known_camera)
 
 
 def test_colours_are_right_end_to_end(run: Path) -> None:
@@ -105,7 +97,7 @@ def test_curves_told_by_the_chart_make_right_colours(tmp_path: Path, name: str) 
         with_camera(name)(rig)
         rig["optics"]["camera"] = str(tmp_path / CURVES_FILE)
 
-    every = SOME | {"through": "all"}
+    every = COLOUR_CHECK | {"through": "all"}
     checked = analyse(part_of(record(tmp_path / "check", every, with_curves)))
     assert checked.plain.mean < 2
     assert checked.through is not None

@@ -9,8 +9,7 @@ from labrig.analyse.excitation.evenness import evened, evenness
 from labrig.analyse.excitation.flicker import common_flicker
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import read_material
-from tests.fit.charged_samples import Bench
-from tests.fit.test_excitation_order import BARE, LVF
+from tests.fit.charged_samples import BARE, LVF, Bench
 from tests.results.made_excitation import excitation_result
 
 

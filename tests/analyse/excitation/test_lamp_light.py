@@ -13,7 +13,7 @@ from labrig.analyse.excitation.lamp_light import (
     site_modes,
 )
 from labrig.analyse.excitation.warmth import weighted_over_mean
-from tests.analyse.excitation.test_excitation_run import true_irradiance
+from tests.analyse.excitation.bench import true_irradiance
 
 
 def test_across_a_place_the_light_runs_as_along_the_filter() -> None:

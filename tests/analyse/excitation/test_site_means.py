@@ -5,7 +5,7 @@ import pytest
 
 from labrig.analyse.excitation.site_means import site_means, site_weights
 from labrig.reduce import SensorLayout
-from tests.analyse.excitation.test_excitation_run import true_irradiance
+from tests.analyse.excitation.bench import true_irradiance
 
 
 def glow(position: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.simulation import LampSettings
 from tests.acquire.fakes import Watching
 from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.analyse.small_runs import FADE
 from tests.results.made import assert_read_back
 
 FloatArray = NDArray[np.float64]
@@ -27,18 +28,10 @@ FloatArray = NDArray[np.float64]
 #: Of a photograph, relative.
 FLICKER = 0.007
 
-PROTOCOL: dict[str, Any] = {
-    "protocol": "fade",
-    "sample": {"name": "lamp"},
-    "every": "80 ms",
-    "until": "400 ms",
-    "passes": 2,
-}
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return record(tmp_path_factory.mktemp("fade"), PROTOCOL)
+    return record(tmp_path_factory.mktemp("fade"), FADE)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +99,7 @@ def test_with_the_curves_of_another_camera_it_still_is(tmp_path: Path) -> None:
     def other_camera(rig: dict[str, Any]) -> None:
         rig["simulation"]["seed"] = 2
 
-    protocol = PROTOCOL | {"warming": False, "rise": False}
+    protocol = FADE | {"warming": False, "rise": False}
     result: Any = process_run(record(tmp_path, protocol, other_camera))
     assert result.warnings == ()
     assert result.fade.best.name == "filament"
@@ -124,7 +117,7 @@ def test_what_glows_after_the_lamp_is_no_glowing_bodys(tmp_path: Path) -> None:
     def afterglow(rig: dict[str, Any]) -> None:
         rig["simulation"]["lamp"] = {"afterglow": "0.01 %", "afterglow_fades": "60 s"}
 
-    protocol = PROTOCOL | {"warming": False, "rise": False, "every": "80 ms"}
+    protocol = FADE | {"warming": False, "rise": False, "every": "80 ms"}
     result: Any = process_run(record(tmp_path, protocol, afterglow))
     assert any("is not that of a glowing body" in warning for warning in result.warnings)
 
@@ -205,7 +198,7 @@ def test_what_began_late_is_photographed_again(run: Path, tmp_path: Path) -> Non
     def busy(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
         yield Busy(clock)
 
-    again = read_run(record(tmp_path, PROTOCOL | {"warming": False}, watch=busy))
+    again = read_run(record(tmp_path, FADE | {"warming": False}, watch=busy))
     counts = [
         len([frame for frame in one.frames("rise") if frame.unit == "pass-1"])
         for one in (read_run(run), again)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from labrig import resources
 from labrig.analyse.led_brightness import analyse
 from labrig.process import process_run
 from labrig.record import read_run
@@ -17,8 +16,7 @@ from labrig.sim.opening import PIXEL_STREAM
 from labrig.sim.simulation import Simulation
 from labrig.sim.spectrometer import Detector
 from labrig.yaml_file import validate
-from tests.analyse.recorded import part_of, record
-from tests.quick_yaml import read_quickly
+from tests.analyse.recorded import part_of, record, shipped_rig
 
 QUICK = {"protocol": "led_brightness", "sample": {"name": "bank"}, "exposures": 1, "repeats": 1,
          "repetitions": 3, "integration": "0.2 s", "longest": "4 s"}  # fmt: skip
@@ -32,9 +30,7 @@ def recorded(
 
     def fluorescent(rig: Rig) -> None:
         rig.clear()
-        rig |= read_quickly((resources.folder("config") / "sim-fluorescent.yaml").read_text())
-        rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z"}
-        rig["simulation"]["sensor"] = {"width": 96, "height": 64}
+        rig |= shipped_rig("sim-fluorescent")
         rig["devices"]["camera"]["warm_up"] = "1 min"
         del rig["devices"]["spectrometer"]["calibration"]
         change(rig)

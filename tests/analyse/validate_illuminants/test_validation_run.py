@@ -21,6 +21,7 @@ from labrig.results import (
 )
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of
+from tests.analyse.small_runs import VALIDATE_ONE
 from tests.results.made import assert_read_back
 
 VALIDATE: dict[str, Any] = {
@@ -29,8 +30,6 @@ VALIDATE: dict[str, Any] = {
     "fluorescence": SAMPLES,
     "longest": "2 s",
 }
-#: One exposure under one lamp takes less time.
-ONE = VALIDATE | {"lamps": ["halogen"], "exposures": 1, "repeats": 1, "longest": "1 s"}
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +113,7 @@ def test_another_matrix_differs_and_is_named(run: Path) -> None:
 
 
 def test_a_lamp_that_does_not_light_is_left_out_and_named(tmp_path: Path) -> None:
-    two = ONE | {"lamps": ["daylight", "halogen"]}
+    two = VALIDATE_ONE | {"lamps": ["daylight", "halogen"]}
     result = analyse(part_of(record(tmp_path, two, _with_relays({"halogen": 7}))))
     assert list(result.lamps) == ["daylight"]
     assert any("halogen" in line and "lamp did not light" in line for line in result.warnings)
@@ -140,7 +139,7 @@ def test_light_of_the_room_is_subtracted_and_said(tmp_path: Path) -> None:
     def leaking(rig: dict[str, Any]) -> None:
         rig["simulation"]["faults"] = [{"ambient_light": {"level": "0.5 %", "at": "3 min"}}]
 
-    result = analyse(part_of(record(tmp_path, ONE, leaking)))
+    result = analyse(part_of(record(tmp_path, VALIDATE_ONE, leaking)))
     assert any(
         "with all lamps off there was light after halogen" in line for line in result.warnings
     )
@@ -159,7 +158,7 @@ def test_a_chart_is_found_in_the_frame_and_tells_the_colours(tmp_path: Path) -> 
     def larger(rig: dict[str, Any]) -> None:
         rig["simulation"]["sensor"] = {"width": 384, "height": 256}
 
-    result = analyse(part_of(record(tmp_path, ONE | {"chart": True}, larger)))
+    result = analyse(part_of(record(tmp_path, VALIDATE_ONE | {"chart": True}, larger)))
     assert result.colours_from == "chart"
     assert result.chart_delta_e is not None
     assert result.chart_delta_e[0] < 2

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from labrig.errors import DataError
 from labrig.material import (
@@ -21,6 +20,7 @@ from labrig.material import (
 )
 from labrig.report import reradiation_text
 from tests.material.reradiation import bfc450
+from tests.material.reradiation.noisy_bands import FAR, REGIONS, ULTRAVIOLET, band_sigma
 from tests.material.reradiation.synthetic import (
     BRIGHTENER,
     INPUT_NM,
@@ -33,23 +33,8 @@ from tests.material.reradiation.synthetic import (
     noise_sigma,
 )
 
-FAR = OUTPUT_NM[:, np.newaxis] > INPUT_NM + 15
-REGIONS = {
-    "seen by few rows": FAR & (INPUT_NM >= 400) & (INPUT_NM <= 430),
-    "blue": FAR & (INPUT_NM >= 440) & (INPUT_NM <= 600),
-    "red": FAR & (INPUT_NM > 600),
-    "middle rows": FAR & (INPUT_NM >= 400) & (abs(OUTPUT_NM - 525) <= 75)[:, np.newaxis],
-    "long rows": FAR & (INPUT_NM >= 400) & (OUTPUT_NM >= 700)[:, np.newaxis],
-}
-ULTRAVIOLET = FAR & (INPUT_NM <= 390)
 #: A σ that is 20 % too large or too small is outside of it in every region.
 TOLERANCE = 0.13
-
-
-def band_sigma(matrix: ReradiationMatrix) -> NDArray[np.float64]:
-    """σ of the re-radiation as fraction per band."""
-    assert matrix.reradiation_sigma is not None
-    return matrix.reradiation_sigma * matrix.output_width_nm[:, np.newaxis]
 
 
 @cache

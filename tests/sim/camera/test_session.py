@@ -4,6 +4,7 @@ import pytest
 import usb.core
 import usb.util
 
+from tests.sim.camera.datasets import arrays, strings
 from tests.sim.camera.host import (
     AV,
     DESTINATION,
@@ -25,24 +26,6 @@ IMPLEMENTED = {
     *(0x9115, 0x9116, 0x9117, 0x911A, 0x911D, 0x9125, 0x9126, 0x9127, 0x9128, 0x9129),
     0x9153,
 }
-
-
-def arrays(dataset: bytes, offset: int, count: int) -> tuple[list[tuple[int, ...]], int]:
-    found = []
-    for _ in range(count):
-        (n,) = struct.unpack_from("<I", dataset, offset)
-        found.append(struct.unpack_from(f"<{n}H", dataset, offset + 4))
-        offset += 4 + 2 * n
-    return found, offset
-
-
-def strings(dataset: bytes, offset: int) -> list[str]:
-    found = []
-    while offset < len(dataset):
-        n = dataset[offset]
-        found.append(dataset[offset + 1 : offset + 1 + 2 * n].decode("utf-16-le").rstrip("\0"))
-        offset += 1 + 2 * n
-    return found
 
 
 def test_descriptors_are_those_of_a_5d_mark_ii() -> None:

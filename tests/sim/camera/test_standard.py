@@ -9,8 +9,8 @@ from hypothesis import given, strategies as st
 
 from labrig.sim.camera import BodySettings, CameraFaults, StandardHabits
 from labrig.sim.camera.vocabulary import ObjectFormat
+from tests.sim.camera.datasets import arrays, strings
 from tests.sim.camera.host import BUSY, OK, Bench, Host
-from tests.sim.camera.test_session import arrays, strings
 
 RAW, JPEG = ObjectFormat.DNG, ObjectFormat.JPEG
 OPERATIONS = {

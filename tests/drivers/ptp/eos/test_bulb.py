@@ -11,7 +11,12 @@ from labrig.errors import DeviceError
 
 from ..usb.wire import TRANSACTION_S
 from .bench import Bench, bench, photograph
-from .test_faults import BROKEN, InterruptingClock, assert_one_helpful_line, assert_usable
+from .broken import (
+    BROKEN,
+    InterruptingClock,
+    assert_one_helpful_line,
+    assert_usable,
+)
 from .toy import BULB, FULL, HALF, OFF_FULL, OPERATIONS, Fault, Key, ToyEos, u32
 
 BULB_START, BULB_END = (0x9125,), (0x9126,)

@@ -12,7 +12,13 @@ from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError
 
 from ..usb.wire import OneDevice, Wire
-from .bench import ADDRESS, SHORT, Bench, bench, photograph
+from .bench import ADDRESS, SHORT, bench, photograph
+from .broken import (
+    BROKEN,
+    InterruptingClock,
+    assert_one_helpful_line,
+    assert_usable,
+)
 from .toy import FULL, HALF, OFF_FULL, OFF_HALF, OPERATIONS, Fault, Key, ToyEos, u32
 
 STEPS: dict[str, Key] = {
@@ -26,25 +32,6 @@ STEPS: dict[str, Key] = {
     "frame data": (0x9107,),
     "transfer complete": (0x9117,),
 }
-BROKEN = (Fault.REFUSED, Fault.STALLED, Fault.SILENT, Fault.GARBAGE)
-
-
-def assert_usable(b: Bench, camera: PtpCamera) -> None:
-    """Safe now, and the next frame is the next exposure's."""
-    camera.make_safe()
-    assert not b.toy.buttons
-    frame = photograph(camera)
-    assert frame.data == b.toy.frame(b.toy.exposures)
-    assert b.toy.is_idle
-    camera.disconnect()
-    assert not b.toy.session_open
-    assert not b.wire.claimed
-
-
-def assert_one_helpful_line(error: pytest.ExceptionInfo[DeviceError]) -> None:
-    message = str(error.value)
-    assert "\n" not in message
-    assert ": " in message
 
 
 @pytest.mark.parametrize("fault", BROKEN, ids=lambda f: f.name.lower())
@@ -240,20 +227,6 @@ class TestConnecting:
         with pytest.raises(DeviceError, match=r"0x9116, 0x9128 with 0x9129, or 0x910F"):
             b.connect()
         assert not b.toy.session_open
-
-
-class InterruptingClock(VirtualClock):
-    """Somebody presses Ctrl-C just before the nth wait."""
-
-    def __init__(self, at_wait: int) -> None:
-        super().__init__()
-        self._waits_left = at_wait
-
-    def sleep_until(self, deadline_s: float) -> None:
-        self._waits_left -= 1
-        if self._waits_left == 0:
-            self.interrupt(2)
-        super().sleep_until(deadline_s)
 
 
 def test_ctrl_c_at_every_wait() -> None:

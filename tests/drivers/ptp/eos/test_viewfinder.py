@@ -14,8 +14,8 @@ from labrig.errors import DeviceError
 
 from ..usb.wire import OneDevice, Wire
 from .bench import SHORT, bench
-from .test_transcript import CONNECT, Transcript
 from .toy import OPERATIONS, ToyEos
+from .transcript import CONNECT, Transcript
 
 LIVE = (*OPERATIONS, 0x9153)
 PICTURE = b"\xff\xd8\xaa\xbb\xff\xd9"

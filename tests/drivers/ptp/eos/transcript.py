@@ -1,0 +1,97 @@
+"""A transcript of an EOS camera, played."""
+
+import re
+
+from ..usb.wire import Wire
+
+CONNECT = """
+# OpenSession 1
+> 10000000 0100 0210 00000000 01000000
+< 0c000000 0300 0120 00000000
+# GetDeviceInfo: standard 100, extension 0xB 200 "", mode 0, twelve operations, no other codes
+> 0c000000 0100 0110 01000000
+< 8d000000 0200 0110 01000000 6400 0b000000 c800 00 0000
+  0c000000 0110 0210 0310 0791 1091 1491 1591 1691 1791 1a91 2891 2991
+  00000000 00000000 00000000 00000000
+  "Canon Inc." "Canon EOS X" "3-2.1.2" "123"
+< 0c000000 0300 0120 01000000
+# SetRemoteMode 1, SetEventMode 1
+> 10000000 0100 1491 02000000 01000000
+< 0c000000 0300 0120 02000000
+> 10000000 0100 1591 03000000 01000000
+< 0c000000 0300 0120 03000000
+# GetEvent: mode M, Tv 1/128, Av 4, ISO 100, to card, JPEG; lists of Tv, ISO (0: automatic), Av
+> 0c000000 0100 1691 04000000
+< e0000000 0200 1691 04000000
+  10000000 89c10000 05d10000 03000000
+  10000000 89c10000 02d10000 70000000
+  10000000 89c10000 01d10000 28000000
+  10000000 89c10000 03d10000 48000000
+  10000000 89c10000 1cd10000 02000000
+  20000000 89c10000 20d10000 01000000 10000000 01000000 00000000 03000000
+  20000000 8ac10000 02d10000 03000000 03000000 0c000000 68000000 70000000
+  20000000 8ac10000 03d10000 03000000 03000000 00000000 48000000 50000000
+  1c000000 8ac10000 01d10000 03000000 02000000 28000000 30000000
+  08000000 00000000
+< 0c000000 0300 0120 04000000
+> 0c000000 0100 1691 05000000
+< 14000000 0200 1691 05000000 08000000 00000000
+< 0c000000 0300 0120 05000000
+# SetDevicePropValueEx: image format RAW alone; read back
+> 0c000000 0100 1091 06000000
+> 28000000 0200 1091 06000000
+  1c000000 20d10000 01000000 10000000 06000000 00000000 04000000
+< 0c000000 0300 0120 06000000
+> 0c000000 0100 1691 07000000
+< 34000000 0200 1691 07000000
+  20000000 89c10000 20d10000 01000000 10000000 06000000 00000000 04000000
+  08000000 00000000
+< 0c000000 0300 0120 07000000
+> 0c000000 0100 1691 08000000
+< 14000000 0200 1691 08000000 08000000 00000000
+< 0c000000 0300 0120 08000000
+# SetDevicePropValueEx: destination host; read back
+> 0c000000 0100 1091 09000000
+> 18000000 0200 1091 09000000 0c000000 1cd10000 04000000
+< 0c000000 0300 0120 09000000
+> 0c000000 0100 1691 0a000000
+< 24000000 0200 1691 0a000000 10000000 89c10000 1cd10000 04000000 08000000 00000000
+< 0c000000 0300 0120 0a000000
+> 0c000000 0100 1691 0b000000
+< 14000000 0200 1691 0b000000 08000000 00000000
+< 0c000000 0300 0120 0b000000
+# PCHDDCapacity; the lists may have changed
+> 18000000 0100 1a91 0c000000 ffffff0f 00100000 01000000
+< 0c000000 0300 0120 0c000000
+> 0c000000 0100 1691 0d000000
+< 14000000 0200 1691 0d000000 08000000 00000000
+< 0c000000 0300 0120 0d000000
+"""
+
+
+class Transcript:
+    """Plays the camera's part; anything but the driver's part is an error."""
+
+    def __init__(self, text: str) -> None:
+        self.steps = [
+            (step[0], bytes.fromhex(re.sub(r'"([^"]*)"', _ptp_string, step[1:])))
+            for step in re.split(r"\n(?=[<>])", re.sub(r"(?m)^#.*\n", "", text))
+            if step.strip()
+        ]
+
+    def written(self, wire: Wire, data: bytes) -> None:
+        assert not any(wire.to_host), "the driver wrote before it had read the answer"
+        assert self.steps, f"the driver wrote more: {data.hex(' ')}"
+        direction, expected = self.steps.pop(0)
+        assert direction == ">"
+        assert data.hex(" ") == expected.hex(" ")
+        while self.steps and self.steps[0][0] == "<":
+            wire.send(self.steps.pop(0)[1])
+
+    def control(self, wire: Wire, request: int, data: bytes) -> bytes:
+        raise AssertionError(f"unexpected class request 0x{request:02X}")
+
+
+def _ptp_string(match: re.Match[str]) -> str:
+    text = match[1] + "\0"
+    return (bytes([len(text)]) + text.encode("utf-16-le")).hex()
