@@ -363,7 +363,8 @@ def test_the_level_of_k_e_is_that_of_the_series_that_defines_e() -> None:
     def k_e(factor: float, defining: int) -> NDArray[np.float64]:
         series = [replace(through, irradiance=factor * through.irradiance), direct]
         uncertain = RelativeSigmas(0.003, 0.002, scale=0.04, defining=defining)
-        return fit(series, rates, bench.amplitudes(), uncertain).k_e()[truth > 0.1 * truth.max()]
+        rates_by_band = fit(series, rates, bench.amplitudes(), uncertain).k_e()
+        return np.asarray(rates_by_band[truth > 0.1 * truth.max()])
 
     by_places, by_lamp = (np.mean(np.log(k_e(1.06, n) / k_e(1.0, n))) for n in (0, 1))
     assert by_places == pytest.approx(-np.log(1.06), abs=0.01)
