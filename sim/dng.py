@@ -4,6 +4,7 @@ tifffile is not used, since it cannot write an EXIF directory; cameras keep the 
 is `labrig`, so that LibRaw applies no quirks of a known model.
 """
 
+import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +24,14 @@ DIAL: Final[tuple[Fraction, ...]] = (
     *(Fraction(1, part) for part in (4, 5, 6, 8, 10, 13, 15, 20, 25, 30, 40, 50, 60, 80)),
     *(Fraction(1, part) for part in (100, 125, 160, 200, 250, 320, 400, 500, 640, 800)),
     *(Fraction(1, part) for part in (1000, 1250, 1600, 2000, 2500, 3200, 4000, 5000, 6400, 8000)),
+)
+#: Labels of apertures in thirds of a stop from f/1 on; the actual ones are powers of 2^(1/6).
+APERTURES: Final[tuple[Fraction, ...]] = tuple(
+    Fraction(tenths, 10)
+    for tenths in (
+        *(10, 11, 12, 14, 16, 18, 20, 22, 25, 28, 32, 35, 40, 45, 50, 56, 63, 71, 80),
+        *(90, 100, 110, 130, 140, 160, 180, 200, 220, 250, 290, 320),
+    )
 )
 #: log2 of the dial's longest exposure: "30" is 32 s.
 LONGEST_LOG2 = 5
@@ -65,6 +74,11 @@ def exposure_label(exposure_s: float) -> Fraction:
     return DIAL[nearest]
 
 
+def aperture_label(f_number: float) -> Fraction:
+    """Return the f-number that a Canon writes: the label, 2.8 for the actual 2.83."""
+    return min(APERTURES, key=lambda label: abs(math.log(f_number / label)))
+
+
 def encode_dng(mosaic: Mosaic, shot: Shot, levels: Levels = RECORDED) -> bytes:
     """Return the file's bytes.
 
@@ -85,7 +99,7 @@ def encode_dng(mosaic: Mosaic, shot: Shot, levels: Levels = RECORDED) -> bytes:
     subsecond = f"{microseconds // 10_000:02d}"
     exif: list[Entry] = [
         (33434, _RATIONAL, [exposure_label(shot.exposure_s)]),
-        (33437, _RATIONAL, [Fraction(shot.f_number).limit_denominator(10)]),
+        (33437, _RATIONAL, [aperture_label(shot.f_number)]),
         (34855, _SHORT, [shot.iso]),
         (36864, _UNDEFINED, b"0230"),
         (36867, _ASCII, date_time),

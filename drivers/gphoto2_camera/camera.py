@@ -11,6 +11,7 @@ from .checks import findings
 from .exposure import Exposure
 from .failures import BusyError, PerhapsReleasedError
 from .frames import Frames
+from .labels import labelled_times_s
 from .library import POLL_PERIOD_S, Library
 from .preparation import prepare
 from .process import require_gphoto2
@@ -70,6 +71,24 @@ class Gphoto2Camera:
     def declared_offers(cls, settings: Gphoto2CameraSettings) -> CameraOffers:
         """Return the offers that planning without the camera assumes."""
         return settings.declared_offers()
+
+    @classmethod
+    def recorded_exposures_s(cls, label_s: float, identity: str) -> tuple[float, ...]:
+        """Return the exposure times that a run may hold for a frame with a time in its EXIF.
+
+        Parameters
+        ----------
+        label_s
+            Exposure time in the frame's EXIF in seconds.
+        identity
+            What the camera said of itself.
+
+        Returns
+        -------
+        tuple of float
+            Times in seconds by a dial in thirds and in halves of a stop.
+        """
+        return labelled_times_s(label_s)
 
     def identity(self) -> str:
         """Return maker, model, serial number, firmware and driver of the camera."""

@@ -48,6 +48,13 @@ def true_times_s(labels: Iterable[str]) -> dict[str, float]:
     return nominal | {label: _true_time_s(time_s, steps) for label, time_s in dial.items()}
 
 
+def labelled_times_s(time_s: float) -> tuple[float, ...]:
+    """Return the actual times of a nominal one in seconds, in thirds and in halves of a stop."""
+    if time_s > LONGEST_ON_DIAL_S:
+        return (time_s, time_s)
+    return (_true_time_s(time_s, _THIRDS), _true_time_s(time_s, _HALVES))
+
+
 def label_of_time(exposure_s: float, times_s: Mapping[str, float]) -> str | None:
     """Return the label in `times_s` for `exposure_s` seconds, actual or nominal."""
 

@@ -8,11 +8,13 @@ from labrig.errors import DeviceError, DeviceLostError
 
 from .body import Body
 from .eos.camera import EosCamera
+from .eos.codes import labelled_times_s as eos_times_s
 from .eos.protocol import lacking_operations
 from .opening import identify, open_link, open_session
 from .session import Session
 from .settings import PtpCameraSettings
 from .standard.camera import NEEDED, StandardCamera
+from .standard.exposure import labelled_times_s as standard_times_s
 
 
 class PtpCamera:
@@ -58,6 +60,28 @@ class PtpCamera:
     def declared_offers(cls, settings: PtpCameraSettings) -> CameraOffers:
         """Return the offers that planning without the camera assumes."""
         return settings.declared_offers()
+
+    @classmethod
+    def recorded_exposures_s(cls, label_s: float, identity: str) -> tuple[float, ...]:
+        """Return the exposure times that a run may hold for a frame with a time in its EXIF.
+
+        Parameters
+        ----------
+        label_s
+            Exposure time in the frame's EXIF in seconds.
+        identity
+            What the camera said of itself.
+
+        Returns
+        -------
+        tuple of float
+            Times in seconds, one for each way in which such a camera may count, always in the same
+            order; empty if the PC ends the exposure.
+        """
+        if "EOS" in identity:
+            return eos_times_s(label_s)
+        # Some cameras of other names are set by Canon's codes, too.
+        return (*(eos_times_s(label_s) or (label_s, label_s)), *standard_times_s(label_s))
 
     def identity(self) -> str:
         """Return model, serial number and firmware that the camera reported."""

@@ -7,6 +7,12 @@ from labrig.analyse.hyperspectral import CubeList, matrix_from_cubes
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.luminance_table import LuminanceTableOptions, evaluate_luminance_table
 from labrig.analyse.overrides import Overrides, read_run_protocol
+from labrig.analyse.raw_agreement import (
+    clock_warnings,
+    require_recorded_settings,
+    settings_differences,
+    spectra_differences,
+)
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.shared_tables import fit_shared_tables
 from labrig.analyse.table_fit import FittedTable, TableFitOptions, fit_table
@@ -21,6 +27,7 @@ __all__ = [
     "Overrides",
     "Part",
     "TableFitOptions",
+    "clock_warnings",
     "evaluate_luminance_table",
     "fit_charge_table",
     "fit_series",
@@ -29,6 +36,9 @@ __all__ = [
     "matrix_from_cubes",
     "read_run_protocol",
     "reference_of",
+    "require_recorded_settings",
+    "settings_differences",
+    "spectra_differences",
     "temperature_warnings",
     "verify_frames",
 ]

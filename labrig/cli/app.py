@@ -12,6 +12,7 @@ from labrig.cli import (
     figures,
     fit,
     frame,
+    key,
     leds,
     material,
     optics,
@@ -45,10 +46,12 @@ app.command("render")(render.render)
 app.command("note")(runs.note)
 app.command("design")(design.design)
 app.command("verify")(verify.verify)
+app.command("seal")(verify.seal)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)
 app.add_typer(driver.app, name="driver")
 app.add_typer(fit.app, name="fit")
+app.add_typer(key.app, name="key")
 app.add_typer(leds.app, name="leds")
 app.add_typer(material.app, name="material")
 app.add_typer(optics.app, name="optics")

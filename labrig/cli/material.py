@@ -160,6 +160,7 @@ def apply(
     In the unit of the irradiance; of a perfect white all of it would be reflected.
     """
     from labrig.optics import read_light
+    from labrig.text_table import table_text
 
     matrix = checked(file, read_matrix(file, entry, pixel, rows, excitation), corrected)
     returned = matrix.under(read_light(light))
@@ -172,8 +173,7 @@ def apply(
     if returned.total.sigma is not None:
         columns["total_sigma"] = returned.total.sigma
     numbers = zip(*(column.tolist() for column in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in numbers)]
-    _write_lines(lines, out)
+    _write_lines(table_text(list(columns), numbers).splitlines(), out)
 
 
 @app.command("compare")

@@ -1,12 +1,21 @@
-"""`labrig verify`: is a run as it was recorded?"""
+"""`labrig verify` and `labrig seal`: a run is as it was recorded, and who vouches for it."""
 
+import json as json_text
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labrig.cli.completion import complete_run
 from labrig.errors import DataError
+
+if TYPE_CHECKING:
+    from labrig.process import Verification
+
+#: Most changes that are named in one line.
+_MOST_NAMED = 6
+
+Runs = Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")]
 
 
 def verify(
@@ -16,18 +25,99 @@ def verify(
             help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
         ),
     ],
-    runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
+    runs: Runs = Path("runs"),
+    signers: Annotated[
+        Path | None,
+        typer.Option(
+            "--signers",
+            help="Public keys (.pub) or OpenSSH's allowed signers: the run has to be sealed by one "
+            "of them.",
+        ),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
 ) -> None:
-    """Check that journal, frames and result of a run are as they were recorded.
+    """Check that journal, frames and result of a run are as they were recorded and sealed.
 
-    Every frame is read. The seal that is printed is that of the whole journal: kept elsewhere, it
-    shows later that nothing was changed.
+    Every frame is read. The seal of the journal that is printed is that of its last line: kept
+    elsewhere, it shows later that nothing was changed. Laboratories are named by 'labrig key
+    trust', by this PC's own key, and by --signers.
     """
     from labrig.catalogue import find_run
+    from labrig.cli.key import trusted_signers
     from labrig.process import verify_run
+    from labrig.seal import read_signers
 
-    verification = verify_run(find_run(run, runs))
-    for line in verification.intact:
-        typer.echo(line)
+    folder = find_run(run, runs)
+    accepted = trusted_signers() if signers is None else read_signers(signers)
+    verification = verify_run(folder, accepted)
+    if json:
+        typer.echo(json_text.dumps(_content(folder, verification), ensure_ascii=False, indent=2))
+    else:
+        for line in (*verification.intact, verification.seal_line):
+            typer.echo(line)
+    for line in verification.doubtful:
+        typer.echo(f"warning: {line}", err=True)
     if not verification.is_intact:
-        raise DataError("; ".join(verification.changed))
+        named, more = verification.changed[:_MOST_NAMED], verification.changed[_MOST_NAMED:]
+        others = f"; {len(more)} more, all of them with --json" if more else ""
+        raise DataError(f"{'; '.join(named)}{others}")
+    if signers is not None and verification.signer is None:
+        raise DataError(f"{folder}: expected a seal by a key in {signers}, got none such")
+
+
+def seal(
+    run: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Run folders, beginnings of their names, or 'last'.", autocompletion=complete_run
+        ),
+    ],
+    runs: Runs = Path("runs"),
+    key: Annotated[
+        Path | None,
+        typer.Option("--key", help="Another private key than that of 'labrig key new'."),
+    ] = None,
+) -> None:
+    """Sign runs by the laboratory's own key, so that they can be cited and checked elsewhere.
+
+    Journal, frames and result are checked before. The list of files with their SHA-256 is
+    seal.sha256 in the run folder, its signature seal.sha256.sig: 'labrig verify', or sha256sum and
+    ssh-keygen, check both.
+    """
+    from labrig.catalogue import find_run
+    from labrig.cli.key import key_file
+    from labrig.clock import SystemClock
+    from labrig.process import seal_run
+    from labrig.seal import read_key
+
+    lab_key = read_key(key_file() if key is None else key)
+    for folder in [find_run(each, runs) for each in run]:
+        made = seal_run(folder, lab_key, SystemClock().wall())
+        typer.echo(
+            f"{folder}: sealed {made.files.sealed}, {len(made.files.sha256)} files, by "
+            f"{lab_key.name} ({made.signer.fingerprint})"
+        )
+
+
+def _content(folder: Path, verification: "Verification") -> dict[str, object]:
+    """Return the outcome of a check as JSON has it."""
+    seal = verification.seal
+    return {
+        "run": folder.resolve().name,
+        "status": verification.status,
+        "journal": verification.journal,
+        "intact": verification.intact,
+        "changed": verification.changed,
+        "doubtful": verification.doubtful,
+        "seal": None
+        if seal is None
+        else {
+            "sealed": seal.files.sealed,
+            "files": len(seal.files.sha256),
+            "fingerprint": seal.signer.fingerprint,
+            "is_trusted": verification.signer is not None,
+            "signer": verification.signer,
+            "calls_itself": seal.files.by,
+            "journal": seal.files.journal,
+        },
+    }

@@ -12,6 +12,7 @@ from labrig.optics import Spectrum
 from labrig.reduce import SensorLayout
 from labrig.region import Region, region_pixels
 from labrig.reproduce import CARD_NAME, DarkRoomPicture, Renderer, Scene, SceneFile
+from labrig.text_table import table_text
 from labrig.yaml_file import yaml_text
 
 #: Height of the frame in the rendering; its light is even on every sample.
@@ -47,10 +48,10 @@ class DarkRoomScene:
             else:
                 write_fluorescent(folder / name, material)
         for name, light in self.lights.items():
-            columns = np.column_stack([light.wavelength_nm, light.value])
-            np.savetxt(
-                folder / name, columns, "%.9g", ",", header="wavelength_nm,value", comments=""
-            )
+            pairs = zip(light.wavelength_nm, light.value, strict=True)
+            rows = ([f"{number:.9g}" for number in pair] for pair in pairs)
+            text = table_text(["wavelength_nm", "value"], rows)
+            (folder / name).write_text(text, encoding="utf-8", newline="")
         path = folder / SCENE_FILE
         content = self.file.model_dump(mode="json", exclude_none=True)
         path.write_text(yaml_text(content), encoding="utf-8")

@@ -1,12 +1,12 @@
 """Photographed and rendered values as a table for other programs."""
 
-import csv
 from collections.abc import Iterator
 from pathlib import Path
 
 from labrig.compare.rendered import RenderedComparison
 from labrig.compare.rendered_lamps import LampsComparison
 from labrig.errors import DiskError
+from labrig.text_table import table_text
 
 Row = tuple[str | float, ...]
 
@@ -68,12 +68,8 @@ def write_rendered(path: Path, comparison: RenderedComparison | LampsComparison)
         rows = _of_lamps(comparison)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("w", encoding="utf-8", newline="") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(head)
-            table.writerows(
-                [cell if isinstance(cell, str) else f"{cell:.6g}" for cell in row] for row in rows
-            )
+        cells = ([cell if isinstance(cell, str) else f"{cell:.6g}" for cell in row] for row in rows)
+        path.write_text(table_text(head, cells), encoding="utf-8", newline="")
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
 

@@ -15,6 +15,7 @@ import numpy as np
 from labrig.optics.ordinate import Quantity
 from labrig.optics.piecewise import FloatArray
 from labrig.optics.spectral_axis import PLAUSIBLE_NM
+from labrig.text_table import plain_text
 
 #: Wavelengths, values and σ of a curve.
 Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray | None]
@@ -74,7 +75,7 @@ def curves_from_table(text: str) -> tuple[str, Curves]:
     """
     rows = _rows(_content(text))
     titles = (line[8:].strip() for line in text.splitlines() if line.startswith("#Camera:"))
-    title = next(titles, "")
+    title = plain_text(next(titles, ""))
     header = rows[0]
     if _is_number(header[0]):
         return title, _from_columns(_CHANNELS, rows)

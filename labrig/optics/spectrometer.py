@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +20,8 @@ BoolArray = NDArray[np.bool_]
 
 #: Number of pixels with the most similar light whose variances are averaged.
 POOL = 101
+#: Signs with which a formula begins in a spreadsheet, after a separator of cells.
+_FORMULA = re.compile(r"(?<=[,;|])[=+\-@]")
 #: First line of a reading's file.
 FORMAT = "# labrig spectrometer reading 1"
 
@@ -269,12 +272,14 @@ def _texts_again(wavelength_nm: bytes) -> list[str]:
 @lru_cache(maxsize=4)
 def _spectrum_text(spectrum: Spectrum) -> str:
     content = {
-        "name": spectrum.name,
+        "name": "",
         "wavelength_nm": spectrum.wavelength_nm.tolist(),
         "value": spectrum.value.tolist(),
         "sigma": None if spectrum.sigma is None else spectrum.sigma.tolist(),
     }
-    return json.dumps(content)
+    # The comment is a row of cells to a spreadsheet, in which a name is to begin no formula.
+    name = _FORMULA.sub(lambda sign: f"\\u{ord(sign[0]):04x}", json.dumps(spectrum.name))
+    return json.dumps(content).replace('"name": ""', f'"name": {name}', 1)
 
 
 @lru_cache(maxsize=4)

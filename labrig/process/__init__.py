@@ -9,7 +9,7 @@ from labrig.process.run import Processed, draw_figures, process_and_report, proc
 from labrig.process.shared_decay import report_shared_decay
 from labrig.process.table import report_table
 from labrig.process.trap_depths import report_trap_depths
-from labrig.process.verification import Verification, verify_run
+from labrig.process.verification import Verification, seal_run, verify_run
 from labrig.process.without_run import describe_without_run, write_with_report
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "report_shared_decay",
     "report_table",
     "report_trap_depths",
+    "seal_run",
     "show_comparison",
     "verify_run",
     "write_with_report",

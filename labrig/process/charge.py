@@ -17,6 +17,7 @@ from labrig.process.table import TableProvenance, stated
 from labrig.process.without_run import describe_without_run
 from labrig.report import charge_report, write_report
 from labrig.results import TableLayout
+from labrig.text_table import table_text
 from labrig.yaml_file import write_yaml
 
 
@@ -125,8 +126,9 @@ def _write_readings(path: Path, fit: ChargeFit) -> None:
     """Write what was fitted, with σ and the light of the fit."""
     readings = fit.readings
     columns = (readings.t_s, readings.values, readings.sigma, readings.light)
-    header = "t_after_lamp_on_s,value,value_sigma,fit"
-    np.savetxt(path, np.transpose(columns), "%.9g", ",", header=header, comments="")
+    rows = ([f"{number:.9g}" for number in row] for row in zip(*columns, strict=True))
+    text = table_text(["t_after_lamp_on_s", "value", "value_sigma", "fit"], rows)
+    path.write_text(text, encoding="utf-8", newline="")
 
 
 def _material(table: Path, fit: ChargeFit) -> Material | None:

@@ -11,8 +11,10 @@ from labrig.analyse import (
     Inputs,
     Overrides,
     Part,
+    clock_warnings,
     read_run_protocol,
     reference_of,
+    require_recorded_settings,
     temperature_warnings,
 )
 from labrig.bench_optics import camera_curves, with_shipped_camera
@@ -23,6 +25,7 @@ from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
+from labrig.process.verification import require_as_sealed
 from labrig.record import RunLock, read_run
 from labrig.report import (
     Rendered,
@@ -183,17 +186,24 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Processed:
     """Process a run that no other process processes meanwhile."""
     overrides.check_method(protocol)
+    require_as_sealed(folder)
     run = read_run(folder)
     rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])
+    require_recorded_settings(run, overrides.bench(folder), overrides)
     analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
     inputs = Inputs.of(rig)
     part = Part(run, protocol, rig, overrides, inputs)
     result: RunResult = analyse(part)
     lvf = inputs.updated_by(result).lvf
     camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
-    warnings = (*result.warnings, *unknown_camera, *temperature_warnings(run, protocol.rate_frames))
+    warnings = (
+        *result.warnings,
+        *clock_warnings(run),
+        *unknown_camera,
+        *temperature_warnings(run, protocol.rate_frames),
+    )
     result = replace(result, warnings=warnings)
 
     about = describe_run(run, protocol, rig)

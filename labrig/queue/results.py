@@ -1,7 +1,5 @@
 """How far a queue is, and what its runs found: entries, a table, and a page."""
 
-import csv
-import io
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,6 +21,7 @@ from labrig.queue.luminances import FoundLuminance, found_luminances
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
 from labrig.results import MCD_PER_M2, Measured, read_fitted_decay, read_result
+from labrig.text_table import table_text
 
 #: Name of the figure, what it shows, label of its axis, and the quantity.
 SWEPT: tuple[tuple[str, str, str, Callable[["FoundState"], Measured]], ...] = (
@@ -205,13 +204,11 @@ def write_results(folder: Path, name: str, listed: Sequence[QueueEntry]) -> Path
 def _csv(listed: Sequence[QueueEntry]) -> str:
     """Return a line for each rate and luminance of each run, and one of a run that found none."""
     keys = _keys(listed)
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
     found = ["k_r_per_s", "k_r_sigma_per_s", "amplitude", "amplitude_sigma"]
     luminous = any(True for entry in listed for _ in entry.luminances)
     light = ["t_s", "luminance_mcd_per_m2", "luminance_sigma_mcd_per_m2"] if luminous else []
     head = ["number", "protocol", *keys, "status", "run", "patch", "state", *found, *light]
-    table.writerow(head)
+    table: list[list[object]] = []
     for entry in listed:
         queued = entry.queued
         start = [entry.number, queued.protocol, *(queued.changes.get(key, "") for key in keys)]
@@ -226,8 +223,8 @@ def _csv(listed: Sequence[QueueEntry]) -> str:
             for one in entry.luminances
         ]
         for cells in rows or [[]]:
-            table.writerow([*start, *cells, *[""] * (len(head) - len(start) - len(cells))])
-    return text.getvalue().rstrip("\n")
+            table.append([*start, *cells, *[""] * (len(head) - len(start) - len(cells))])
+    return table_text(head, table).rstrip("\n")
 
 
 def _keys(listed: Sequence[QueueEntry]) -> list[str]:

@@ -38,6 +38,7 @@ from .journal import (
     Disk as Disk,
     Document as Document,
     add_note as add_note,
+    line_seals as line_seals,
     read_journal as read_journal,
     read_notes as read_notes,
     sealed_line as sealed_line,
@@ -64,4 +65,7 @@ from .run_record import (
 from .run_size import (
     RunSize as RunSize,
     size_text as size_text,
+)
+from .user_secret import (
+    own_digest as own_digest,
 )

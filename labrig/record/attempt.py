@@ -6,6 +6,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from labrig.record.document_checks import VALUES, described
 from labrig.record.frames import (
     ActionRecord,
     FrameRecord,
@@ -13,40 +14,6 @@ from labrig.record.frames import (
     TemperatureRecord,
 )
 from labrig.record.journal import Disk, Journal, write_durably
-
-_ACTION_KEYS: dict[str, str] = {
-    "device": "string",
-    "action": "string",
-    "start_time": "number",
-    "end_time": "number",
-    "late_s": "number",
-    "task": "string",
-}
-_TEMPERATURE_KEYS: dict[str, str] = {"time": "number", "temperature_c": "number"}
-_FRAME_KEYS: dict[str, str] = {
-    "frame": "string",
-    "sha256": "string",
-    "size_bytes": "integer",
-    "role": "string",
-    "exposure_s": "number",
-    "iso": "integer",
-    "f_number": "number",
-    "start_time": "number",
-    "end_time": "number",
-    "late_s": "number",
-    "disk_s": "number",
-}
-_SPECTRUM_KEYS: dict[str, str] = {
-    "frame": "string",
-    "sha256": "string",
-    "size_bytes": "integer",
-    "role": "string",
-    "integration_s": "number",
-    "repetitions": "integer",
-    "start_time": "number",
-    "end_time": "number",
-    "late_s": "number",
-}
 
 
 class AttemptWriter:
@@ -111,16 +78,14 @@ class AttemptWriter:
         """Write one action to the journal."""
         self._event(
             "actions",
-            _ACTION_KEYS,
-            {key: getattr(record, key) for key in _ACTION_KEYS},
+            {key: getattr(record, key) for key in VALUES["actions"]},
         )
 
     def temperature(self, record: TemperatureRecord) -> None:
         """Write one reading of the thermometer to the journal."""
         self._event(
             "temperatures",
-            _TEMPERATURE_KEYS,
-            {key: getattr(record, key) for key in _TEMPERATURE_KEYS},
+            {key: getattr(record, key) for key in VALUES["temperatures"]},
         )
 
     def frame(
@@ -156,8 +121,8 @@ class AttemptWriter:
             late_s=late_s,
             disk_s=self._wall() - began,
         )
-        content = {key: getattr(record, key) for key in _FRAME_KEYS if key != "frame"}
-        self._event("frames", _FRAME_KEYS, {"frame": f"frames/{path.name}", **content})
+        content = {key: getattr(record, key) for key in VALUES["frames"] if key != "frame"}
+        self._event("frames", {"frame": f"frames/{path.name}", **content})
         return record
 
     def spectrum(
@@ -186,8 +151,8 @@ class AttemptWriter:
             end_time=end_time,
             late_s=late_s,
         )
-        content = {key: getattr(record, key) for key in _SPECTRUM_KEYS if key != "frame"}
-        self._event("spectra", _SPECTRUM_KEYS, {"frame": f"frames/{path.name}", **content})
+        content = {key: getattr(record, key) for key in VALUES["spectra"] if key != "frame"}
+        self._event("spectra", {"frame": f"frames/{path.name}", **content})
         return record
 
     def stop(self, exit_status: str, reason: str = "") -> None:
@@ -203,9 +168,9 @@ class AttemptWriter:
             ),
         )
 
-    def _event(self, stream: str, keys: Mapping[str, str], data: dict[str, Any]) -> None:
+    def _event(self, stream: str, data: dict[str, Any]) -> None:
         if stream not in self._streams:
-            self._streams[stream] = self._declare(stream, keys)
+            self._streams[stream] = self._declare(stream)
         time = self._wall()
         event = self._streams[stream].compose_event(
             data=data,
@@ -216,13 +181,10 @@ class AttemptWriter:
         )
         self._journal.append("event", event)
 
-    def _declare(self, stream: str, keys: Mapping[str, str]) -> Any:
+    def _declare(self, stream: str) -> Any:
         bundle = self._bundle.compose_descriptor(
             name=stream,
-            data_keys={
-                key: {"source": "labrig", "dtype": dtype, "shape": []}
-                for key, dtype in keys.items()
-            },
+            data_keys=described(stream),
             uid=self._new_uid(),
             time=self._wall(),
             validate=False,

@@ -1,7 +1,8 @@
 """Checksums of a run's frames and spectra, read anew only if a file was touched since.
 
 That a frame has the checksum of its journal is noted with the size and the modification time of its
-file. As long as both stay the same, the file is trusted and not read.
+file. As long as both stay the same, the file is trusted and not read. A note by another user or
+another PC does not count.
 """
 
 import json
@@ -17,12 +18,13 @@ from typing import TypeVar
 from labrig.errors import DiskError
 from labrig.record.frames import FileRecord
 from labrig.record.journal import write_durably
+from labrig.record.user_secret import own_digest
 
 #: Folder of the frames in a run folder.
 FRAMES = "frames"
 #: Folder in a run folder for what can be made again from the frames; it may be deleted.
 CACHE = "cache"
-_CHECKED = "checked_frames.json"
+_CHECKED = "checked_frames.txt"
 #: Files read at once: hashing takes longer than reading from most disks.
 _READERS = 4
 
@@ -137,7 +139,10 @@ def _checked_state(frame: FileRecord) -> _State | str:
 def _read_checked(run: Path) -> dict[str, _State]:
     """Return the states of the files that were checked before; none if the list is unusable."""
     try:
-        content = json.loads((run / CACHE / _CHECKED).read_bytes())
+        digest, _, text = (run / CACHE / _CHECKED).read_bytes().partition(b"\n")
+        if digest != own_digest(text).encode():
+            return {}
+        content = json.loads(text)
     except (OSError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
@@ -147,4 +152,5 @@ def _write_checked(run: Path, checked: dict[str, _State]) -> None:
     """Write the list as far as the disk allows: without it, files are read again."""
     with suppress(OSError, DiskError):
         (run / CACHE).mkdir(exist_ok=True)
-        write_durably(run / CACHE / _CHECKED, json.dumps(checked).encode())
+        text = json.dumps(checked).encode()
+        write_durably(run / CACHE / _CHECKED, own_digest(text).encode() + b"\n" + text)

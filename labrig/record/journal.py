@@ -274,6 +274,39 @@ def read_journal(path: Path) -> JournalContent:
     return _parse(path, raw)
 
 
+def line_seals(path: Path) -> list[str]:
+    """Return the SHA-256 of every complete line of a journal, each the seal of all up to it.
+
+    Parameters
+    ----------
+    path
+        File `journal.jsonl` of a run folder.
+
+    Returns
+    -------
+    list of str
+        Seals in hexadecimal digits, in the order of the lines; none if there is no such file.
+
+    Raises
+    ------
+    DiskError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.record import line_seals
+    >>> line_seals(Path("runs/decay/journal.jsonl"))[-1] == labrig.read_run("runs/decay").seal
+    True
+    """
+    try:
+        raw = path.read_bytes() if path.is_file() else b""
+    except OSError as error:
+        raise DiskError(f"{path}: the journal cannot be read ({error.strerror})") from None
+    return [_seal(line) for line in raw.split(b"\n")[:-1]]
+
+
 def _parse(path: Path, raw: bytes) -> JournalContent:
     lines = raw.split(b"\n")
     torn = lines.pop() != b""

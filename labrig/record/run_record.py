@@ -9,6 +9,12 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from labrig.errors import DataError
+from labrig.record.document_checks import (
+    check_descriptor,
+    check_event,
+    check_start,
+    check_stop,
+)
 from labrig.record.frames import (
     UNDONE,
     ActionRecord,
@@ -222,7 +228,7 @@ def run_record(folder: Path, content: JournalContent) -> RunRecord:
         If a document does not fit those before it.
     """
     attempts: dict[str, Attempt] = {}
-    streams: dict[str, tuple[str, str]] = {}
+    streams: dict[str, _Stream] = {}
     last_time = 0.0
     for number, (name, doc) in enumerate(content.documents, start=1):
         try:
@@ -236,22 +242,43 @@ def run_record(folder: Path, content: JournalContent) -> RunRecord:
     return RunRecord(folder, list(attempts.values()), content.torn, last_time, content.seal)
 
 
+@dataclass
+class _Stream:
+    """A stream of an attempt, the names of its values, and how many of its events were read."""
+
+    attempt: Attempt
+    name: str
+    values: tuple[str, ...]
+    events: int = 0
+
+
 def _add_document(
     folder: Path,
     document: Document,
     attempts: dict[str, Attempt],
-    streams: dict[str, tuple[str, str]],
+    streams: dict[str, _Stream],
 ) -> None:
     name, doc = document
     if name == "start":
+        check_start(doc)
+        if doc["uid"] in attempts:
+            raise ValueError("it is there already")
         attempts[doc["uid"]] = _open_attempt(doc)
     elif name == "descriptor":
-        streams[doc["uid"]] = (doc["run_start"], doc["name"])
+        check_descriptor(doc)
+        attempt = _still_open(attempts, doc["run_start"])
+        if any(each.attempt is attempt and each.name == doc["name"] for each in streams.values()):
+            raise ValueError(f"the stream '{doc['name']}' is there already")
+        streams[doc["uid"]] = _Stream(attempt, doc["name"], tuple(doc["data_keys"]))
     elif name == "stop":
-        attempts[doc["run_start"]] = _close_attempt(attempts[doc["run_start"]], doc)
+        open_attempt = _still_open(attempts, doc["run_start"])
+        attempts[doc["run_start"]] = _close_attempt(open_attempt, doc)
     elif name == "event":
-        run_uid, stream = streams[doc["descriptor"]]
-        attempt, data = attempts[run_uid], dict(doc["data"])
+        opened = streams[doc["descriptor"]]
+        opened.events += 1
+        check_event(doc, opened.events, opened.values)
+        attempt = _still_open(attempts, opened.attempt.uid)
+        stream, data = opened.name, dict(doc["data"])
         if stream == "frames":
             path = folder / _frame_name(data.pop("frame"))
             frame = _FRAME.validate_python({**data, "path": path, "unit": attempt.unit})
@@ -268,6 +295,13 @@ def _add_document(
             attempt.temperatures.append(_check_reading(reading))
 
 
+def _still_open(attempts: dict[str, Attempt], uid: str) -> Attempt:
+    """Return an attempt that has not ended yet."""
+    if attempts[uid].exit_status is not None:
+        raise ValueError("its attempt has ended before")
+    return attempts[uid]
+
+
 def _frame_name(name: str) -> str:
     """Return `name` if it names a frame within the run folder."""
     if not _FRAME_NAME.fullmatch(name):
@@ -276,8 +310,6 @@ def _frame_name(name: str) -> str:
 
 
 def _open_attempt(doc: dict[str, Any]) -> Attempt:
-    if not isinstance(doc["unit"], str) or not isinstance(doc.get("devices", {}), dict):
-        raise TypeError("'unit' or 'devices' is of another kind")
     _seconds(doc["time"])
     return Attempt(uid=doc["uid"], unit=doc["unit"], start=doc)
 
@@ -289,9 +321,7 @@ def _close_attempt(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
         "actions": len(attempt.actions),
         "temperatures": len(attempt.temperatures),
     }
-    for stream, number in dict(doc.get("num_events", {})).items():
-        if stream in counts and counts[stream] != number:
-            raise ValueError(f"it counts {number} {stream}, there are {counts[stream]}")
+    check_stop(doc, counts)
     return replace(attempt, exit_status=doc["exit_status"], reason=doc.get("reason", ""))
 
 

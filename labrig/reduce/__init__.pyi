@@ -46,6 +46,9 @@ from .hot_pixels import (
     hot_pixels as hot_pixels,
     hot_pixels_of as hot_pixels_of,
 )
+from .kept_exif import (
+    frames_exif as frames_exif,
+)
 from .measured_frames import (
     SeriesFrame as SeriesFrame,
     measure_region as measure_region,
@@ -65,6 +68,7 @@ from .pictures import (
     small as small,
 )
 from .raw import (
+    Exif as Exif,
     RawFrame as RawFrame,
     read_exif as read_exif,
     read_raw as read_raw,

@@ -1,8 +1,9 @@
 """Reductions of the frames of a run, kept in the run folder for the next time.
 
 Each reduction, with its arguments, has a file of its own in the folder `cache`. A file that is
-damaged counts as missing; all of them may be deleted without loss. Files that other code made, such
-as an older labrig, are deleted when the reduction is kept anew.
+damaged, or that another user or another PC wrote, counts as missing; all of them may be deleted
+without loss. Files that other code made, such as an older labrig, are deleted when the reduction is
+kept anew.
 """
 
 import json
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from labrig.errors import DiskError
-from labrig.record import CACHE, write_durably
+from labrig.record import CACHE, own_digest, write_durably
 from labrig.reduce.codec import encoded
 
 #: Frames after which what is new is written, so that little is lost if the process is killed.
@@ -63,7 +64,7 @@ class KeptReductions:
         if not self._new:
             return
         content = "".join(f"{key} {text}\n" for key, text in self._texts.items())
-        head = f"{self._identity} {_checksum(content)}\n"
+        head = f"{self._identity} {own_digest(content.encode())}\n"
         with suppress(OSError, DiskError):
             self._path.parent.mkdir(exist_ok=True)
             write_durably(self._path, (head + content).encode())
@@ -78,7 +79,7 @@ class KeptReductions:
             head, _, content = self._path.read_text(encoding="utf-8").partition("\n")
         except (OSError, ValueError):
             return {}
-        if head != f"{self._identity} {_checksum(content)}":
+        if head != f"{self._identity} {own_digest(content.encode())}":
             return {}
         pairs = (line.partition(" ") for line in content.splitlines())
         return {key: text for key, _, text in pairs}

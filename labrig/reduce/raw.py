@@ -9,9 +9,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -78,6 +79,11 @@ class Exif:
         Name and focal length of the lens, as far as the camera records them.
     dng
         Whether the file declares itself a DNG.
+    time_s
+        Begin of the exposure by the camera's own clock, in seconds since 1970 in whatever zone the
+        clock is set to.
+    time_step_s
+        Step of that clock in seconds.
     """
 
     exposure_s: float | None = None
@@ -87,10 +93,14 @@ class Exif:
     model: str | None = None
     lens: str | None = None
     dng: bool = False
+    time_s: float | None = None
+    time_step_s: float = 1.0
 
 
 #: Value of EXIF 2.3 for an ISO above 65534, which is in another tag.
 _ISO_OVERFLOW = 65535
+#: Most digits of a fraction of a second.
+_MOST_SUBSECOND_DIGITS = 9
 #: Names that exifread gives the tag of DNG files: by its number, or by its name.
 _DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
 
@@ -99,15 +109,15 @@ _DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
 logging.getLogger("exifread").setLevel(logging.CRITICAL)
 
 
-def read_exif(content: bytes) -> Exif:
+def read_exif(source: bytes | BinaryIO) -> Exif:
     """Read the EXIF of a RAW file.
 
     Damaged EXIF counts as missing: the picture can be reduced without it.
 
     Parameters
     ----------
-    content
-        The bytes of the RAW file.
+    source
+        The bytes of the RAW file, or the file, of which only what is needed is read.
 
     Returns
     -------
@@ -125,9 +135,11 @@ def read_exif(content: bytes) -> Exif:
     import exifread  # with its maker-note tables, only when a RAW file is read
 
     try:
-        tags: dict[str, Any] = exifread.process_file(io.BytesIO(content), details=False)
+        file = io.BytesIO(source) if isinstance(source, bytes) else source
+        tags: dict[str, Any] = exifread.process_file(file, details=False)
     except Exception:  # a damaged file can fail anywhere in exifread, with any exception
         return Exif()
+    time_s, time_step_s = _time(tags)
     speeds = (_positive(tags, name) for name in ("ISOSpeedRatings", "RecommendedExposureIndex"))
     return Exif(
         exposure_s=_positive(tags, "ExposureTime"),
@@ -137,6 +149,8 @@ def read_exif(content: bytes) -> Exif:
         model=_text(tags, "Image Model"),
         lens=_lens(tags),
         dng=any(name in tags for name in _DNG_VERSION),
+        time_s=time_s,
+        time_step_s=time_step_s,
     )
 
 
@@ -158,6 +172,19 @@ def _lens(tags: dict[str, Any]) -> str | None:
     focal_mm = _positive(tags, "FocalLength")
     parts = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
     return ", ".join(filter(None, parts)) or None
+
+
+def _time(tags: dict[str, Any]) -> tuple[float | None, float]:
+    """Return the begin of the exposure by the camera's clock, and the step of that clock, in s."""
+    text = _text(tags, "EXIF DateTimeOriginal") or ""
+    digits = _text(tags, "EXIF SubSecTimeOriginal") or ""
+    try:
+        time = datetime.strptime(text, "%Y:%m:%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
+    except (ValueError, OverflowError):
+        return None, 1.0
+    if not (digits.isascii() and digits.isdigit() and len(digits) <= _MOST_SUBSECOND_DIGITS):
+        return time, 1.0
+    return time + int(digits) / 10 ** len(digits), 10.0 ** -len(digits)
 
 
 def _text(tags: dict[str, Any], name: str) -> str | None:

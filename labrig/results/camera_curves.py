@@ -10,6 +10,7 @@ from labrig.optics import CHART_PATCHES, CURVES_FILE, CameraResponse
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_text
+from labrig.text_table import table_text
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,6 +93,6 @@ class CameraCurvesResult(RunResult):
         """Write `curves.csv`, which a rig file names under `optics: camera`."""
         head = ["wavelength_nm", *self.channels, *(f"{name}_sigma" for name in self.channels)]
         rows = np.column_stack([self.wavelength_nm, self.sensitivity, self.sigma])
-        lines = [f"#Camera: {self.camera}", ",".join(head)]
-        lines += [",".join(f"{number:.6g}" for number in row) for row in rows]
-        write_text(folder / CURVES_FILE, "\n".join(lines) + "\n")
+        cells = ([f"{number:.6g}" for number in row] for row in rows)
+        title = " ".join(f"#Camera: {self.camera}".split())
+        write_text(folder / CURVES_FILE, table_text(head, cells, [title]))

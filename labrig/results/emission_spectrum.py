@@ -1,6 +1,5 @@
 """The emission spectrum Λ* of a sample, whether it changes, and its file `emission.yaml`."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from labrig.optics import band_means, edges_from_centres
 from labrig.results.budget import Budget, named
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
+from labrig.results.text_files import write_csv
 from labrig.yaml_file import read_model, write_yaml
 
 #: Grid of wavelengths in nm, from section 4.7 of the paper (Nalbach et al.).
@@ -154,12 +154,9 @@ class EmissionSpectrum(BaseModel):
 
     def write_csv(self, path: Path) -> None:
         """Write the columns of the grid as a table."""
-        with path.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file, lineterminator="\n")
-            table.writerow(["wavelength_nm", "value", "sigma", "low", "high"])
-            columns = (self.wavelength_nm, self.value, self.sigma, self.low, self.high)
-            for row in zip(*columns, strict=True):
-                table.writerow([f"{number:.6g}" for number in row])
+        columns = (self.wavelength_nm, self.value, self.sigma, self.low, self.high)
+        rows = ([f"{number:.6g}" for number in row] for row in zip(*columns, strict=True))
+        write_csv(path, ["wavelength_nm", "value", "sigma", "low", "high"], rows)
 
 
 def read_emission_spectrum(path: Path) -> EmissionSpectrum:

@@ -28,6 +28,7 @@ from labrig.text_table import (
     EXPECTED,
     Block,
     exact_number,
+    plain_text,
     read_blocks,
     read_table_text,
 )
@@ -266,7 +267,7 @@ def _own_table(text: str) -> Block | None:
     head, _, body = text.replace("\r\n", "\n").partition("\n")
     if not head.startswith(f"{TIME},{EXPOSURE},"):
         return None
-    names = tuple(_cells(head, 1))
+    names = tuple(map(plain_text, _cells(head, 1)))
     if names[:2] != (TIME, EXPOSURE) or names[-len(RESERVED) :] != RESERVED:
         return None
     lines = [(number, line) for number, line in enumerate(body.split("\n"), start=2) if line]
@@ -352,7 +353,7 @@ def _series(table: Block, columns: Columns, t_s: FloatArray, clock: TableClock) 
 
     def texts(name: str) -> tuple[str, ...]:
         column = columns.reserved.get(name)
-        return tuple("" if column is None else row[column] for row in table.rows)
+        return tuple("" if column is None else plain_text(row[column]) for row in table.rows)
 
     channels = columns.channels
     pairs = [

@@ -1,7 +1,5 @@
 """Writers of results as text files."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -33,11 +31,10 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
     DiskError
         The file cannot be written.
     """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(head)
-    table.writerows(rows)
-    write_text(path, text.getvalue())
+    # Not above: it loads NumPy, and who lists runs needs none.
+    from labrig.text_table import table_text
+
+    write_text(path, table_text(head, rows))
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

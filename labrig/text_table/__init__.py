@@ -9,6 +9,7 @@ from labrig.text_table.encoding import read_table_text
 from labrig.text_table.header import is_axis_line
 from labrig.text_table.numbers import DECIMAL_MARKS, exact_number, is_clock, parse_number
 from labrig.text_table.style import SEPARATORS, Line, Style
+from labrig.text_table.written_table import cell_text, plain_text, table_text
 
 __all__ = [
     "DECIMAL_MARKS",
@@ -17,10 +18,13 @@ __all__ = [
     "Block",
     "Line",
     "Style",
+    "cell_text",
     "exact_number",
     "is_axis_line",
     "is_clock",
     "parse_number",
+    "plain_text",
     "read_blocks",
     "read_table_text",
+    "table_text",
 ]

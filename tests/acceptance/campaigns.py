@@ -225,6 +225,7 @@ CAMPAIGNS = {
         ),
         _module("disk_failures", "--every", "3"),
         _module("mutated_files", "--cases", "10000"),
+        _module("edited_journals"),
         _module("ptp_fuzz", "--cases", "10000", "--seed", "4"),
         _module("two_labrigs", "--trials", "40"),
         _module("suspended", "--trials", "20"),

@@ -294,6 +294,23 @@ def refused(printed: str) -> str:
     return f"{wrong} wrong; longest refusal {max(longest_s):.1f} s"
 
 
+def edited_beside_a_seal(printed: str) -> str:
+    refused, named, same, silent = _edits(printed, "line alone|chain anew|seal removed")
+    return f"{refused + named:.0f} of {refused + named + same + silent:.0f}"
+
+
+def edited_without_a_seal(printed: str) -> str:
+    refused, named, same, silent = _edits(printed, "result removed")
+    return (
+        f"{refused + named:.0f} of {refused + named + same + silent:.0f} refused or named, "
+        f"{same:.0f} without an effect"
+    )
+
+
+def _edits(printed: str, ways: str) -> tuple[float, ...]:
+    return tuple(map(sum, columns(rf"^(?:{ways}) +(\d+) +(\d+) +(\d+) +(\d+)$", printed)))
+
+
 def containers(printed: str) -> str:
     cases, failures = columns(r"^.+? +(\d+) cases, (\d+) failures", printed)
     return f"{sum(failures):.0f} failures in {sum(cases):.0f} containers, {len(cases)} ways"

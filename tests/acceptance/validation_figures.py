@@ -415,6 +415,17 @@ FIGURES = (
         figure.refused,
     ),
     Figure(
+        "Edited journals: every field of every kind of line, and lines removed, doubled, moved; as "
+        "they are, chained anew, and without the seal. Edits that were refused or named",
+        "edited_journals",
+        figure.edited_beside_a_seal,
+    ),
+    Figure(
+        "The same by a forger who removes seal and result, too: what RAW files and documents tell",
+        "edited_journals",
+        figure.edited_without_a_seal,
+    ),
+    Figure(
         "Damaged PTP containers over USB and network, 10 000 each way: no hang, no traceback",
         "ptp_fuzz",
         figure.containers,

@@ -12,7 +12,7 @@ from tests.conftest import Ended
 Labrig = Callable[..., Ended]
 #: Names below a run folder that labrig reads or writes, and some that it does not know.
 NAMES = [
-    "cache", "cache/checked_frames.json", ".lock", ".holder", ".process.lock", ".process.holder",
+    "cache", "cache/checked_frames.txt", ".lock", ".holder", ".process.lock", ".process.holder",
     "journal.jsonl.part", "journal.jsonl", "log.txt", "frames", "frames/000099.dng", "notes.md",
     "result", "result.part", "result/figures", "result/figures/figures.pdf", "result/report.html",
     "result/later", "rig.yaml", "made.txt", "calibrations.yaml", "comparison", "a name of theirs",

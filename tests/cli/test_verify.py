@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from labrig.record import read_run
+from labrig.record import own_digest, read_run
 from tests.conftest import Ended
 from tests.resealed import reseal
 
@@ -51,10 +51,11 @@ def test_a_changed_frame_is_named_though_it_looks_untouched(labrig: Labrig, fini
     frame = read_run(finished).frames("decay")[0].path
     content = frame.read_bytes()
     frame.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
-    checked = finished / "cache" / "checked_frames.json"
-    states, status = json.loads(checked.read_text()), frame.stat()
+    checked = finished / "cache" / "checked_frames.txt"
+    states, status = json.loads(checked.read_text().partition("\n")[2]), frame.stat()
     states[frame.name][:2] = [status.st_size, status.st_mtime_ns]
-    checked.write_text(json.dumps(states))
+    text = json.dumps(states)
+    checked.write_text(f"{own_digest(text.encode())}\n{text}")
     ended = labrig("verify", finished)
     assert ended.code == 4
     assert frame.name in ended.err

@@ -1,12 +1,14 @@
 """Frames against the checksums of the journal, read anew only if their files were touched."""
 
+import json
 import os
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
 
-from labrig.record import FrameRecord, damaged_frames
+from labrig.record import FrameRecord, damaged_frames, own_digest
 
 CONTENT = b"what the camera delivered"
 
@@ -48,6 +50,35 @@ def test_a_file_with_another_time_or_size_is_read(frame: FrameRecord, tmp_path: 
     assert "checksum" in damaged_frames(tmp_path, [frame])[frame]
     frame.path.unlink()
     assert damaged_frames(tmp_path, [frame]) == {frame: "is missing"}
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.binary(max_size=60)
+    | st.recursive(
+        st.none() | st.integers() | st.text(max_size=3),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
+    ).map(lambda content: json.dumps({"000001.cr2": content}).encode())
+)
+def test_no_malformed_list_is_a_fault_or_trusted(
+    frame: FrameRecord, tmp_path: Path, content: bytes
+) -> None:
+    frame.path.write_bytes(CONTENT)
+    damaged_frames(tmp_path, [frame])
+    change_unseen(frame)
+    (file,) = (tmp_path / "cache").iterdir()
+    for digest in (own_digest(content), sha256(content).hexdigest(), ""):
+        file.write_bytes(digest.encode() + b"\n" + content)
+        assert frame in damaged_frames(tmp_path, [frame])
+
+
+def test_a_list_that_somebody_else_wrote_trusts_nothing(frame: FrameRecord, tmp_path: Path) -> None:
+    damaged_frames(tmp_path, [frame])
+    change_unseen(frame)
+    (file,) = (tmp_path / "cache").iterdir()
+    text = file.read_bytes().partition(b"\n")[2]
+    file.write_bytes(sha256(text).hexdigest().encode() + b"\n" + text)
+    assert frame in damaged_frames(tmp_path, [frame])
 
 
 @pytest.mark.parametrize("content", ["", "[1]", "{", '{"000001.cr2": null}', "\xff"])

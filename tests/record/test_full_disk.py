@@ -37,7 +37,7 @@ class SmallDisk:
 def photograph(writer: AttemptWriter, data: bytes) -> None:
     writer.frame(
         data, ".dng", role="decay", exposure_s=1.0, iso=400, f_number=4.0,
-        start_time=STARTED, end_time=STARTED + 1, late_s=0.0,
+        start_time=STARTED - 1, end_time=STARTED, late_s=0.0,
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from labrig.errors import DataError, FrameError, UsageError
+from labrig.record import own_digest
 from labrig.reduce import RawFrame, Reduction, SeriesFrame, reduce_frames, reduce_groups
 from labrig.reduce.codec import decoded, encoded
 from labrig.reduce.decoding import reduced_text
@@ -212,11 +213,11 @@ def test_what_one_failed_frame_leaves_is_kept(run: Sequence[SeriesFrame]) -> Non
 
 
 def forged(intact: bytes) -> bytes:
-    """The file with its last value replaced by none, under a checksum that fits."""
+    """The file with its last value replaced by none, under a digest that fits."""
     head, _, content = intact.decode().partition("\n")
     *others, last = content.splitlines(keepends=True)
     content = "".join([*others, f"{last.split(' ')[0]}\n"])
-    return f"{head.rpartition(' ')[0]} {sha256(content.encode()).hexdigest()}\n{content}".encode()
+    return f"{head.rpartition(' ')[0]} {own_digest(content.encode())}\n{content}".encode()
 
 
 @pytest.mark.parametrize("damage", ["cut off", "one byte", "no text", "empty", "forged"])
@@ -236,6 +237,27 @@ def test_a_damaged_file_is_made_again(run: Sequence[SeriesFrame], damage: str) -
     )
     assert reduce_frames(run, MeanLevel()) == first
     assert file.read_bytes() == intact
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    content=st.binary(max_size=80) | st.text(max_size=40).map(str.encode),
+    key=st.sampled_from(["of a frame", "none"]),
+    digest=st.sampled_from([own_digest, lambda content: sha256(content).hexdigest()]),
+)
+def test_no_malformed_file_is_a_fault_and_none_of_anybody_counts(
+    run: Sequence[SeriesFrame], content: bytes, key: str, digest: Callable[[bytes], str]
+) -> None:
+    first = reduce_frames(run, MeanLevel())
+    (file,) = kept_files(run)
+    identity = file.read_bytes().partition(b"\n")[0].rpartition(b" ")[0]
+    name = run[0].sha256.encode() if key == "of a frame" else b"x"
+    lines = name + b" " + content + b"\n"
+    file.write_bytes(identity + b" " + digest(lines).encode() + b"\n" + lines)
+    again = reduce_frames(run, MeanLevel())
+    assert again == first or digest is own_digest
+    file.write_bytes(content)
+    assert reduce_frames(run, MeanLevel()) == first
 
 
 def test_what_other_code_kept_is_deleted(run: Sequence[SeriesFrame]) -> None:

@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,7 +28,14 @@ from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import thumbnail
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import UsageError
-from labrig.record import UNDONE, ActionRecord, RunFolder, read_run, sealed_line
+from labrig.record import (
+    UNDONE,
+    ActionRecord,
+    RunFolder,
+    read_journal,
+    read_run,
+    sealed_line,
+)
 from labrig.watch.previews import Previews
 from labrig.watch.run_follower import RunFollower, State
 from labrig.watch.server import UpdateFeed, WatchServer, watch_run
@@ -390,6 +398,12 @@ class Written:
         self.frames = self.of_decays = 0
         self._in_unit = self.FRAMES_EACH
         self._unit = self._seal = ""
+        self._events = Counter[str]()
+        self._descriptors = {
+            doc["name"]: {key: value for key, value in doc.items() if key != "time"}
+            for kind, doc in read_journal(finished / "journal.jsonl").documents
+            if kind == "descriptor"
+        }
 
     def _append(self, kind: str, /, **doc: object) -> None:
         self._time += 1.0
@@ -399,21 +413,28 @@ class Written:
         self._seal = sha256(line[:-1]).hexdigest()
 
     def _event(self, stream: str, **data: object) -> None:
-        self._append("event", descriptor=f"{self._unit} {stream}", data=data)
+        self._events[stream] += 1
+        stamps = dict.fromkeys(data, self._time + 1.0)
+        number, descriptor = self._events[stream], f"{self._unit} {stream}"
+        self._append(
+            "event", descriptor=descriptor, data=data, timestamps=stamps, seq_num=number, filled={}
+        )
 
     def _happens(self) -> dict[str, float]:
         return {"start_time": self._time, "end_time": self._time, "late_s": 0.0}
 
     def _next_unit(self) -> None:
         if self._unit:
-            self._append("stop", run_start=self._unit, exit_status="success")
+            self._append(
+                "stop", uid="", run_start=self._unit, exit_status="success", num_events=self._events
+            )
         self._unit, self._in_unit = next(self._units), 0
         self._append("start", uid=self._unit, unit=self._unit)
+        self._events = Counter[str]()
         for stream in ("actions", "frames"):
-            self._append(
-                "descriptor", uid=f"{self._unit} {stream}", run_start=self._unit, name=stream
-            )
-        self._event("actions", device="lamp", action="off", **self._happens())
+            mine = {"uid": f"{self._unit} {stream}", "run_start": self._unit}
+            self._append("descriptor", **self._descriptors[stream] | mine)
+        self._event("actions", device="lamp", action="off", task="", **self._happens())
 
     def shoot(self, role: str = "decay") -> None:
         """One frame more."""
@@ -424,7 +445,7 @@ class Written:
         name = f"frames/{self.frames:06d}.dng"
         (self.path / name).hardlink_to(self._frame)
         settings = {"exposure_s": 1.0, "iso": 100, "f_number": 4.0, "role": role}
-        kept = {"frame": name, "sha256": "", "size_bytes": 1}
+        kept = {"frame": name, "sha256": "", "size_bytes": 1, "disk_s": 0.0}
         self._event("frames", **kept, **settings, **self._happens())
 
 

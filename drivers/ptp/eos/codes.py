@@ -94,6 +94,21 @@ def shutter_code(exposure_s: float, among: Iterable[int]) -> int | None:
     return None if nearest is None or off_stops[nearest] > SAME_SHUTTER_STOPS else nearest
 
 
+def labelled_times_s(label_s: float) -> tuple[float, ...]:
+    """Return the actual times in seconds of a dial's label, in thirds and in halves of a stop.
+
+    Labels of halves are as much as a quarter of a stop off: 10 is 11.3 s, 0.3 is 0.35 s. A label
+    beyond the dial is of an exposure at bulb, which has no actual time of its own.
+    """
+    longest_s = shutter_time_s(LONGEST_TV)
+    assert longest_s is not None
+    if label_s > longest_s * 2 ** (1 / 6):
+        return ()
+    return tuple(
+        2.0 ** float(Fraction(round(math.log2(label_s) * steps), steps)) for steps in (3, 2)
+    )
+
+
 def aperture_code(f_number: float, among: Iterable[int]) -> int | None:
     """Return the Av code in `among` whose label is `f_number`."""
     for code in among:

@@ -204,6 +204,19 @@ class StandardExposure:
             )
 
 
+def labelled_times_s(label_s: float) -> tuple[float, ...]:
+    """Return the times in seconds that cameras tell of a dial's label, by the way of counting.
+
+    It is the nominal time, cut off or rounded to 0.1 ms, or the actual one in thirds of a stop.
+    """
+    actual_s = 2.0 ** (round(math.log2(label_s) * 3) / 3)
+    units = (
+        math.floor(label_s * UNITS_PER_S),
+        *(round(t * UNITS_PER_S) for t in (label_s, actual_s)),
+    )
+    return tuple(each / UNITS_PER_S for each in units)
+
+
 def _f_number(units: int) -> float | None:
     """Return the f-number; None where the lens reports none."""
     return units / F_NUMBER_UNITS if 0 < units < 0xFFFF else None

@@ -29,6 +29,7 @@ from labrig.material.reradiation.formats.text_rows import (
 )
 from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix, are_same_bands
 from labrig.optics import edges_from_centres
+from labrig.text_table import cell_text, plain_text
 
 PER_BAND = "per band"
 _UNITS = (PER_BAND, "1/nm", "relative")
@@ -75,7 +76,7 @@ def parse_csv(text: str) -> ReradiationMatrix:
     sigmas = _table(blocks["sigma"], False) if blocks["sigma"] else None
     if sigmas is not None:
         _check_same_columns(values, sigmas)
-    matrix = _matrix(one_line(said["name"]), unit, values, sigmas)
+    matrix = _matrix(one_line(plain_text(said["name"])), unit, values, sigmas)
     return replace(matrix, column_correlation=_correlation(said["correlation"], values.input_nm))
 
 
@@ -194,7 +195,7 @@ def csv_text(matrix: ReradiationMatrix) -> str:
     """Return the table of a matrix, with its standard deviations where they are known."""
     check_wavelengths(matrix.input_nm)
     check_wavelengths(matrix.output_nm)
-    lines = [f"# name: {one_line(matrix.name)}", f"# unit: {matrix.unit}"]
+    lines = [f"# name: {cell_text(one_line(matrix.name))}", f"# unit: {matrix.unit}"]
     lines += _table_lines(matrix, matrix.reflectance, matrix.reradiation)
     if matrix.reflectance_sigma is not None or matrix.reradiation_sigma is not None:
         lines += ["# sigma"]

@@ -1,0 +1,88 @@
+"""`labrig key`: the key of this laboratory, and public keys of others."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labrig.errors import DiskError, UsageError
+
+if TYPE_CHECKING:
+    from labrig.seal import LabKey, Signers
+
+app = typer.Typer(help="The key by which this laboratory seals runs, and keys of others.")
+
+
+@app.command("new")
+def new(
+    name: Annotated[str, typer.Argument(help="Name of the laboratory, as others are to read it.")],
+) -> None:
+    """Make the key of this laboratory and print its public half.
+
+    The private half is in this user's own settings, with mode 600 and without a passphrase: keep a
+    copy of it where nobody else reads. Publish the other half, on the laboratory's page or in a
+    paper, so that others can check your seals.
+    """
+    from labrig.seal import create_key
+
+    path = key_file()
+    _print(create_key(path, name), path)
+
+
+@app.command("show")
+def show() -> None:
+    """Print the public key of this laboratory with its fingerprint."""
+    from labrig.seal import read_key
+
+    path = key_file()
+    if not path.exists():
+        raise UsageError(f"{path}: there is no key yet; make one: labrig key new 'NAME OF THE LAB'")
+    _print(read_key(path), path)
+
+
+@app.command("trust")
+def trust(
+    file: Annotated[Path, typer.Argument(help="Public keys, or OpenSSH's allowed signers.")],
+) -> None:
+    """Accept the laboratories in a file of public keys by their names from now on.
+
+    Compare the fingerprints with those that a laboratory itself has published.
+    """
+    from labrig.record import write_durably
+    from labrig.seal import Signers, read_signers
+
+    new_signers, trusted = read_signers(file), _trusted_file()
+    before = read_signers(trusted) if trusted.exists() else Signers()
+    try:
+        trusted.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiskError(f"{trusted.parent}: cannot be made ({error.strerror})") from None
+    write_durably(trusted, (before | new_signers).text().encode())
+    for key, name in new_signers.names.items():
+        typer.echo(f"{name} ({key.fingerprint})")
+
+
+def key_file() -> Path:
+    """Return the file of this laboratory's private key in the folder of this user's settings."""
+    return Path(typer.get_app_dir("labrig")) / "seal_key"
+
+
+def trusted_signers() -> "Signers":
+    """Return the laboratories whose keys were trusted, and this one."""
+    from labrig.seal import PUBLIC, Signers, read_signers
+
+    own = key_file().with_name(key_file().name + PUBLIC)
+    signers = Signers()
+    for file in (_trusted_file(), own):
+        if file.exists():
+            signers = signers | read_signers(file)
+    return signers
+
+
+def _trusted_file() -> Path:
+    return Path(typer.get_app_dir("labrig")) / "trusted_keys"
+
+
+def _print(key: "LabKey", path: Path) -> None:
+    typer.echo(key.public_line)
+    typer.echo(f"{key.name} ({key.public.fingerprint}); private key: {path}", err=True)

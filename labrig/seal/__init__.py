@@ -1,0 +1,8 @@
+"""Seals of runs: a list of a run's files, signed by a laboratory's key in OpenSSH's formats.
+
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,27 @@
+from .file_list import (
+    FileList as FileList,
+    list_files as list_files,
+)
+from .lab_key import (
+    PUBLIC as PUBLIC,
+    LabKey as LabKey,
+    create_key as create_key,
+    read_key as read_key,
+)
+from .run_seal import (
+    SEAL as SEAL,
+    SIGNATURE as SIGNATURE,
+    RunSeal as RunSeal,
+    read_seal as read_seal,
+    write_seal as write_seal,
+)
+from .signature import (
+    NAMESPACE as NAMESPACE,
+    PublicKey as PublicKey,
+    signature_text as signature_text,
+    signer_of as signer_of,
+)
+from .signers import (
+    Signers as Signers,
+    read_signers as read_signers,
+)

@@ -1,0 +1,179 @@
+"""The key of a laboratory: created once, in this user's own folder, readable by nobody else."""
+
+import os
+import stat
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    NoEncryption,
+    PrivateFormat,
+    load_ssh_private_key,
+)
+
+from labrig.errors import DiskError, UsageError
+from labrig.input_file import open_regular, read_text
+from labrig.seal.signature import ED25519, PublicKey
+
+#: Ending of the file with the public key, beside that of the private one.
+PUBLIC = ".pub"
+_MOST_BYTES = 100_000
+#: Permissions of owners of a file alone.
+_OWN_FILE, _OWN_FOLDER = 0o600, 0o700
+#: Longest name of a laboratory.
+_LONGEST_NAME = 80
+
+
+@dataclass(frozen=True)
+class LabKey:
+    """A private key with the name of the laboratory whose it is.
+
+    Attributes
+    ----------
+    name
+        Name of the laboratory.
+    private
+        Key that signs; it is not printed.
+    """
+
+    name: str
+    private: Ed25519PrivateKey = field(repr=False)
+
+    @property
+    def public(self) -> PublicKey:
+        """The key by which others check signatures."""
+        return PublicKey.of(self.private.public_key())
+
+    @property
+    def public_line(self) -> str:
+        """Content of the file with the public key, in one line with the name."""
+        return f"{self.public.line} {self.name}"
+
+
+def create_key(path: Path, name: str) -> LabKey:
+    """Create a key, and write it so that this user alone can read it.
+
+    Parameters
+    ----------
+    path
+        File of the private key; the public one is written beside it, with the ending `.pub`.
+    name
+        Name of the laboratory, in one line of at most 80 characters.
+
+    Returns
+    -------
+    LabKey
+        The new key.
+
+    Raises
+    ------
+    UsageError
+        There is a key already, or the name is none.
+    DiskError
+        The files cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.seal import create_key
+    >>> key = create_key(Path("settings/seal_key"), "Optics lab, Example University")
+    >>> key.public_line.split()[0], key.public_line.split()[2:]
+    ('ssh-ed25519', ['Optics', 'lab,', 'Example', 'University'])
+    """
+    name = " ".join(name.split())
+    if not name or not name.isprintable() or len(name) > _LONGEST_NAME:
+        raise UsageError(
+            f"expected the name of a laboratory in at most {_LONGEST_NAME} characters, got {name!r}"
+        )
+    key = LabKey(name, Ed25519PrivateKey.generate())
+    content = key.private.private_bytes(Encoding.PEM, PrivateFormat.OpenSSH, NoEncryption())
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=_OWN_FOLDER)
+        _write_new(path, content, _OWN_FILE)
+    except FileExistsError:
+        raise UsageError(
+            f"{path}: there is a key already; signatures by it are checked by its public key "
+            "(labrig key show). Move it away to make another one"
+        ) from None
+    except OSError as error:
+        raise DiskError(f"{path}: the key cannot be written ({error.strerror})") from None
+    public = path.with_name(path.name + PUBLIC)
+    try:
+        public.unlink(missing_ok=True)
+        _write_new(public, f"{key.public_line}\n".encode(), 0o644)
+    except OSError as error:
+        with suppress(OSError):
+            path.unlink()
+        raise DiskError(f"{public}: the key cannot be written ({error.strerror})") from None
+    return key
+
+
+def read_key(path: Path) -> LabKey:
+    """Read a private key of the kind Ed25519, as labrig or `ssh-keygen` writes it.
+
+    Parameters
+    ----------
+    path
+        File of the private key; the name is that of the public key beside it.
+
+    Returns
+    -------
+    LabKey
+        The key, named `unnamed` if there is no public key beside it.
+
+    Raises
+    ------
+    UsageError
+        There is no such key, others can read it, it has a passphrase, or it is of another kind.
+    DiskError
+        The disk does not give it back.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.seal import create_key, read_key
+    >>> created = create_key(Path("settings/lab"), "Example lab")
+    >>> read_key(Path("settings/lab")).public == created.public
+    True
+    """
+    with open_regular(path) as file:
+        mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
+        content = file.read(_MOST_BYTES)
+    if os.name != "nt" and mode & 0o077:
+        raise UsageError(
+            f"{path}: expected a key that nobody else can read, got one of mode {mode:o}; if "
+            f"nobody has copied it: chmod 600 {path}, else make another one"
+        )
+    try:
+        private = load_ssh_private_key(content, None)
+    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
+        raise UsageError(
+            f"{path}: expected a private key of OpenSSH without passphrase, got another file "
+            f"({error})"
+        ) from None
+    if not isinstance(private, Ed25519PrivateKey):
+        raise UsageError(f"{path}: expected a key of the kind {ED25519}, got another kind")
+    return LabKey(_name_beside(path), private)
+
+
+def _name_beside(path: Path) -> str:
+    """Return the name in the file with the public key."""
+    with suppress(UsageError):
+        words = read_text(path.with_name(path.name + PUBLIC), _MOST_BYTES).split(maxsplit=2)
+        name = " ".join(words[2].split()) if len(words) > 2 else ""
+        if name and name.isprintable():
+            return name[:_LONGEST_NAME]
+    return "unnamed"
+
+
+def _write_new(path: Path, content: bytes, mode: int) -> None:
+    """Write a file that does not exist yet, with its permissions from the beginning."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(path, flags, mode), "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
