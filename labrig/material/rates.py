@@ -30,12 +30,12 @@ def phi1(x: ArrayLike) -> FloatArray:
     Parameters
     ----------
     x
-        Arguments ≥ 0, of any shape.
+        Arguments of any shape; below −700 the mean overflows.
 
     Returns
     -------
     ndarray
-        Values in (0, 1] in the shape of `x`; 1 at 0.
+        Values above 0 in the shape of `x`; 1 at 0.
 
     Examples
     --------

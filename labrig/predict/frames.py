@@ -9,7 +9,12 @@ from labrig.fit import FloatArray
 from labrig.predict.camera import CameraFigures
 from labrig.predict.glow import Glow
 from labrig.predict.state_means import state_means
-from labrig.reduce import ROUNDING_VARIANCE, ChannelStats, FrameMeasurement
+from labrig.reduce import (
+    ChannelStats,
+    FrameMeasurement,
+    rounded_variance,
+    shared_rounding_variance,
+)
 from labrig.region import Region
 
 #: Standard deviations above the mean at which a normal variate has its 99.5 % quantile.
@@ -46,15 +51,31 @@ class ExpectedFrames:
         return self.exposure_s[:, np.newaxis] * self.camera.dark_dn_per_s
 
     @property
+    def pixel_variance(self) -> FloatArray:
+        """Variance of a pixel in DN², rounded as it is, shape (n, C)."""
+        return rounded_variance(self._unrounded_variance)
+
+    @property
+    def _electrons_variance(self) -> FloatArray:
+        return np.asarray((self.light_dn + self.dark_dn) / self.camera.electrons_per_dn)
+
+    @property
+    def _unrounded_variance(self) -> FloatArray:
+        return self._electrons_variance + self.camera.read_noise_dn**2
+
+    @property
     def photon_variance(self) -> FloatArray:
         """Variance of the mean by photon noise in DN², shape (n, C)."""
         return self.light_dn / self.camera.electrons_per_dn / self.pixels
 
     @property
     def read_variance(self) -> FloatArray:
-        """Variance of the mean by read noise in DN², shape (n, C)."""
-        pixel_variance = max(self.camera.read_noise_dn**2, ROUNDING_VARIANCE)
-        return np.broadcast_to(pixel_variance / self.pixels, self.light_dn.shape)
+        """Variance of the mean by read noise and rounding in DN², shape (n, C).
+
+        What noise does not dither is an error of all pixels alike, and does not average out.
+        """
+        own = self.pixel_variance - self._electrons_variance
+        return own / self.pixels + shared_rounding_variance(self._unrounded_variance)
 
     @property
     def dark_variance(self) -> FloatArray:
@@ -70,14 +91,14 @@ class ExpectedFrames:
     def saturated(self) -> FloatArray:
         """Fraction of the pixels that clip, shape (n, C)."""
         brightest = self.light_dn * self.camera.unevenness + self.dark_dn
-        deviation = np.sqrt(self.variance * self.pixels)
+        deviation = np.sqrt(self.pixel_variance)
         return np.asarray(ndtr((brightest - self.camera.range_dn) / deviation))
 
     def measurements(self) -> list[FrameMeasurement]:
         """Return each frame as `labrig.reduce.measure` would reduce it."""
         camera = self.camera
         mean = np.minimum(self.light_dn + self.dark_dn, camera.range_dn)
-        deviation = np.sqrt(self.variance * self.pixels)
+        deviation = np.sqrt(self.pixel_variance)
         peak = self.light_dn * camera.unevenness + self.dark_dn + PEAK_SIGMAS * deviation
         sigma, saturated = np.sqrt(self.variance), self.saturated * self.pixels
 

@@ -37,6 +37,11 @@ def budget_sections(result: RunResult) -> tuple[Section, ...]:
     return (Section(TITLE, tables=(Table(head, rows, CAPTION),)),)
 
 
+def budget_lines(result: RunResult) -> tuple[str, ...]:
+    """Return the budgets of a result as lines for the terminal, one a headline value."""
+    return tuple(f"budget of {name}: {budget}" for name, budget in result.budgets().items())
+
+
 def _cells(budget: Budget, causes: list[str]) -> tuple[str, ...]:
     """Return value, components and what is not included, a cell each."""
     parts = budget.components

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from labrig.plugins import REPORTS, load, names
 from labrig.report import any_result
-from labrig.report.budgets import budget_sections
+from labrig.report.budgets import budget_lines, budget_sections
 from labrig.report.sections import Rendered, Renderer, Source
 from labrig.results import RunResult
 
@@ -12,7 +12,7 @@ from labrig.results import RunResult
 def render(result: RunResult, source: Source) -> Rendered:
     """Render a result by the registered renderer of its protocol, or as plain tables without one.
 
-    The budgets of its headline values follow.
+    The budgets of its headline values follow, a line each for the terminal.
 
     Parameters
     ----------
@@ -54,4 +54,8 @@ def render(result: RunResult, source: Source) -> Rendered:
     if result.kind in names(REPORTS):
         show = load(REPORTS, result.kind, str(source.run.folder))
     rendered = show(result, source)
-    return replace(rendered, sections=(*rendered.sections, *budget_sections(result)))
+    return replace(
+        rendered,
+        sections=(*rendered.sections, *budget_sections(result)),
+        lines=(*rendered.lines, *budget_lines(result)),
+    )

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import BLANK_KIND, BlankFile
-from labrig.results.measured import BoolArray, FloatArray
+from labrig.results.budget import Budget
+from labrig.results.measured import BoolArray, FloatArray, Measured
 from labrig.results.run_result import RunResult
 
 
@@ -63,6 +64,23 @@ class BlankResult(RunResult):
 
     calibration: BlankFile
     stray_light: StrayLight
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the constant and of the ambient light in every channel."""
+        file = self.calibration
+        budgets = {}
+        for number, channel in enumerate(file.channels):
+            constant = Measured(
+                file.constant_dn_per_s[number], file.constant_sigma_dn_per_s[number], "DN/s"
+            )
+            leak = Measured(
+                file.ambient_dn_per_s[number], file.ambient_sigma_dn_per_s[number], "DN/s"
+            )
+            budgets[f"constant light, {channel}"] = Budget.of(constant)
+            budgets[f"light in the dark frames, {channel}"] = Budget.of(
+                leak, left_out=("light that all channels share",)
+            )
+        return budgets
 
     def provides(self) -> Mapping[str, Any]:
         """Return the calibration."""

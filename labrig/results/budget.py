@@ -8,6 +8,8 @@ from typing import Any, Self
 from labrig.number_format import digits_of_range, plus_minus, rounded
 from labrig.results.measured import Measured
 
+#: Wavelengths in nm near which a spectrum has headline values.
+HEADLINE_NM = (450.0, 550.0, 650.0)
 #: Name of noise and calibration where a result has their sum only.
 UNDIVIDED = "noise and calibration"
 

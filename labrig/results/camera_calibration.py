@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from labrig.calibration import CAMERA_KIND, CameraFile, Noise
 from labrig.optics import Flat
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
@@ -149,6 +150,23 @@ class CameraCalibrationResult(RunResult):
     photon_transfers: tuple[PhotonTransfer, ...]
     repeat_flicker: Measured
     flats: tuple[FittedFlat, ...]
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of gain and read noise of every ISO, and of the flicker.
+
+        A read noise that is only a limit has none.
+        """
+        budgets = {}
+        for noise in self.calibration.noise:
+            at = f"at ISO {noise.iso:g}"
+            gain = Measured(noise.gain_e_per_dn, noise.gain_e_per_dn_sigma, "e/DN")
+            budgets[f"gain {at}"] = Budget.of(gain, left_out=("light in the frame that moves",))
+            if not noise.read_noise_is_limit:
+                read = Measured(noise.read_noise_e, noise.read_noise_e_sigma, "e")
+                gain_part = read.value * gain.sigma / gain.value
+                budgets[f"read noise {at}"] = Budget.of(read, gain_part)
+        budgets["flicker of frames alike"] = Budget.of(self.repeat_flicker)
+        return budgets
 
     def provides(self) -> Mapping[str, Any]:
         """Return the calibration."""

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from labrig.calibration import FADE_KIND, FadeFile
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray, IntArray, Measured
 from labrig.results.run_result import RunResult
 
@@ -101,6 +104,20 @@ class LampChange:
     exponent: Measured
     lag: Measured
 
+    def exponent_budget(self) -> Budget:
+        """Return the budget of p: its noise by each shape, and the spread of the shapes."""
+        weight = np.array([shape.weight for shape in self.shapes])
+        value, variance = np.array(
+            [(shape.parameters[-2], shape.covariance[-2, -2]) for shape in self.shapes]
+        ).T
+        mean = float(weight @ value / weight.sum())
+        return Budget(
+            self.exponent.value,
+            noise=float(np.sqrt(weight @ variance / weight.sum())),
+            model=float(np.sqrt(weight @ (value - mean) ** 2 / weight.sum())),
+            model_of="the shape of the curve",
+        )
+
     @property
     def best(self) -> FittedShape:
         """Most probable shape."""
@@ -148,6 +165,21 @@ class FadeResult(RunResult):
     fade: LampChange
     rise: LampChange | None = None
     warming: WarmingLight | None = None
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the exponents of both transients and of the cold lamp's deficit."""
+        changes = {"fade": self.fade, "rise": self.rise}
+        budgets = {
+            f"exponent of the {name}": change.exponent_budget()
+            for name, change in changes.items()
+            if change is not None
+        }
+        if (warming := self.calibration.warming) is not None:
+            deficit = Measured(100 * warming.deficit, 100 * warming.deficit_sigma, "%")
+            budgets["light that the cold lamp lacks"] = Budget.of(
+                deficit, left_out=("a warm-up that is not one exponential",)
+            )
+        return budgets
 
     def provides(self) -> Mapping[str, Any]:
         """Return the calibration."""

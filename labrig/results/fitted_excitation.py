@@ -31,7 +31,8 @@ class ExcitedState:
     amplitude, amplitude_sigma
         Glow Λ* k_r of a fully charged sample in the brightest channel, in the unit of the values.
     k_e_per_s, k_e_sigma_per_s
-        Excitation rates in 1/s per unit of the first series' irradiance, shape (B,).
+        Excitation rates in 1/s per unit of the irradiance E, of the series that defines it, shape
+        (B,).
     kinetic_order, kinetic_order_sigma
         Kinetic order b; its σ is 0 where it is held.
     is_level_known

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import IRRADIANCE_KIND, IrradianceFile
+from labrig.results.budget import HEADLINE_NM, Budget
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 
@@ -90,6 +91,24 @@ class IrradianceResult(RunResult):
     centre_nm: FloatArray
     card_ratio: CardRatio
     scale: StripScale
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of the lamp's light over that of some places, or of every light."""
+        file = self.calibration
+        rows = range(len(file.lights))
+        if not file.lights:
+            rows = np.unique(
+                [np.argmin(np.abs(self.centre_nm - near_nm)) for near_nm in HEADLINE_NM]
+            ).tolist()
+        return {
+            f"light by the lamp itself over that at {self.centre_nm[row]:.0f} nm": Budget(
+                file.ratio[row],
+                noise=file.ratio[row] * file.scale_sigma,
+                calibration=file.ratio[row] * float(self.scale.relative_sigma[row]),
+                left_out=("fluorescence of the card",),
+            )
+            for row in rows
+        }
 
     def provides(self) -> Mapping[str, Any]:
         """Return the calibration."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from labrig.results.budget import Budget, named
 from labrig.results.measured import FloatArray, IntArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
@@ -102,6 +103,15 @@ class IsotropyResult(RunResult):
 
     patches: Mapping[str, AngularGlow]
     encloses_sample: bool
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budget of each patch's view that deviates most from the straight one."""
+        return {
+            named(name, f"glow at {glow.worst_angle_deg}° over that at 0°"): Budget.of(
+                glow.worst, left_out=("the angle's own error",)
+            )
+            for name, glow in self.patches.items()
+        }
 
     def write_files(self, folder: Path) -> None:
         """Write `isotropy.csv`."""

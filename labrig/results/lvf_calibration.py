@@ -9,6 +9,7 @@ import numpy as np
 
 from labrig.calibration import LVF_KIND, LvfFile
 from labrig.optics import CameraResponse, Strip
+from labrig.results.budget import Budget
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 
@@ -242,6 +243,22 @@ class LvfCalibrationResult(RunResult):
     def map_rms_nm(self) -> float:
         """Root mean square residual of the wavelength map in nm."""
         return float(np.sqrt(np.mean(self.map_residual_nm**2)))
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of centre and width of the bands at both ends and in the middle.
+
+        Their σ has noise, camera, lines and colour filters in it, and is enlarged by the misfit.
+        """
+        bands, sigma = self.calibration.bands, self.calibration.sigma
+        budgets = {}
+        last = len(self.calibration.position) - 1
+        for row in (0, last // 2, last):
+            at = f"at position {self.calibration.position[row]:.2f}"
+            for quantity, name in (("centre", "centre_nm"), ("width", "fwhm_nm")):
+                budgets[f"{quantity} of the band {at}"] = Budget(
+                    getattr(bands, name)[row], "nm", undivided=getattr(sigma, name)[row]
+                )
+        return budgets
 
     def provides(self) -> Mapping[str, Any]:
         """Return the calibrated filter."""

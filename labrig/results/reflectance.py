@@ -8,13 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import REFLECTANCE_KIND, PatchReflectance, ReflectanceFile
-from labrig.results.budget import Budget, named
+from labrig.results.budget import HEADLINE_NM, Budget, named
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
-
-#: Wavelengths in nm near which the albedo is a headline value.
-HEADLINE_NM = (450.0, 550.0, 650.0)
 
 
 @dataclass(frozen=True, eq=False)

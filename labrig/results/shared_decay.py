@@ -9,8 +9,17 @@ from labrig.material import exponential_means
 from labrig.number_format import aligned
 from labrig.results.decay_reference import DecayReference
 from labrig.results.fitted_decay import Candidate, DecayState
-from labrig.results.measured import FloatArray, Measured, with_uncertainty
+from labrig.results.measured import (
+    FloatArray,
+    Measured,
+    OneSided,
+    measured_number,
+    with_uncertainty,
+)
 from labrig.results.text_files import finite, json_text
+
+#: Amplitude in σ that is as good as 0, at which its bound holds it.
+AT_BOUND = 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,16 @@ class TableDecay:
     chi2: float
     dof: float
     residual_sigma: float | None
+
+    @property
+    def amplitudes(self) -> tuple[Measured, ...]:
+        """Amplitudes by falling rate; one-sided where the table has none of a state's light."""
+        return tuple(
+            OneSided.held(0.0, state.amplitude_sigma, 0.0)
+            if state.amplitude <= AT_BOUND * state.amplitude_sigma
+            else Measured(state.amplitude, state.amplitude_sigma)
+            for state in self.states
+        )
 
     def predict(self, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray:
         """Return the signal of exposures that begin at some times as fitted, offset included."""
@@ -95,7 +114,10 @@ class SharedDecay:
             "rates": [
                 {"k_r_per_s": rate.value, "k_r_sigma_per_s": rate.sigma} for rate in self.rates
             ],
-            "tables": [asdict(table) for table in self.tables],
+            "tables": [
+                asdict(table) | {"amplitudes": [measured_number(a) for a in table.amplitudes]}
+                for table in self.tables
+            ],
             "chi2": self.chi2,
             "dof": self.dof,
             "reduced_chi2": self.chi2 / self.dof,
@@ -115,7 +137,7 @@ class SharedDecay:
             rows.append(
                 [
                     table.name,
-                    *(with_uncertainty(s.amplitude, s.amplitude_sigma) for s in table.states),
+                    *map(str, table.amplitudes),
                     with_uncertainty(table.offset, table.offset_sigma)
                     if table.offset_sigma
                     else "0",

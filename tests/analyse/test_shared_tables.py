@@ -10,7 +10,7 @@ from labrig.analyse import TableFitOptions, fit_shared_tables
 from labrig.errors import FitError, UsageError
 from labrig.fit import DecayTable, fit_shared_rates
 from labrig.process import report_shared_decay
-from labrig.results import FloatArray
+from labrig.results import FloatArray, OneSided
 
 T_S = np.linspace(0, 60, 50)
 RATES = (0.3, 0.04)
@@ -85,3 +85,27 @@ def test_what_cannot_share_is_refused(paths: list[Path]) -> None:
     dark = DecayTable("dark", T_S, zero, zero - 1.0, zero + 1)
     with pytest.raises(FitError, match="dark: expected a signal that decays"):
         fit_shared_rates([dark, dark])
+
+
+def test_a_table_without_a_state_has_a_limit_of_its_amplitude() -> None:
+    t_s = np.linspace(0.0, 60.0, 120)
+    fast, slow = np.exp(-0.3 * t_s), np.exp(-0.04 * t_s)
+    covered, held = [], 0
+    for seed in range(7):
+        rng = np.random.default_rng([seed, 5])
+        tables = [
+            DecayTable(
+                *(name, t_s, np.zeros_like(t_s)),
+                *(light + 0.5 * rng.standard_normal(len(t_s)), np.full(len(t_s), 0.5)),
+            )
+            for name, light in (("both", 100 * fast + 50 * slow), ("slow", 60 * slow))
+        ]
+        (amplitude, _) = fit_shared_rates(tables, 2).tables[1].amplitudes
+        if isinstance(amplitude, OneSided):
+            held += 1
+            covered.append(amplitude.limit > 0)
+            assert str(amplitude).startswith("<")
+        else:
+            covered.append(abs(amplitude.value) < 3 * amplitude.sigma)
+    assert held >= 2
+    assert all(covered)

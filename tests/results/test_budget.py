@@ -7,14 +7,21 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from labrig import plugins
 from labrig.fit import fit_luminance
+from labrig.report.budgets import budget_lines
 from labrig.results import (
+    AngularGlow,
     Budget,
     DensityBasis,
+    FittedShape,
+    IsotropyResult,
+    LampChange,
     LayerEffect,
     LuminanceDecay,
     Measured,
     RunResult,
+    SwitchedFrames,
 )
 from tests.results.made_excitation import excitation_result
 
@@ -136,3 +143,47 @@ def test_a_result_file_has_the_budgets_and_is_read_without_them() -> None:
         if all(isinstance(part, float) for part in parts):
             assert entry["sigma"] == pytest.approx(math.hypot(*parts))
     assert type(result).from_dict(content).budgets().keys() == result.budgets().keys()
+
+
+CALIBRATIONS = (
+    *("blank", "camera_calibration", "fade"),
+    *("irradiance", "isotropy", "lvf_calibration"),
+)
+
+
+@pytest.mark.parametrize("kind", CALIBRATIONS)
+def test_every_calibration_has_budgets(kind: str) -> None:
+    result_type = plugins.load(plugins.RESULTS, kind, "")
+    assert result_type.budgets is not RunResult.budgets
+
+
+def test_the_view_that_deviates_most_has_a_budget_and_a_line_for_the_terminal() -> None:
+    glow = AngularGlow(
+        np.array([0, 30, 60]),
+        np.array([1.0, 0.97, 1.02]),
+        np.array([0.0, 0.01, 0.02]),
+        Measured(1.0, 0.001),
+    )
+    result = IsotropyResult(patches={"a": glow}, encloses_sample=False)
+    ((name, budget),) = result.budgets().items()
+    assert name.startswith("a: ")
+    assert (budget.value, budget.noise) == (0.97, 0.01)
+    (line,) = budget_lines(result)
+    assert name in line
+    assert budget.value_text in line
+
+
+def test_shapes_of_a_fade_that_differ_are_the_model_part_of_its_exponent() -> None:
+    frames = SwitchedFrames(
+        *(np.zeros(1), np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1)),
+        *(np.zeros(1, int), np.ones(1, int), 0),
+    )
+    shapes = tuple(
+        FittedShape(name, np.array([p, 0.0]), np.diag([0.03**2, 1.0]), 0.0, 1.0, 1, 0.5)
+        for name, p in (("filament", 0.9), ("polynomial", 1.1))
+    )
+    change = LampChange(frames, shapes, Measured(1.0, 0.1044), Measured(0.0, 1.0))
+    budget = change.exponent_budget()
+    assert budget.noise == pytest.approx(0.03)
+    assert budget.model == pytest.approx(0.1)
+    assert budget.sigma == pytest.approx(0.1044, rel=1e-3)

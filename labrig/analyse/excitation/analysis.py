@@ -21,6 +21,7 @@ from labrig.analyse.excitation.lamp_light import (
 from labrig.analyse.excitation.material import excited_material
 from labrig.analyse.excitation.orders import ChosenOrders, OrderFits
 from labrig.analyse.excitation.selected_light import course_warnings, with_doubt, within_bands
+from labrig.analyse.excitation.warmth import remembered_warmth, scatter_by_warmth
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.analyse.radiometric_scale import RadiometricScale, radiometric_scale
@@ -30,7 +31,7 @@ from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectan
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
-from labrig.fit.excitation import IntervalChoice, RelativeSigmas
+from labrig.fit.excitation import RelativeSigmas
 from labrig.record import FrameRole
 from labrig.results import (
     ChargingSeries,
@@ -43,10 +44,12 @@ from labrig.results import (
     PatchExcitation,
 )
 
-#: Function that fits all series of a patch, with the intervals asked for.
-Fitting = Callable[[Sequence[ChargingSeries], IntervalChoice], FittedExcitation]
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
+#: Numbers of the series, in the order of `_series`. The norm of k_e is the irradiance by the lamp
+#: itself, so that its charges, which the ratio to the light behind the filter does not enter,
+#: measure the level of all k_e.
+THROUGH, DIRECT = range(2)
 #: Fits after which the course of excitation within bands stays the same.
 COURSES = 2
 #: Fraction of the largest size of the light's errors from which a warning is given.
@@ -106,10 +109,12 @@ def _patch_excitation(
 ) -> tuple[PatchExcitation, Sequence[str]]:
     """Return the patch's excitation, and warnings."""
     decay = fit_series(charging.whole, _states(part, patch))
+    charging = remembered_warmth(charging, decay, warming.deficit, warming.time_constant_s)
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), MIN_DARK).tolist())
     relative_sigmas = RelativeSigmas(
         flicker=_flicker(part, decay),
         lamp=LAMP_SIGMA,
+        least_lamp=scatter_by_warmth(charging, warming.deficit_sigma),
         cold_deficit=warming.deficit_sigma,
         offset=dark,
         # The sensor warms and cools over hours of long exposures, more than dark frames show.
@@ -118,6 +123,7 @@ def _patch_excitation(
         evenness=EVENNESS_SIGMA,
         start=START_SIGMA,
         scale=scale_sigma(irradiance),
+        defining=DIRECT,
         irradiance=band_sigma(irradiance),
         largest_factor=LARGEST_FACTOR,
     )
@@ -128,20 +134,19 @@ def _patch_excitation(
         relative_sigmas = replace(relative_sigmas, flicker=flicker)
         choice = replace(choice, relative_sigmas=relative_sigmas)
     charging = evened(charging, choice.best)
-    fitted: Fitting = choice.fitted
+    even: FittedExcitation | None = None
     if irradiance.lights:
         by_leds = bool(part.protocol.select.leds)
-        charging, fitted = _within_bands(charging, irradiance, choice, by_leds=by_leds)
-    fit = fitted(_series(charging), "all" if part.overrides.intervals else "auto")
+        charging, even = _within_bands(charging, irradiance, choice, by_leds=by_leds)
+    fit = choice.fitted(_series(charging), "all" if part.overrides.intervals else "auto")
+    fit = fit if even is None else with_doubt(fit, even)
     density, basis = largest_density(
         irradiance.bands_nm,
         part.protocol.sample.max_optical_density,
         patch_reflectance(patch.folder, part.inputs.reflectance),
     )
     fit = choice.in_a_layer(_series(charging), fit, density, basis)
-    closure = predicted_charging(
-        charging, relative_sigmas, lambda reduced: fitted(_series(reduced), "none")
-    )
+    closure = predicted_charging(charging, relative_sigmas, _fitting_by_places(choice, even))
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
     frames = tuple(frame.path.name for role in GLOWING for frame in run.frames(role))
@@ -173,8 +178,8 @@ def _patch_excitation(
 
 def _within_bands(
     charging: PatchCharging, irradiance: IrradianceFile, choice: ChosenOrders, *, by_leds: bool
-) -> tuple[PatchCharging, Fitting]:
-    """Return the charging with its light as excitation sees it, and the function that fits it.
+) -> tuple[PatchCharging, FittedExcitation]:
+    """Return the charging with its light as excitation sees it, and a fit by even excitation.
 
     Each fit knows more of the course of excitation.
     """
@@ -182,8 +187,23 @@ def _within_bands(
     for _ in range(COURSES):
         charging = within_bands(charging, irradiance, fit, by_leds=by_leds)
         fit = choice.fitted(_series(charging))
-    charging = within_bands(charging, irradiance, fit, by_leds=by_leds)
-    return charging, lambda series, intervals: with_doubt(choice.fitted(series, intervals), even)
+    return within_bands(charging, irradiance, fit, by_leds=by_leds), even
+
+
+def _fitting_by_places(
+    choice: ChosenOrders, even: FittedExcitation | None
+) -> Callable[[PatchCharging], FittedExcitation]:
+    """Return the function by whose k_e charging by the lamp itself is predicted.
+
+    Its level is that of the light on the places: charges by the lamp itself are what is tested.
+    """
+    by_places = replace(choice, relative_sigmas=replace(choice.relative_sigmas, defining=THROUGH))
+
+    def fitted(charging: PatchCharging) -> FittedExcitation:
+        fit = by_places.fitted(_series(charging))
+        return fit if even is None else with_doubt(fit, even)
+
+    return fitted
 
 
 def _scale(

@@ -70,7 +70,8 @@ def fit_excitation(
     Parameters
     ----------
     series
-        Charging series; k_e belongs to the irradiance E of the first one.
+        Charging series; k_e belongs to the irradiance E of the one that `uncertain` says, by
+        default the first.
     k_r_per_s, fractions
         Start values of the rates in 1/s and each state's fraction of the glow, such as from a decay
         fit, shape (N,).
@@ -317,7 +318,7 @@ def _at_off(
     first_order = 2 * n + n * bands
     b, a, k_r = rates.order, rates.amplitude, rates.k_r_per_s
     levels_at_charge = []
-    for charging in problem.illuminated_series(rates):
+    for number, charging in enumerate(problem.illuminated_series(rates)):
         orders = None if problem.parameters.is_first_order else b
         at_off = levels_at_off(charging, k_r, rates.k_e_per_s, orders)
         glow = at_off.value**b @ a
@@ -335,17 +336,20 @@ def _at_off(
         # The time of a state that was not charged is that of the full one.
         level = np.where(r0 > 0, r0, 1.0)
         time_s = 1 / (beyond * k_r * level ** (b - 1))
-        by[1] = (a * b * r0 ** (b - 1))[:, None] * by[0]
-        by[2] = -(time_s * (b - 1) / level)[:, None] * by[0]
+        per_level = np.stack([np.ones(n), a * b * level ** (b - 1), -time_s * (b - 1) / level])
+        by[1:] = per_level[1:, :, None] * by[0]
         each = np.arange(n)
         by[1, each, n + each] += r0**b
         by[2, each, each] -= time_s / k_r
         if len(stated) > first_order:
             by[1, each, first_order + each] += a * r0**b * log_r0
             by[2, each, first_order + each] -= time_s * (1 / beyond + log_r0)
+        # The lamp of that charge has errors of its own, beside those of the rates.
+        light = problem.by_light_at_off(number, charging, rates)[charge, site]
+        by_light = per_level[..., None] * (light / (b * level ** (b - 1))[:, None])
         r0_sigma, a_sigma, time_sigma_s = (
-            np.sqrt(np.diag(propagated_covariance(covariance, jacobian @ stated)))[falling]
-            for jacobian in by
+            np.sqrt(np.diag(propagated_covariance(covariance, rows)))[falling]
+            for rows in by @ stated + by_light
         )
         levels_at_charge.append(
             ConcentrationAtOff(

@@ -52,7 +52,8 @@ class LightErrors(NamedTuple):
             )
             for charging in series
         ]
-        return scaled, replace(uncertain, lamp=uncertain.lamp * self.lamp)
+        lamp = max(uncertain.lamp * self.lamp, uncertain.least_lamp)
+        return scaled, replace(uncertain, lamp=lamp)
 
 
 def found_errors(

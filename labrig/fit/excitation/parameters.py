@@ -29,8 +29,8 @@ class Rates(NamedTuple):
     weights
         Weights of the channels, that of the reference 1, shape (C,).
     log_scale
-        Logarithm of each series' irradiance over its nominal value, shape (S,); 0 for the first,
-        which defines E.
+        Logarithm of each series' irradiance over its nominal value, shape (S,); 0 for the one that
+        defines E.
     log_brightness
         Logarithm of the lamp's brightness over its nominal value at every charge of every series,
         (K,).
@@ -81,10 +81,14 @@ class RelativeSigmas:
         Relative flicker ρ common to all values of an exposure.
     lamp
         Relative scatter of the lamp's brightness from charge to charge.
+    least_lamp
+        Least scatter of the lamp's brightness that the fit may find.
     cold_deficit
         Relative σ of the deficit of a lamp that was just switched on; 0 is expected.
     scale
-        Relative σ of the irradiance of every series but the first over that of the first.
+        Relative σ of the irradiance of every other series over that of the one that defines E.
+    defining
+        Number, from 0, of the series whose irradiance defines E, to which k_e belongs.
     offset
         σ of the subtracted dark level in the values' unit, common to all of them, shape (C,).
     common_mode
@@ -114,8 +118,10 @@ class RelativeSigmas:
 
     flicker: float = 0.0
     lamp: float = 0.0
+    least_lamp: float = 0.0
     cold_deficit: float = 0.0
     scale: float = 0.0
+    defining: int = 0
     offset: tuple[float, ...] = ()
     common_mode: tuple[float, ...] = ()
     veil: float = 0.0
@@ -166,7 +172,7 @@ class Parameters:
     Parameters
     ----------
     series
-        Charging series; the first one defines E.
+        Charging series; `uncertain` says which one defines E.
     states
         Number N of states.
     reference
@@ -182,6 +188,8 @@ class Parameters:
         Numbers N of states and B of bands.
     others
         Indices of the channels whose weights are fitted.
+    scaled
+        Numbers of the series whose scale is fitted.
     order
         Kinetic order of all states, None where they are fitted.
     columns
@@ -209,12 +217,16 @@ class Parameters:
         self._least_gain = LEAST_AMPLITUDE * brightest / self._unit
         self._largest_gain = LARGEST_AMPLITUDE * brightest / self._unit
         self.others = [channel for channel in range(channels) if channel != reference]
+        is_scaled = uncertain.scale > 0
+        self.scaled = [
+            number for number in range(len(series)) if is_scaled and number != uncertain.defining
+        ]
         self._first_charge = _begins([len(charging.charges) for charging in series])
         self._first_mode = _begins(
             [0 if charging.site_modes is None else len(charging.site_modes) for charging in series]
         )
         counts = [
-            len(series) - 1 if uncertain.scale > 0 else 0,
+            len(self.scaled),
             self._first_charge[-1] if uncertain.lamp > 0 else 0,
             1 if uncertain.cold_deficit > 0 else 0,
             self._first_mode[-1],
@@ -302,7 +314,7 @@ class Parameters:
         weights[self.others] = theta[columns.weights]
         log_scale, log_brightness = np.zeros(self._series), np.zeros(self._first_charge[-1])
         if is_fitted(columns.scale):
-            log_scale[1:] = theta[columns.scale]
+            log_scale[self.scaled] = theta[columns.scale]
         if is_fitted(columns.brightness):
             log_brightness[:] = theta[columns.brightness]
         return Rates(

@@ -23,7 +23,7 @@ class ExcitationProblem:
     Parameters
     ----------
     series
-        Charging series; the first one defines E.
+        Charging series; `uncertain` says which one defines E.
     states
         Number N of states.
     reference
@@ -154,6 +154,35 @@ class ExcitationProblem:
         """Return the glow (n, P) of a series in the brightest channel."""
         return np.asarray(self.levels(charging, rates).value @ rates.amplitude * rates.evenness)
 
+    def by_light_at_off(self, number: int, charging: ChargingSeries, rates: Rates) -> FloatArray:
+        """Return what the light's parameters and the start change of the levels at lamp off.
+
+        Parameters
+        ----------
+        number, charging, rates
+            A series in the light of θ, and θ by name.
+
+        Returns
+        -------
+        ndarray
+            Derivatives by θ of the light rᵇ of every state at every lamp off, shape (K, P, N, p).
+        """
+        at_off = tuple(
+            replace(charge, start_s=np.array([charge.off_s]), exposure_s=np.zeros(1))
+            for charge in charging.charges
+        )
+        level, by_light, by_start = levels_and_slopes(
+            replace(charging, charges=at_off, across=None), *self._of_levels(rates)
+        )
+        start = self.parameters.columns.start
+        slopes = np.zeros((*level.value.shape, self.parameters.count))
+        for state, alone in enumerate(np.eye(len(rates.amplitude))):
+            own, of_state = slopes[:, :, state], rates._replace(amplitude=alone)
+            self._set_light_derivatives(number, charging, of_state, by_light, own)
+            if is_fitted(start):
+                own[..., start.start + state] = by_start[..., state]
+        return slopes
+
     def _series_residuals(
         self, number: int, charging: ChargingSeries, rates: Rates
     ) -> tuple[FloatArray, FloatArray]:
@@ -224,8 +253,9 @@ class ExcitationProblem:
         for of, by_its_bands in parts:
             lit, charges = self.series[of], self.parameters.charges(of)
             by_charge = by_its_bands.sum(axis=3)
-            if is_fitted(columns.scale) and of:
-                slopes[..., columns.scale.start + of - 1] = by_charge.sum(axis=1)
+            if of in self.parameters.scaled:
+                place = columns.scale.start + self.parameters.scaled.index(of)
+                slopes[..., place] = by_charge.sum(axis=1)
             if is_fitted(columns.brightness):
                 first = columns.brightness.start
                 own = slice(first + charges.start, first + charges.stop)

@@ -12,6 +12,7 @@ from labrig.analyse.excitation.lamp_light import (
     mode_kinds,
     site_modes,
 )
+from labrig.analyse.excitation.warmth import weighted_over_mean
 from tests.analyse.excitation.bench import true_irradiance
 
 
@@ -58,3 +59,11 @@ def test_a_lamp_is_warm_after_a_long_charge_and_cools_in_the_dark() -> None:
     assert cold_deficit[0] == pytest.approx(1 - 10 / 150 / 2, abs=0.002)
     assert cold_deficit[2] < 0.1
     assert cold_deficit[3] > 0.95
+
+
+@pytest.mark.parametrize("k_r_per_s", [1e-6, 1 / 150, 0.03, 1.0])
+def test_of_a_warming_lamp_a_sample_remembers_the_end_of_the_charge(k_r_per_s: float) -> None:
+    t_s = np.linspace(0.0, 240.0, 200_001)
+    lacking, memory = np.exp(-t_s / 150.0), np.exp(-k_r_per_s * (240.0 - t_s))
+    expected = np.average(lacking, weights=memory) / lacking.mean()
+    assert weighted_over_mean(240.0, 150.0, k_r_per_s) == pytest.approx(expected, rel=1e-4)
