@@ -37,8 +37,8 @@ import yaml
 from labrig import resources
 from labrig.cli.exit_codes import guarded
 from labrig.errors import LabrigError
+from labrig.output_file import RealDisk
 from labrig.record import read_run
-from labrig.record.journal import RealDisk
 from tests.forked import forked
 
 KINDS = {"lost": 0, "done": 1, "dead": 2, "read-only": 3, "full": 4}
@@ -235,7 +235,7 @@ def _fail_at_write(place: Path, kind: str, at: int) -> None:
             _mount("-o", "remount,abort", place)
         whole(disk, file, data)
 
-    RealDisk.write = write  # type: ignore[method-assign]
+    RealDisk.write = write  # type: ignore[method-assign, assignment]
 
 
 @contextmanager
@@ -284,7 +284,7 @@ def campaign(
     ):
         for kind in kinds:
             tally = tallies[f"{what}, {kind}"] = Tally()
-            moments = range(1, peace.calls + 1, every)
+            moments = list(range(1, peace.calls + 1, every))
             if kind == "full":
                 moments = sorted(rng.sample(range(1, peace.written_bytes), n_bytes))
             for at in moments:

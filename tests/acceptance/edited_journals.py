@@ -247,9 +247,9 @@ def tried(sound: Path, made: Sequence[Edit], key: LabKey, place: Path, process: 
     fields = {edit.field for edit in made}
     print(f"{sound.name}: {len(made)} edits of {len(fields)} fields and kinds of lines")
     print(f"{'forged':16}" + "".join(f"{name:>14}" for name in OUTCOMES))
-    for way, said in counts.items():
-        if any(said.values()):
-            print(f"{way:16}" + "".join(f"{said[name]:14}" for name in OUTCOMES))
+    for way, outcomes in counts.items():
+        if any(outcomes.values()):
+            print(f"{way:16}" + "".join(f"{outcomes[name]:14}" for name in OUTCOMES))
     print("RAW files alone do not tell: " + ", ".join(sorted(untold)) + "\n", flush=True)
     return sum(counts[way]["silent"] for way in WAYS[:3])
 

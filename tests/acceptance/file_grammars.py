@@ -125,7 +125,8 @@ def exr(rng: random.Random, path: Path) -> None:
     names = rng.choice(
         [["R", "G", "B"]] * 4 + [["R", "G"], ["Y"], ["X", "Y", "Z"], ["R", "G", "B", "A"]]
     )
-    kinds = rng.choice([[np.float32]] * 3 + [[np.float16], [np.uint32], [np.float32, np.float16]])
+    usual: list[list[type[np.generic]]] = [[np.float32]] * 3
+    kinds = rng.choice([*usual, [np.float16], [np.uint32], [np.float32, np.float16]])
     special = rng.choice([0.0, 1.0, np.nan, np.inf, -1.0, 6e4, 3e38])
     channels = {}
     for k, name in enumerate(names):

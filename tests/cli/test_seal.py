@@ -100,11 +100,30 @@ def test_openssh_checks_a_seal_and_its_signature_is_read(
     text = (sealed / "seal.sha256").read_bytes()
     allowed = tmp_path / "allowed"
     allowed.write_text(f'lab namespaces="labrig-run" {(settings / "seal_key.pub").read_text()}')
-    check = ["ssh-keygen", "-Y", "verify", "-f", allowed, "-I", "lab", "-n", "labrig-run", "-s"]
+    check: list[str | Path] = [
+        "ssh-keygen",
+        "-Y",
+        "verify",
+        "-f",
+        allowed,
+        "-I",
+        "lab",
+        "-n",
+        "labrig-run",
+        "-s",
+    ]
     done = subprocess.run([*check, sealed / "seal.sha256.sig"], input=text, capture_output=True)
     assert done.returncode == 0, done.stderr
     assert read_signers(allowed).names == {read_key(settings / "seal_key").public: LAB}
-    sign = ["ssh-keygen", "-Y", "sign", "-f", settings / "seal_key", "-n", "labrig-run"]
+    sign: list[str | Path] = [
+        "ssh-keygen",
+        "-Y",
+        "sign",
+        "-f",
+        settings / "seal_key",
+        "-n",
+        "labrig-run",
+    ]
     theirs = subprocess.run(sign, input=text, capture_output=True, check=True).stdout
     (sealed / "seal.sha256.sig").write_bytes(theirs)
     assert status(labrig, sealed)[:2] == (0, "sealed")

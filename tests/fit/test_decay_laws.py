@@ -97,9 +97,9 @@ def test_becquerels_law_ends_at_its_lowest_chi2(
 
 
 def test_a_long_table_ends_at_its_lowest_chi2_though_its_rows_are_merged() -> None:
-    t_s = 5.0 + 0.3 * np.arange(1500)
+    t_s = np.asarray(5.0 + 0.3 * np.arange(1500), dtype=np.float64)
     signal = 1000 * (1 + t_s / 25.0) ** -1.6
-    sigma = np.hypot(0.01 * signal, 0.05)
+    sigma: FloatArray = np.hypot(0.01 * signal, 0.05)
     values = signal + sigma * np.random.default_rng(1516).standard_normal(len(t_s))
     fit = fit_decay(t_s, values, sigma, flicker=0.0)
     (law,) = (law for law in fit.laws if law.name == "becquerel")

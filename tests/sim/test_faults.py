@@ -10,7 +10,7 @@ import pytest
 import serial
 
 from labrig.clock import VirtualClock
-from labrig.record import REAL_DISK
+from labrig.output_file import REAL_DISK
 from labrig.sim import OpenRoom, open_room
 from labrig.sim.disk import SimulatedDisk
 from labrig.sim.faults import AfterBytes, Slowness

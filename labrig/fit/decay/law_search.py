@@ -149,15 +149,21 @@ class _Frames:
         # Where nothing was measured, a frame counts as little as it may.
         weight = np.maximum(self.information, np.finfo(float).tiny)
         total = np.add.reduceat(weight, firsts)
+        since_first, begin, exposure = (
+            np.add.reduceat(weight * each, firsts) / total
+            for each in (self.since_first, self.begin, self.exposure)
+        )
+        information, pull, shadow = (
+            np.add.reduceat(each, firsts, axis=-1)
+            for each in (self.information, self.pull, self.shadow)
+        )
         return _Frames(
-            *(
-                np.add.reduceat(weight * each, firsts) / total
-                for each in (self.since_first, self.begin, self.exposure)
-            ),
-            *(
-                np.add.reduceat(each, firsts, axis=-1)
-                for each in (self.information, self.pull, self.shadow)
-            ),
+            since_first,
+            begin,
+            exposure,
+            information,
+            pull,
+            shadow,
             self.chi2,
         )
 
@@ -254,7 +260,7 @@ class _Places:
     def _arrays(self) -> tuple[FloatArray, ...]:
         return self.x, self.level, self.chi2, self.slope, self.curvature
 
-    def step(self, damping: FloatArray, low: ArrayLike, high: ArrayLike) -> FloatArray:
+    def step(self, damping: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
         """Return the damped Gauss–Newton step of what no bound holds, shape (k, 2)."""
         is_held = ((self.x <= low) & (self.slope >= 0)) | ((self.x >= high) & (self.slope <= 0))
         (a, b), (_, d) = np.moveaxis(self.curvature, 0, 2)
@@ -263,7 +269,7 @@ class _Places:
         p, q = np.where(is_held.T, 0.0, -self.slope.T)
         with np.errstate(all="ignore"):
             step = np.stack([d * p - b * q, a * q - b * p], axis=1) / (a * d - b * b)[:, None]
-        return np.nan_to_num(step)
+        return np.asarray(np.nan_to_num(step))
 
     def lowest(self) -> FloatArray:
         """Return [level, log rate, shape] of the distinct places that may be the lowest, (m, 3)."""

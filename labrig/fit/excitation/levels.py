@@ -91,8 +91,8 @@ def levels_and_slopes(
     # not.
     if order is not None and series.arriving is not None:
         each = [levels_and_slopes(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()]
-        of_levels, by_light, by_start = zip(*each, strict=True)
-        return mean_levels(of_levels), _mean(by_light), _mean(by_start)
+        of_levels, lights, starts = zip(*each, strict=True)
+        return mean_levels(of_levels), _mean(lights), _mean(starts)
     if order is not None and series.across is not None:
         places = len(series.across)
         level, by_light, by_start = levels_and_slopes(series.spread(), k_r_per_s, k_e_per_s, order)
