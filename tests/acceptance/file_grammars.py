@@ -125,8 +125,7 @@ def exr(rng: random.Random, path: Path) -> None:
     names = rng.choice(
         [["R", "G", "B"]] * 4 + [["R", "G"], ["Y"], ["X", "Y", "Z"], ["R", "G", "B", "A"]]
     )
-    usual: list[list[type[np.generic]]] = [[np.float32]] * 3
-    kinds = rng.choice([*usual, [np.float16], [np.uint32], [np.float32, np.float16]])
+    kinds = rng.choice([["f4"]] * 3 + [["f2"], ["u4"], ["f4", "f2"]])
     special = rng.choice([0.0, 1.0, np.nan, np.inf, -1.0, 6e4, 3e38])
     channels = {}
     for k, name in enumerate(names):
