@@ -43,6 +43,8 @@ class RealDisk:
 REAL_DISK: Disk = RealDisk()
 #: Ending of files that are being written; a crash may leave one.
 PART = ".part"
+#: Permissions of a file and of a folder that their owner alone can read.
+OWN_FILE, OWN_FOLDER = 0o600, 0o700
 
 
 def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
@@ -127,7 +129,30 @@ def _require_no_other_kind(path: Path) -> None:
             raise DiskError(f"{path}: cannot be written; expected a file or nothing, got {kind}")
 
 
-def make_folder(path: Path) -> None:
+def write_private(path: Path, content: bytes) -> None:
+    """Write a file that does not exist yet, which this user alone can read from the beginning.
+
+    Its folder, where there is none, is this user's alone, too.
+
+    Raises
+    ------
+    FileExistsError
+        The file is there already.
+    DiskError
+        It cannot be written.
+    """
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+    make_folder(path.parent, OWN_FOLDER)
+    try:
+        with os.fdopen(os.open(path, flags, OWN_FILE), "wb") as file:
+            REAL_DISK.write(file, content)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def make_folder(path: Path, mode: int = 0o777) -> None:
     """Make a folder that a person named, and those above it, where there is none.
 
     Raises
@@ -136,7 +161,7 @@ def make_folder(path: Path) -> None:
         It cannot be made.
     """
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        path.mkdir(mode, parents=True, exist_ok=True)
     except OSError as error:
         raise DiskError(f"{path}: the folder cannot be made ({error.strerror})") from None
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.seal import LabKey, Signers
@@ -48,15 +48,12 @@ def trust(
 
     Compare the fingerprints with those that a laboratory itself has published.
     """
-    from labrig.output_file import write_durably
+    from labrig.output_file import make_folder, write_durably
     from labrig.seal import Signers, read_signers
 
     new_signers, trusted = read_signers(file), _trusted_file()
     before = read_signers(trusted) if trusted.exists() else Signers()
-    try:
-        trusted.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DiskError(f"{trusted.parent}: cannot be made ({error.strerror})") from None
+    make_folder(trusted.parent)
     write_durably(trusted, (before | new_signers).text().encode())
     for key, name in new_signers.names.items():
         typer.echo(f"{name} ({key.fingerprint})")

@@ -351,7 +351,9 @@ class _Way:
             off = between[target].root - root
             return 0.0 if abs(off) <= PRECISION * root else off
 
-        brentq(excess, below.target, above.target)
+        # Where a profile jumps from one minimum to another, its two sides are near enough.
+        width = abs(above.target - below.target)
+        brentq(excess, below.target, above.target, xtol=PRECISION * width, disp=False)
         # Between the two nearest points, √Δχ² is a straight line.
         by_root = sorted(between.values(), key=lambda point: point.root)
         beyond = next(k for k, point in enumerate(by_root) if point.root >= root)

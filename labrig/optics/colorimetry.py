@@ -71,7 +71,11 @@ def observer(name: str) -> Observer:
     """
     if name == CIE_1931:
         table_nm, *functions = np.loadtxt(
-            read_text(_OBSERVER).splitlines(), delimiter=",", skiprows=2, unpack=True
+            read_text(_OBSERVER).splitlines(),
+            delimiter=",",
+            skiprows=2,
+            unpack=True,
+            encoding="utf-8",
         )
         return Observer(name, table_nm, np.stack(functions, axis=1))
     table = colour_science.load().MSDS_CMFS[name]

@@ -25,7 +25,7 @@ _SCOTOPIC = Path(__file__).with_name("cie_1951_scotopic.csv")
 @cache
 def _scotopic_table() -> tuple[FloatArray, FloatArray]:
     lines = read_text(_SCOTOPIC).splitlines()
-    nm, efficiency = np.loadtxt(lines, delimiter=",", skiprows=2, unpack=True)
+    nm, efficiency = np.loadtxt(lines, delimiter=",", skiprows=2, unpack=True, encoding="utf-8")
     return nm, efficiency
 
 

@@ -13,8 +13,9 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-from labrig.errors import LabrigError
+from labrig.errors import DiskError, LabrigError
 from labrig.input_file import open_regular
+from labrig.output_file import write_private
 
 _FOLDER, _FILE = "labrig", "kept_numbers_key"
 _BYTES = 32
@@ -49,11 +50,8 @@ def _secret() -> bytes:
     from platformdirs import user_cache_path
 
     file = user_cache_path(_FOLDER, appauthor=False) / _FILE
-    with suppress(OSError):
-        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-        with suppress(FileExistsError), os.fdopen(os.open(file, flags, 0o600), "wb") as new:
-            new.write(secrets.token_bytes(_BYTES))
+    with suppress(FileExistsError, DiskError):
+        write_private(file, secrets.token_bytes(_BYTES))
     return _read(file) or secrets.token_bytes(_BYTES)
 
 

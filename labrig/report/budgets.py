@@ -6,6 +6,8 @@ from labrig.results import UNDIVIDED, Budget, RunResult
 TITLE = "How far each number may be trusted"
 #: Text of a component that is not included.
 MISSING = "–"
+#: Most budgets that are printed in the terminal.
+MAX_LINES = 4
 CAPTION = (
     "σ is the root of the sum of squares of its components; a dash is not included in it. A range "
     "by the model is beside σ and not in it."
@@ -38,8 +40,14 @@ def budget_sections(result: RunResult) -> tuple[Section, ...]:
 
 
 def budget_lines(result: RunResult) -> tuple[str, ...]:
-    """Return the budgets of a result as lines for the terminal, one a headline value."""
-    return tuple(f"budget of {name}: {budget}" for name, budget in result.budgets().items())
+    """Return the budgets of a result as lines for the terminal, one per headline value.
+
+    Of more than `MAX_LINES` values there is one line, which says that the report has them.
+    """
+    budgets = result.budgets()
+    if len(budgets) > MAX_LINES:
+        return (f"budgets of {len(budgets)} values are in the report",)
+    return tuple(f"budget of {name}: {budget}" for name, budget in budgets.items())
 
 
 def _cells(budget: Budget, causes: list[str]) -> tuple[str, ...]:

@@ -15,15 +15,14 @@ from cryptography.hazmat.primitives.serialization import (
     load_ssh_private_key,
 )
 
-from labrig.errors import DiskError, UsageError
+from labrig.errors import UsageError
 from labrig.input_file import open_regular, read_text
+from labrig.output_file import write_durably, write_private
 from labrig.seal.signature import ED25519, PublicKey
 
 #: Ending of the file with the public key, beside that of the private one.
 PUBLIC = ".pub"
 _MOST_BYTES = 100_000
-#: Permissions of owners of a file alone.
-_OWN_FILE, _OWN_FOLDER = 0o600, 0o700
 #: Longest name of a laboratory.
 _LONGEST_NAME = 80
 
@@ -92,23 +91,13 @@ def create_key(path: Path, name: str) -> LabKey:
     key = LabKey(name, Ed25519PrivateKey.generate())
     content = key.private.private_bytes(Encoding.PEM, PrivateFormat.OpenSSH, NoEncryption())
     try:
-        path.parent.mkdir(parents=True, exist_ok=True, mode=_OWN_FOLDER)
-        _write_new(path, content, _OWN_FILE)
+        write_private(path, content)
     except FileExistsError:
         raise UsageError(
             f"{path}: there is a key already; signatures by it are checked by its public key "
             "(labrig key show). Move it away to make another one"
         ) from None
-    except OSError as error:
-        raise DiskError(f"{path}: the key cannot be written ({error.strerror})") from None
-    public = path.with_name(path.name + PUBLIC)
-    try:
-        public.unlink(missing_ok=True)
-        _write_new(public, f"{key.public_line}\n".encode(), 0o644)
-    except OSError as error:
-        with suppress(OSError):
-            path.unlink()
-        raise DiskError(f"{public}: the key cannot be written ({error.strerror})") from None
+    write_durably(path.with_name(path.name + PUBLIC), f"{key.public_line}\n".encode())
     return key
 
 
@@ -168,12 +157,3 @@ def _name_beside(path: Path) -> str:
         if name and name.isprintable():
             return name[:_LONGEST_NAME]
     return "unnamed"
-
-
-def _write_new(path: Path, content: bytes, mode: int) -> None:
-    """Write a file that does not exist yet, with its permissions from the beginning."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-    with os.fdopen(os.open(path, flags, mode), "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())

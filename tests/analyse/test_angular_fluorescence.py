@@ -274,7 +274,8 @@ def test_a_flat_sample_is_no_sphere(tmp_path: Path) -> None:
 def test_the_page_answers_with_p_and_power(planted: Path) -> None:
     done = process_and_report(planted)
     assert isinstance(done.result, AngularFluorescenceResult)
-    (line,) = done.lines
+    line, *budgets = done.lines
+    assert all(each.startswith("budget") for each in budgets)
     assert line.startswith("angular fluorescence: re-radiation depends on angle (p < ")
     assert "from 30° to 120°, vertical, 365 nm, it changes by −" in line
     assert "would have been found with 90% power" in line

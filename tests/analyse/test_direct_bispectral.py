@@ -130,7 +130,8 @@ def test_the_files_are_read_back_and_the_report_says_what_it_is(quick: Path) -> 
     assert matrix.column_correlation is not None
     assert len((folder / "columns.csv").read_text().splitlines()) == 1 + 3 * 41
     assert (folder / "material.yaml").is_file()
-    (line,) = processed.lines
+    line, *budgets = processed.lines
+    assert len(budgets) == 3
     assert line.startswith("yellow-textile: re-radiates up to ")
     page = processed.report.read_text()
     assert "reflected and re-radiated light come together" in page

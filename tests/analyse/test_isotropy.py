@@ -41,7 +41,8 @@ def test_around_a_whole_sample_the_cosine_is_divided_out(tmp_path: Path) -> None
     assert glow.ratio * np.cos(np.radians(glow.angle_deg)) == pytest.approx(1.0, abs=0.03)
     rows = (done.report.parent / "isotropy.csv").read_text().splitlines()
     assert len(rows) == 1 + 2
-    (line,) = done.lines
+    line, budget = done.lines
+    assert budget.startswith("budget of ")
     assert f"(at {glow.worst_angle_deg}°: " in line
     page = done.report.read_text()
     assert "here divided by the cosine" in page

@@ -56,7 +56,8 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     assert_read_back(replace(done.result, patches={"sample": given_noise}))
     rows = (done.report.parent / "saturation.csv").read_text().splitlines()
     assert len(rows) == 1 + 6
-    time_saturation, of_level, rates, order = done.lines
+    time_saturation, of_level, rates, order, *budgets = done.lines
+    assert all(line.startswith("budget") for line in budgets)
     assert "saturated in time" in time_saturation
     assert of_level.endswith("assumption r(0) = 1: no")
     assert "rates are the same after all 6 charges" in rates

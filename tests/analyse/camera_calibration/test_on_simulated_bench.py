@@ -51,7 +51,9 @@ def test_the_result_and_its_file_are_read_back(run: Path, result: CameraCalibrat
 
 def test_a_person_is_reported(processed: Processed) -> None:
     told = ("ISO 100: gain", "ISO 400: gain", "flicker", "shutter", "aperture", "vignetting")
-    for line, begin in zip(processed.lines, told, strict=True):
+    *lines, budgets = processed.lines
+    assert budgets.startswith("budgets of ")
+    for line, begin in zip(lines, told, strict=True):
         assert line.startswith(begin)
 
 

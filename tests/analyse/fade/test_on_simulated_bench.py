@@ -144,7 +144,8 @@ def test_the_light_of_a_frame_has_all_that_scatters_from_one_to_the_next(
 
 def test_a_person_is_reported(processed: Processed) -> None:
     told = ("the turn-off transient is", "the turn-on transient lacks", "a cold lamp has")
-    for line, begin in zip(processed.lines, told, strict=True):
+    lines = [line for line in processed.lines if not line.startswith("budget of ")]
+    for line, begin in zip(lines, told, strict=True):
         assert line.startswith(begin)
 
 

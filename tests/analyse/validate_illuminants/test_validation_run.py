@@ -82,8 +82,10 @@ def test_the_result_is_read_back_and_its_page_says_what_it_is(run: Path) -> None
     done = process_and_report(run)
     assert isinstance(done.result, ValidateIlluminantsResult)
     assert_read_back(done.result)
-    assert [line.split(":")[0] for line in done.lines] == list(done.result.lamps)
-    assert all("agrees" in line for line in done.lines)
+    *lines, budgets = done.lines
+    assert [line.split(":")[0] for line in lines] == list(done.result.lamps)
+    assert all("agrees" in line for line in lines)
+    assert budgets == "budgets of 16 values are in the report"
     rows = (done.report.parent / "illuminants.csv").read_text().splitlines()
     assert len(rows) == 1 + 4 * 4
     page = done.report.read_text()
