@@ -167,7 +167,7 @@ def main() -> None:
     )
     wrong: list[str] = []
     done: dict[str, Path] = {}
-    number = 0
+    number = trials = 0
     with tempfile.TemporaryDirectory() as scratch:
         place = asked.keep or Path(scratch)
         place.mkdir(exist_ok=True)
@@ -201,7 +201,8 @@ def main() -> None:
                 flush=True,
             )
             wrong += tally.wrong
-    print(f"{len(wrong)} went wrong", *wrong, sep="\n")
+            trials += tally.codes.total()
+    print(f"{len(wrong)} of {trials} went wrong", *wrong, sep="\n")
     sys.exit(bool(wrong))
 
 

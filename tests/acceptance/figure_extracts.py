@@ -317,6 +317,11 @@ def went_wrong(printed: str) -> str:
     return f"{match(r'^([0-9]+ of [0-9]+) went wrong', printed)} wrong"
 
 
+def growth(printed: str) -> str:
+    """Return the last line: what grows, or that nothing does."""
+    return printed.splitlines()[-1]
+
+
 def containers(printed: str) -> str:
     cases, failures = columns(r"^.+? +(\d+) cases, (\d+) failures", printed)
     return f"{sum(failures):.0f} failures in {sum(cases):.0f} containers, {len(cases)} ways"

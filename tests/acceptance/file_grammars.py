@@ -220,6 +220,7 @@ def main() -> None:
     parser.add_argument("--case", type=int, help="only this one of that kind")
     asked = parser.parse_args()
     wrong: list[str] = []
+    number = 0
     print(f"{'file':16}{'cases':>8}{'read':>8}{'refusals':>10}{'kinds':>7}{'wrong':>7}  longest")
     with tempfile.TemporaryDirectory() as name:
         for kind in [asked.kind] if asked.kind else KINDS:
@@ -230,12 +231,13 @@ def main() -> None:
                 if said := try_one(kind, rng, Path(name), tally):
                     tally.wrong.append(f"{kind}, case {case}: {said}")
             wrong += tally.wrong
+            number += len(cases)
             print(
                 f"{kind:16}{len(cases):8}{tally.read:8}{tally.refusals.total():10}"
                 f"{len(tally.refusals):7}{len(tally.wrong):7}  {tally.longest_s:.2f} s",
                 flush=True,
             )
-    print(f"{len(wrong)} went wrong", *wrong[:20], sep="\n")
+    print(f"{len(wrong)} of {number} went wrong", *wrong[:20], sep="\n")
     sys.exit(bool(wrong))
 
 

@@ -415,6 +415,23 @@ FIGURES = (
         figure.refused,
     ),
     Figure(
+        "Matrices in BFC and ARK files, camera curves and linear OpenEXR pictures by grammars of "
+        "which some rules are broken, 20 000 of each: refused with one line, or read",
+        "file_grammars",
+        figure.went_wrong,
+    ),
+    Figure(
+        "A camera or a board that vanishes in every fortieth of the units of all protocols, and "
+        "comes back: lamp off, one line, and the run is resumed to its end",
+        "devices_vanish",
+        figure.went_wrong,
+    ),
+    Figure(
+        "A decay of 24 hours with a frame every 30 s: what grows of memory, open files and threads",
+        "long_run",
+        figure.growth,
+    ),
+    Figure(
         "Edited journals: every field of every kind of line, and lines removed, doubled, moved; as "
         "they are, chained anew, and without the seal. Edits that were refused or named",
         "edited_journals",
