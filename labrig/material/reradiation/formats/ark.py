@@ -123,7 +123,9 @@ def _grid(entry: ArkEntry, what: str, size: int) -> FloatArray:
     if step <= 0:
         line = entry.fields[f"{what} increment"].number
         raise ValueError(f"line {line}: expected an increment above 0 nm, got {step:g}")
-    grid: FloatArray = start + step * np.arange(size, dtype=np.float64)
+    # An absurd increment gives wavelengths that the check below refuses.
+    with np.errstate(over="ignore"):
+        grid: FloatArray = start + step * np.arange(size, dtype=np.float64)
     check_wavelengths(grid, f"line {entry.fields[f'{what} start'].number}: ")
     return grid
 
