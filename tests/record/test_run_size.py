@@ -12,10 +12,10 @@ def test_frames_and_all_else_add_up_to_what_lies_in_the_folder(tmp_path: Path) -
         "frames/1.dng": 1000, "frames/2.dng": 500, "journal.jsonl": 70, "result/report.html": 8,
         "result/frames/picture.png": 3,
     }  # fmt: skip
-    for name, size in sizes.items():
+    for name, size_bytes in sizes.items():
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(bytes(size))
+        path.write_bytes(bytes(size_bytes))
     size = RunSize.measured(tmp_path)
     assert size == RunSize(2, 1500, 81)
     assert size.total_bytes == 1581
