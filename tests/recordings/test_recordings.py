@@ -9,7 +9,17 @@ from .numbers import differences
 from .runs import RUNS, Recorded
 
 
-@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.name)
+#: Their numbers take several seconds each, and are compared by `python -m tests.recordings`.
+SLOW = {"led_fluorescence", "calibration", "calibration_check", "reflectance"}
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        pytest.param(run, id=run.name, marks=[pytest.mark.campaign] * (run.name in SLOW))
+        for run in RUNS
+    ],
+)
 def test_results_are_those_that_were_kept(run: Recorded, tmp_path: Path) -> None:
     different = [str(one) for one in run.differences(run.processed(tmp_path)) if one.matters]
     assert not different, "\n".join(["python -m tests.recordings tells all", *different[:5]])
