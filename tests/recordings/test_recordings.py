@@ -8,7 +8,6 @@ import pytest
 from .numbers import differences
 from .runs import RUNS, Recorded
 
-
 #: Their numbers take several seconds each, and are compared by `python -m tests.recordings`.
 SLOW = {"led_fluorescence", "calibration", "calibration_check", "reflectance"}
 
