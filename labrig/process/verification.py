@@ -77,7 +77,7 @@ class Verification:
 
     @property
     def seal_line(self) -> str:
-        """Who sealed the run and when, or that nobody did, in a line for people."""
+        """The seal's author and time, or that there is none, in a line for people."""
         if self.is_seal_broken:
             return "seal: broken, it shows nothing"
         if self.seal is None:
