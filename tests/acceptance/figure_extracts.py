@@ -318,8 +318,10 @@ def went_wrong(printed: str) -> str:
 
 
 def growth(printed: str) -> str:
-    """Return the last line: what grows, or that nothing does."""
-    return printed.splitlines()[-1]
+    first, *_, last = (line.split() for line in printed.splitlines()[1:-2])
+    names = ("MB of memory", "files", "threads")
+    pairs = zip(first[2:5], last[2:5], names, strict=True)
+    return ", ".join(f"{before} to {after} {name}" for before, after, name in pairs)
 
 
 def containers(printed: str) -> str:
