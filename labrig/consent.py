@@ -12,6 +12,7 @@ from pathlib import Path
 from labrig.errors import LabrigError, UsageError
 from labrig.input_file import read_text
 from labrig.output_file import make_folder, write_text
+from labrig.settings_file import settings_file
 
 #: Schemes of the addresses that lead to a network; what opens addresses takes no others there.
 NETWORK_SCHEMES = ("ptpip", "socket", "tcp", "http", "https", "rtsp")
@@ -77,6 +78,4 @@ def _given() -> set[str]:
 
 
 def _file() -> Path:
-    import typer  # of the commands' settings; slow to load
-
-    return Path(typer.get_app_dir("labrig")) / "consents.txt"
+    return settings_file("consents.txt")

@@ -3,18 +3,12 @@
 import errno
 import os
 from collections.abc import Sequence
-from typing import Any, BinaryIO, Protocol, cast
+from typing import Any, BinaryIO, cast
 
 from labrig.clock import VirtualClock
+from labrig.output_file import Disk
 
 from .faults import AfterBytes, Slowness
-
-
-class Disk(Protocol):
-    """Durable writing, as a bench without faults does it."""
-
-    def write(self, file: BinaryIO, data: bytes) -> None:
-        """Append to an unbuffered file and wait until the disk has it."""
 
 
 class SimulatedDisk:

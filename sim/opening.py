@@ -9,6 +9,7 @@ import numpy as np
 import usb.backend
 
 from labrig.clock import VirtualClock
+from labrig.output_file import Disk
 from labrig.yaml_file import validate
 
 from . import protocol_sim
@@ -27,7 +28,7 @@ from .boards.dc4100 import OUTPUTS
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
 from .clock import RoomClock
-from .disk import Disk, SimulatedDisk
+from .disk import SimulatedDisk
 from .faults import Fault, FaultTime, given
 from .room import Room
 from .simulation import Simulation

@@ -49,7 +49,7 @@ OWN_PROGRAMS = ("systemd-inhibit", "caffeinate")
 
 @dataclass(frozen=True)
 class Stage:
-    """What the makers of hostile files work with.
+    """Place and material of the makers of hostile files.
 
     Attributes
     ----------
@@ -710,7 +710,7 @@ def folder_of_results_that_lead_out(stage: Stage) -> Path:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a command on a hostile file ended.
+    """End of a command on a hostile file.
 
     Attributes
     ----------

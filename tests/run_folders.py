@@ -32,7 +32,7 @@ def lamp_after(folder: Path, rig: Path, stop: Callable[[], None]) -> bool:
 
 
 def lamp_is_on(stand: Bench) -> bool:
-    """What the room knows, whatever relay and driver say."""
+    """The lamp as the room has it, whatever relay and driver say."""
     assert stand.room is not None
     return stand.room.room.lamp_on
 

@@ -78,7 +78,7 @@ def test_an_import_past_a_face_is_seen(line: str, is_past: bool) -> None:
 
 
 def test_a_test_imports_no_other_test() -> None:
-    """What several tests need is in a module of its own."""
+    """Code that several tests need is in a module of its own."""
     found = [
         f"{path.relative_to(TESTS)}: {line}"
         for path in sorted(TESTS.rglob("*.py"))

@@ -111,8 +111,9 @@ def is_being_written(folder: Path) -> bool:
     from filelock import Timeout
 
     from labrig.file_lock import plain_lock
+    from labrig.record import RECORDING_LOCK
 
-    lock = folder / ".lock"
+    lock = folder / RECORDING_LOCK
     if not lock.exists():
         return False
     try:

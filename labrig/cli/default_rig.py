@@ -10,6 +10,7 @@ import typer
 from labrig.cli.completion import complete_rig
 from labrig.errors import LabrigError, UsageError
 from labrig.input_file import read_text
+from labrig.settings_file import settings_file
 
 #: Environment variable with a rig, which has priority over the one that was chosen.
 VARIABLE = "LABRIG_RIG"
@@ -166,7 +167,7 @@ def _choose(rig: str) -> None:
     file = read_rig_file(path)  # a mistake in the file is better found now
     deeds = list(calls(file.addresses()))
     if isinstance(file.on_finish, tuple):
-        deeds.append(f"{starting(file.on_finish)}")
+        deeds.append(starting(file.on_finish))
     if deeds:
         give_consent(deeds)
         typer.echo(f"note: with your consent, every run on it {', '.join(deeds)}", err=True)
@@ -178,4 +179,4 @@ def _choose(rig: str) -> None:
 
 def _choice_file() -> Path:
     """Return the file with the chosen rig in the folder of this user's settings."""
-    return Path(typer.get_app_dir("labrig")) / "rig.txt"
+    return settings_file("rig.txt")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.errors import UsageError
+from labrig.settings_file import settings_file
 
 if TYPE_CHECKING:
     from labrig.seal import LabKey, Signers
@@ -48,36 +49,35 @@ def trust(
 
     Compare the fingerprints with those that a laboratory itself has published.
     """
-    from labrig.output_file import make_folder, write_durably
+    from labrig.output_file import make_folder, write_text
     from labrig.seal import Signers, read_signers
 
     new_signers, trusted = read_signers(file), _trusted_file()
     before = read_signers(trusted) if trusted.exists() else Signers()
     make_folder(trusted.parent)
-    write_durably(trusted, (before | new_signers).text().encode())
+    write_text(trusted, (before | new_signers).text())
     for key, name in new_signers.names.items():
         typer.echo(f"{name} ({key.fingerprint})")
 
 
 def key_file() -> Path:
     """Return the file of this laboratory's private key in the folder of this user's settings."""
-    return Path(typer.get_app_dir("labrig")) / "seal_key"
+    return settings_file("seal_key")
 
 
 def trusted_signers() -> "Signers":
     """Return the laboratories whose keys were trusted, and this one."""
-    from labrig.seal import PUBLIC, Signers, read_signers
+    from labrig.seal import Signers, public_file, read_signers
 
-    own = key_file().with_name(key_file().name + PUBLIC)
     signers = Signers()
-    for file in (_trusted_file(), own):
+    for file in (_trusted_file(), public_file(key_file())):
         if file.exists():
             signers = signers | read_signers(file)
     return signers
 
 
 def _trusted_file() -> Path:
-    return Path(typer.get_app_dir("labrig")) / "trusted_keys"
+    return settings_file("trusted_keys")
 
 
 def _print(key: "LabKey", path: Path) -> None:

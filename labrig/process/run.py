@@ -222,7 +222,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
         *clock_warnings(run),
         *unknown_camera,
         *temperature_warnings(run, protocol.rate_frames),
-        *_clock_warnings(run),
+        *_clock_step_warnings(run),
     )
     result = replace(result, warnings=warnings)
 
@@ -308,7 +308,7 @@ def _render(result: RunResult, source: Source) -> Rendered:
     return replace(rendered, sections=(*rendered.sections, *more))
 
 
-def _clock_warnings(run: RunRecord) -> tuple[str, ...]:
+def _clock_step_warnings(run: RunRecord) -> tuple[str, ...]:
     """Return a warning of each step of the PC's clock during the completed units of a run."""
     return tuple(
         CLOCK_STEPPED.format(f"{action.action} in {attempt.unit}")

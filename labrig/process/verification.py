@@ -15,7 +15,15 @@ from labrig.analyse import (
 from labrig.errors import DataError, UsageError
 from labrig.process.comparison import LOCK
 from labrig.process.provenance import PROVENANCE, Provenance
-from labrig.record import RunLock, RunRecord, damaged_frames, line_seals, read_run
+from labrig.record import (
+    JOURNAL,
+    RECORDING_LOCK,
+    RunLock,
+    RunRecord,
+    damaged_frames,
+    line_seals,
+    read_run,
+)
 from labrig.seal import (
     SEAL,
     LabKey,
@@ -28,9 +36,7 @@ from labrig.seal import (
 from labrig.yaml_file import read_model
 
 #: Files that grow when a run goes on.
-JOURNAL, LOG = "journal.jsonl", "log.txt"
-#: Lock of who records into a run.
-_RECORDING = ".lock"
+_GROWING = (JOURNAL, "log.txt")
 
 
 @dataclass(frozen=True)
@@ -192,7 +198,7 @@ def seal_run(folder: Path, key: LabKey, time_s: float) -> RunSeal:
     ('sealed', 'Example lab')
     """
     with ExitStack() as locks:
-        locks.enter_context(RunLock(folder / _RECORDING, "writing to this run"))
+        locks.enter_context(RunLock(folder / RECORDING_LOCK, "writing to this run"))
         locks.enter_context(RunLock(folder / LOCK, "processing this run"))
         run, changed = read_run(folder), list[str]()
         _check_content(run, [], changed, [])
@@ -252,9 +258,10 @@ def _check_content(
     except UsageError as error:
         changed.append(str(error))
         return
-    text = f"{path.parent}: the result is of this journal"
-    other = f"{path.parent}: the result is of another journal; labrig process {folder}"
-    (intact if is_of_journal else changed).append(text if is_of_journal else other)
+    if is_of_journal:
+        intact.append(f"{path.parent}: the result is of this journal")
+    else:
+        changed.append(f"{path.parent}: the result is of another journal; labrig process {folder}")
 
 
 def _differences(run: RunRecord) -> Iterator[str]:
@@ -287,8 +294,7 @@ def _changes_since(folder: Path, seal: RunSeal, *, went_on: bool) -> Iterator[st
             f"{folder}: the run went on after it was sealed, with {len(added)} new files; labrig "
             "seal seals it anew"
         )
-        grown = {JOURNAL, LOG}
         now = {name: sha256 for name, sha256 in now.items() if name not in added}
-        now |= {name: seal.files.sha256[name] for name in grown & seal.files.sha256.keys()}
+        now |= {name: seal.files.sha256[name] for name in seal.files.sha256.keys() & _GROWING}
     for change in seal.changes(now):
         yield f"{folder}: {change}"

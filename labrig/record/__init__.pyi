@@ -36,6 +36,7 @@ from .history import (
     time_text as time_text,
 )
 from .journal import (
+    JOURNAL as JOURNAL,
     Document as Document,
     add_note as add_note,
     line_seals as line_seals,
@@ -54,6 +55,7 @@ from .run_folder import (
     RunFolder as RunFolder,
 )
 from .run_lock import (
+    RECORDING_LOCK as RECORDING_LOCK,
     RunLock as RunLock,
 )
 from .run_record import (

@@ -213,10 +213,7 @@ def line_seals(path: Path) -> list[str]:
     >>> line_seals(Path("runs/decay/journal.jsonl"))[-1] == labrig.read_run("runs/decay").seal
     True
     """
-    try:
-        raw = path.read_bytes() if path.is_file() else b""
-    except OSError as error:
-        raise DiskError(f"{path}: the journal cannot be read ({error.strerror})") from None
+    raw = read_bytes(path, MAX_JOURNAL_BYTES) if path.is_file() else b""
     return [_seal(line) for line in raw.split(b"\n")[:-1]]
 
 

@@ -20,7 +20,7 @@ from labrig.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, Journal
 from labrig.record.made import MADE, made_text
-from labrig.record.run_lock import RunLock
+from labrig.record.run_lock import RECORDING_LOCK, RunLock
 from labrig.record.run_record import RunRecord, run_record
 
 #: File by which a run folder is recognised.
@@ -55,7 +55,7 @@ class RunFolder:
         self.path = path
         self._seed = seed
         self._disk = disk
-        self._lock = RunLock(path / ".lock", "writing to this run")
+        self._lock = RunLock(path / RECORDING_LOCK, "writing to this run")
         _discard_parts(path)
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)

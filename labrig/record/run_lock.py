@@ -19,6 +19,8 @@ from labrig.output_file import write_text
 from labrig.record.plain_folder import require_plain_folder
 
 #: Time to wait for a lock: who only looks whether it is held, holds it for a moment.
+#: Lock of the process that records into a run.
+RECORDING_LOCK = ".lock"
 LOCK_TIMEOUT_S = 0.5
 
 

@@ -3,9 +3,9 @@ from .file_list import (
     list_files as list_files,
 )
 from .lab_key import (
-    PUBLIC as PUBLIC,
     LabKey as LabKey,
     create_key as create_key,
+    public_file as public_file,
     read_key as read_key,
 )
 from .run_seal import (

@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from hashlib import sha256
+from hashlib import file_digest
 from pathlib import Path
 
 from labrig.errors import DataError, DiskError
@@ -24,7 +24,6 @@ _FILES = (
 _FOLDERS = ("frames", "result")
 #: What `labrig figures` draws from a result at any time.
 _DRAWN_LATER = ("result/figures/figures.pdf",)
-_BLOCK_BYTES = 1_000_000
 _TITLE = "# labrig seal"
 _LINE = re.compile(r"([0-9a-f]{64})  (\S[^\r\n\\]*)")
 _HEAD = re.compile(r"# (sealed|by|run|journal|labrig): (.*)")
@@ -135,11 +134,8 @@ def list_files(folder: Path, names: Collection[str] = ()) -> dict[str, str]:
         if not _LINE.fullmatch(f"{'0' * 64}  {name}"):
             raise DataError(f"{folder}: expected names of files in one line, got {name!r}")
         try:
-            digest = sha256()
             with open_regular(path) as file:
-                while block := file.read(_BLOCK_BYTES):
-                    digest.update(block)
-            sha256_of[name] = digest.hexdigest()
+                sha256_of[name] = file_digest(file, "sha256").hexdigest()
         except OSError as error:
             raise DiskError(f"{path}: cannot be read ({error.strerror})") from None
     return sha256_of

@@ -17,11 +17,9 @@ from cryptography.hazmat.primitives.serialization import (
 
 from labrig.errors import UsageError
 from labrig.input_file import open_regular, read_text
-from labrig.output_file import write_durably, write_private
+from labrig.output_file import write_private, write_text
 from labrig.seal.signature import ED25519, PublicKey
 
-#: Ending of the file with the public key, beside that of the private one.
-PUBLIC = ".pub"
 _MOST_BYTES = 100_000
 #: Longest name of a laboratory.
 _LONGEST_NAME = 80
@@ -51,6 +49,29 @@ class LabKey:
     def public_line(self) -> str:
         """Content of the file with the public key, in one line with the name."""
         return f"{self.public.line} {self.name}"
+
+
+def public_file(path: Path) -> Path:
+    """Return the file of the public key beside that of a private one.
+
+    Parameters
+    ----------
+    path
+        File of the private key.
+
+    Returns
+    -------
+    Path
+        File of the public key, which may not exist.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.seal import public_file
+    >>> public_file(Path("settings/seal_key")).name
+    'seal_key.pub'
+    """
+    return path.with_name(f"{path.name}.pub")
 
 
 def create_key(path: Path, name: str) -> LabKey:
@@ -97,7 +118,7 @@ def create_key(path: Path, name: str) -> LabKey:
             f"{path}: there is a key already; signatures by it are checked by its public key "
             "(labrig key show). Move it away to make another one"
         ) from None
-    write_durably(path.with_name(path.name + PUBLIC), f"{key.public_line}\n".encode())
+    write_text(public_file(path), f"{key.public_line}\n")
     return key
 
 
@@ -152,7 +173,7 @@ def read_key(path: Path) -> LabKey:
 def _name_beside(path: Path) -> str:
     """Return the name in the file with the public key."""
     with suppress(UsageError):
-        words = read_text(path.with_name(path.name + PUBLIC), _MOST_BYTES).split(maxsplit=2)
+        words = read_text(public_file(path), _MOST_BYTES).split(maxsplit=2)
         name = " ".join(words[2].split()) if len(words) > 2 else ""
         if name and name.isprintable():
             return name[:_LONGEST_NAME]

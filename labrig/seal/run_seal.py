@@ -8,7 +8,7 @@ from pathlib import Path
 
 from labrig.errors import DataError, UsageError
 from labrig.input_file import MAX_TEXT_BYTES, read_bytes, read_text
-from labrig.output_file import write_durably
+from labrig.output_file import write_text
 from labrig.seal.file_list import FileList, list_files
 from labrig.seal.lab_key import LabKey
 from labrig.seal.signature import PublicKey, signature_text, signer_of
@@ -99,9 +99,9 @@ def write_seal(folder: Path, key: LabKey, journal: str, time_s: float) -> RunSea
         sealed=datetime.fromtimestamp(time_s, UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         labrig=version("labrig"),
     )
-    text = files.text().encode()
-    write_durably(folder / SEAL, text)
-    write_durably(folder / SIGNATURE, signature_text(text, key.private).encode())
+    text = files.text()
+    write_text(folder / SEAL, text)
+    write_text(folder / SIGNATURE, signature_text(text.encode(), key.private))
     return RunSeal(files, key.public)
 
 

@@ -33,7 +33,7 @@ PER_JOURNAL_BYTE, SLACK_MB = 3.0, 8.0
 
 @dataclass(frozen=True)
 class Reading:
-    """What the process holds after some frames."""
+    """Memory, files and threads of the process after some frames."""
 
     frames: int
     lab_h: float

@@ -46,7 +46,7 @@ class PlantedBug:
 
 
 class Verdict(Enum):
-    """How the tests beside a bug ended."""
+    """End of the tests beside a bug."""
 
     NOTICED = "noticed"
     SURVIVED = "SURVIVED"

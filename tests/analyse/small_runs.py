@@ -75,8 +75,8 @@ VALIDATE_ONE: Protocol = {
     "fluorescence": led_bench.SAMPLES, "lamps": ["halogen"], "exposures": 1, "repeats": 1,
     "longest": "1 s",
 }  # fmt: skip
+#: Size in pixels of the sensor of runs that calibrate a whole bench.
 BENCH_WIDTH, BENCH_HEIGHT = 128, 48
-"""Size of the sensor of runs that calibrate a whole bench."""
 
 
 def with_known_camera(rig: Rig) -> None:

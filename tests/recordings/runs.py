@@ -63,7 +63,7 @@ class Recorded:
 
     @property
     def folder(self) -> Path:
-        """Where the run, `run/`, and the files of numbers of its result, `result/`, are kept."""
+        """Folder of the kept run, `run/`, and of the files of numbers of its result, `result/`."""
         return HERE / self.name
 
     def keep(self, run: Path) -> None:

@@ -41,7 +41,7 @@ def test_the_vignetting_of_the_frame_is_divided_out_where_its_light_is(tmp_path:
 
 
 def test_what_a_lens_does_not_scatter_keeps_its_relative_sigma() -> None:
-    """Of light x in a frame of mean m a lens shows (1 − g) x + g m."""
+    """A lens shows (1 − g) x + g m of light x in a frame of mean m."""
     true = decay_series()
     frame = replace(true, values=0.2 * true.values)
     shown = replace(

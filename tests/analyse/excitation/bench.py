@@ -33,7 +33,7 @@ TILT = np.radians(1.0)
 
 
 def true_irradiance(width: int = WIDTH, height: int = HEIGHT) -> IrradianceFile:
-    """What an irradiance run without error would find on the shipped rig with such a sensor."""
+    """The result of an irradiance run without error on the shipped rig with such a sensor."""
     lvf_settings = read_quickly(Path("config/sim-phosphor.yaml").read_text(encoding="utf-8"))[
         "simulation"
     ]["lvf"]
