@@ -8,10 +8,11 @@ public drivers of brzycki, AscomSwitchDriver and MultiRoomAudio.
 import re
 from collections.abc import Sequence
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Connections, Finding
-from labrig.errors import UnclearAnswerError
+from labrig.foundation.errors import UnclearAnswerError
+from labrig.foundation.models import FrozenModel
 
 from .serial_line import LATEST_ANSWER_S, SerialLine
 
@@ -43,7 +44,7 @@ class LcusRelay:
         Connections that open the port.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a relay of an LCUS board in a rig file.
 
         Attributes
@@ -51,8 +52,6 @@ class LcusRelay:
         relay
             Number of the relay that switches the lamp, as printed on the board: the first one is 1.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         relay: int = Field(ge=1, le=MAX_RELAYS)
 

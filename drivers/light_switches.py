@@ -7,7 +7,7 @@ from typing import Annotated, Protocol
 from pydantic import Field
 
 from labrig.acquire import LedLight
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 #: Name of a light in a rig file.
 Name = Annotated[str, Field(min_length=1)]

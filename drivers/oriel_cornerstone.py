@@ -6,7 +6,7 @@ public drivers of bicarlsen (oriel-cornerstone-260) and fsc2. The wavelength is 
 """
 
 from labrig.acquire import Connections, MonochromatorBand
-from labrig.errors import UnclearAnswerError
+from labrig.foundation.errors import UnclearAnswerError
 
 from .serial_line import SerialLine
 

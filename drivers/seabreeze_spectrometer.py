@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import usb.core
-from pydantic import BaseModel, ConfigDict
 
-from labrig import resources
 from labrig.acquire import Connections, Finding, require_integration
-from labrig.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
-from labrig.named_files import ShippedOrFile
+from labrig.foundation import resources
+from labrig.foundation.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.named_files import ShippedOrFile
 from labrig.optics import SpectrometerReading, Spectrum, read_spectrum
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class SeabreezeSpectrometer:
         There is no such device, access to it is refused, or it is none that seabreeze knows.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of an Ocean Optics spectrometer in a rig file.
 
         Attributes
@@ -68,8 +68,6 @@ class SeabreezeSpectrometer:
             `labrig.optics.lamp_calibration` from a reading under a standard lamp. Default: counts
             are relative.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         calibration: ShippedOrFile | None = None
 

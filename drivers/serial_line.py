@@ -9,8 +9,8 @@ from collections.abc import Callable
 import serial
 
 from labrig.acquire import PORT_FAILURES, SerialPort, gone
-from labrig.clock import Clock
-from labrig.errors import DeviceLostError, UnclearAnswerError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceLostError, UnclearAnswerError
 
 #: Interval of polling; USB serial adapters deliver once a millisecond at best.
 POLL_S = 0.002

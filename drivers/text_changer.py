@@ -4,11 +4,12 @@ Any microcontroller will do: it reads `fresh sample\n` or `filter 37\n`, moves, 
 or `cannot`, the reason and `\n`. The simulated room's changer uses the same lines.
 """
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Connections
-from labrig.errors import DeviceError, UnclearAnswerError
-from labrig.quantity import DurationS
+from labrig.foundation.errors import DeviceError, UnclearAnswerError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS
 
 from .serial_line import SerialLine
 
@@ -28,7 +29,7 @@ class TextChanger:
         Connections that open the port.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a changer that obeys lines of text in a rig file.
 
         Attributes
@@ -38,8 +39,6 @@ class TextChanger:
         takes_at_most
             Time within which the changer must have answered `done`, for example `2 min`.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         baud: int = Field(BAUDRATE, gt=0)
         takes_at_most: DurationS = 120.0

@@ -11,11 +11,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import Connections, Finding, LedLight
-from labrig.errors import DeviceError, UnclearAnswerError, UsageError
-from labrig.quantity import Fraction
+from labrig.foundation.errors import DeviceError, UnclearAnswerError, UsageError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import Fraction
 
 from .light_switches import LightSwitches, Name
 from .serial_line import SerialLine
@@ -313,7 +314,7 @@ class ThorlabsLedBank(LightSwitches):
         A serial number is given for an address without a unit.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of LED heads on Thorlabs DC4100 or DC4104 units in a rig file.
 
         Attributes
@@ -327,10 +328,8 @@ class ThorlabsLedBank(LightSwitches):
             Default: any unit.
         """
 
-        model_config = ConfigDict(frozen=True, extra="forbid")
-
         channels: dict[Name, Dc4100Led] = Field(min_length=1)
-        serial_numbers: dict[Name, str] = {}
+        serial_numbers: dict[Name, str] = Field(default_factory=dict)
 
         @model_validator(mode="after")
         def _an_output_each(self) -> Self:

@@ -10,11 +10,12 @@ is read until it is the one that was asked for.
 from collections.abc import Mapping
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import Connections
-from labrig.errors import DeviceError, UnclearAnswerError
-from labrig.quantity import DurationS
+from labrig.foundation.errors import DeviceError, UnclearAnswerError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS
 
 from .named_places import FilterPlaces
 from .serial_line import SerialLine
@@ -45,7 +46,7 @@ class ThorlabsFilterWheel(FilterPlaces[int]):
         Another device is at the address, or the wheel has fewer slots than the rig file names.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a Thorlabs filter wheel in a rig file.
 
         Attributes
@@ -58,8 +59,6 @@ class ThorlabsFilterWheel(FilterPlaces[int]):
         takes_at_most
             Time within which the wheel must have turned, for example `10 s`.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         filters: Mapping[str, Annotated[int, Field(ge=1, le=MOST_SLOTS)]] = Field(min_length=1)
         open_slot: Annotated[int, Field(ge=1, le=MOST_SLOTS)] = 1

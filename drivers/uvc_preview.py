@@ -6,10 +6,10 @@ and texts that start plugins.
 """
 
 import cv2
-from pydantic import BaseModel, ConfigDict
 
 from labrig.acquire import Connections
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.models import FrozenModel
 
 SCHEME = "uvc://"
 STREAMS = ("http://", "https://", "rtsp://")
@@ -34,10 +34,8 @@ class UvcPreview:
         The address is neither.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a video device for aiming in a rig file: none of its own."""
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._address = address

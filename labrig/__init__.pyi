@@ -10,14 +10,6 @@ from .analyse import (
     fit_series as fit_series,
 )
 from .bench import open_bench as open_bench
-from .errors import (
-    DataError as DataError,
-    DeviceError as DeviceError,
-    FitError as FitError,
-    FrameError as FrameError,
-    LabrigError as LabrigError,
-    UsageError as UsageError,
-)
 from .export import (
     read_dataset as read_dataset,
     to_tiled as to_tiled,
@@ -25,6 +17,14 @@ from .export import (
 from .fit import (
     DecayFit as DecayFit,
     fit_decay as fit_decay,
+)
+from .foundation.errors import (
+    DataError as DataError,
+    DeviceError as DeviceError,
+    FitError as FitError,
+    FrameError as FrameError,
+    LabrigError as LabrigError,
+    UsageError as UsageError,
 )
 from .material import (
     Material as Material,

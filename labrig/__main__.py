@@ -4,8 +4,8 @@ import os
 import signal
 import sys
 
-from labrig.readable_output import make_streams_readable
-from labrig.signals import STOP_SIGNALS, end_at_once
+from labrig.foundation.readable_output import make_streams_readable
+from labrig.foundation.signals import STOP_SIGNALS, end_at_once
 
 # The matrices here are small: threads of the linear algebra would only wait for one another, six
 # times as long where another program computes, too. Has to be said before numpy is loaded.

@@ -9,10 +9,12 @@ from typing import TypeVar
 import numpy as np
 from pydantic import BaseModel
 
-from labrig import material, resources
+from labrig import material
 from labrig.acquire import RigFile, illuminant_lights, led_lights
 from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -24,7 +26,6 @@ from labrig.optics import (
     read_transmittance,
     shipped_camera,
 )
-from labrig.yaml_file import did_you_mean
 
 FileT = TypeVar("FileT", bound=BaseModel)
 

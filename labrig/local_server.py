@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import parse_qs, urlsplit
 
-from labrig.errors import DiskError, LabrigError, UsageError, memory_shortage
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.errors import DiskError, LabrigError, UsageError, memory_shortage
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 
 LOOPBACK = "127.0.0.1"
 #: No content from other origins, and no embedding in another page.

@@ -9,10 +9,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
-from labrig import plugins, resources
-from labrig.errors import UsageError
-from labrig.input_file import read_text
-from labrig.output_file import make_folder, write_text
+from labrig.foundation import plugins, resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.output_file import make_folder, write_text
 
 Kind = Literal["driver", "protocol"]
 #: Name of each template's module, and the entry points that must not have the new name yet.

@@ -13,13 +13,13 @@ from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import SchemaError, SchemaSerializer, core_schema
 
-from labrig import plugins
 from labrig.acquire import ROLES, DeviceEntry, RigFile
 from labrig.design import WishFile
-from labrig.errors import UsageError
+from labrig.foundation import plugins
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import FluorescentMaterial, Material
 from labrig.reproduce import SceneFile
-from labrig.yaml_file import did_you_mean
 
 KINDS = ("protocol", "rig", "material", "scene", "design")
 

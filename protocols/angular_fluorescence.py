@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import (
     LEDS,
@@ -23,9 +23,10 @@ from labrig.acquire import (
     Shoot,
     Unit,
 )
-from labrig.errors import ProtocolError
-from labrig.quantity import Count, DurationS
-from labrig.region import Region
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import Count, DurationS
+from labrig.foundation.region import Region
 
 from .steps.camera_settings import CameraSettings
 from .steps.led_scenes import LedNames
@@ -50,7 +51,7 @@ SPHERE_ANGLE_DEG = 45
 LEAST_REPOSITIONINGS = 3
 
 
-class Circle(BaseModel):
+class Circle(FrozenModel):
     """Outline of the sphere in the frame.
 
     Attributes
@@ -61,13 +62,11 @@ class Circle(BaseModel):
         Radius of the sphere as a fraction of the frame's width, for example `0.2`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     centre: tuple[Coordinate, Coordinate]
     radius: Annotated[float, Field(gt=0, le=1)]
 
 
-class SphereLight(BaseModel):
+class SphereLight(FrozenModel):
     """Light on the sphere.
 
     Attributes
@@ -79,8 +78,6 @@ class SphereLight(BaseModel):
     distance_radii
         Distance of the LED from the sphere's centre in radii of the sphere.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     side: Literal["left", "right", "above", "below"] = "left"
     angle: Annotated[float, Field(ge=10, le=80)] = float(SPHERE_ANGLE_DEG)

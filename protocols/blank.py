@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
@@ -19,10 +19,11 @@ from labrig.acquire import (
     Shoot,
     at,
 )
-from labrig.errors import ProtocolError
-from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.foundation.region import CENTRE, Region
 from labrig.record import FrameRole
-from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import (
     DARKS_PER_EXPOSURE,
@@ -42,7 +43,7 @@ BLANK_FRAMES = "blank"
 EARLIEST_S = 0.1
 
 
-class Clean(BaseModel):
+class Clean(FrozenModel):
     """Limits below which the signal of a blank counts as zero.
 
     Attributes
@@ -53,8 +54,6 @@ class Clean(BaseModel):
         Signal as a fraction of the camera's range from black to white below which the blank counts
         as clean, whatever its uncertainty, for example `0.001 %`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     sigmas: float = Field(4.0, gt=0)
     fraction: Fraction = Field(1e-5, ge=0, lt=1)

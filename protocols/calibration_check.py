@@ -10,10 +10,10 @@ from pydantic import Field
 
 from labrig.acquire import CalibrationRules, RigFile, Session
 from labrig.calibration import REFERENCE_KIND, CardPicture, ReferenceFile
-from labrig.errors import DataError, UsageError
 from labrig.fit.lvf import compare_card_pictures, place_means
-from labrig.named_files import FilePath
-from labrig.quantity import Count, DurationS
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.named_files import FilePath
+from labrig.foundation.quantity import Count, DurationS
 from labrig.record import FrameRecord
 from labrig.reduce import find_strip, read_hdr_frame, strip_profile
 from labrig.results import Measured, PictureChange

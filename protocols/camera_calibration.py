@@ -21,9 +21,9 @@ from labrig.acquire import (
     Shoot,
     Unit,
 )
-from labrig.quantity import Count, DurationS
+from labrig.foundation.quantity import Count, DurationS
+from labrig.foundation.region import CENTRE, Region
 from labrig.record import FrameRole
-from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import CameraSettings, FNumber, Iso
 from .steps.grey_card import CARD_REASON, CardLight, CardMeterUnit, card_light, light_card

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
-from labrig.quantity import Count, DurationS
+from labrig.foundation.quantity import Count, DurationS
 
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings

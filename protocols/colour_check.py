@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 
 from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
+from labrig.foundation.quantity import Count, DurationS
 from labrig.optics import CHART_PATCHES
-from labrig.quantity import Count, DurationS
 
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
@@ -26,10 +26,11 @@ from labrig.acquire import (
     at,
     planned_rig,
 )
-from labrig.quantity import Count, DurationS, Fraction, WordOrDuration, duration_text
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import Count, DurationS, Fraction, WordOrDuration, duration_text
+from labrig.foundation.region import CENTRE, Region
 from labrig.record import FrameRole
 from labrig.reduce import FrameMeasurement
-from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import (
     DARKS_PER_EXPOSURE,
@@ -58,7 +59,7 @@ from .steps.scenes import Arrangement, Scene, ScenesProtocol
 EARLIEST_S = 0.5
 
 
-class Plateau(BaseModel):
+class Plateau(FrozenModel):
     """Criterion by which `charge: plateau` ends.
 
     Attributes
@@ -72,8 +73,6 @@ class Plateau(BaseModel):
         Time of charging after which the decay begins in any case, with a warning, for example
         `2 h`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     growth: Fraction = Field(0.01, gt=0, lt=1)
     check_every: DurationS = Field(300.0, gt=0)

@@ -24,8 +24,8 @@ from labrig.acquire import (
     Session,
     Unit,
 )
+from labrig.foundation.quantity import Count, DurationS
 from labrig.optics import read_spectrometer_reading
-from labrig.quantity import Count, DurationS
 from labrig.record import PERSON, SpectrumRecord
 
 from .steps.led_scenes import LED_NAMES, LedNames, shuffled

@@ -9,12 +9,13 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import CAMERA, RigFile, Session, Shoot, at
 from labrig.calibration import LVF_KIND
-from labrig.quantity import DurationS, duration_text
-from labrig.region import Region
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, duration_text
+from labrig.foundation.region import Region
 
 from .steps.camera_settings import CameraSettings
 from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
@@ -69,7 +70,7 @@ OTHER_LAMP = "the glow is to have the same colour whatever lamp charged it"
 WHITE = "it tells what the camera's curves are off by"
 
 
-class CameraFilters(BaseModel):
+class CameraFilters(FrozenModel):
     """Colour filters before the camera, through which the glow is seen one after another.
 
     Attributes
@@ -79,8 +80,6 @@ class CameraFilters(BaseModel):
         bandpass-500]`. A wheel before the camera turns to those that it has, a person puts all
         others in.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     filters: tuple[str, ...] = Field(min_length=FEWEST_FILTERS)
 

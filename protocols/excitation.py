@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
@@ -32,9 +32,11 @@ from labrig.acquire import (
     at,
 )
 from labrig.calibration import IRRADIANCE_KIND
-from labrig.quantity import Count, DurationS, Fraction, duration_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import Count, DurationS, Fraction, duration_text
+from labrig.foundation.region import Region
 from labrig.record import FrameRecord, FrameRole
-from labrig.region import Region
 
 from .steps.afterglow import dark_level
 from .steps.camera_settings import (
@@ -43,7 +45,7 @@ from .steps.camera_settings import (
     dark_exposures_s,
     longest_exposure_s,
 )
-from .steps.charge_times import FloatArray, fades_below_s, most_informative_s, still_grows
+from .steps.charge_times import fades_below_s, most_informative_s, still_grows
 from .steps.darkness import levels
 from .steps.exciting_lights import ExcitingLights
 from .steps.exposure_metering import (
@@ -107,7 +109,7 @@ PAUSES_GROW = 1.25
 PLACES = 12
 
 
-class Rest(BaseModel):
+class Rest(FrozenModel):
     """Rest in the dark between two charges, until the sample should hardly glow.
 
     How long that takes follows from how the glow faded after the last charge. What is left of it is
@@ -123,8 +125,6 @@ class Rest(BaseModel):
     at_most
         Longest rest, for example `15 min`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     below: Fraction = Field(0.02, gt=0, lt=1)
     at_least: DurationS = Field(60.0, ge=0)

@@ -24,8 +24,8 @@ from labrig.acquire import (
     Unit,
     at,
 )
-from labrig.quantity import Count, DurationS, duration_text
-from labrig.region import CENTRE, Region
+from labrig.foundation.quantity import Count, DurationS, duration_text
+from labrig.foundation.region import CENTRE, Region
 
 from .camera_calibration import HALF, CardDarkUnit
 from .steps.camera_settings import CameraSettings, frame_times_s

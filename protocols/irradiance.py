@@ -24,8 +24,8 @@ from labrig.acquire import (
     Session,
 )
 from labrig.calibration import LVF_KIND
-from labrig.quantity import Count, DurationS
-from labrig.region import Region
+from labrig.foundation.quantity import Count, DurationS
+from labrig.foundation.region import Region
 
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings

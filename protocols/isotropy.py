@@ -10,8 +10,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import ManualStep, Session, Shoot, Unit, at
-from labrig.quantity import Count, DurationS, duration_text
-from labrig.region import Region
+from labrig.foundation.quantity import Count, DurationS, duration_text
+from labrig.foundation.region import Region
 
 from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from .steps.patch_names import Patches

@@ -12,8 +12,8 @@ from typing import Literal
 from pydantic import Field
 
 from labrig.acquire import SPECTROMETER, Session, Unit
-from labrig.quantity import Count, DurationS
-from labrig.region import CENTRE, Region
+from labrig.foundation.quantity import Count, DurationS
+from labrig.foundation.region import CENTRE, Region
 
 from .steps.led_scenes import (
     AGAIN,

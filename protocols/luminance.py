@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
@@ -30,13 +30,15 @@ from labrig.acquire import (
     at,
 )
 from labrig.bench_optics import card_radiance, illuminance_lx, luminance
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.named_files import ShippedOrFile, is_path
+from labrig.foundation.quantity import DurationS, duration_text
+from labrig.foundation.region import CENTRE
 from labrig.material import read_material
-from labrig.named_files import ShippedOrFile, is_path
 from labrig.optics import read_spectrum
-from labrig.quantity import DurationS, duration_text
 from labrig.record import FrameRecord, FrameRole
-from labrig.region import CENTRE
 from labrig.results import (
     VISIBLE_MCD_PER_M2,
     LuminanceRequirement,
@@ -47,7 +49,7 @@ from labrig.results import (
 from .steps.afterglow import Afterglow, dark_level, glow
 from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, Iso
 from .steps.darkness import levels, range_dn
-from .steps.exposure_metering import TARGET, FloatArray, MeteringFrame, measure_frame
+from .steps.exposure_metering import TARGET, MeteringFrame, measure_frame
 from .steps.glow import dark_frames
 from .steps.patch_names import Patches
 from .steps.sample_pose import check_visible, face_camera, face_lamp, has_door, lights_out
@@ -171,7 +173,7 @@ PRESETS = {
 }
 
 
-class Excitation(BaseModel):
+class Excitation(FrozenModel):
     """Excitation of the sample, by a standard or as the user wants it.
 
     Attributes
@@ -190,8 +192,6 @@ class Excitation(BaseModel):
     rested
         Time for which this sample was in the dark before the run, for example `50 h`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     preset: Preset = "DIN 67510-1"
     lamp: LampType | None = None

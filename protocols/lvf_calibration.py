@@ -19,8 +19,8 @@ from labrig.acquire import (
     TimedAction,
     at,
 )
+from labrig.foundation.quantity import Count, DurationS, WordOrDuration
 from labrig.optics import read_transmittance
-from labrig.quantity import Count, DurationS, WordOrDuration
 
 from .steps.camera_settings import MARGIN_S, CameraSettings
 from .steps.sample_pose import charge, face_lamp, lights_out, visible_after_s

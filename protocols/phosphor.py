@@ -22,9 +22,9 @@ from labrig.acquire import (
 )
 from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, kinds
-from labrig.errors import ProtocolError
-from labrig.quantity import duration_text
-from labrig.yaml_file import did_you_mean
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.yaml_file import did_you_mean
 
 from .excitation import ExcitationFrames
 from .steps.chain import Chain, Part

@@ -24,7 +24,7 @@ from labrig.acquire import (
     at,
 )
 from labrig.calibration import LVF_KIND
-from labrig.quantity import Count, DurationS
+from labrig.foundation.quantity import Count, DurationS
 
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import MARGIN_S, CameraSettings

@@ -9,11 +9,12 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import CameraOffers, ManualStep, ProtocolModel, Unit
-from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
-from labrig.region import CENTRE
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.foundation.region import CENTRE
 
 from .decay import Decay, DecayUnit
 from .steps.camera_settings import CameraSettings
@@ -45,7 +46,7 @@ Charge = Annotated[DurationS, Field(gt=0)]
 WHY = "saturation in level shows only between two irradiances"
 
 
-class WeakerLight(BaseModel):
+class WeakerLight(FrozenModel):
     """Weakening of the light by hand: by a neutral filter or by a distance.
 
     Attributes
@@ -61,8 +62,6 @@ class WeakerLight(BaseModel):
     fraction_sigma
         Standard uncertainty of `fraction`, relative to it, for example `2 %`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     filter: str | None = Field(None, min_length=1)
     distance: str | None = Field(None, min_length=1)

@@ -11,8 +11,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import ProtocolModel, Unit
-from labrig.named_files import FilePath, ShippedOrFile
-from labrig.quantity import Count, DurationS
+from labrig.foundation.named_files import FilePath, ShippedOrFile
+from labrig.foundation.quantity import Count, DurationS
 
 from .steps.camera_settings import CameraSettings
 from .steps.led_scenes import CARD, ON_CARD, ON_SAMPLE, LampNames, LampUnit

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .sensor import read_noise_electrons
+from labrig.foundation.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+from .sensor import read_noise_electrons
 
 #: Longest side of a live picture; about that of a 5D Mark II's.
 LIVE_PIXELS = 1056

@@ -10,12 +10,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.region import region_pixels
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.region import region_pixels
 
 from .arrangement import USUAL_LIGHT_DEG, Arrangement
 from .simulation import Simulation
-
-FloatArray = NDArray[np.float64]
 
 #: Angle in degrees by which the light is turned until a yarn reflects 1/e: its sheen.
 SHEEN_DEG = 60.0

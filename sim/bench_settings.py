@@ -2,20 +2,19 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from labrig.named_files import FilePath
-from labrig.quantity import DurationS, Fraction
-from labrig.region import Region
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.named_files import FilePath
+from labrig.foundation.quantity import DurationS, Fraction
+from labrig.foundation.region import Region
 
 #: Wavelengths of the ends of a strip.
 Nanometres = Annotated[float, Field(ge=300, le=900)]
 
 
-class Part(BaseModel):
+class Part(FrozenModel):
     """Part of a simulated room; never changes."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class DoorSettings(Part):

@@ -1,15 +1,12 @@
 """Cards before lamp and camera: a grey card, a ColorChecker."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.region import Region, region_pixels
+from labrig.foundation.arrays import FloatArray, IntArray
+from labrig.foundation.region import Region, region_pixels
 
 from .arrangement import Card
 from .lamp import WAVELENGTH_NM
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: Rows and columns of a ColorChecker; its patches leave this part of their distance to the frame.
 ROWS, COLUMNS = 4, 6

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Callable, Mapping
 
-from labrig.clock import VirtualClock
-from labrig.errors import UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UsageError
 
 from .arrangement import (
     USUAL_LAMP_M,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .arrangement import LampKind
 from .faults import Fault, FaultTime, given

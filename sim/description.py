@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from labrig.foundation.yaml_file import validate
 from labrig.material import read_any_material
-from labrig.yaml_file import validate
 
 from .dng import Shot, encode_dng
 from .simulation import EMPTY, Simulation

@@ -5,8 +5,8 @@ import os
 from collections.abc import Sequence
 from typing import Any, BinaryIO, cast
 
-from labrig.clock import VirtualClock
-from labrig.output_file import Disk
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.output_file import Disk
 
 from .faults import AfterBytes, Slowness
 

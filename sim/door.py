@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .bench_settings import DoorSettings
 from .boards import Pulse

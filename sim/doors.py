@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .bench_settings import DoorSettings
 from .boards import Pulse

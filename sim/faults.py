@@ -4,16 +4,13 @@ import math
 from collections.abc import Iterable
 from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
+from pydantic import ConfigDict, Field, model_serializer, model_validator
 
-from labrig.quantity import DurationS, Fraction
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, Fraction
 
 
-class FaultTime(_Part):
+class FaultTime(FrozenModel):
     """Time span of a fault.
 
     Attributes
@@ -161,7 +158,7 @@ def _or_its_name(schema: dict[str, Any]) -> None:
     schema["anyOf"] = [name, with_span]
 
 
-class Fault(_Part):
+class Fault(FrozenModel):
     """One item of `simulation.faults`: a name, or a name and when.
 
     Attributes

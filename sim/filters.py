@@ -5,20 +5,18 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from labrig import resources
-from labrig.errors import UsageError
-from labrig.input_file import read_text
-from labrig.yaml_file import did_you_mean
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.yaml_file import did_you_mean
 
 from .arrangement import USUAL_LAMP_M, Arrangement, Arrangements
 from .bench_settings import MonochromatorSettings
 from .lamp import IS_VISIBLE, WAVELENGTH_NM
 from .monochromator import passed_by
-
-FloatArray = NDArray[np.float64]
 
 SHIPPED = "config/optics/filters"
 SUFFIX = ".csv"

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .bench_settings import IlluminantSettings
 from .lamp import BURNING_LIGHT, C2_NM_K, WAVELENGTH_NM, filament_spectrum
 from .leds import Leds, led_shape
-
-FloatArray = NDArray[np.float64]
 
 #: Lines of the xenon arc: wavelength in nm, height over the continuum, width (1 σ) in nm.
 XENON_LINES = (

@@ -5,12 +5,11 @@ from collections.abc import Iterator
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import Float32Array
 
 from .arrangement import Arrangement
 from .bench_settings import ImagingSettings
-
-Float32Array = NDArray[np.float32]
 
 #: Grain of surfaces is never darker than this part of them.
 DARKEST = 0.05

@@ -12,9 +12,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .kinetics_settings import USUAL_DEPTH_EV, KineticsSettings
+from labrig.foundation.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+from .kinetics_settings import USUAL_DEPTH_EV, KineticsSettings
 
 #: Boltzmann's constant in eV/K.
 BOLTZMANN_EV_K = 8.617333e-5

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.quantity import Fraction
+from labrig.foundation.quantity import Fraction
 
 from .bench_settings import Part
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline, make_interp_spline
 
-from .simulation import LampSettings
+from labrig.foundation.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+from .simulation import LampSettings
 
 #: Second radiation constant hc/k, nm K (CODATA 2018).
 C2_NM_K = 1.438776877e7

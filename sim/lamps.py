@@ -4,14 +4,13 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .illuminants import Illuminants
 from .lamp import Lamp
 from .leds import Leds
 from .mercury import Mercury
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,17 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.region import region_pixels
+from labrig.foundation.arrays import IntArray
+from labrig.foundation.region import region_pixels
 
 from .arrangement import Arrangement, Card, LvfPlace
 from .cards import surfaces
 from .lvf import PIECES, pieces
 from .sensor import BAYER_RGGB
 from .simulation import Simulation
-
-IntArray = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .faults import Fault, OfLed, given
 from .leds import Leds

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .bench_settings import LedSettings
 from .filters import read_curve
 from .lamp import BURNING_LIGHT, WAVELENGTH_NM
-
-FloatArray = NDArray[np.float64]
 
 #: Full width at half maximum of Ohno's shape with width 1.
 OHNO_FWHM = 0.9215

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .door import Door
 from .faults import FaultTime
@@ -25,7 +26,6 @@ from .lamp import (
 )
 from .lamps import FilteredLamps
 
-FloatArray = NDArray[np.float64]
 #: Function of time: fraction of a light.
 UnitFraction = Callable[[float], float]
 

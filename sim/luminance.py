@@ -1,14 +1,13 @@
 """Luminance in the simulated room: its absolute scale, from the illuminance by its lamp."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
+
+from labrig.foundation.arrays import FloatArray
 
 from .lamp import BURNING_SPECTRUM, CELL_NM, WAVELENGTH_NM
 from .optics import REFLECTED
 from .simulation import LampSettings
-
-FloatArray = NDArray[np.float64]
 
 #: Luminous efficacy of light of 540 THz in lm/W (SI, since 2019), and mcd in a cd.
 KM_LM_PER_W = 683.0

@@ -8,16 +8,13 @@ import math
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from labrig.region import Region, region_pixels
+from labrig.foundation.arrays import FloatArray, IntArray
+from labrig.foundation.region import Region, region_pixels
 
 from .bench_settings import LvfSettings, StripSettings
 from .lamp import WAVELENGTH_NM
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: The strip is made of so many evenly wide pieces: less than 1 nm each, whatever the sensor.
 PIECES = 400

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .lamp import CELL_NM, WAVELENGTH_NM
-
-FloatArray = NDArray[np.float64]
 
 #: Lines in air [nm] (Sansonetti, Salit and Reader, Applied Optics 35, 1996) and their light over
 #: the strongest's, about that of a germicidal lamp. Their own width, a hundredth of a nanometre,

@@ -1,12 +1,11 @@
 """The monochromator before the lamp: a band rounder than a triangle, and some stray light."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .bench_settings import MonochromatorSettings
 from .lamp import WAVELENGTH_NM
-
-FloatArray = NDArray[np.float64]
 
 #: Blaze of the grating and width of its efficiency in nm.
 BLAZE_NM, BLAZE_WIDTH_NM = 480.0, 260.0

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import usb.backend
 
-from labrig.clock import VirtualClock
-from labrig.output_file import Disk
-from labrig.yaml_file import validate
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.output_file import Disk
+from labrig.foundation.yaml_file import validate
 
 from . import protocol_sim
 from .boards import (

@@ -8,19 +8,17 @@ import json
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
-from labrig import resources
-from labrig.errors import UsageError
-from labrig.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.material import Material
 
 from .lamp import CELL_NM, IS_VISIBLE, WAVELENGTH_NM
 from .phosphor import band_cells
-
-FloatArray = NDArray[np.float64]
 
 CURVES = "canon_eos_5d_mark_ii"
 CHANNELS = ("R", "G", "B")

@@ -18,15 +18,14 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import Material, State
 
 from .kinetics import Law, Traps, depths_of, law_of, layers_of, rate_in_the_middle
 from .kinetics_settings import KineticsSettings
 from .lamp import BURNING_K, CELL_EDGES_NM, CELL_NM, filament_spectrum
 from .traps import Drive, integrate
-
-FloatArray = NDArray[np.float64]
 
 #: A step may differ by so much from its two halves, relative; and absolute, of concentrations
 #: between 0 and 1. The halves, which are kept, are better by orders of magnitude.

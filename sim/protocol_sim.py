@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 import serial
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .boards import SerialCable
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.clock import VirtualClock
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UsageError
 
 from .aiming import (
     LIVE_EXPOSURE_S,
@@ -55,8 +56,6 @@ from .simulation import Simulation
 from .table import Table
 from .truth import Truth, true_lvf, true_patches
 from .wander import Ripple, Wander
-
-FloatArray = NDArray[np.float64]
 
 #: Rounding of times that were added up differently.
 TICK_S = 1e-6

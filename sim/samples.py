@@ -5,9 +5,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import Albedo, Material, State, read_any_material
 
 from .arrangement import Arrangement, Arrangements
@@ -19,8 +19,6 @@ from .optics import CLOTH_REFLECTANCE, REFLECTED, emission
 from .phosphor import Light, Phosphor, phosphor
 from .simulation import EMPTY, Simulation
 from .temperature import rate_factor
-
-FloatArray = NDArray[np.float64]
 
 #: Unit of the lamp's mean spectral irradiance among the factors of an absolute scale.
 IRRADIANCE_UNIT = "W/m²/nm"

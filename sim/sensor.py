@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
+from labrig.foundation.arrays import Float32Array, FloatArray
+
 Mosaic = NDArray[np.uint16]
 #: Function of the time in seconds since 1970.
 Course = Callable[[float], float]

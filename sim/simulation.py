@@ -12,9 +12,9 @@ from pydantic import (
     model_validator,
 )
 
-from labrig.named_files import FilePath, NamesFile, ShippedOrFile
-from labrig.quantity import DurationS, Fraction
-from labrig.region import Region
+from labrig.foundation.named_files import FilePath, NamesFile, ShippedOrFile
+from labrig.foundation.quantity import DurationS, Fraction
+from labrig.foundation.region import Region
 
 from .bench_settings import (
     DoorSettings,

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import Material, ReradiationMatrix
 
 from .lamp import CELL_NM, WAVELENGTH_NM
 from .optics import emission
-
-FloatArray = NDArray[np.float64]
 
 #: Reflectance of a sample whose material file has no albedo.
 SAMPLE_REFLECTANCE = 0.5

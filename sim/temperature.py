@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .bench_settings import TemperatureSettings
 from .faults import FaultTime

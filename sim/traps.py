@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .kinetics import Law
-
-FloatArray = NDArray[np.float64]
 
 #: Nodes of a step; the error of a step falls with the power 2 × this of its length.
 STAGES = 7

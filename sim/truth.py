@@ -4,11 +4,11 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.output_file import write_text
 from labrig.material import Material
-from labrig.output_file import write_text
 
 from .bench_settings import StripSettings
 from .kinetics_settings import KineticsSettings
@@ -17,17 +17,11 @@ from .lvf import Lvf, in_pixels
 from .samples import Samples
 from .simulation import Simulation
 
-FloatArray = NDArray[np.float64]
-
 #: Places along the LVF's strip, as many as the paper takes.
 SLICES = 31
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class TrueState(_Part):
+class TrueState(FrozenModel):
     """One state of a patch.
 
     Attributes
@@ -57,7 +51,7 @@ class TrueState(_Part):
     amplitude_dn_per_s: tuple[float, float, float] | None
 
 
-class TruePatch(_Part):
+class TruePatch(FrozenModel):
     """One sample and its states by falling rate; a fluorescent material has none.
 
     Attributes
@@ -73,7 +67,7 @@ class TruePatch(_Part):
     states: tuple[TrueState, ...]
 
 
-class TrueStrip(_Part):
+class TrueStrip(FrozenModel):
     """The strip of the LVF in the picture, in pixels.
 
     Attributes
@@ -92,7 +86,7 @@ class TrueStrip(_Part):
     rising: bool
 
 
-class TrueLvf(_Part):
+class TrueLvf(FrozenModel):
     """The linear variable filter.
 
     Attributes
@@ -113,7 +107,7 @@ class TrueLvf(_Part):
     on_sample: TrueStrip
 
 
-class Truth(_Part):
+class Truth(FrozenModel):
     """The room's parameters.
 
     Attributes

@@ -1,7 +1,8 @@
 """The camera's view of the bench: glow, and light reflected by samples, cards, door, cloth."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from labrig.foundation.arrays import FloatArray
 
 from .angles import Angles
 from .arrangement import Arrangement
@@ -13,8 +14,6 @@ from .optics import CLOTH_REFLECTANCE, REFLECTED
 from .sensor import BAYER_RGGB
 from .simulation import Simulation
 from .surfaces import Surfaces
-
-FloatArray = NDArray[np.float64]
 
 
 class View:

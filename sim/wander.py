@@ -1,9 +1,6 @@
 """Courses over time: random ones, of flicker and of a black level, and a periodic one."""
 
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 #: Waves of which a course consists; their sum is a Gaussian process to 1 %.
 WAVES = 300

@@ -37,7 +37,7 @@ for _name in ("SIGINT", "SIGQUIT", "SIGHUP"):
     if _signum is not None and signal.getsignal(_signum) == signal.SIG_IGN:
         signal.signal(_signum, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
 
-from labrig.signals import STOP_SIGNALS
+from labrig.foundation.signals import STOP_SIGNALS
 from tests.quick_yaml import read_quickly, write_quickly
 from tests.real_data import REAL, SHARED
 
@@ -258,7 +258,7 @@ def make_rig(tmp_path: Path) -> Callable[..., Path]:
 
 def write_small_rig(path: Path, base: str = "sim", **simulation: object) -> Path:
     """Write the shipped simulated rig with a small sensor, changed as told."""
-    from labrig import resources
+    from labrig.foundation import resources
 
     content = read_quickly((resources.folder("config") / f"{base}.yaml").read_text())
     content["simulation"] |= {"sensor": {"width": 96, "height": 64}}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import LabrigError
+from labrig.foundation.errors import LabrigError
 from labrig.results import TableLayout, read_described_series
 
 #: Times in ns, and counts, that every table below holds.

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig import resources
 from labrig.cli.exit_codes import guarded
+from labrig.foundation import resources
 from tests.forked import forked
 
 #: A refusal takes no longer, in seconds of computing; nor does anything hang for longer than this.

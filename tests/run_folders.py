@@ -7,8 +7,8 @@ from pathlib import Path
 from labrig.acquire import Plan, RunObserver, plan, read_protocol, read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.bench.execution import execute
-from labrig.clock import Clock, Interrupted
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock, Interrupted
+from labrig.foundation.errors import DeviceError
 from labrig.record import RunFolder
 from tests.acquire.fakes import Watching
 

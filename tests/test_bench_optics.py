@@ -124,7 +124,7 @@ def test_a_sphere_is_lit_from_where_the_rig_says(
 
 
 def test_the_shipped_bench_tells_its_lens_and_geometry() -> None:
-    from labrig import resources
+    from labrig.foundation import resources
 
     shipped = read_rig_file(resources.find("config", "rig", "sim-fluorescent"))
     require_optics(shipped)

@@ -11,7 +11,7 @@ import pytest
 from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import open_bench
 from labrig.consent import calls, give_consent, has_consent, starting
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from tests.terminal import idle_guard
 
 

@@ -26,7 +26,7 @@ from labrig.acquire import (
     run_units,
 )
 from labrig.bench import open_bench
-from labrig.errors import DeviceError, ProtocolError, UsageError
+from labrig.foundation.errors import DeviceError, ProtocolError, UsageError
 from labrig.record import RunFolder, RunRecord
 from labrig.sim.door import FRAME_S
 from tests.acquire.fakes import Watching

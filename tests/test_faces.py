@@ -9,8 +9,8 @@ import pytest
 
 HOME, TESTS = Path(__file__).parents[1], Path(__file__).parent
 BESIDE = ("drivers", "protocols", "sim")
-#: A protocol's module is its face: its model, units and frame roles, for its analysis.
-OPEN = ("labrig.protocols",)
+#: Their modules are faces: a protocol's model, units and frame roles; one matter of shared ground.
+OPEN = ("labrig.foundation", "labrig.protocols")
 #: What a source that imports from deep within has somewhere; most have not, and are not parsed.
 DEEP = re.compile(r"labrig\.\w+\.\w")
 

@@ -18,12 +18,12 @@ from labrig.acquire import LAMP, read_rig_file
 from labrig.acquire.rig import device_errors
 from labrig.bench import Bench, open_bench
 from labrig.cli.progress import PlainProgress
-from labrig.clock import SystemClock
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.yaml_file import read_yaml
 from labrig.record import PC_CLOCK, RunRecord, read_run
 from labrig.record.history import interruptions
 from labrig.record.journal import read_journal
 from labrig.sim.boards import SerialCable
-from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 

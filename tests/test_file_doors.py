@@ -19,10 +19,10 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
     "read a file": (
         {"open", "io.open", "os.open", "os.fdopen", "*.open", "*.read_text", "*.read_bytes"},
         {
-            "labrig/input_file.py",
-            "labrig/output_file.py",
+            "labrig/foundation/input_file.py",
+            "labrig/foundation/output_file.py",
             "labrig/record/journal.py",  # appends to its own file, in a folder that was checked
-            "labrig/exr_file.py",  # the null device, for what OpenEXR prints
+            "labrig/foundation/exr_file.py",  # the null device, for what OpenEXR prints
             "labrig/bench/device_lock.py",  # locks of all users, not followed through links
             "labrig/acquire/running_programs.py",  # of the system: /proc
             "labrig/cli/closed_pipe.py",  # the null device
@@ -38,7 +38,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "shutil.copytree", "shutil.move", "*.tofile", "*.savetxt", "*.extractall",
         },
         {
-            "labrig/output_file.py",
+            "labrig/foundation/output_file.py",
             "labrig/process/run.py",  # names of whole folders of results
             "labrig/calibration/kept.py",  # and of calibrations
         },
@@ -46,7 +46,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
     "make or delete a folder": (
         {"*.mkdir", "os.makedirs", "*.rmdir", "shutil.rmtree", "*.unlink", "os.remove"},
         {
-            "labrig/output_file.py",
+            "labrig/foundation/output_file.py",
             "labrig/record/run_folder.py",
             "labrig/record/checksums.py",
             "labrig/record/run_lock.py",
@@ -64,11 +64,11 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "np.load", "np.fromfile", "np.memmap", "np.genfromtxt", "np.save", "np.savez",
             "np.savez_compressed",
         },
-        {"labrig/array_file.py"},
+        {"labrig/foundation/array_file.py"},
     ),
     "read a picture": (
         {"cv2.imread", "cv2.imdecode", "cv2.imreadmulti", "cv2.VideoCapture", "cv2.FileStorage"},
-        {"labrig/picture_file.py", "drivers/uvc_preview.py"},
+        {"labrig/foundation/picture_file.py", "drivers/uvc_preview.py"},
     ),
     "write a picture": (
         {"cv2.imwrite", "cv2.VideoWriter", "*.savefig", "PdfPages"},
@@ -79,9 +79,13 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "labrig/report/figures_pdf.py",
         },
     ),
-    "parse YAML": ({"yaml.load", "yaml.safe_load", "yaml.load_all"}, {"labrig/yaml_file.py"}),
+    "parse YAML": (
+        {"yaml.load", "yaml.safe_load", "yaml.load_all"},
+        {"labrig/foundation/yaml_file.py"},
+    ),
     "lock a file": (
-        {"FileLock", "SoftFileLock"}, {"labrig/file_lock.py", "labrig/bench/device_lock.py"},
+        {"FileLock", "SoftFileLock"},
+        {"labrig/foundation/file_lock.py", "labrig/bench/device_lock.py"},
     ),
     "run code": (
         {
@@ -134,16 +138,23 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
         "drivers/gphoto2_camera/process.py",  # a pipe to labrig itself
         "drivers/gphoto2_camera/helper.py",
     },
-    ("ctypes",): {"labrig/clock.py", "labrig/signals.py", "labrig/bench/awake.py"},
+    ("ctypes",): {
+        "labrig/foundation/clock.py",
+        "labrig/foundation/signals.py",
+        "labrig/bench/awake.py",
+    },
     ("gzip", "bz2", "lzma", "tarfile"): set(),
-    ("zipfile",): {"labrig/array_file.py"},
-    ("OpenEXR",): {"labrig/exr_file.py"},
-    ("PIL",): {"labrig/picture_file.py"},
+    ("zipfile",): {"labrig/foundation/array_file.py"},
+    ("OpenEXR",): {"labrig/foundation/exr_file.py"},
+    ("PIL",): {"labrig/foundation/picture_file.py"},
     ("rawpy",): {"labrig/reduce/raw.py", "labrig/process/provenance.py"},  # there its version
     ("tifffile",): {"labrig/reduce/dng.py"},
     ("exifread",): {"labrig/reduce/raw.py", "labrig/setup/check.py"},  # there of the own camera
     ("h5py",): {"labrig/export/nexus.py"},
-    ("yaml",): {"labrig/yaml_file.py", "labrig/setup/patches_block.py"},  # there where a key stands
+    ("yaml",): {
+        "labrig/foundation/yaml_file.py",
+        "labrig/setup/patches_block.py",
+    },  # there where a key stands
     ("serial",): {
         "labrig/bench/opening.py",
         "labrig/bench/serial_ports.py",  # a list of the ports

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
+from labrig.foundation import resources
 from labrig.material import read_material
 from tests.conftest import Ended
 

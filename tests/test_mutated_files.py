@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import read_protocol, read_rig_file
-from labrig.errors import LabrigError
+from labrig.foundation import resources
+from labrig.foundation.errors import LabrigError
 from labrig.material import read_material
 from labrig.optics import read_curve_file
 from labrig.record import RunFolder, read_run

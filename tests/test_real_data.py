@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig import colour_science
+from labrig.foundation import colour_science
 from tests.conftest import Ended
 
 #: Centres of the neutrals, white to black, in pixels, and their reflectance (BabelColor average of

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig import resources
+from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.process import process_run
 from labrig.results import CalibrationCheckResult, CalibrationResult, PhosphorResult

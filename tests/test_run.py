@@ -15,7 +15,7 @@ import pytest
 
 from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import Recording, open_bench, resume_run
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.record import read_run
 from labrig.record.journal import read_journal
 from tests.conftest import Ended

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from labrig import resources
+from labrig.foundation import resources
+from labrig.foundation.yaml_file import read_yaml
 from labrig.schema import KINDS, schema
-from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
 
 SHIPPED = [

@@ -5,8 +5,8 @@ from urllib.parse import urlsplit
 import usb.util
 
 from labrig.acquire import Connections
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError, UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, UsageError
 
 #: IANA's port for PTP/IP.
 PTPIP_PORT = 15740

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.errors import DeviceError, DeviceLostError
 
 from .address import port_path
 from .checks import findings

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from labrig.acquire import CameraOffers, ExposureSettings
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 from .labels import SAME_F_NUMBER, f_number, iso, label_of_time, true_times_s
 from .library import Library, Setting

@@ -1,6 +1,6 @@
 """Failures of libgphoto2 and their remedies; all of them are `DeviceError` to the outside."""
 
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.errors import DeviceError, DeviceLostError
 
 #: libgphoto2's own numbers, gphoto2-result.h and gphoto2-port-result.h.
 GENERAL, NOT_SUPPORTED, IO, TIMEOUT = -1, -6, -7, -10

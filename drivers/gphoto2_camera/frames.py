@@ -2,8 +2,8 @@
 
 from pathlib import PurePosixPath
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from .library import AT_ONCE_S, Library
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import gphoto2
 
-from labrig.clock import SystemClock
+from labrig.foundation.clock import SystemClock
 
 NETWORK_MODEL = "PTP/IP Camera"
 #: An image, as one of the kinds of events.

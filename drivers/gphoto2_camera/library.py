@@ -2,8 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from .failures import UnspecifiedError
 from .process import HelperProcess

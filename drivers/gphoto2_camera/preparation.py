@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 from .labels import is_raw_alone
 from .library import Library

@@ -15,8 +15,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from labrig.clock import CHECK_INTERVAL_S, Clock
-from labrig.errors import DeviceLostError, UsageError
+from labrig.foundation.clock import CHECK_INTERVAL_S, Clock
+from labrig.foundation.errors import DeviceLostError, UsageError
 
 from .failures import failure
 

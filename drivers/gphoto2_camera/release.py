@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
-from labrig.clock import Clock
-from labrig.errors import UsageError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import UsageError
 
 from .failures import BusyError, PerhapsReleasedError
 from .library import POLL_PERIOD_S, RELEASE_S, Library, Span

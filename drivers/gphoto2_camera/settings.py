@@ -3,10 +3,11 @@
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import CameraOffers, FramePixels, frame_bytes
-from labrig.quantity import DurationS, SizeBytes
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, SizeBytes
 
 #: In thirds of a stop, from 32 s down to 1/8192 s.
 _LONGEST_THIRDS, _SHORTEST_THIRDS = 15, -39
@@ -14,7 +15,7 @@ _LONGEST_THIRDS, _SHORTEST_THIRDS = 15, -39
 Positive = Annotated[DurationS, Field(gt=0)]
 
 
-class Gphoto2CameraSettings(BaseModel):
+class Gphoto2CameraSettings(FrozenModel):
     """Keys of a camera behind libgphoto2 in a rig file.
 
     Attributes
@@ -50,8 +51,6 @@ class Gphoto2CameraSettings(BaseModel):
     answer_timeout
         Time within which the camera must have taken a setting, for example `5 s`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     shutter_lag: Annotated[DurationS, Field(ge=0)] = 0.0
     release: Literal["button", "trigger"] | None = None

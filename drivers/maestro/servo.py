@@ -9,11 +9,12 @@ Source: Pololu's Maestro User's Guide, sections 4.e and 5.
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Connections
-from labrig.errors import UnclearAnswerError
-from labrig.quantity import DurationS
+from labrig.foundation.errors import UnclearAnswerError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS
 
 from ..serial_line import SerialLine
 
@@ -69,7 +70,7 @@ QUARTER_US = 0.25e-6
 PulseS = Annotated[DurationS, Field(ge=64e-6, le=4080e-6)]
 
 
-class ServoSettings(BaseModel):
+class ServoSettings(FrozenModel):
     """Keys of a servo on a Pololu Maestro in a rig file.
 
     Attributes
@@ -88,8 +89,6 @@ class ServoSettings(BaseModel):
         Device number of the Maestro if several share the line, which are then addressed by Pololu's
         protocol; null: the only one, addressed by the compact protocol.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     channel: int = Field(ge=0, le=23)
     travel: Annotated[DurationS, Field(gt=0)]

@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 
 from labrig.acquire import Connections
-from labrig.errors import UnclearAnswerError
+from labrig.foundation.errors import UnclearAnswerError
 
 from ..serial_line import SerialLine
 

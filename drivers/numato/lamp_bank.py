@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import Connections, Illuminant
+from labrig.foundation.models import FrozenModel
 
 from ..light_switches import Name
 from .relay_bank import Number, RelayBank, require_a_relay_each
@@ -38,7 +39,7 @@ class NumatoLampBank(RelayBank):
 
     nouns = "lamps"
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of lamps on relays of a Numato board in a rig file.
 
         Attributes
@@ -47,8 +48,6 @@ class NumatoLampBank(RelayBank):
             Relay and light of each lamp by the lamp's name, for example
             `{halogen: {relay: 1, spectrum: halogen_3000k, settling: 10 min}}`.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         lamps: dict[Name, RelayLamp] = Field(min_length=1)
 

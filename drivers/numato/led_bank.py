@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from labrig.acquire import Connections, LedLight
+from labrig.foundation.models import FrozenModel
 
 from ..light_switches import Name
 from .relay_bank import Number, RelayBank, require_a_relay_each
@@ -45,7 +46,7 @@ class NumatoLedBank(RelayBank):
 
     nouns = "LEDs"
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of LEDs on relays of a Numato board in a rig file.
 
         Attributes
@@ -55,8 +56,6 @@ class NumatoLedBank(RelayBank):
             `{"450 nm": 1, "525 nm": 2}`; or with the LED's light
             `{"450 nm": {relay: 1, centre: 450, fwhm: 20, settling: 0.5 s}}`.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         relays: dict[Name, Led] = Field(min_length=1)
 

@@ -1,8 +1,9 @@
 """A relay of a Numato board that switches a lamp."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Connections
+from labrig.foundation.models import FrozenModel
 
 from .board import CHANNELS, Board
 
@@ -20,7 +21,7 @@ class NumatoRelay:
         Connections that open the port.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a relay of a Numato board in a rig file.
 
         Attributes
@@ -28,8 +29,6 @@ class NumatoRelay:
         relay
             Number of the relay that switches the lamp, counted from 0.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         relay: int = Field(ge=0, lt=len(CHANNELS))
 

@@ -9,10 +9,11 @@ Sources: Numato's user guides of their relay modules; data sheets of LM35 and TM
 from contextlib import suppress
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Connections
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.errors import DeviceError, DeviceLostError
+from labrig.foundation.models import FrozenModel
 
 from .board import CHANNELS, Board
 
@@ -38,7 +39,7 @@ class NumatoThermometer:
         Connections that open the port.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a thermometer on a Numato board in a rig file; by default a TMP36 at 5 V.
 
         Attributes
@@ -55,8 +56,6 @@ class NumatoThermometer:
         bits
             Resolution of the board's converter in bits.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         input: int = Field(0, ge=0, lt=len(CHANNELS))
         volts_per_degree: Volts = 0.01

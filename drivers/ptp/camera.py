@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 
 from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.errors import DeviceError, DeviceLostError
 
 from .body import Body
 from .eos.camera import EosCamera

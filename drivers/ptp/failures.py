@@ -1,6 +1,6 @@
 """Failures of the communication with a camera; all of them are `DeviceError` to the outside."""
 
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.errors import DeviceError, DeviceLostError
 
 MAX_SHOWN_BYTES = 32
 

@@ -2,8 +2,8 @@
 
 from enum import IntEnum
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from .session import Session, Timeouts
 

@@ -4,8 +4,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from labrig.acquire import Connections
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from .codes import Standard
 from .device_info import DeviceInfo, parse_device_info

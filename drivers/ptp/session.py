@@ -5,8 +5,8 @@ import struct
 from dataclasses import dataclass
 from enum import IntEnum
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from .codes import (
     DEVICE_BUSY,

@@ -2,16 +2,17 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
 from labrig.acquire import CameraOffers, FramePixels, frame_bytes
-from labrig.quantity import DurationS, SizeBytes
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, SizeBytes
 
 from .eos.codes import F_NUMBERS, ISOS, bulb_times_s, shutter_time_s, third_stop_codes
 from .eos.iso import NativeIsos, isos_of_model
 
 
-class PtpCameraSettings(BaseModel):
+class PtpCameraSettings(FrozenModel):
     """Keys of a camera on PTP in a rig file.
 
     Attributes
@@ -44,8 +45,6 @@ class PtpCameraSettings(BaseModel):
     answer_timeout
         Time within which the camera must have taken a setting, for example `5 s`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     shutter_lag: Annotated[DurationS, Field(ge=0)] = 0.0
     isos: Annotated[tuple[int, ...], Field(min_length=1)] = isos_of_model("").values

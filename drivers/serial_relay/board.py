@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 
 from labrig.acquire import Connections, Finding
-from labrig.errors import DeviceError, UnclearAnswerError
+from labrig.foundation.errors import DeviceError, UnclearAnswerError
 
 from ..serial_line import SerialLine
 from .settings import BoardSettings, Exchange, SwitchCommands

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from labrig.acquire import Connections
-from labrig.quantity import DurationS
+from labrig.foundation.quantity import DurationS
 
 from ..named_places import FilterPlaces, NamedPlaces, SamplePlaces
 from .board import Board

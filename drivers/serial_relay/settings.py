@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from labrig.quantity import DurationS
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS
 
 from .wire_text import wire_text
 
@@ -34,7 +35,7 @@ Bytes = Annotated[str, _IsText, AfterValidator(_some_bytes)]
 LineEnd = Annotated[str, _IsText, AfterValidator(_bytes)]
 
 
-class Exchange(BaseModel):
+class Exchange(FrozenModel):
     """A command, and what the board answers to it.
 
     Attributes
@@ -44,8 +45,6 @@ class Exchange(BaseModel):
     answer
         Answer that confirms the command. Default: the board is not expected to answer.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     send: Bytes
     answer: Bytes | None = None
@@ -64,7 +63,7 @@ def _exchange(value: Any) -> Any:
 Command = Annotated[Exchange, BeforeValidator(_exchange, json_schema_input_type=str | Exchange)]
 
 
-class StateQuery(BaseModel):
+class StateQuery(FrozenModel):
     """A query for the state of a relay, and the two answers to it.
 
     Attributes
@@ -74,8 +73,6 @@ class StateQuery(BaseModel):
     on, off
         Answer of the board if the relay is on, and if it is off.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     send: Bytes
     on: Bytes
@@ -94,7 +91,7 @@ class StateQuery(BaseModel):
         return self
 
 
-class SwitchCommands(BaseModel):
+class SwitchCommands(FrozenModel):
     r"""Commands of one relay.
 
     Attributes
@@ -107,8 +104,6 @@ class SwitchCommands(BaseModel):
         Query for the state of the relay, for example `{send: lamp?, on: on, off: off}`. Default:
         the state cannot be read back.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     on: Command
     off: Command
@@ -124,7 +119,7 @@ class SwitchCommands(BaseModel):
         return self
 
 
-class BoardSettings(BaseModel):
+class BoardSettings(FrozenModel):
     """The serial line to a board, and commands that concern all of it.
 
     Attributes
@@ -149,8 +144,6 @@ class BoardSettings(BaseModel):
     keep_alive
         Command that restarts the board's watchdog, sent about twice a minute.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     baud: Annotated[int, Field(gt=0)] = 9600
     framing: Framing = "8N1"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from labrig.acquire.roles import DeviceAction, ReadSpectrum, Shoot
-from labrig.quantity import duration_text
+from labrig.foundation.quantity import duration_text
 
 
 @dataclass(frozen=True)

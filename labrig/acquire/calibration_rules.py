@@ -2,12 +2,13 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from labrig.quantity import DurationS, Fraction
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, Fraction
 
 
-class CalibrationRules(BaseModel):
+class CalibrationRules(FrozenModel):
     """Limits within which a kept calibration still holds.
 
     Attributes
@@ -30,8 +31,6 @@ class CalibrationRules(BaseModel):
     only_warn
         Rules that only give a warning where they are broken.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     find: bool = True
     at_most_age: DurationS = Field(720 * 3600.0, gt=0)

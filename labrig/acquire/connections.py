@@ -4,7 +4,7 @@ import socket
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 
 class SerialPort(Protocol):

@@ -5,8 +5,8 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from labrig.errors import ProtocolError, UsageError
-from labrig.region import LEAST_PIXELS, IsRegion, Region, region_pixels
+from labrig.foundation.errors import ProtocolError, UsageError
+from labrig.foundation.region import LEAST_PIXELS, IsRegion, Region, region_pixels
 
 
 def regions_in(model: BaseModel) -> dict[str, Region]:

@@ -10,10 +10,10 @@ from pydantic import BaseModel
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import ILLUMINANTS, LEDS, ROLES, Illuminant, LedLight
-from labrig.errors import UsageError
-from labrig.named_files import with_absolute_paths
-from labrig.plugins import DRIVERS, PROTOCOLS, load, names
-from labrig.yaml_file import read_yaml, validate
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import with_absolute_paths
+from labrig.foundation.plugins import DRIVERS, PROTOCOLS, load, names
+from labrig.foundation.yaml_file import read_yaml, validate
 
 
 def load_driver(key: str, name: str, source: str) -> Any:
@@ -81,7 +81,7 @@ def driver_and_settings(rig: RigFile, key: str, source: str) -> tuple[Any, Any]:
     Examples
     --------
     >>> import labrig
-    >>> from labrig import resources
+    >>> from labrig.foundation import resources
     >>> from labrig.acquire import driver_and_settings
     >>> rig = labrig.read_rig_file(resources.find("config", "rig", "sim-arduino"))
     >>> driver, settings = driver_and_settings(rig, "leds", "sim-arduino")
@@ -117,7 +117,7 @@ def led_lights(rig: RigFile, source: str) -> dict[str, LedLight]:
     Examples
     --------
     >>> import labrig
-    >>> from labrig import resources
+    >>> from labrig.foundation import resources
     >>> from labrig.acquire import led_lights
     >>> path = resources.find("config", "rig", "sim-arduino")
     >>> lights = led_lights(labrig.read_rig_file(path), "sim-arduino")
@@ -154,7 +154,7 @@ def illuminant_lights(rig: RigFile, source: str) -> dict[str, Illuminant]:
     Examples
     --------
     >>> import labrig
-    >>> from labrig import resources
+    >>> from labrig.foundation import resources
     >>> from labrig.acquire import illuminant_lights
     >>> path = resources.find("config", "rig", "sim-fluorescent")
     >>> lamps = illuminant_lights(labrig.read_rig_file(path), "sim-fluorescent")

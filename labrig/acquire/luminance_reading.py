@@ -4,10 +4,11 @@ import re
 from functools import cached_property
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from labrig.named_files import ShippedOrFile
-from labrig.quantity import Fraction
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.named_files import ShippedOrFile
+from labrig.foundation.quantity import Fraction
 
 #: Units of readings, each with the place at which it is taken.
 UNITS = {"lx": "sample plane", "cd/m2": "card"}
@@ -19,7 +20,7 @@ _READING = re.compile(
 LampType = Literal["xenon", "D65 fluorescent", "fluorescent", "halogen", "LED", "daylight", "other"]
 
 
-class LuminanceReading(BaseModel):
+class LuminanceReading(FrozenModel):
     """One reading of a luxmeter or a luminance meter under the bare, warm lamp of the bench.
 
     Attributes
@@ -40,8 +41,6 @@ class LuminanceReading(BaseModel):
     f1_prime
         General mismatch index f1′ of the meter, for example `5 %`. Default: not stated.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     value: str
     sigma: Fraction = Field(gt=0, lt=1)

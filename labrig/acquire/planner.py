@@ -17,10 +17,10 @@ from labrig.acquire.roles import CAMERA, ROLES, Device
 from labrig.acquire.roles.camera import PlannedCamera
 from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import CameraOffers, Frame
-from labrig.clock import VirtualClock
-from labrig.errors import ProtocolError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
-from labrig.quantity import duration_text
 from labrig.record import ActionRecord, FrameRecord, SpectrumRecord
 
 #: Largest number of steps: more than any run has, and laid out in about a second.

@@ -12,9 +12,10 @@ from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.acquire.values import CameraOffers
 from labrig.calibration import CalibrationKind
-from labrig.quantity import LengthMm, MassPerArea
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import LengthMm, MassPerArea
+from labrig.foundation.region import Region
 from labrig.record import FrameRole, unit_in
-from labrig.region import Region
 
 
 class Unit(Protocol):
@@ -64,7 +65,7 @@ class Sample(BaseModel):
     notes: str | None = None
 
 
-class ProtocolModel(BaseModel):
+class ProtocolModel(FrozenModel):
     """Base of the protocols' models; a YAML file names its model in `protocol:`.
 
     Attributes
@@ -74,8 +75,6 @@ class ProtocolModel(BaseModel):
     sample
         Description of the sample, for the record.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     #: Roles of the frames to which rates are fitted; the rates belong to their temperature.
     rate_frames: ClassVar[Collection[str]] = (FrameRole.DECAY,)

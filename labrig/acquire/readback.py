@@ -5,8 +5,8 @@ from typing import cast
 
 from labrig.acquire.rig import Rig, device_errors
 from labrig.acquire.roles import DARK, LIGHTS, ROLES, DeviceAction, Light
-from labrig.errors import DeviceError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.quantity import duration_text
 
 #: Period of readings during waits; checked every 30 s, it is about a minute.
 READ_PERIOD_S = 50.0

@@ -6,8 +6,8 @@ from typing import Any, cast
 
 from labrig.acquire.roles import ROLES, Device, Role
 from labrig.acquire.roles.role import DeviceT
-from labrig.clock import Clock
-from labrig.errors import (
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import (
     DeviceError,
     DeviceLostError,
     LabrigError,

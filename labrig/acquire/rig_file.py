@@ -6,16 +6,17 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from labrig import resources
 from labrig.acquire.calibration_rules import CalibrationRules
 from labrig.acquire.luminance_reading import LuminanceReading
 from labrig.acquire.roles import ROLES
 from labrig.calibration import CalibrationKind, kinds
-from labrig.errors import UsageError
-from labrig.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
-from labrig.plugins import DRIVERS, load
-from labrig.quantity import DurationS
-from labrig.yaml_file import did_you_mean, read_yaml, validate
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
+from labrig.foundation.plugins import DRIVERS, load
+from labrig.foundation.quantity import DurationS
+from labrig.foundation.yaml_file import did_you_mean, read_yaml, validate
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -86,7 +87,7 @@ def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
 
 
 @_with_calibrations
-class Optics(BaseModel):
+class Optics(FrozenModel):
     """Measured curves and calibrations of the bench; see `CalibrationKind` for the latter.
 
     Attributes
@@ -153,8 +154,6 @@ class Optics(BaseModel):
         Background and stray light of the bench after lamp off: its file `blank.yaml`, or the folder
         of the run of protocol `blank` that measured it.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     camera: ShippedOrFile | None = None
     lamp: ShippedOrFile | None = None
@@ -229,7 +228,7 @@ class Optics(BaseModel):
         return name
 
 
-class RigFile(BaseModel):
+class RigFile(FrozenModel):
     """Content of a rig file.
 
     Attributes
@@ -249,8 +248,6 @@ class RigFile(BaseModel):
         Content of the simulated dark room, for a rig file whose devices have addresses
         `sim://room/…`. Default: none, the devices are real.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     devices: dict[str, DeviceEntry] = Field(min_length=1)

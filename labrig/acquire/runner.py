@@ -12,9 +12,9 @@ from labrig.acquire.rig import Rig
 from labrig.acquire.session import Observer, Session
 from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import Frame
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
+from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
-from labrig.quantity import duration_text
 from labrig.record import (
     CLOCK_STEPPED,
     PC_CLOCK,

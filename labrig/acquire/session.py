@@ -26,9 +26,9 @@ from labrig.acquire.roles import (
 )
 from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import ExposureSettings, Frame
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
+from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
-from labrig.quantity import duration_text
 from labrig.record import PERSON, ActionRecord, FrameRecord, SpectrumRecord, unit_within
 
 T = TypeVar("T")

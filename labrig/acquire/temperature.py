@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from labrig.acquire.rig import Rig, device_errors
 from labrig.acquire.roles import THERMOMETER
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 #: Period of readings during waits; rooms change within ten minutes.
 READ_PERIOD_S = 60.0

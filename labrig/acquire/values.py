@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from labrig.errors import ProtocolError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.quantity import duration_text
 
 #: Width and height of a frame in pixels, in a rig file.
 FramePixels = tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]

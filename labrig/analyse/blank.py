@@ -14,7 +14,8 @@ from labrig.analyse.frames import (
 )
 from labrig.analyse.inputs import Part
 from labrig.calibration import BlankFile
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.protocols.blank import BLANK_FRAMES
 from labrig.reduce import (
     FrameMeasurement,
@@ -23,7 +24,7 @@ from labrig.reduce import (
     measure_region,
     reduce_patches,
 )
-from labrig.results import BlankResult, FloatArray, Series, StrayLight
+from labrig.results import BlankResult, Series, StrayLight
 
 #: Fraction of the frames, the latest ones, that determine the constant level.
 LATE = 1 / 2

@@ -16,7 +16,7 @@ from labrig.calibration import (
     kinds,
 )
 from labrig.fit.lvf import place_means
-from labrig.input_file import MAX_FRAME_BYTES, read_bytes
+from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.optics import SLICES
 from labrig.protocols.lvf_calibration import LvfFrames, filter_unit
 from labrig.reduce import read_exif, read_raw, strip_profile_in

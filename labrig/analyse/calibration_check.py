@@ -5,7 +5,7 @@ from pathlib import Path
 from labrig.acquire import CalibrationRules
 from labrig.analyse.inputs import Part
 from labrig.calibration import REFERENCE_KIND
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.protocols.calibration_check import (
     CheckFrames,
     broken_rules,

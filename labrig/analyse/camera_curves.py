@@ -15,7 +15,6 @@ from labrig.bench_optics import (
     lens_transmittance,
     polariser_transmittance,
 )
-from labrig.errors import DataError, UsageError
 from labrig.fit.camera_curves import (
     GRID_NM,
     CameraCurvesFit,
@@ -23,6 +22,8 @@ from labrig.fit.camera_curves import (
     FilterReadings,
     fit_camera_curves,
 )
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.optics import (
     CHANNELS,
     CHART_PATCHES,
@@ -36,7 +37,6 @@ from labrig.protocols.camera_curves import CurvesFrames
 from labrig.record import FrameRole
 from labrig.reduce import sensor_layout, slice_values
 from labrig.results import CameraCurvesResult
-from labrig.yaml_file import did_you_mean
 
 #: Misfit from which the chart is not what it is taken for.
 ODD_CHART = 1.6

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from labrig import plugins
 from labrig.analyse.inputs import Inputs, Part
-from labrig.errors import DataError, FitError
+from labrig.foundation import plugins
+from labrig.foundation.errors import DataError, FitError
 from labrig.results import RunResult
 
 

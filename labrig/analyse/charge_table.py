@@ -6,8 +6,8 @@ from typing import Literal, cast
 
 import numpy as np
 
-from labrig.errors import FitError, UsageError
 from labrig.fit import ChargeFit, fit_charge_and_decay
+from labrig.foundation.errors import FitError, UsageError
 from labrig.results import Series, TableLayout, read_described_series
 
 #: Spans of the rows from them beyond which a switching of the lamp is by another clock.

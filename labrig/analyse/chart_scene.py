@@ -6,12 +6,13 @@ import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.optics import CHART_PATCHES
 from labrig.record import FrameRole
 from labrig.reduce import SeriesFrame, find_colour_chart, region_values
-from labrig.region import Region
-from labrig.results import FloatArray, SliceValues
+from labrig.results import SliceValues
 
 #: Significance in σ below which a patch is too dark, and the patches that must not be: those that
 #: are not nearly black in some channel.

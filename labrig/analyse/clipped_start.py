@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import FitError
 from labrig.fit import DecayFit
-from labrig.results import FloatArray, Series
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.results import Series
 
 #: Largest number of first values that are left out to see whether they are too low.
 MOST_LEFT_OUT = 3

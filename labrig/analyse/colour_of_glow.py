@@ -13,7 +13,6 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labrig.analyse.inputs import Part
-from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import (
     CurveError,
     SpectralSystem,
@@ -21,8 +20,10 @@ from labrig.fit.spectrum import (
     curve_modes,
     fit_spectrum,
 )
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.named_files import is_path
 from labrig.material import Material, read_material
-from labrig.named_files import is_path
 from labrig.optics import (
     CameraResponse,
     Spectrum,
@@ -34,7 +35,7 @@ from labrig.optics import (
     scotopic_efficacy,
 )
 from labrig.protocols.luminance import TABLES
-from labrig.results import EmissionSpectrumResult, FloatArray, Measured, read_result
+from labrig.results import EmissionSpectrumResult, Measured, read_result
 
 #: Error of a camera's curves: laboratories differ by 2 % to 6 % RMS of the peak, which is some 7 %
 #: of the curve itself.

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CIE_1931, CameraResponse, Spectrum, observer
-from labrig.results import FloatArray
 
 #: Reflectances that a camera's matrix is for: smooth, σ of their level and course, and distance in
 #: nm at which they are independent.

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.nonnegative import nonnegative_least_squares
-from labrig.results import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 
 #: Fewest values that tell how σ follows from them.
 FEWEST = 6

@@ -18,8 +18,10 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.surface import with_layer, with_reflectance
 from labrig.analyse.temperature import drift_an_hour, drift_warnings
-from labrig.errors import FitError
 from labrig.fit import DecayFit
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.region import Region
 from labrig.material import Material, Provenance, State
 from labrig.record import FrameRole, charge_durations_s, glow_temperature_c
 from labrig.reduce import (
@@ -30,13 +32,11 @@ from labrig.reduce import (
     sensor_layout,
     variance_terms,
 )
-from labrig.region import Region
 from labrig.results import (
     EXPONENTIALS,
     DecayPatch,
     DecayResult,
     FittedDecay,
-    FloatArray,
     Measured,
     NoiseBudget,
     Series,

@@ -14,7 +14,8 @@ import numpy as np
 from labrig.acquire import MONOCHROMATOR, driver_and_settings
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import filter_transmittances, led_exposures
-from labrig.errors import DataError, UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import (
     SpectrometerReading,
     Spectrum,
@@ -24,7 +25,6 @@ from labrig.optics import (
 from labrig.protocols.irradiance import CardSpectra, light_unit
 from labrig.protocols.steps.exciting_lights import ExcitingLights
 from labrig.record import SpectrumRecord
-from labrig.results import FloatArray
 
 #: Relative σ of the transmittance in a filter's file, and σ of its wavelengths in nm.
 FILTER_SIGMA, FILTER_NM = 0.02, 0.5

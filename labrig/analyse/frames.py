@@ -7,11 +7,11 @@ from typing import TypeVar
 from labrig.analyse.inputs import Part
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile, CameraFile
-from labrig.errors import DataError, UsageError
-from labrig.input_file import MAX_FRAME_BYTES, read_bytes
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
+from labrig.foundation.region import Region
 from labrig.record import Attempt, FileRecord, FrameRecord, FrameRole, RunRecord, damaged_frames
 from labrig.reduce import SeriesFrame, read_exif
-from labrig.region import Region
 from labrig.results import add_flag
 
 

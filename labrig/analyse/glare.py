@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from labrig.foundation.region import Region, region_pixels
 from labrig.reduce import SensorLayout
-from labrig.region import Region, region_pixels
 from labrig.results import Series
 
 #: Glare of a clean photographic lens, as a fraction of the frame's mean light.

@@ -12,10 +12,11 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.calibration import CameraFile
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.reduce import SeriesFrame, reduce_patches
-from labrig.region import Region
-from labrig.results import FloatArray, Measured, Series
+from labrig.results import Measured, Series
 
 #: Scatter of a frame's light by shutter, aperture and lamp, where it was not calibrated (1 σ).
 FLICKER = 0.007

@@ -9,21 +9,23 @@ from pathlib import Path
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from labrig import resources
 from labrig.analyse.direct_bispectral.analysis import direct_columns
-from labrig.errors import DataError, UsageError
 from labrig.fit import LitSpectrum, bispectral_columns
 from labrig.fit.bispectral import light_window_nm
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.region import LEAST_PIXELS, Region, region_pixels
 from labrig.optics import (
     HyperspectralCube,
     Transmittance,
     read_hyperspectral_cube,
     read_transmittance,
 )
-from labrig.region import LEAST_PIXELS, Region, region_pixels
-from labrig.results import DirectColumns, FloatArray, Measured
+from labrig.results import DirectColumns, Measured
 
 #: Width of the bands of the light that comes back, and the longest wavelength, in nm.
 BAND_NM, LAST_NM = 10.0, 780.0
@@ -31,7 +33,7 @@ BAND_NM, LAST_NM = 10.0, 780.0
 LEAST_BANDS = 5
 
 
-class LightCube(BaseModel):
+class LightCube(FrozenModel):
     """Images of one light.
 
     Attributes
@@ -47,15 +49,13 @@ class LightCube(BaseModel):
         File with the image without light; null: that of all lights.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     name: Annotated[str, Field(min_length=1)]
     cube: str
     white: str | None = None
     dark: str | None = None
 
 
-class CubeList(BaseModel):
+class CubeList(FrozenModel):
     """Hyperspectral images of a sample; files are named relative to the list's own folder.
 
     Attributes
@@ -74,8 +74,6 @@ class CubeList(BaseModel):
     lights
         Images of each light, two at least.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Annotated[str, Field(min_length=1)]
     region: Region

@@ -12,8 +12,9 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CardLight, IrradianceFile
-from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError, camera_modes
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import (
     CameraResponse,
     Lvf,
@@ -26,7 +27,7 @@ from labrig.optics import (
 from labrig.protocols.irradiance import CardFrames, Irradiance, light_unit
 from labrig.protocols.steps.exciting_lights import ExcitingLights
 from labrig.reduce import FLICKER, region_values, sensor_layout, slice_values
-from labrig.results import CardRatio, FloatArray, IrradianceResult, SliceValues, StripScale
+from labrig.results import CardRatio, IrradianceResult, SliceValues, StripScale
 
 #: Relative change of the lamp between rounds that causes a warning.
 DRIFT = 0.03

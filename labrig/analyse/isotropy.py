@@ -12,13 +12,13 @@ from labrig.analyse.frames import (
 )
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
-from labrig.errors import DataError
-from labrig.number_format import plus_minus
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.number_format import plus_minus
 from labrig.reduce import reduce_patches
 from labrig.results import (
     PAPER_FLUCTUATION,
     AngularGlow,
-    FloatArray,
     IsotropyResult,
     Measured,
     Series,

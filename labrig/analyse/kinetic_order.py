@@ -10,8 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.errors import FitError
-from labrig.fit import FloatArray, LeastSquaresFit, least_squares
+from labrig.fit import LeastSquaresFit, least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS
 from labrig.results import Curve, Measured, OrderTest
 

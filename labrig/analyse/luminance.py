@@ -31,8 +31,10 @@ from labrig.bench_optics import (
     card_reflectance,
     illuminance_lx,
 )
-from labrig.errors import DataError
 from labrig.fit import fit_luminance
+from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.optics import mesopic_adaptation, mesopic_ratio
 from labrig.protocols.luminance import GlowUnit, LuminanceFrames
 from labrig.record import PERSON, RunRecord, glow_temperature_c
@@ -42,14 +44,10 @@ from labrig.reduce import (
     reduce_patches,
     sensor_layout,
 )
-from labrig.region import Region
 from labrig.results import (
     MCD_PER_M2,
     VISIBLE_MCD_PER_M2,
-    BoolArray,
     ExcitationState,
-    FloatArray,
-    IntArray,
     LuminanceDecay,
     LuminanceResult,
     Measured,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import FitError, UsageError
 from labrig.fit import fit_luminance
-from labrig.quantity import FRACTION, parse
+from labrig.foundation.errors import FitError, UsageError
+from labrig.foundation.quantity import FRACTION, parse
 from labrig.results import (
     LuminanceDecay,
     LuminanceRequirement,

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, Self, get_args
 
 from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import with_absolute_paths
+from labrig.foundation.region import Region, parse_region
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import MAX_ORDER
-from labrig.named_files import with_absolute_paths
 from labrig.record import FileRecord
-from labrig.region import Region, parse_region
 from labrig.results import AUTO, EstimateMethod, require_law
-from labrig.yaml_file import did_you_mean
 
 #: Kinetic orders that are fitted, one of each state.
 FREE = "free"

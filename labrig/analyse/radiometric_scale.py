@@ -14,8 +14,8 @@ import numpy as np
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CardLight, IrradianceFile, relative_sensitivity
-from labrig.errors import UsageError
 from labrig.fit.spectrum import CurveError, camera_modes
+from labrig.foundation.errors import UsageError
 from labrig.material import SEEN_FACTOR, Material, ScaleFactor, State
 from labrig.optics import (
     CameraResponse,

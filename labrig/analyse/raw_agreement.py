@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from labrig.acquire import CAMERA, RigFile, load_driver, shutter_text
 from labrig.analyse.overrides import Overrides
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import read_spectrometer_reading
 from labrig.record import FrameRecord, RunRecord, SpectrumRecord
 from labrig.reduce import Exif, frames_exif

@@ -25,10 +25,11 @@ from labrig.analyse.frames import (
 from labrig.analyse.inputs import Part
 from labrig.analyse.kinetic_order import compare_levels
 from labrig.analyse.series_fit import fit_series
-from labrig.errors import DataError, FitError
 from labrig.fit import EPSILON, least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, FitError
+from labrig.foundation.number_format import plus_minus
 from labrig.material import exponential_means, exponential_means_and_slopes
-from labrig.number_format import plus_minus
 from labrig.protocols.saturation import Light, WeakerLight
 from labrig.record import FrameRole, RunRecord, charge_durations_s
 from labrig.reduce import reduce_patches
@@ -36,7 +37,6 @@ from labrig.results import (
     Concentration,
     Curve,
     FittedDecay,
-    FloatArray,
     Measured,
     PatchSaturation,
     RatesTest,

@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.results import AUTO, DecayReference, FloatArray, Series, TableClock
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.results import AUTO, DecayReference, Series, TableClock
 
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6

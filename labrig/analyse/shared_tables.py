@@ -8,8 +8,8 @@ import numpy as np
 
 from labrig.analyse.series_fit import by_clock
 from labrig.analyse.table_fit import EQUAL, FittedTable, TableFitOptions, fit_table
-from labrig.errors import FitError, UsageError
 from labrig.fit import DecayTable, fit_shared_rates
+from labrig.foundation.errors import FitError, UsageError
 from labrig.results import AUTO, EXPONENTIALS, SharedDecay, TableLayout
 
 

@@ -10,11 +10,12 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region, region_pixels
 from labrig.optics import SLICES, Strip
 from labrig.record import FrameRole
 from labrig.reduce import (
@@ -27,7 +28,6 @@ from labrig.reduce import (
     sensor_layout,
     strip_profile_in,
 )
-from labrig.region import Region, region_pixels
 from labrig.results import StripProfile
 
 
@@ -80,7 +80,6 @@ class StripFrames:
         return hot_pixels_of(self.dark)
 
 
-FloatArray = NDArray[np.float64]
 Found = TypeVar("Found")
 Slices = dict[str, Region]
 

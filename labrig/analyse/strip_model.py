@@ -7,9 +7,9 @@ import numpy as np
 
 from labrig.analyse.strip import Slices, tilt_offset
 from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Bands, CameraResponse, Lvf, Spectrum, Strip
 from labrig.reduce import SensorLayout
-from labrig.results import FloatArray
 
 #: Relative uncertainty of a lamp's spectrum whose file has none.
 LAMP_SIGMA = 0.01

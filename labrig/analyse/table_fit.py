@@ -13,12 +13,12 @@ from scipy.ndimage import median_filter
 from labrig.analyse.clipped_start import LowStart, low_start
 from labrig.analyse.counting_sigma import COUNTS, VarianceOfValue, variance_of_values
 from labrig.analyse.series_fit import fit_series
-from labrig.errors import FitError, UsageError
 from labrig.fit import DecayFit
-from labrig.quantity import FRACTION, parse
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError, UsageError
+from labrig.foundation.quantity import FRACTION, parse
 from labrig.results import (
     AUTO,
-    FloatArray,
     Series,
     TableLayout,
     add_flag,

@@ -5,6 +5,7 @@ from itertools import groupby
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, Provenance
 from labrig.record import (
     KNOWN_FOR_S,
@@ -16,7 +17,7 @@ from labrig.record import (
     relative_rate_change,
     time_text,
 )
-from labrig.results import FloatArray, Measured
+from labrig.results import Measured
 
 #: Change in K from which a warning is given: rates then change by 4 %, more than their usual σ.
 MOVED_K = 0.5

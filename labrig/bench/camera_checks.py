@@ -4,8 +4,8 @@ from labrig.acquire import CAMERA, RigFile, RunObserver
 from labrig.bench.run_log import LoggedObserver
 from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, ReferenceFile
-from labrig.errors import ProtocolError
-from labrig.input_file import MAX_FRAME_BYTES, read_bytes
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.record import FrameRecord
 from labrig.reduce import read_exif
 

@@ -17,7 +17,7 @@ from urllib.parse import quote
 
 from filelock import FileLock, Timeout
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 if sys.platform != "win32":
     import fcntl

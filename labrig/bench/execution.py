@@ -27,8 +27,8 @@ from labrig.acquire import (
 from labrig.bench.camera_checks import LensObserver, require_calibrated_camera
 from labrig.bench.opening import Bench
 from labrig.bench.trial_frame import offers_with_frame_size
-from labrig.clock import Clock, Interrupted, Slept
-from labrig.errors import (
+from labrig.foundation.clock import Clock, Interrupted, Slept
+from labrig.foundation.errors import (
     DataError,
     DeviceError,
     DeviceLostError,
@@ -38,9 +38,9 @@ from labrig.errors import (
     is_memory_shortage,
     memory_shortage,
 )
-from labrig.quantity import duration_text
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
-from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 

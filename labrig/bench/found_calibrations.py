@@ -14,8 +14,8 @@ from labrig.calibration import (
     kept_calibrations,
     kinds,
 )
+from labrig.foundation.quantity import duration_text
 from labrig.optics import f_number_text
-from labrig.quantity import duration_text
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from contextlib import contextmanager, suppress
 from typing import IO, Any
 
 from labrig.acquire import LIGHTS, RigFile
-from labrig.errors import DeviceError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.quantity import duration_text
 
 #: Messages to the guard: a light may be on, or all are off.
 MAY_BE_ON, ALL_OFF = b"+", b"-"

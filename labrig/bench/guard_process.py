@@ -16,7 +16,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import BinaryIO
 
-from labrig import plugins
 from labrig.acquire import RigFile
 from labrig.bench.guard import (
     ALL_OFF,
@@ -28,8 +27,9 @@ from labrig.bench.guard import (
 )
 from labrig.bench.opening import Bench
 from labrig.bench.serial_ports import SerialPorts
-from labrig.clock import SystemClock
-from labrig.errors import LabrigError
+from labrig.foundation import plugins
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import LabrigError
 
 #: Pauses between two attempts. The first ones are short: the port of a killed process is free some
 #: milliseconds after its end.

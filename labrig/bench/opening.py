@@ -38,12 +38,12 @@ from labrig.bench.awake import kept_awake
 from labrig.bench.device_lock import held, network_devices, serial_devices, usb_device
 from labrig.bench.guard import Guard, guarding
 from labrig.bench.serial_ports import SerialPorts
-from labrig.clock import Clock, SystemClock
 from labrig.consent import NETWORK_SCHEMES, calls, require_consent
-from labrig.errors import DeviceError, LabrigError, UsageError
-from labrig.named_files import with_absolute_paths
-from labrig.output_file import REAL_DISK, Disk
-from labrig.signals import interrupting, pausing
+from labrig.foundation.clock import Clock, SystemClock
+from labrig.foundation.errors import DeviceError, LabrigError, UsageError
+from labrig.foundation.named_files import with_absolute_paths
+from labrig.foundation.output_file import REAL_DISK, Disk
+from labrig.foundation.signals import interrupting, pausing
 
 if TYPE_CHECKING:
     from labrig.sim import OpenRoom
@@ -295,7 +295,7 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
     >>> import signal
     >>> import labrig
     >>> from labrig.bench import serve_camera
-    >>> from labrig.clock import Interrupted
+    >>> from labrig.foundation.clock import Interrupted
     >>> def tell(address):
     ...     print(address.partition(":")[0])
     ...     raise Interrupted(signal.SIGINT)  # Ctrl-C, as soon as the camera can be reached

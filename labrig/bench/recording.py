@@ -22,9 +22,9 @@ from labrig.bench.opening import open_bench, wall_at_start, with_frame_size
 from labrig.bench.run_log import run_log
 from labrig.bench_optics import require_optics
 from labrig.calibration import REFERENCE_KIND
-from labrig.errors import DiskError, ProtocolError, UsageError
+from labrig.foundation.errors import DiskError, ProtocolError, UsageError
+from labrig.foundation.yaml_file import yaml_text
 from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
-from labrig.yaml_file import yaml_text
 
 #: Protocol that compares a bench with its calibration.
 CHECK = "calibration_check"
@@ -186,7 +186,7 @@ def resume_run(path: Path, watch: Watch) -> Path:
     >>> from labrig.bench import resume_run
     >>> resume_run(Path("somewhere"), watch=None)
     Traceback (most recent call last):
-    labrig.errors.UsageError: somewhere: expected a run folder with protocol.yaml in it; see --runs
+    labrig.foundation.errors.UsageError: somewhere: expected a run folder ...
     """
     if not (path / "protocol.yaml").is_file():
         raise UsageError(f"{path}: expected a run folder with protocol.yaml in it; see --runs")

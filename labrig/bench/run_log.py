@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from labrig.acquire import ManualStep, RunObserver
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 from labrig.record import FrameRecord
 
 FILE = "log.txt"
@@ -88,7 +88,7 @@ def logging_to(handler: logging.Handler, clock: Clock) -> Iterator[None]:
     >>> import io
     >>> import logging
     >>> from labrig.bench import logging_to
-    >>> from labrig.clock import VirtualClock
+    >>> from labrig.foundation.clock import VirtualClock
     >>> text = io.StringIO()
     >>> with logging_to(logging.StreamHandler(text), VirtualClock()):
     ...     logging.getLogger("labrig.example").info("lamp on")

@@ -13,7 +13,7 @@ from typing import Self
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from labrig.acquire import Camera, CameraOffers, ExposureSettings
-from labrig.errors import ProtocolError
+from labrig.foundation.errors import ProtocolError
 from labrig.reduce import read_raw
 
 #: Shutter time in seconds at most: the picture does not matter, only its size.

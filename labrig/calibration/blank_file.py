@@ -4,11 +4,11 @@ from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.errors import DataError
-from labrig.finite import Finite, NotNegative, Positive
+from labrig.foundation.errors import DataError
+from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
 
 Row = tuple[Finite, ...]
 
@@ -18,7 +18,7 @@ SIGNIFICANT = 4.0
 SAME_TIME_S = 0.02
 
 
-class BlankFile(BaseModel):
+class BlankFile(FrozenModel):
     """Light after lamp off without a sample, in DN/s above dark frames taken as those of the decay.
 
     Attributes
@@ -48,8 +48,6 @@ class BlankFile(BaseModel):
     >>> blank.channels, blank.is_clean(2.0)
     (('R', 'G', 'B'), True)
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["blank"] = "blank"
     iso: Positive

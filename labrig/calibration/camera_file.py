@@ -2,19 +2,15 @@
 
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.errors import DataError
-from labrig.finite import Finite, NotNegative, Positive
+from labrig.foundation.errors import DataError
+from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
 from labrig.optics import CameraModel, f_number_text
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Noise(_Part):
+class Noise(FrozenModel):
     """Noise of a pixel at one ISO; every σ is one standard deviation.
 
     Attributes
@@ -41,7 +37,7 @@ class Noise(_Part):
     row_noise_e: NotNegative = 0.0
 
 
-class Linearity(_Part):
+class Linearity(FrozenModel):
     """Deviation from linearity: ln(signal over that of a linear sensor) at levels above dark.
 
     Attributes

@@ -4,21 +4,17 @@ from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from numpy.typing import ArrayLike
+from pydantic import Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.finite import NotNegative, Positive
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.models import FrozenModel, NotNegative, Positive
 
-FloatArray = NDArray[np.float64]
 Row = tuple[NotNegative, ...]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Change(_Part):
+class Change(FrozenModel):
     """Irradiance over that of the steady lamp after a switch.
 
     Attributes
@@ -51,7 +47,7 @@ class Change(_Part):
         return total
 
 
-class Warming(_Part):
+class Warming(FrozenModel):
     """Warm-up transient of a lamp: its light over that of the warm lamp is 1 − d e^(−t/τ).
 
     Attributes
@@ -68,7 +64,7 @@ class Warming(_Part):
     time_constant_s: Positive
 
 
-class FadeFile(_Part):
+class FadeFile(FrozenModel):
     """Result of the protocol `fade`: the transients of a lamp.
 
     Attributes

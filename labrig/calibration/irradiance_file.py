@@ -3,17 +3,17 @@
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.errors import UsageError
-from labrig.finite import NotNegative, Positive
+from labrig.foundation.errors import UsageError
+from labrig.foundation.models import FrozenModel, NotNegative, Positive
 from labrig.optics import Strip
 
 Numbers = tuple[NotNegative, ...]
 
 
-class CardLight(BaseModel):
+class CardLight(FrozenModel):
     """The camera's signal of the grey card under the lamp itself, which links counts to radiance.
 
     Attributes
@@ -25,8 +25,6 @@ class CardLight(BaseModel):
     dn_per_s, sigma_dn_per_s
         Mean signal along the strip's place in DN/s, one number for each channel, and σ.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     iso: Positive
     f_number: Positive | None
@@ -43,7 +41,7 @@ class CardLight(BaseModel):
         return self
 
 
-class IrradianceFile(BaseModel):
+class IrradianceFile(FrozenModel):
     """Irradiance E per band on one scale, directly under the lamp, and of parts of its light.
 
     These are the places behind the LVF, or lights that are selected one after another.
@@ -98,8 +96,6 @@ class IrradianceFile(BaseModel):
     >>> len(lamp.through) == len(lamp.position)
     True
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["irradiance"] = "irradiance"
     lamp: str

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from labrig.calibration.kind import kinds
 from labrig.calibration.reference_file import REFERENCE_KIND, ReferenceFile
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
-from labrig.output_file import make_folder_in, write_durably
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.output_file import make_folder_in, write_durably
 
 #: Name of the folder beside the run folders.
 FOLDER = "calibrations"

@@ -7,9 +7,9 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel
 
-from labrig import plugins
-from labrig.errors import UsageError
-from labrig.yaml_file import read_model, write_yaml
+from labrig.foundation import plugins
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import read_model, write_yaml
 
 FileT = TypeVar("FileT", bound=BaseModel)
 

@@ -4,10 +4,10 @@ from itertools import pairwise
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.finite import Finite, NotNegative, Positive
+from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
 from labrig.optics import Spectrum
 
 #: Wavelength in nm below which a camera with colour filters says nothing of a brightness.
@@ -23,7 +23,7 @@ UvScale = Literal["measured", "unknown", "none"]
 LedSource = Literal["spectrometer", "camera", "rig file"]
 
 
-class CalibratedLed(BaseModel):
+class CalibratedLed(FrozenModel):
     """Light of one LED.
 
     Attributes
@@ -44,8 +44,6 @@ class CalibratedLed(BaseModel):
         Origin of the spectrum: measured by the `spectrometer`, or that of the `rig file`, shifted
         as the `camera` told.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     wavelength_nm: tuple[Positive, ...]
     value: tuple[Finite, ...]
@@ -78,7 +76,7 @@ class CalibratedLed(BaseModel):
         return Spectrum(name, np.array(self.wavelength_nm), np.array(self.value), sigma)
 
 
-class LedsFile(BaseModel):
+class LedsFile(FrozenModel):
     """Spectra and brightnesses of a bank of LEDs at a white reference.
 
     Attributes
@@ -107,8 +105,6 @@ class LedsFile(BaseModel):
     >>> file.leds["450 nm"].spectrum("450 nm").at([445.0, 450.0]).tolist()
     [0.5, 1.0]
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["leds"] = "leds"
     leds: dict[str, CalibratedLed] = Field(min_length=1)

@@ -3,20 +3,16 @@
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.finite import Finite, NotNegative
+from labrig.foundation.models import Finite, FrozenModel, NotNegative
 from labrig.optics import Bands, CameraResponse, Lvf, Strip, WavelengthMap
 
 Numbers = tuple[Finite, ...]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class BandColumns(_Part):
+class BandColumns(FrozenModel):
     """Parameters of `labrig.optics.Bands`, one number for each position."""
 
     centre_nm: Numbers
@@ -35,7 +31,7 @@ class BandColumns(_Part):
         return Bands(*(np.array(getattr(self, name)) for name in type(self).model_fields))
 
 
-class WavelengthColumns(_Part):
+class WavelengthColumns(FrozenModel):
     """Wavelength along the whole strip, as in `labrig.optics.WavelengthMap`."""
 
     coefficients: Numbers
@@ -59,7 +55,7 @@ class WavelengthColumns(_Part):
         return WavelengthMap(np.array(self.coefficients), self.span, np.array(self.covariance))
 
 
-class CurveColumns(_Part):
+class CurveColumns(FrozenModel):
     """Sensitivity curves of a camera, as in `labrig.optics.CameraResponse`."""
 
     name: str
@@ -94,7 +90,7 @@ class CurveColumns(_Part):
         )
 
 
-class LvfFile(_Part):
+class LvfFile(FrozenModel):
     """A calibrated linear variable filter.
 
     Attributes

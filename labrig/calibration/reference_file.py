@@ -4,19 +4,15 @@ from datetime import datetime
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AwareDatetime, Field, model_validator
 
 from labrig.calibration.camera_file import camera_body
 from labrig.calibration.kind import CalibrationKind
-from labrig.finite import Finite, NotNegative, Positive
+from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
 from labrig.optics import Strip
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class CardPicture(_Part):
+class CardPicture(FrozenModel):
     """The grey card under the lamp, through the variable filter before the camera.
 
     Attributes
@@ -55,7 +51,7 @@ class CardPicture(_Part):
         return self
 
 
-class ReferenceFile(_Part):
+class ReferenceFile(FrozenModel):
     """Result of `calibration`: the bench to which its other files belong.
 
     Attributes

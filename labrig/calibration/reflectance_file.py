@@ -3,15 +3,15 @@
 from itertools import pairwise
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.finite import NotNegative, Positive
+from labrig.foundation.models import FrozenModel, NotNegative, Positive
 
 Numbers = tuple[NotNegative, ...]
 
 
-class PatchReflectance(BaseModel):
+class PatchReflectance(FrozenModel):
     """Albedo and total radiance factor of one sample, a number for each wavelength.
 
     Attributes
@@ -28,8 +28,6 @@ class PatchReflectance(BaseModel):
     common_sigma
         Relative standard uncertainty common to all numbers.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     wavelength_nm: tuple[Positive, ...] = Field(min_length=2)
     albedo: Numbers
@@ -54,7 +52,7 @@ class PatchReflectance(BaseModel):
         return self
 
 
-class ReflectanceFile(BaseModel):
+class ReflectanceFile(FrozenModel):
     """Albedo and total radiance factor of each sample of a run.
 
     Attributes
@@ -76,8 +74,6 @@ class ReflectanceFile(BaseModel):
     >>> ReflectanceFile(lamp="halogen", patches={"": grey}).patches[""].albedo
     (0.2, 0.2)
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["reflectance"] = "reflectance"
     lamp: str

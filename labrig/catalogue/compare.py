@@ -10,7 +10,8 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labrig.catalogue.reference import gain
-from labrig.errors import DataError, DiskError
+from labrig.foundation.errors import DataError, DiskError
+from labrig.foundation.yaml_file import read_yaml
 from labrig.record import FrameRole, glow_temperature_c, read_run, relative_rate_change
 from labrig.results import (
     EXPONENTIALS,
@@ -21,7 +22,6 @@ from labrig.results import (
     Measured,
     read_fitted_decays,
 )
-from labrig.yaml_file import read_yaml
 
 #: Significance level below which rates differ.
 DIFFERENT_P = 0.01

@@ -17,10 +17,10 @@ from typing import Any, Self
 from zlib import crc32
 
 from labrig.catalogue.run_summary import RunSummary
-from labrig.clock import SystemClock
-from labrig.errors import DiskError, LabrigError
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
-from labrig.output_file import write_durably
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import DiskError, LabrigError
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.output_file import write_durably
 from labrig.results import SUMMARY
 
 FILE = ".runs-index"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from labrig.catalogue.index import PROTOCOL, is_run, read_summaries
 from labrig.catalogue.run_summary import STATUSES, RunSummary
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.record import require_plain_folder, time_made
 
 
@@ -34,7 +34,7 @@ class RunFilter:
 
     def __post_init__(self) -> None:
         if self.status is not None and self.status not in STATUSES:
-            from labrig.yaml_file import did_you_mean
+            from labrig.foundation.yaml_file import did_you_mean
 
             raise UsageError(f"--status {self.status}: {did_you_mean(self.status, STATUSES)}")
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.results import FittedDecay, Measured, read_fitted_decays, read_series
-from labrig.yaml_file import did_you_mean
 
 #: Signal over σ that a reference needs.
 SEEN_SIGMA = 5.0

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.record import RunRecord
@@ -110,7 +110,7 @@ def is_being_written(folder: Path) -> bool:
     """Whether a process has the run open for writing."""
     from filelock import Timeout
 
-    from labrig.file_lock import plain_lock
+    from labrig.foundation.file_lock import plain_lock
     from labrig.record import RECORDING_LOCK
 
     lock = folder / RECORDING_LOCK

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from labrig.acquire import read_protocol
 from labrig.catalogue.run_summary import RunStatus, RunSummary, status_of, utc
-from labrig.errors import DataError, DiskError, LabrigError
+from labrig.foundation.errors import DataError, DiskError, LabrigError
+from labrig.foundation.yaml_file import read_yaml
 from labrig.record import read_run, time_made
 from labrig.results import fits_by_folder, read_fitted_decay, read_summary
-from labrig.yaml_file import read_yaml
 
 
 def summarise(folder: Path) -> RunSummary:

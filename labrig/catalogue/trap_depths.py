@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from labrig.errors import FitError, UsageError
 from labrig.fit import fit_trap_depth
+from labrig.foundation.errors import FitError, UsageError
 from labrig.record import FrameRole, glow_temperature_c, read_run
 from labrig.results import EXPONENTIALS, FittedDecay, StateDepth, read_fitted_decays, state_name
 

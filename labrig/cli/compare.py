@@ -80,7 +80,7 @@ def compare(
     """
     from labrig.catalogue import find_run
     from labrig.compare import compare_run, is_of_fluorescence, numbers, sections, write_rendered
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     if not rendered and (assume_albedo is not None or assume_scale is not None):
         raise UsageError("expected --assume-albedo and --assume-scale with --rendered only")
@@ -159,7 +159,7 @@ def _check_for_fluorescence(
     assume_scale: float | None,
 ) -> None:
     """Refuse what a run under lamps does not answer."""
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     if not rendered:
         raise UsageError(
@@ -243,7 +243,7 @@ def _print_section(section: "Section") -> None:
 
 def _save_figures(section: "Section", folder: Path) -> None:
     """Save the figures of a section as PNG and as PDF."""
-    from labrig.output_file import make_folder
+    from labrig.foundation.output_file import make_folder
     from labrig.report import figure_style, save_picture
 
     if section.figures:

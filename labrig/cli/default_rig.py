@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from labrig.cli.completion import complete_rig
-from labrig.errors import LabrigError, UsageError
-from labrig.input_file import read_text
-from labrig.settings_file import settings_file
+from labrig.foundation.errors import LabrigError, UsageError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.settings_file import settings_file
 
 #: Environment variable with a rig, which has priority over the one that was chosen.
 VARIABLE = "LABRIG_RIG"
@@ -64,7 +64,7 @@ class DefaultRig:
         UsageError
             It is gone, or was misspelt in the environment variable.
         """
-        from labrig import resources
+        from labrig.foundation import resources
 
         try:
             return resources.find("config", "rig", self.name)
@@ -106,7 +106,7 @@ def rig_path(rig: str | None) -> Path:
     UsageError
         There is no such rig, or none was given and there is no default.
     """
-    from labrig import resources
+    from labrig.foundation import resources
 
     if rig is not None:
         return resources.find("config", "rig", rig)
@@ -158,10 +158,10 @@ def use(
 
 
 def _choose(rig: str) -> None:
-    from labrig import resources
     from labrig.acquire import read_rig_file
     from labrig.consent import calls, give_consent, starting
-    from labrig.output_file import make_folder, write_text
+    from labrig.foundation import resources
+    from labrig.foundation.output_file import make_folder, write_text
 
     path = resources.find("config", "rig", rig)
     file = read_rig_file(path)  # a mistake in the file is better found now

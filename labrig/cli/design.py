@@ -59,7 +59,7 @@ def design(
     no_browser: NoBrowserOption = False,
 ) -> None:
     """Find the phosphorescent material that glows as you want it to: on a page, or from a file."""
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     if constraints is not None:
         for_page = {"SCENE": scene, "--material": material, "--open": begin_with, "--port": port}
@@ -83,8 +83,8 @@ def design(
 def _serve(
     begin_with: Path | None, scene: str | None, material: str | None, port: int, no_browser: bool
 ) -> None:
-    from labrig.clock import SystemClock
-    from labrig.signals import interrupting
+    from labrig.foundation.clock import SystemClock
+    from labrig.foundation.signals import interrupting
     from labrig.studio import design_on_page
 
     clock = SystemClock()
@@ -100,7 +100,7 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
         to_material,
         written_factor,
     )
-    from labrig.errors import DiskError, UsageError
+    from labrig.foundation.errors import DiskError, UsageError
     from labrig.report import (
         describe_design,
         describe_energy,
@@ -173,7 +173,7 @@ def _spread(
 
 
 def _write(material: "Material", path: Path) -> None:
-    from labrig.errors import DiskError
+    from labrig.foundation.errors import DiskError
     from labrig.material import write_material
 
     try:

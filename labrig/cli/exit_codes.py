@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from labrig.cli.closed_pipe import DetachableStream
-from labrig.clock import Interrupted
-from labrig.errors import (
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import (
     DiskError,
     LabrigError,
     MemoryShortageError,
@@ -17,8 +17,8 @@ from labrig.errors import (
     is_memory_shortage,
     memory_shortage,
 )
-from labrig.readable_output import spelled
-from labrig.signals import STOP_SIGNALS, raise_interrupted
+from labrig.foundation.readable_output import spelled
+from labrig.foundation.signals import STOP_SIGNALS, raise_interrupted
 
 if TYPE_CHECKING:
     from typer.exceptions import TyperException
@@ -116,7 +116,7 @@ def _wrong_call(error: "TyperException") -> str:
     """Return what is wrong with the arguments, and where the command's own help is."""
     from pydantic import ValidationError
 
-    from labrig.model_errors import is_rule, refusal
+    from labrig.foundation.model_errors import is_rule, refusal
 
     message = error.format_message()
     if isinstance(error.__cause__, ValidationError):

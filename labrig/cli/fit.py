@@ -20,7 +20,7 @@ from labrig.cli.matrices import (
     checked,
     read_matrix,
 )
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from labrig.analyse import TableFitOptions
@@ -467,7 +467,7 @@ def _require_one_of(option: str, value: str, choices: tuple[str, ...]) -> None:
 
 
 def _time_s(text: str) -> float:
-    from labrig.quantity import TIME_S, parse
+    from labrig.foundation.quantity import TIME_S, parse
 
     try:
         return parse(text, TIME_S)

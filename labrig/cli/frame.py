@@ -17,8 +17,8 @@ def frame(
     """Mean, uncertainty, scatter, clipped and hot pixels per colour channel of a RAW file."""
     import json as json_format
 
+    from labrig.foundation.region import parse_region
     from labrig.reduce import measure, read_raw
-    from labrig.region import parse_region
 
     region = None if roi is None else parse_region(roi)
     measured = measure(read_raw(file), region)

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labrig.errors import UsageError
-from labrig.settings_file import settings_file
+from labrig.foundation.errors import UsageError
+from labrig.foundation.settings_file import settings_file
 
 if TYPE_CHECKING:
     from labrig.seal import LabKey, Signers
@@ -49,7 +49,7 @@ def trust(
 
     Compare the fingerprints with those that a laboratory itself has published.
     """
-    from labrig.output_file import make_folder, write_text
+    from labrig.foundation.output_file import make_folder, write_text
     from labrig.seal import Signers, read_signers
 
     new_signers, trusted = read_signers(file), _trusted_file()

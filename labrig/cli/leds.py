@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.matrices import Corrected, checked, read_fractions
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -165,7 +165,7 @@ def _surfaces(
     matrices: list[str], is_corrected: bool, is_all: bool
 ) -> "tuple[list[ReradiationMatrix], str]":
     """Return matrices, and words on what they are."""
-    from labrig import resources
+    from labrig.foundation import resources
 
     kind = "measured matrices"
     if not matrices:

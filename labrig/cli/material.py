@@ -122,8 +122,8 @@ def from_cubes(
     Images are ENVI files (.hdr), .npz or .npy.
     """
     from labrig.analyse import CubeList, matrix_from_cubes
+    from labrig.foundation.yaml_file import read_model
     from labrig.material import YAML, write_fluorescent, write_reradiation
-    from labrig.yaml_file import read_model
 
     columns, name = matrix_from_cubes(read_model(cubes, CubeList), cubes)
     matrix = columns.matrix(name) if lights_only else columns.interpolated(name)[0]
@@ -216,7 +216,7 @@ def list_materials(
 
     Files that cannot be used are named with the reason, and left out.
     """
-    from labrig.errors import DataError, UsageError
+    from labrig.foundation.errors import DataError, UsageError
     from labrig.material import matrix_files
     from labrig.optics import read_light
     from labrig.report import draw_contact_sheet, reradiation_text
@@ -238,7 +238,7 @@ def list_materials(
 
 
 def _write_lines(lines: list[str], out: Path | None) -> None:
-    from labrig.output_file import write_text
+    from labrig.foundation.output_file import write_text
 
     if out is None:
         for line in lines:

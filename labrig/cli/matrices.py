@@ -82,7 +82,7 @@ def read_matrix(
     excitation: str | None = None,
 ) -> "ReradiationMatrix":
     """Read a fluorescent material from any of its files."""
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
     from labrig.material import ReradiationMatrix
 
     material = read_any(file, entry, pixel, rows, excitation)
@@ -93,7 +93,7 @@ def read_matrix(
 
 def read_fractions(file: str) -> "ReradiationMatrix":
     """Read a fluorescent material in absolute units: a relative one has no colours."""
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     matrix = read_matrix(file)
     if matrix.unit == "relative":
@@ -105,7 +105,7 @@ def read_fractions(file: str) -> "ReradiationMatrix":
 
 
 def _pixel(text: str | None) -> tuple[int, int] | None:
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     if text is None:
         return None
@@ -116,7 +116,7 @@ def _pixel(text: str | None) -> tuple[int, int] | None:
 
 
 def _layout(rows: str | None, excitation: str | None) -> "MatrixLayout | None":
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
     from labrig.material import MatrixLayout
 
     if rows is None and excitation is None:
@@ -130,7 +130,7 @@ def _layout(rows: str | None, excitation: str | None) -> "MatrixLayout | None":
 def _steps_nm(text: str) -> "npt.NDArray[np.float64]":
     import numpy as np
 
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     expected = f"--excitation: expected first, last and step such as 230:450:5, got '{text}'"
     try:
@@ -148,7 +148,7 @@ def checked(file: str, matrix: "ReradiationMatrix", is_corrected: bool) -> "Rera
 
     What no surface can do, beyond that σ, is refused, and what few can is told on standard error.
     """
-    from labrig.errors import DataError
+    from labrig.foundation.errors import DataError
     from labrig.material import physical_warnings
 
     try:
@@ -168,7 +168,7 @@ def _corrected(matrix: "ReradiationMatrix") -> "ReradiationMatrix":
 
 
 def _with_sigma(matrix: "ReradiationMatrix") -> "ReradiationMatrix":
-    from labrig.errors import DataError
+    from labrig.foundation.errors import DataError
     from labrig.material import with_sigma
 
     if matrix.reradiation_sigma is not None or matrix.unit == "relative":

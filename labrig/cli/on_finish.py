@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig.clock import Interrupted
 from labrig.consent import has_consent, starting
-from labrig.errors import LabrigError
-from labrig.readable_output import spelled
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import LabrigError
+from labrig.foundation.readable_output import spelled
 
 #: Longest duration of the command.
 COMMAND_TIMEOUT_S = 30.0

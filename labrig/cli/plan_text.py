@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from labrig.acquire import CAMERA, Plan, Step, shutter_text
 from labrig.cli.wording import counted, measurement
 from labrig.consent import calls, has_consent, starting
-from labrig.quantity import duration_text
+from labrig.foundation.quantity import duration_text
 from labrig.record import PERSON, size_text
 
 if TYPE_CHECKING:

@@ -196,7 +196,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
 
 
 def _extra_time(remedy: "Remedy", duration_s: float) -> str:
-    from labrig.quantity import duration_text
+    from labrig.foundation.quantity import duration_text
 
     if abs(remedy.extra_time_s) < SAME_TIME * duration_s:
         return "same"

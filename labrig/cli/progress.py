@@ -21,9 +21,9 @@ from labrig.acquire import ExposureSettings, ManualStep, Plan, RunObserver
 from labrig.bench import logging_to
 from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.prompt import Terminal
-from labrig.clock import Clock
-from labrig.errors import UsageError
-from labrig.quantity import duration_text
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import UsageError
+from labrig.foundation.quantity import duration_text
 from labrig.record import FrameRecord
 from labrig.watch import Previews, RenderedPreview
 

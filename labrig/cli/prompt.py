@@ -8,8 +8,8 @@ from contextlib import suppress
 from typing import TextIO
 
 from labrig.acquire import ManualStep
-from labrig.errors import UsageError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import UsageError
+from labrig.foundation.quantity import duration_text
 
 #: Answer that undoes the previous step.
 UNDO = "undo"

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from labrig.cli.completion import complete_protocol
-from labrig.input_file import read_text
+from labrig.foundation.input_file import read_text
 
 app = typer.Typer(help="The protocols that can be run.")
 
@@ -20,8 +20,8 @@ def protocol_path(protocol: str) -> Path:
     UsageError
         There is no such file, as of a protocol that a package adds without one.
     """
-    from labrig import plugins, resources
-    from labrig.errors import UsageError
+    from labrig.foundation import plugins, resources
+    from labrig.foundation.errors import UsageError
 
     try:
         return resources.find("protocols", "protocol", protocol)
@@ -44,8 +44,8 @@ def list_protocols() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from labrig import plugins, resources
     from labrig.acquire import read_protocol
+    from labrig.foundation import plugins, resources
 
     table = Table(box=None, pad_edge=False)
     for title in ("file", "protocol", "measures"):
@@ -107,8 +107,8 @@ def _new_package(name: str, folder: Path) -> None:
 
 
 def _new_file(name: str, path: Path) -> None:
-    from labrig.errors import UsageError
-    from labrig.output_file import write_text
+    from labrig.foundation.errors import UsageError
+    from labrig.foundation.output_file import write_text
 
     text = read_text(protocol_path(name))
     if path.exists() or path.is_symlink():

@@ -9,7 +9,7 @@ import typer
 from labrig.cli.completion import complete_protocol
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.protocol import protocol_path
-from labrig.named_files import beside, is_path
+from labrig.foundation.named_files import beside, is_path
 
 if TYPE_CHECKING:
     from labrig.acquire import RigFile
@@ -72,7 +72,7 @@ def list_(
     """What is in the queue, how far it is, and what was found."""
     from json import dumps
 
-    from labrig.number_format import aligned
+    from labrig.foundation.number_format import aligned
     from labrig.queue import entries, queue_report, read_queue
 
     listed = entries(read_queue(queue), runs)

@@ -106,8 +106,8 @@ def render(
 
     A rendering that was interrupted goes on when it is started again.
     """
-    from labrig.clock import SystemClock
-    from labrig.quantity import duration_text
+    from labrig.foundation.clock import SystemClock
+    from labrig.foundation.quantity import duration_text
     from labrig.reproduce import (
         Assumptions,
         RenderFolder,
@@ -234,7 +234,7 @@ def _write_linear(folder: "RenderFolder") -> None:
 
 def _check_places(gltf: Path | None, mitsuba: Path | None) -> None:
     """Refuse places for exports before a picture is made."""
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     if gltf is not None and (gltf.suffix.lower() != ".glb" or not gltf.absolute().parent.is_dir()):
         raise UsageError(f"{gltf}: expected a file that ends in .glb in a folder that is there")
@@ -243,7 +243,7 @@ def _check_places(gltf: Path | None, mitsuba: Path | None) -> None:
 
 
 def _pairs(texts: list[str]) -> dict[str, str]:
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     pairs = {}
     for text in texts:
@@ -256,7 +256,7 @@ def _pairs(texts: list[str]) -> dict[str, str]:
 
 def _changed(scene: "Scene", times: str | None, size: str | None, paths: int | None) -> "Scene":
     """Return the scene with what was given on the command line."""
-    from labrig.errors import UsageError
+    from labrig.foundation.errors import UsageError
 
     width = height = None
     if size is not None:
@@ -285,8 +285,8 @@ def _draw(
     fps: float,
 ) -> None:
     """Draw all frames for a screen: a picture each, a sheet, and a film if it is wanted."""
-    from labrig.number_format import rounded
-    from labrig.quantity import duration_text
+    from labrig.foundation.number_format import rounded
+    from labrig.foundation.quantity import duration_text
     from labrig.report import draw_frames
     from labrig.reproduce import shown_frames, write_png, write_video
 

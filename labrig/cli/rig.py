@@ -11,7 +11,7 @@ import typer
 from labrig.cli import default_rig, view
 from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.default_rig import RigArgument, rig_path
-from labrig.errors import DeviceError, ProtocolError
+from labrig.foundation.errors import DeviceError, ProtocolError
 
 if TYPE_CHECKING:
     from labrig.setup import Discovery, RigReport
@@ -37,7 +37,7 @@ def list_devices(
     from dataclasses import asdict
     from json import dumps
 
-    from labrig import plugins
+    from labrig.foundation import plugins
     from labrig.setup import Host, discover
 
     discovery = discover(Host.of_this_pc(), plugins.names(plugins.DRIVERS))

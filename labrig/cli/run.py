@@ -12,8 +12,8 @@ from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.cli.protocol import protocol_path
-from labrig.clock import Interrupted
-from labrig.errors import UsageError
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.bench import Recording

@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.wording import counted, measurement
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
@@ -209,7 +209,7 @@ def _temperatures_c(text: str | None) -> list[float] | None:
 
 
 def _temperature_sigma_k(text: str) -> float:
-    from labrig.quantity import TEMPERATURE_STEP_K, parse
+    from labrig.foundation.quantity import TEMPERATURE_STEP_K, parse
 
     try:
         return parse(text, TEMPERATURE_STEP_K)
@@ -224,7 +224,7 @@ def note(
 ) -> None:
     """Add a note to a run: what you saw, what was odd. Kept in notes.md in its folder."""
     from labrig.catalogue import find_run
-    from labrig.clock import SystemClock
+    from labrig.foundation.clock import SystemClock
     from labrig.record import add_note
 
     typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
@@ -270,7 +270,7 @@ def _print_comparison(comparison: "Comparison") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from labrig.number_format import plus_minus
+    from labrig.foundation.number_format import plus_minus
 
     for key, value_a, value_b in comparison.protocol_differences:
         typer.echo(f"asked differently: {key}: {value_a} | {value_b}")

@@ -18,9 +18,9 @@ def camera(
     ] = "sim",
 ) -> None:
     """Serve a simulated rig's camera as PTP/IP on this PC, until Ctrl-C."""
-    from labrig import resources
     from labrig.acquire import read_rig_file
     from labrig.bench import serve_camera
+    from labrig.foundation import resources
 
     path = resources.find("config", "rig", rig)
     serve_camera(read_rig_file(path), str(path), port, typer.echo)

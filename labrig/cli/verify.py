@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_run
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 
 if TYPE_CHECKING:
     from labrig.process import Verification
@@ -86,7 +86,7 @@ def seal(
     """
     from labrig.catalogue import find_run
     from labrig.cli.key import key_file
-    from labrig.clock import SystemClock
+    from labrig.foundation.clock import SystemClock
     from labrig.process import seal_run
     from labrig.seal import read_key
 

@@ -22,8 +22,8 @@ def watch(
 ) -> None:
     """A page for the screen outside the dark room: live decay, timeline, state. Ctrl-C ends it."""
     from labrig.catalogue import find_run
-    from labrig.clock import SystemClock
-    from labrig.signals import interrupting
+    from labrig.foundation.clock import SystemClock
+    from labrig.foundation.signals import interrupting
     from labrig.watch import watch_run
 
     clock = SystemClock()

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.compare.viewing import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.output_file import make_folder, write_text
+from labrig.foundation.region import Region, region_pixels
+from labrig.foundation.yaml_file import yaml_text
 from labrig.material import Material, ReradiationMatrix, write_fluorescent, write_material
 from labrig.optics import Spectrum
-from labrig.output_file import make_folder, write_text
 from labrig.reduce import SensorLayout
-from labrig.region import Region, region_pixels
 from labrig.reproduce import CARD_NAME, DarkRoomPicture, Renderer, Scene, SceneFile
 from labrig.results import write_csv
-from labrig.yaml_file import yaml_text
 
 #: Height of the frame in the rendering; its light is even on every sample.
 HEIGHT_PX, MOST_PX = 32, 512

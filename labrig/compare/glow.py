@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.compare.nalbach2017 import DELTA_E, emission
-from labrig.compare.viewing import FloatArray, Viewing
-from labrig.errors import DataError, UsageError
+from labrig.compare.viewing import Viewing
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import (
     DECAY_LAWS,
     SEEN_FACTOR,

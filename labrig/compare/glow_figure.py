@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from labrig import colour_science
 from labrig.compare.glow import GlowComparison
-from labrig.compare.viewing import FloatArray
-from labrig.number_format import rounded
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
 from labrig.report import (
     EDGE_PT,
     FONT_PT,

@@ -9,8 +9,9 @@ from labrig.compare.glow import GlowComparison, compare_scaled, glow_sigma
 from labrig.compare.photographed_room import SAMPLE, PhotographedRoom, ReflectedLight
 from labrig.compare.rendered_states import MEASURED, FittedGlow, SeenPatch
 from labrig.compare.run import MeasuredPatch
-from labrig.compare.viewing import FloatArray, Viewing
-from labrig.errors import UsageError
+from labrig.compare.viewing import Viewing
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import Material
 from labrig.results import Series
 

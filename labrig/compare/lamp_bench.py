@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig import resources
 from labrig.acquire import read_rig_file
 from labrig.bench_optics import with_shipped_camera
 from labrig.compare.dark_room_view import (
@@ -19,8 +18,9 @@ from labrig.compare.dark_room_view import (
     picture_of,
     rendered_light,
 )
-from labrig.compare.viewing import FloatArray
-from labrig.errors import DataError, UsageError
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse
 from labrig.record import FrameRole, read_run

@@ -17,7 +17,7 @@ from labrig.compare.glow_figure import (
     draw_cell,
 )
 from labrig.compare.rendered_lamps import LOOKS, RenderedLamp, RenderedSample
-from labrig.compare.viewing import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import XYZ_TO_SRGB
 from labrig.report import EDGE_PT, FONT_PT, INK, MUTED, SMALL_PT, WIDTH_PT, into_gamut, new_figure
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from labrig.compare.lamps_figure import NOTHING, lamps_figure, percent
 from labrig.compare.rendered_lamps import LampsComparison, RenderedLamp, RenderedSample
-from labrig.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus
 from labrig.report import Picture, Section, Table
 
 #: Least light, relative to the brightest of a lamp, of which differences in % say something.

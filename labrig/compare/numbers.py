@@ -7,7 +7,7 @@ from typing import Any
 from labrig.compare.rendered import RenderedComparison
 from labrig.compare.rendered_lamps import LampsComparison
 from labrig.compare.run import RunComparison
-from labrig.compare.viewing import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 
 def numbers(comparison: RunComparison) -> dict[str, Any]:

@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from labrig import resources
 from labrig.acquire import RigFile
 from labrig.bench_optics import calibration, illuminance_lx
 from labrig.calibration import (
@@ -25,15 +23,16 @@ from labrig.calibration import (
     relative_sensitivity,
 )
 from labrig.compare.dark_room_view import fractions_of
-from labrig.errors import DataError, UsageError
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.region import Region
 from labrig.material import Material
 from labrig.record import FrameRole, RunRecord, read_run
 from labrig.reduce import SensorLayout, SeriesFrame, reduce_patches, sensor_layout
-from labrig.region import Region
 from labrig.reproduce import DarkRoomLamp
 from labrig.results import DecayResult, PhosphorResult, RunResult, Series
 
-FloatArray = NDArray[np.float64]
 FileT = TypeVar("FileT", bound=BaseModel)
 
 #: Illuminance where none was read; what is compared does not depend on it.

@@ -24,7 +24,7 @@ from labrig.compare.rendered_states import MEASURED, RenderedBench
 from labrig.compare.residuals import Refit, fits_by_states
 from labrig.compare.run import MeasuredPatch, measured_camera, read_patches, references_by_patch
 from labrig.compare.viewing import DEFAULT_WHITE, Viewing, viewing
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Material
 from labrig.record import read_run
 from labrig.reproduce import Assumptions

@@ -16,8 +16,10 @@ from labrig.compare.dark_room_view import DarkRoomScene
 from labrig.compare.glow import RGB
 from labrig.compare.lamp_bench import LampBench, LitSamples, lit_by_all
 from labrig.compare.run import measured_camera
-from labrig.compare.viewing import DEFAULT_WHITE, FloatArray, Viewing, viewing
-from labrig.errors import UsageError
+from labrig.compare.viewing import DEFAULT_WHITE, Viewing, viewing
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import read_yaml
 from labrig.optics import CIE_1931, delta_e, lab, observer, white_xyz
 from labrig.results import (
     AngularFluorescenceResult,
@@ -27,7 +29,6 @@ from labrig.results import (
     ValidateIlluminantsResult,
     read_result,
 )
-from labrig.yaml_file import read_yaml
 
 #: Protocols that measure fluorescence, and photograph nothing under lamps of daily life.
 WITHOUT_LAMPS = tuple(

@@ -9,8 +9,8 @@ from labrig.compare.glow_figure import glow_figure, shown_rows
 from labrig.compare.glow_ratio import RenderedPatch
 from labrig.compare.rendered import RenderedComparison
 from labrig.compare.rendered_states import MEASURED
-from labrig.compare.viewing import FloatArray
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.report import Picture, Section, Table
 
 #: Units in which glow is told over reflected light, the first of which it reaches.

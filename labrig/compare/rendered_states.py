@@ -10,12 +10,12 @@ from labrig.compare.dark_room_view import DarkRoomScene, picture_of, rendered_li
 from labrig.compare.glow import predicted_by
 from labrig.compare.photographed_room import PhotographedRoom, ReflectedLight
 from labrig.compare.run import MeasuredPatch
-from labrig.compare.viewing import FloatArray
-from labrig.errors import UsageError
 from labrig.fit import DecayFit
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.region import Region
 from labrig.material import MAX_ORDER, Material, State, write_material
 from labrig.optics import CameraResponse
-from labrig.region import Region
 from labrig.reproduce import (
     CARD_NAME,
     Assumptions,

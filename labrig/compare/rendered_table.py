@@ -5,7 +5,7 @@ from pathlib import Path
 
 from labrig.compare.rendered import RenderedComparison
 from labrig.compare.rendered_lamps import LampsComparison
-from labrig.output_file import make_folder
+from labrig.foundation.output_file import make_folder
 from labrig.results import write_csv
 
 Row = tuple[str | float, ...]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.compare.nalbach2017 import LAST_RESIDUALS, RESIDUALS
-from labrig.compare.viewing import FloatArray
-from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.report import Table
 from labrig.results import Series
 

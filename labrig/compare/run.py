@@ -21,9 +21,11 @@ from labrig.compare.residuals import (
     residuals,
 )
 from labrig.compare.three_channels import ThreeChannels, three_channels
-from labrig.compare.viewing import DEFAULT_WHITE, FloatArray, viewing
-from labrig.errors import DataError, UsageError
+from labrig.compare.viewing import DEFAULT_WHITE, viewing
 from labrig.fit import DecayFit
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.yaml_file import did_you_mean, read_yaml
 from labrig.material import Material, MaterialComparison, compare_materials, read_material
 from labrig.optics import CameraResponse
 from labrig.record import read_run
@@ -35,7 +37,6 @@ from labrig.results import (
     read_result,
     read_series,
 )
-from labrig.yaml_file import did_you_mean, read_yaml
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from labrig import colour_science
 from labrig.compare.three_channels import ThreeChannels
-from labrig.compare.viewing import FloatArray
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
 from labrig.report import (
     DASHED,
     EDGE_PT,

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.compare.viewing import DEFAULT_WHITE, FloatArray
-from labrig.errors import DataError
+from labrig.compare.viewing import DEFAULT_WHITE
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import (
     CIE_2015,
     CameraResponse,

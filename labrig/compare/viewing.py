@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig import colour_science
-from labrig.errors import UsageError
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import CIE_1931, CameraResponse, observer, white_xyz
 from labrig.report import camera_to_xyz
-
-FloatArray = NDArray[np.float64]
 
 #: White of the screens on which comparisons are viewed.
 DEFAULT_WHITE = "D65"

@@ -1,13 +1,11 @@
 """How different two glows look."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design.smooth_spectrum import XYZ_OF_RGB
+from labrig.foundation.arrays import FloatArray
 from labrig.material import REFERENCE_Y
 from labrig.optics import CIE_1931, delta_e, lab, observer, white_xyz
-
-FloatArray = NDArray[np.float64]
 
 
 def key_differences(

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from labrig.design.smooth_spectrum import PRIMARIES_NM, primary_spectra
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import CIE_1931, Spectrum, band_integrals, band_means, illuminant, observer
-
-FloatArray = NDArray[np.float64]
 
 #: CIE XYZ to linear sRGB, IEC 61966-2-1.
 XYZ_TO_RGB = np.array(

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design.result import Design
 from labrig.design.scene_spectra import SceneSpectra
+from labrig.foundation.arrays import FloatArray
 from labrig.reproduce import ParameterTexture
-
-FloatArray = NDArray[np.float64]
 
 #: Strength, as a part of the largest, below which light is none.
 FAINTEST = 1e-9

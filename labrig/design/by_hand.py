@@ -4,17 +4,16 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from labrig.design.bands import DesignBands
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme
 from labrig.design.possible import impossible_keys
 from labrig.design.result import Design
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import MAX_ORDER
-
-FloatArray = NDArray[np.float64]
 
 #: Largest rate or Λ.
 LARGEST = 1e9

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import lsq_linear
 
 from labrig.design.bands import DesignBands, spectral_bands
 from labrig.design.smooth_spectrum import PRIMARIES_NM, primary_spectra, smooth_spectrum
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import band_means
-
-FloatArray = NDArray[np.float64]
 
 #: Lights under which a reflectance is to look as its three channels.
 MOST_LIGHTS = 40

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Steps of all searches, and the relative gain below which one has ended.
 STEPS, LEAST_GAIN = 25, 1e-5

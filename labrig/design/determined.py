@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Singular value, relative to the largest, below which a combination of parameters changes no key.
 NO_EFFECT = 1e-9

@@ -8,13 +8,10 @@ each dot's is 1 at itself and 0 at the others.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design.propagation import propagate
 from labrig.design.spread_wish import SpreadWish
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from labrig.foundation.arrays import BoolArray, FloatArray
 
 
 def dot_shares(

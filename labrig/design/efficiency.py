@@ -1,9 +1,8 @@
 """How much light of each band a material would give back of what it absorbs."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 
 def emitted_over_absorbed(

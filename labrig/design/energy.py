@@ -8,14 +8,12 @@ itself, since light of that band alone could fall on the material.
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.linear_part import Coefficients
 from labrig.design.search import Found, Problem
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Searches for the nearest material that keeps the energy, and evaluations of each.
 SEARCHES, EVALUATIONS = 4, 40

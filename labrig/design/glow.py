@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design.light import Steps
+from labrig.foundation.arrays import FloatArray
 from labrig.material import (
     dark_step,
     lit_concentration,
@@ -21,8 +21,6 @@ from labrig.material import (
     phi2,
     relaxation_with_slopes,
 )
-
-FloatArray = NDArray[np.float64]
 
 #: κ τ of a step below which its light excites nothing.
 NO_LIGHT = 1e-200

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.design.bands import RGB_TO_Y, DesignBands
 from labrig.design.light import STRONGEST
-from labrig.errors import UsageError
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 
 #: Luminance, as a part of the brightest key's, below which a key is black.
 FLOOR = 1e-6

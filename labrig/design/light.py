@@ -6,9 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 
 #: Irradiance below which it is dark, and largest one; 1 is a light that makes a card white.
 DARK, STRONGEST = 1e-12, 1e12

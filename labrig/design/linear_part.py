@@ -17,10 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.design.descent import Curvature
-from labrig.nonnegative import nonnegative_least_squares
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 
 #: Pivot relative to its column below which two columns are the same.
 SINGULAR = 1e-13

@@ -3,14 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design.conversion import Conversion
 from labrig.design.light import LightProgramme
 from labrig.design.nearest import material_radiance
 from labrig.design.result import Design
 from labrig.design.scene_spectra import SceneSpectra
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.material import (
     Albedo,
     IrradianceNorm,
@@ -19,8 +19,6 @@ from labrig.material import (
     State,
     self_excitation,
 )
-
-FloatArray = NDArray[np.float64]
 
 #: Bands in nm of a design of three channels, as wide as its smooth spectra allow.
 EDGES_NM = np.arange(400.0, 701.0, 20.0)

@@ -5,18 +5,17 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from labrig import resources
 from labrig.design.conversion import Conversion
 from labrig.design.glow import emission
 from labrig.design.light import LightProgramme, steps_to
 from labrig.design.result import Design
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.material import Albedo, Material, Provenance, read_material
-from labrig.nonnegative import nonnegative_least_squares
-
-FloatArray = NDArray[np.float64]
 
 #: Share below which a material is not part of a mixture.
 LEAST_SHARE = 1e-3

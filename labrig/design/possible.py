@@ -4,14 +4,12 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design.bands import RGB_TO_Y
 from labrig.design.light import LightProgramme
 from labrig.design.result import Design, Impossible
 from labrig.design.smooth_spectrum import XYZ_OF_RGB, smooth_spectrum
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Relative excess that counts as rounding of the keys.
 ROUNDED = 1e-3

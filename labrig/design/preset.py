@@ -1,17 +1,15 @@
 """Measured materials as a beginning of a design."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from labrig.design.bands import DesignBands
 from labrig.design.by_hand import Parameters
 from labrig.design.conversion import Conversion
 from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.light import LightProgramme
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import Material
-
-FloatArray = NDArray[np.float64]
 
 #: Part of what is absorbed that a material whose file has no scale emits.
 EFFICIENCY = 0.3

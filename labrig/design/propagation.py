@@ -15,15 +15,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, cg
 from scipy.spatial import cKDTree
 
-from labrig.errors import DataError, UsageError
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 
 #: Neighbours of each texel.
 NEIGHBOURS = 10

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from labrig.design.appearance import key_differences
 from labrig.design.bands import DesignBands
@@ -13,8 +13,7 @@ from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.glow import captures, emission
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme, steps_to
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Excess of emitted over absorbed light that is rounding.
 ROUNDED = 1e-6

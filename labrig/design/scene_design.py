@@ -9,18 +9,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design.material_file import to_material
 from labrig.design.result import Design
 from labrig.design.scene_light import SceneLight
 from labrig.design.scene_spectra import SceneSpectra
 from labrig.design.wish_file import Wish
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import Material
 from labrig.reproduce import Renderer
-
-FloatArray = NDArray[np.float64]
 
 #: How often it is designed anew under the rendered light.
 AGAIN = 2

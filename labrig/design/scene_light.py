@@ -20,7 +20,9 @@ from labrig.design.light import LightProgramme
 from labrig.design.result import Design
 from labrig.design.scene_spectra import SceneSpectra, checked_edges
 from labrig.design.texel_surface import TexelSurface
-from labrig.errors import UsageError
+from labrig.foundation.arrays import BoolArray, Float32Array, FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import Material
 from labrig.reproduce import (
     Bands,
@@ -35,12 +37,6 @@ from labrig.reproduce import (
     of_phosphor,
     read_scene,
 )
-from labrig.yaml_file import did_you_mean
-
-FloatArray = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 
 #: Albedo of the material before it is designed.
 PLACEHOLDER = 0.5
@@ -294,7 +290,7 @@ class SceneLight:
         return self._with(self._measured(material, texture))
 
     @cached_property
-    def places(self) -> IntArray:
+    def places(self) -> Int32Array:
         """Numbers of the material's places among all of the scene, shape (places,)."""
         return self._renderer.places_of(self.material)
 

@@ -15,10 +15,9 @@ from labrig.design.bands import INVISIBLE, RGB_TO_Y, DesignBands, spectral_bands
 from labrig.design.conversion import Conversion, smooth_reflectance
 from labrig.design.light import LightProgramme
 from labrig.design.smooth_spectrum import smooth_spectrum
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import photopic_efficacy
-
-FloatArray = NDArray[np.float64]
 
 #: Negative channel of a light, over its luminance, that three channels leave out.
 LEFT_OUT = 0.02

@@ -22,9 +22,8 @@ from labrig.design.glow import Emission, emission, grid_emission
 from labrig.design.light import LightProgramme, Steps, steps_to
 from labrig.design.linear_part import BandByBand, Coefficients, LinearPart, Wanted
 from labrig.fit import Ending, LeastSquaresFit, least_squares
+from labrig.foundation.arrays import FloatArray
 from labrig.material import MAX_ORDER
-
-FloatArray = NDArray[np.float64]
 
 #: Range of k_r: the slowest decay over all of the time, the fastest over the shortest step.
 SLOWEST, FASTEST = 1e-3, 30.0

@@ -8,12 +8,10 @@ reflectances). It is a choice, no measurement.
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.optics import CIE_1931, observer
-
-FloatArray = NDArray[np.float64]
 
 #: Grid of the primaries' spectra, over which the observer sees.
 PRIMARIES_NM = np.arange(390.0, 721.0, 5.0)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from labrig.design.bands import DesignBands
 from labrig.design.determined import POOR, POOR_ALBEDO, Conflict, Estimate, conflicts, covariance
@@ -24,10 +24,9 @@ from labrig.design.search import (
     search,
     search_near,
 )
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import MAX_ORDER
-
-FloatArray = NDArray[np.float64]
 
 #: Most states of a design: a person's keys do not determine more.
 MOST_STATES = 2

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from labrig.design.blended_materials import BlendedMaterials
 from labrig.design.dot_shares import dot_shares
@@ -22,13 +22,12 @@ from labrig.design.scene_spectra import SceneSpectra
 from labrig.design.search import INSTANT_S
 from labrig.design.spread_wish import SpreadWish
 from labrig.design.wish_file import Wish
-from labrig.errors import UsageError
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.picture_file import read_picture
 from labrig.material import Material
-from labrig.picture_file import read_picture
 from labrig.reproduce import ParameterTexture
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 #: Row and column, from the texture's upper left.
 Texel: TypeAlias = tuple[int, int]
 

@@ -2,16 +2,16 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.design.propagation import Reach
-from labrig.finite import Positive, UnitFraction
+from labrig.foundation.models import FrozenModel, Positive, UnitFraction
 
 #: Part of the picture's height that a stroke is wide at most.
 WIDEST = 1.0
 
 
-class SpreadWish(BaseModel):
+class SpreadWish(FrozenModel):
     """How far materials reach around the dots whose own they are.
 
     Attributes
@@ -31,15 +31,13 @@ class SpreadWish(BaseModel):
         picture, each x, y and radius; x and y as of `pixels`, the radius as a part of its height.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     position: Annotated[Positive, Field(le=1e4)] = 20.0
     appearance: Annotated[Positive, Field(le=1e4)] = 0.1
     brush: Annotated[Positive, Field(le=1e4)] = 2.0
     appearance_file: Annotated[str, Field(min_length=1)] | None = None
     strokes: dict[
         str, tuple[tuple[UnitFraction, UnitFraction, Annotated[float, Field(gt=0, le=WIDEST)]], ...]
-    ] = {}
+    ] = Field(default_factory=dict)
 
     @property
     def reach(self) -> Reach:

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Int32Array
+from labrig.foundation.errors import UsageError
 from labrig.reproduce import Scene, Surface
-
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +66,12 @@ class TexelSurface:
         return rows, columns
 
     @property
-    def materials(self) -> IntArray:
+    def materials(self) -> Int32Array:
         """Number of the material of each texel (rows, columns)."""
         own = self.surface.material_of_texel
         return np.full(self.shape, self.material) if own is None else own[::-1]
 
-    def texels_of(self, places: IntArray) -> tuple[IntArray, IntArray]:
+    def texels_of(self, places: Int32Array) -> tuple[Int32Array, Int32Array]:
         """Return rows and columns of places, which are numbers among all of the scene."""
         rows, columns = self.shape
         row, column = np.divmod(places - self.first_place, columns)

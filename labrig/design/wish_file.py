@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.design.bands import XYZ_TO_RGB, DesignBands, spectral_bands, three_bands
 from labrig.design.keys import Keys
@@ -18,20 +17,20 @@ from labrig.design.result import Design
 from labrig.design.search import PREFERENCE
 from labrig.design.solver import KEY_SIGMA, MOST_STATES, solve
 from labrig.design.spread_wish import SpreadWish
-from labrig.errors import UsageError
-from labrig.finite import Finite, NotNegative, Positive, UnitFraction
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive, UnitFraction
+from labrig.foundation.named_files import beside
+from labrig.foundation.quantity import DurationS, Fraction, TimeS
+from labrig.foundation.yaml_file import did_you_mean, read_model
 from labrig.material import MAX_ORDER
-from labrig.named_files import beside
 from labrig.optics import read_light
-from labrig.quantity import DurationS, Fraction, TimeS
 from labrig.reproduce import ProgrammeEntry
-from labrig.yaml_file import did_you_mean, read_model
 
 # A scene is traced only if a file names one.
 if TYPE_CHECKING:
     from labrig.design.scene_light import SceneLight
 
-FloatArray = NDArray[np.float64]
 
 #: Name of the place of a file that names none.
 ONLY_PLACE = "patch"
@@ -41,11 +40,7 @@ LINEAR_END, LINEAR_SLOPE, OFFSET, EXPONENT = 0.04045, 12.92, 0.055, 2.4
 HEX = re.compile(r"#[0-9a-fA-F]{6}")
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class LightChange(_Part):
+class LightChange(FrozenModel):
     """Light that falls on a place from one time until the next.
 
     Attributes
@@ -76,7 +71,7 @@ class LightChange(_Part):
         return self
 
 
-class WishedKey(_Part):
+class WishedKey(FrozenModel):
     """How a place should look at a time, reflected light included.
 
     Attributes
@@ -124,7 +119,7 @@ class WishedKey(_Part):
         return self.brightness * np.array(self.colour)
 
 
-class SceneWish(_Part):
+class SceneWish(FrozenModel):
     """Scene in which a material is designed.
 
     Attributes
@@ -156,7 +151,7 @@ class SceneWish(_Part):
     spread: SpreadWish | None = None
 
 
-class WishFile(_Part):
+class WishFile(FrozenModel):
     """How something should glow under which light.
 
     Attributes

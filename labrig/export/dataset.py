@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.record import read_run
 from labrig.results import (
     DecayResult,

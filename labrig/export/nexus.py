@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from labrig.acquire import CAMERA, DARK, LIGHTS
-from labrig.output_file import write_durably
+from labrig.foundation.output_file import write_durably
 from labrig.record import DeviceLine, RunDescription, RunRecord
 from labrig.results import (
     DecayPatch,

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labrig.errors import UsageError
 from labrig.export.dataset import read_dataset
+from labrig.foundation.errors import UsageError
 from labrig.record import Document, read_journal, read_run
 
 if TYPE_CHECKING:

@@ -16,13 +16,7 @@ from labrig.fit.decay import (
     fit_shared_rates,
     periodogram,
 )
-from labrig.fit.least_squares import (
-    EPSILON,
-    Ending,
-    FloatArray,
-    LeastSquaresFit,
-    least_squares,
-)
+from labrig.fit.least_squares import EPSILON, Ending, LeastSquaresFit, least_squares
 from labrig.fit.luminance import fit_luminance
 from labrig.fit.mixture import (
     HeldOutError,
@@ -44,7 +38,6 @@ __all__ = [
     "DecayFit",
     "DecayTable",
     "Ending",
-    "FloatArray",
     "HeldOutError",
     "LeastSquaresFit",
     "LightKept",

@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import lapack
 
-from labrig.errors import FitError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 
-FloatArray = NDArray[np.float64]
 #: Parameters (p,) → residuals (m,) and their Jacobian (m, p), in units of the residuals' σ.
 Residuals = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 

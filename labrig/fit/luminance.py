@@ -13,16 +13,16 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import chdtrc
 
-from labrig.errors import FitError
 from labrig.fit.crossing import forecast_crossing
 from labrig.fit.least_squares import least_squares
-from labrig.quantity import duration_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.quantity import duration_text
 from labrig.results import (
     MARKING_S,
     NORMAL_95,
     TABLE_S,
     VISIBLE_MCD_PER_M2,
-    FloatArray,
     ForecastTime,
     LuminanceAt,
     LuminanceDecay,

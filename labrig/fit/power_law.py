@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from labrig.errors import FitError
+from labrig.foundation.errors import FitError
 from labrig.results import Measured
 
 #: Fewest different places that tell a slope and whether there is one.

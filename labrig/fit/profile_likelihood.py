@@ -22,13 +22,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from labrig.fit.bounded_limits import away_from_bound, toward_bound
-from labrig.fit.least_squares import (
-    FloatArray,
-    LeastSquaresFit,
-    Residuals,
-    least_squares,
-    parameter_covariance,
-)
+from labrig.fit.least_squares import LeastSquaresFit, Residuals, least_squares, parameter_covariance
+from labrig.foundation.arrays import FloatArray
 from labrig.results import ASYMMETRIC, NORMAL_95, ProfileInterval
 
 #: Parameters (p,) → value of a quantity, and its derivatives (p,).

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 
 def propagated_covariance(covariance: FloatArray, transform: FloatArray) -> FloatArray:

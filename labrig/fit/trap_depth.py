@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from labrig.errors import FitError
-from labrig.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
+from labrig.foundation.errors import FitError
+from labrig.foundation.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
 from labrig.results import Measured, TrapDepth
 
 #: Span of the temperatures that tells a depth, in K.

@@ -4,10 +4,10 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labrig import resources
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import read_yaml
 from labrig.material.file import Material, read_material
-from labrig.yaml_file import read_yaml
 
 # SciPy, which matrices need, is slow to load.
 if TYPE_CHECKING:

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.file import Material, State
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Argument below which a series takes the place of a difference that loses digits.
 SERIES_BELOW = 0.03

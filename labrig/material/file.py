@@ -11,17 +11,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
     model_serializer,
     model_validator,
 )
 
-from labrig import resources
-from labrig.finite import NotNegative
-from labrig.yaml_file import model_text, read_model, write_yaml
+from labrig.foundation import resources
+from labrig.foundation.models import FrozenModel, NotNegative
+from labrig.foundation.yaml_file import model_text, read_model, write_yaml
 
 Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 #: Largest kinetic order; above 2 it is empirical.
@@ -67,11 +65,7 @@ LEVEL_KNOWN = 0.3
 SAME_TIME = 1e-3
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class IrradianceNorm(_Part):
+class IrradianceNorm(FrozenModel):
     """Normalisation of the irradiance E to which the excitation rates belong.
 
     Attributes
@@ -87,7 +81,7 @@ class IrradianceNorm(_Part):
     value: Rate
 
 
-class State(_Part):
+class State(FrozenModel):
     """One excited state: what was not measured is null; every σ is one standard deviation.
 
     Attributes
@@ -246,7 +240,7 @@ class State(_Part):
         return content
 
 
-class Spectrum(_Part):
+class Spectrum(FrozenModel):
     """Emission on a finer grid than the bands, largest value 1 (Λ* of section 4.3).
 
     Attributes
@@ -269,7 +263,7 @@ class Spectrum(_Part):
         return self
 
 
-class Albedo(_Part):
+class Albedo(FrozenModel):
     """Reflectance R of eq. 2 of Nalbach et al.: light that comes back at its own wavelength.
 
     Attributes
@@ -298,7 +292,7 @@ class Albedo(_Part):
         return self
 
 
-class RadianceFactor(_Part):
+class RadianceFactor(FrozenModel):
     """All light that comes back under a lamp: reflection, prompt fluorescence and steady glow.
 
     Attributes
@@ -325,7 +319,7 @@ class RadianceFactor(_Part):
         return self
 
 
-class ScaleFactor(_Part):
+class ScaleFactor(FrozenModel):
     """One factor of the chain from the camera's counts to `reradiation` and `amplitude`.
 
     Attributes
@@ -346,7 +340,7 @@ class ScaleFactor(_Part):
     unit: str = "1"
 
 
-class Provenance(_Part):
+class Provenance(FrozenModel):
     """Origin of the numbers.
 
     Attributes
@@ -373,7 +367,7 @@ class Provenance(_Part):
     temperature_c: Annotated[float, Field(ge=-273.15, le=1000)] | None = None
 
 
-class Material(_Part):
+class Material(FrozenModel):
     """A phosphorescent material.
 
     Attributes

@@ -5,15 +5,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.material.file import Provenance
 from labrig.material.reradiation import ReradiationMatrix, read_reradiation, write_reradiation
-from labrig.yaml_file import read_model, write_yaml
 
 
-class FluorescentMaterial(BaseModel):
+class FluorescentMaterial(FrozenModel):
     """A fluorescent material.
 
     Attributes
@@ -27,8 +28,6 @@ class FluorescentMaterial(BaseModel):
     provenance
         Origin of the numbers. Default: not recorded.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Annotated[str, Field(min_length=1)]
     kind: Literal["fluorescent"]

@@ -19,11 +19,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.decay_laws import SHORT_EXPOSURE, log_ratio
-
-FloatArray = NDArray[np.float64]
 
 #: Gauss–Legendre nodes and weights on [0, 1] for the integral over y.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)

@@ -12,9 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Argument below which φ₂ is summed as a series: the difference 1 − φ₁ loses digits.
 _SERIES_BELOW = 0.5

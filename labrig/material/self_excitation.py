@@ -1,9 +1,7 @@
 """Glow that excites the material that emits it."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-FloatArray = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 
 def self_excitation(k_e_per_s: ArrayLike, reradiation: ArrayLike, albedo: ArrayLike) -> float:

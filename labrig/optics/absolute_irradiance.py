@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics.colorimetry import CIE_1931, observer
 from labrig.optics.spectrum import Spectrum
 

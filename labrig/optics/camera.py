@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig import resources
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics.curve_file import CurveFile, checked, read_curve_file
-from labrig.optics.piecewise import FloatArray, band_means
+from labrig.optics.piecewise import band_means
 from labrig.optics.shipped_cameras import FOLDER, shipped_camera
 from labrig.optics.spectrum import check_curve
 

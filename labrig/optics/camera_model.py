@@ -4,14 +4,14 @@ import math
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from numpy.typing import ArrayLike
+from pydantic import Field, model_validator
 
-from labrig.errors import DataError
-from labrig.finite import Finite, NotNegative, Positive
-from labrig.region import Region, region_pixels
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
+from labrig.foundation.region import Region, region_pixels
 
-FloatArray = NDArray[np.float64]
 Numbers = tuple[Finite, ...]
 
 #: Relative difference below which settings are the same: a Canon's dial shows 1/60 s for 1/64 s.
@@ -20,11 +20,7 @@ SAME_SETTING = 0.02
 POINTS = 24
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Flat(_Part):
+class Flat(FrozenModel):
     """Flat field 1 + Σ_k c_k ρ^(2k), k = 1, 2 …, ρ the distance from the centre per half diagonal.
 
     The part even about the centre is taken for the lens's vignetting. The odd part, `gradient`, is
@@ -74,7 +70,7 @@ class Flat(_Part):
         return mean
 
 
-class Factor(_Part):
+class Factor(FrozenModel):
     """Actual over nominal effect of a setting, with one standard deviation."""
 
     setting: Positive
@@ -82,7 +78,7 @@ class Factor(_Part):
     sigma: NotNegative
 
 
-class Glare(_Part):
+class Glare(FrozenModel):
     """Veiling glare: part of the frame's mean light that lies evenly over all of it.
 
     Attributes
@@ -95,7 +91,7 @@ class Glare(_Part):
     sigma: NotNegative
 
 
-class CameraModel(_Part):
+class CameraModel(FrozenModel):
     """A calibrated camera body and lens.
 
     Attributes

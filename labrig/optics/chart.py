@@ -1,7 +1,7 @@
 """Reflectances of the patches of a colour chart."""
 
-from labrig import resources
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
 from labrig.optics.curve_file import read_curve_file, read_transmittance
 from labrig.optics.spectrum import Transmittance
 

@@ -9,15 +9,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig import colour_science
-from labrig.errors import UsageError
-from labrig.input_file import read_text
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.optics.spectrum import Spectrum
-from labrig.yaml_file import did_you_mean
-
-FloatArray = NDArray[np.float64]
 
 CIE_1931 = "CIE 1931 2 Degree Standard Observer"
 CIE_2015 = "CIE 2015 2 Degree Standard Observer"

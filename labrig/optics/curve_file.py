@@ -13,16 +13,16 @@ from itertools import starmap
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from labrig.errors import UsageError
-from labrig.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.optics.curve_json import curves_from_json
 from labrig.optics.curve_table import Columns, NamedCurve, curves_from_table, is_own_table
 from labrig.optics.foreign_spectra import foreign_spectra
 from labrig.optics.ordinate import Quantity, read_ordinate
-from labrig.optics.piecewise import FloatArray
 from labrig.optics.spectrum import Spectrum, Transmittance
 from labrig.text_table import read_table_text
-from labrig.yaml_file import did_you_mean
 
 _logger = logging.getLogger(__name__)
 

@@ -12,8 +12,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics.ordinate import Quantity
-from labrig.optics.piecewise import FloatArray
 from labrig.optics.spectral_axis import PLAUSIBLE_NM
 from labrig.text_table import plain_text
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.errors import LabrigError
+from labrig.foundation.errors import LabrigError
 from labrig.optics.curve_table import NamedCurve, sorted_columns
 from labrig.optics.ordinate import UNKNOWN, Ordinate, Quantity, read_ordinate
 from labrig.optics.spectral_axis import AxisUnit, axis_unit, plain, read_axis, wavelengths_nm

@@ -13,12 +13,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.array_file import map_array, map_numbers, read_arrays
-from labrig.errors import DataError, UsageError
-from labrig.input_file import read_text
-from labrig.optics.piecewise import FloatArray
+from labrig.foundation.array_file import map_array, map_numbers, read_arrays
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.region import Region, region_pixels
 from labrig.optics.spectrum import Spectrum
-from labrig.region import Region, region_pixels
 
 T = TypeVar("T")
 

@@ -5,8 +5,8 @@ import re
 
 import numpy as np
 
-from labrig.errors import UsageError
-from labrig.named_files import is_path
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import is_path
 from labrig.optics.colorimetry import illuminant
 from labrig.optics.curve_file import read_spectrum
 from labrig.optics.piecewise import band_integrals

@@ -6,8 +6,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics.camera import CameraResponse
-from labrig.optics.piecewise import FloatArray, hat_functions, quadrature
+from labrig.optics.piecewise import hat_functions, quadrature
 from labrig.optics.spectrum import Spectrum
 
 #: Asymmetry below which the limit, a Gaussian, is equally exact.

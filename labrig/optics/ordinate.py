@@ -12,7 +12,7 @@ from math import log, log10
 
 import numpy as np
 
-from labrig.optics.piecewise import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.optics.spectral_axis import plain
 from labrig.optics.spectrum import FRACTION_SLACK
 

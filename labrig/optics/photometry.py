@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.input_file import read_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.input_file import read_text
 from labrig.optics.colorimetry import CIE_1931, observer
-from labrig.optics.piecewise import FloatArray
 
 #: Luminous efficacies of monochromatic light at their maxima in lm/W (CIE 18:2019).
 PHOTOPIC_LM_PER_W, SCOTOPIC_LM_PER_W = 683.0, 1700.0

@@ -5,9 +5,9 @@ on a 10 nm grid); integration keeps it.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Widest cell of a quadrature, so that smooth factors (a filter's band) are integrated to 1e-9.
 CELL_NM = 1.0

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from labrig import resources
-from labrig.input_file import read_text
+from labrig.foundation import resources
+from labrig.foundation.input_file import read_text
 
 #: Folder of the files, JSON as rawtoaces writes it.
 FOLDER = "config/optics/cameras"

@@ -10,7 +10,7 @@ from enum import Enum
 
 import numpy as np
 
-from labrig.optics.piecewise import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Range of wavelengths in nm, which excludes tables in µm or in Hz.
 PLAUSIBLE_NM = (100.0, 20_000.0)

@@ -9,14 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import DataError
-from labrig.input_file import read_text
-from labrig.optics.piecewise import FloatArray
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.input_file import read_text
 from labrig.optics.spectrum import Spectrum
-
-BoolArray = NDArray[np.bool_]
 
 #: Number of pixels with the most similar light whose variances are averaged.
 POOL = 101

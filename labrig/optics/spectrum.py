@@ -6,7 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.optics.piecewise import FloatArray, band_means, edges_from_centres
+from labrig.foundation.arrays import FloatArray
+from labrig.optics.piecewise import band_means, edges_from_centres
 
 #: Tolerance of measured fractions below 0 and above 1.
 FRACTION_SLACK = 0.02

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.optics.piecewise import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: CIE XYZ, white D65 at Y = 1, to linear sRGB, as the standard rounds it.
 XYZ_TO_SRGB = np.array(

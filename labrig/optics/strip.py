@@ -5,16 +5,16 @@ from itertools import pairwise
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from labrig.finite import UnitFraction
-from labrig.region import Region, region_pixels
+from labrig.foundation.models import FrozenModel, UnitFraction
+from labrig.foundation.region import Region, region_pixels
 
 #: Number of positions along a strip at which pictures are read (paper, section 4.2).
 SLICES = 31
 
 
-class Strip(BaseModel):
+class Strip(FrozenModel):
     """Position of the filter in the frame, in fractions of the frame's width and height.
 
     Attributes
@@ -26,8 +26,6 @@ class Strip(BaseModel):
     rising
         Whether the wavelength rises from left to right.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     left: tuple[UnitFraction, UnitFraction]
     right: tuple[UnitFraction, UnitFraction]

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
-from labrig import resources
 from labrig.acquire import CameraOffers, ProtocolModel
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.quantity import TIME_S, parse
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import Material, read_material
 from labrig.optics import CameraResponse
 from labrig.predict.brightness import brightness_metered_as, measured_glow, relative_glow
@@ -17,8 +19,6 @@ from labrig.predict.glow import Glow, check_states
 from labrig.predict.reference import Reference, read_reference, result_places, run_of
 from labrig.predict.variants import changed
 from labrig.protocols.decay import Decay
-from labrig.quantity import TIME_S, parse
-from labrig.yaml_file import did_you_mean
 
 #: Assumed first exposure as a fraction of the longest, so that it may grow.
 FIRST_EXPOSURE_FRACTION = 1 / 8

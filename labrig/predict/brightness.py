@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from labrig.acquire import CameraOffers
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import Material
 from labrig.optics import CameraResponse
 from labrig.predict.camera import CameraFigures

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from labrig.acquire import TYPICAL_BYTES_PER_PIXEL, CameraOffers
-from labrig.region import Region, region_pixels
+from labrig.foundation.region import Region, region_pixels
 
 #: Conversion gain in electrons per DN at ISO 100 of a typical full-frame DSLR with 14 bits.
 TYPICAL_ELECTRONS_PER_DN = 4.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.acquire import CameraOffers, ProtocolModel
-from labrig.errors import ProtocolError, UsageError
+from labrig.foundation.errors import ProtocolError, UsageError
 from labrig.predict.camera import CameraFigures
 from labrig.predict.frames import dark_frames, glow_frames
 from labrig.predict.glow import Glow

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from labrig.fit import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.region import Region
 from labrig.predict.camera import CameraFigures
 from labrig.predict.glow import Glow
 from labrig.predict.state_means import state_means
@@ -15,7 +16,6 @@ from labrig.reduce import (
     rounded_variance,
     shared_rounding_variance,
 )
-from labrig.region import Region
 
 #: Standard deviations above the mean at which a normal variate has its 99.5 % quantile.
 PEAK_SIGMAS = 2.576

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit import EPSILON, FloatArray
+from labrig.fit import EPSILON
+from labrig.foundation.arrays import FloatArray
 from labrig.predict.series import DARK, FLICKER, ExpectedSeries
 
 

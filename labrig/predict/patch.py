@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtri, ncfdtr
 
-from labrig.errors import FitError
-from labrig.fit import FloatArray, fit_decay
+from labrig.fit import fit_decay
 from labrig.fit.decay import APART_SIGMAS, F_TEST_LEVEL
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.predict.expectation import Expectation
 from labrig.predict.series import ExpectedSeries
 

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from labrig.acquire import ProtocolModel, RigFile, plan
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.predict.expectation import Bench, expect, predictable
 from labrig.predict.patch import PatchPrediction, predicted_patches
 from labrig.predict.variants import Change, changed

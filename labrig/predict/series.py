@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.predict.frames import ExpectedFrames
 from labrig.predict.glow import Glow
 from labrig.predict.state_means import StateMeans, state_means

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labrig.fit import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS, exponential_means_and_slopes
 
 BECQUEREL = DECAY_LAWS["becquerel"]

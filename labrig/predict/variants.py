@@ -6,9 +6,9 @@ from itertools import pairwise
 from typing import Any
 
 from labrig.acquire import CameraOffers, ProtocolModel
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.region import Region
 from labrig.protocols.decay import Decay
-from labrig.quantity import duration_text
-from labrig.region import Region
 
 #: Factor of the number of decays that halves uncorrelated noise.
 REPEATS = 4

@@ -9,16 +9,16 @@ import numpy as np
 
 from labrig.analyse import ChargeTableOptions
 from labrig.fit import ChargeFit, OrderState
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.output_file import make_folder, write_text
+from labrig.foundation.yaml_file import write_yaml
 from labrig.material import Material, Provenance, State, write_material
-from labrig.output_file import make_folder, write_text
 from labrig.process.provenance import library_versions
 from labrig.process.run import new_result, put_in_place
 from labrig.process.table import TableProvenance, stated
 from labrig.process.without_run import describe_without_run
 from labrig.report import charge_report, write_report
 from labrig.results import TableLayout, write_csv
-from labrig.yaml_file import write_yaml
 
 
 @dataclass(frozen=True)

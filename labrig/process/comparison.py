@@ -6,8 +6,8 @@ from pathlib import Path
 
 from markupsafe import escape
 
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes, read_text
-from labrig.output_file import make_folder_in, write_text
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes, read_text
+from labrig.foundation.output_file import make_folder_in, write_text
 from labrig.record import RunLock
 from labrig.report import Section, section_page, with_later
 

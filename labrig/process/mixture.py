@@ -3,7 +3,7 @@
 import hashlib
 from pathlib import Path
 
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.process.without_run import describe_without_run, write_with_report
 from labrig.report import FittedMatrix, mixture_report
 

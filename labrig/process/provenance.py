@@ -5,11 +5,11 @@ from functools import cache
 from importlib.metadata import version
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
-
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Overrides
-from labrig.input_file import read_text
+from labrig.foundation.input_file import read_text
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.region import Region
 from labrig.record import (
     DeviceLine,
     RunDescription,
@@ -18,13 +18,12 @@ from labrig.record import (
     read_notes,
     time_text,
 )
-from labrig.region import Region
 
 PROVENANCE = "provenance.yaml"
 _LIBRARIES = ("numpy", "scipy", "nlopt", "rawpy", "matplotlib", "colour-science", "h5py")
 
 
-class Provenance(BaseModel):
+class Provenance(FrozenModel):
     """Content of `provenance.yaml`; equal provenance gives an equal result.
 
     Attributes
@@ -56,8 +55,6 @@ class Provenance(BaseModel):
     journal
         Seal of the run's journal, the SHA-256 of its last line.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     labrig: str
     libraries: dict[str, str]

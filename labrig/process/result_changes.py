@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import DataError, LabrigError, UsageError
-from labrig.input_file import MAX_JSON_BYTES, read_text
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.errors import DataError, LabrigError, UsageError
+from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.number_format import plus_minus, rounded
+from labrig.foundation.yaml_file import read_yaml
 from labrig.process.provenance import PROVENANCE
 from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
-from labrig.yaml_file import read_yaml
 
 #: Largest number of changed files that are named.
 MOST_FILES = 6

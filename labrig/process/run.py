@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from labrig import plugins
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import (
     Inputs,
@@ -19,10 +18,12 @@ from labrig.analyse import (
 )
 from labrig.bench_optics import camera_curves, with_shipped_camera
 from labrig.calibration import LvfFile, keep_calibration
-from labrig.errors import DiskError, FitError, UsageError
 from labrig.export import write_nexus
+from labrig.foundation import plugins
+from labrig.foundation.errors import DiskError, FitError, UsageError
+from labrig.foundation.output_file import make_folder_in
+from labrig.foundation.yaml_file import write_yaml
 from labrig.optics import CameraResponse
-from labrig.output_file import make_folder_in
 from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
 from labrig.process.result_changes import changes
@@ -47,7 +48,6 @@ from labrig.report import (
     write_report,
 )
 from labrig.results import RunResult, read_result, write_result, write_summary
-from labrig.yaml_file import write_yaml
 
 _EARLIER = "result-"
 

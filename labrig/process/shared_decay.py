@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.process.without_run import describe_without_run, write_with_report
 from labrig.report import shared_decay_report
 from labrig.results import Series, SharedDecay

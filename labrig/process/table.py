@@ -6,20 +6,19 @@ from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
-
 from labrig.analyse import ChargeTableOptions, FittedTable, TableFitOptions
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
-from labrig.output_file import make_folder
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.output_file import make_folder
+from labrig.foundation.yaml_file import write_yaml
 from labrig.process.provenance import library_versions
 from labrig.process.run import Processed, new_result, put_in_place
 from labrig.process.without_run import describe_without_run
 from labrig.report import Report, table_sections, write_report
 from labrig.results import DecayPatch, DecayResult, TableLayout, write_result
-from labrig.yaml_file import write_yaml
 
 
-class TableProvenance(BaseModel):
+class TableProvenance(FrozenModel):
     """Content of the `provenance.yaml` of a table's result.
 
     Attributes
@@ -33,8 +32,6 @@ class TableProvenance(BaseModel):
     options
         Options of the fit and of the reading.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     labrig: str
     libraries: dict[str, str]

@@ -12,7 +12,8 @@ from labrig.analyse import (
     settings_differences,
     spectra_differences,
 )
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.yaml_file import read_model
 from labrig.process.comparison import LOCK
 from labrig.process.provenance import PROVENANCE, Provenance
 from labrig.record import (
@@ -33,7 +34,6 @@ from labrig.seal import (
     read_seal,
     write_seal,
 )
-from labrig.yaml_file import read_model
 
 #: Files that grow when a run goes on.
 _GROWING = (JOURNAL, "log.txt")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from labrig.output_file import make_folder, write_text
+from labrig.foundation.output_file import make_folder, write_text
 from labrig.process.provenance import library_versions
 from labrig.record import RunDescription
 from labrig.report import Report, write_report

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig.errors import LabrigError
+from labrig.foundation.errors import LabrigError
 from labrig.results import LuminanceResult, Measured, read_result
 
 

@@ -4,15 +4,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from labrig.errors import DiskError, UsageError
-from labrig.file_lock import plain_lock
-from labrig.output_file import write_text
-from labrig.yaml_file import read_model, yaml_text
+from labrig.foundation.errors import DiskError, UsageError
+from labrig.foundation.file_lock import plain_lock
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.output_file import write_text
+from labrig.foundation.yaml_file import read_model, yaml_text
 
 
-class QueuedRun(BaseModel):
+class QueuedRun(FrozenModel):
     """A measurement of a queue.
 
     Attributes
@@ -28,15 +29,13 @@ class QueuedRun(BaseModel):
         Name of the run folder; null before the run.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     protocol: str
     rig: str | None = None
     changes: dict[str, Any] = Field(default_factory=dict, alias="set")
     run: str | None = None
 
 
-class Queue(BaseModel):
+class Queue(FrozenModel):
     """Measurements in the order in which they are made.
 
     Attributes
@@ -44,8 +43,6 @@ class Queue(BaseModel):
     runs
         The measurements.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     runs: tuple[QueuedRun, ...] = ()
 

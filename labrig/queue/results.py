@@ -13,10 +13,10 @@ import numpy as np
 
 from labrig.acquire import read_protocol
 from labrig.catalogue import RunSummary, summarise
-from labrig.errors import FitError, LabrigError
 from labrig.fit import fit_power_law
+from labrig.foundation.errors import FitError, LabrigError
+from labrig.foundation.quantity import duration_text
 from labrig.process import describe_without_run, write_with_report
-from labrig.quantity import duration_text
 from labrig.queue.luminances import FoundLuminance, found_luminances
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart

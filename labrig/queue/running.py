@@ -10,8 +10,8 @@ from filelock import Timeout
 from labrig.acquire import SAMPLE_CHANGER, RigFile, driver_and_settings, read_rig_file
 from labrig.bench import Recording, Watch, resume_run
 from labrig.catalogue import summarise
-from labrig.errors import DataError, LabrigError, UsageError
-from labrig.file_lock import plain_lock
+from labrig.foundation.errors import DataError, LabrigError, UsageError
+from labrig.foundation.file_lock import plain_lock
 from labrig.process import process_and_report
 from labrig.queue.queue_file import Queue, QueuedRun, change_queue, read_queue
 from labrig.queue.results import QueueEntry, entries, write_results

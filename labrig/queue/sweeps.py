@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from itertools import product
 from typing import Any
 
-from labrig.errors import UsageError
-from labrig.yaml_file import parse_yaml
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import parse_yaml
 
 
 def combinations(settings: Iterable[str], sweeps: Iterable[str]) -> list[dict[str, Any]]:

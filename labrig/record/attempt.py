@@ -6,7 +6,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from labrig.output_file import Disk, write_durably
+from labrig.foundation.output_file import Disk, write_durably
 from labrig.record.document_checks import VALUES, described
 from labrig.record.frames import (
     ActionRecord,

@@ -15,9 +15,9 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import TypeVar
 
-from labrig.errors import DiskError, LabrigError
-from labrig.input_file import MAX_JSON_BYTES, open_regular, read_text
-from labrig.output_file import make_folder_in, write_durably
+from labrig.foundation.errors import DiskError, LabrigError
+from labrig.foundation.input_file import MAX_JSON_BYTES, open_regular, read_text
+from labrig.foundation.output_file import make_folder_in, write_durably
 from labrig.record.frames import FileRecord
 from labrig.record.user_secret import own_digest
 

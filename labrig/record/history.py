@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
 from labrig.record.frames import FrameRecord, FrameRole
 from labrig.record.run_record import Attempt, RunRecord
-
-FloatArray = NDArray[np.float64]
 
 #: Rates of traps 0.65 eV deep follow exp(−E / k_B T): 8.7 % per degree at 300 K; E / k_B in K.
 TRAP_K = 0.65 / BOLTZMANN_EV_PER_K

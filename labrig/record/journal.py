@@ -15,9 +15,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
-from labrig.errors import DataError, DiskError, UsageError
-from labrig.input_file import MAX_JOURNAL_BYTES, MAX_TEXT_BYTES, read_bytes
-from labrig.output_file import REAL_DISK, Disk, write_durably
+from labrig.foundation.errors import DataError, DiskError, UsageError
+from labrig.foundation.input_file import MAX_JOURNAL_BYTES, MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.output_file import REAL_DISK, Disk, write_durably
 from labrig.record.plain_folder import require_plain_folder
 
 JOURNAL = "journal.jsonl"

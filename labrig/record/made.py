@@ -3,8 +3,8 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
-from labrig.errors import LabrigError
-from labrig.input_file import read_text
+from labrig.foundation.errors import LabrigError
+from labrig.foundation.input_file import read_text
 
 MADE = "made.txt"
 

@@ -4,7 +4,7 @@ import os
 import stat
 from pathlib import Path
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 
 _KINDS = (
     (stat.S_ISLNK, "a link"),

@@ -13,10 +13,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from labrig.clock import SystemClock
-from labrig.errors import DiskError
-from labrig.output_file import PART, REAL_DISK, Disk, sync_folder, write_durably
-from labrig.readable_output import spelled
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import DiskError
+from labrig.foundation.output_file import PART, REAL_DISK, Disk, sync_folder, write_durably
+from labrig.foundation.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, Journal
 from labrig.record.made import MADE, made_text

@@ -11,11 +11,11 @@ from typing import Self
 
 from filelock import Timeout
 
-from labrig.clock import SystemClock
-from labrig.errors import DiskError, LabrigError, UsageError
-from labrig.file_lock import plain_lock
-from labrig.input_file import read_text
-from labrig.output_file import write_text
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import DiskError, LabrigError, UsageError
+from labrig.foundation.file_lock import plain_lock
+from labrig.foundation.input_file import read_text
+from labrig.foundation.output_file import write_text
 from labrig.record.plain_folder import require_plain_folder
 
 #: Time to wait for a lock: who only looks whether it is held, holds it for a moment.

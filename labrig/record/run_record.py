@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.record.document_checks import (
     check_descriptor,
     check_event,

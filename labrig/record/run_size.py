@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from labrig.errors import DiskError
+from labrig.foundation.errors import DiskError
 
 #: Journal, tables and NeXus file, per frame; report, figures and fits, per patch; and what is kept
 #: of the pictures in the report, for the next processing.

@@ -13,9 +13,9 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-from labrig.errors import DiskError, LabrigError
-from labrig.input_file import open_regular
-from labrig.output_file import write_private
+from labrig.foundation.errors import DiskError, LabrigError
+from labrig.foundation.input_file import open_regular
+from labrig.foundation.output_file import write_private
 
 _FOLDER, _FILE = "labrig", "kept_numbers_key"
 _BYTES = 32

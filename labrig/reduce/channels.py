@@ -7,13 +7,13 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import DataError, FrameError
+from labrig.foundation.errors import DataError, FrameError
+from labrig.foundation.region import Region, region_pixels
 from labrig.reduce.black_cut_off import TOO_MANY, BlackCutOff
 from labrig.reduce.plane_noise import TILE, Floats, Mosaic, PlaneNoise, plane_noise
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.rounding import shared_rounding_variance, unrounded_variance
 from labrig.reduce.saturation import count_levels, is_clipped
-from labrig.region import Region, region_pixels
 
 Indices: TypeAlias = npt.NDArray[np.intp]
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.optics import CHART_PATCHES
 from labrig.reduce.pictures import binned
 from labrig.reduce.raw import read_raw
-from labrig.region import Region
 
 #: Width in pixels to which a frame is reduced before the chart is searched for.
 SEARCH_WIDTH = 1200

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.reduce.plane_noise import Floats
 
 #: Relative difference within which two exposure times are the same, by the rounding of cameras.

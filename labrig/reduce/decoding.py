@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.reduce.codec import encoded
 from labrig.reduce.raw import RawFrame, read_raw
 

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import FrameError
+from labrig.foundation.errors import FrameError
 from labrig.reduce.plane_noise import Floats
 
 Letters: TypeAlias = npt.NDArray[np.str_]

@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from labrig.foundation.region import Region, region_pixels
 from labrig.optics import Flat, rho_squared
 from labrig.reduce.channels import PixelMask
 from labrig.reduce.photon_transfer import NoiseModel
@@ -17,7 +18,6 @@ from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.rounding import ROUNDING_VARIANCE
 from labrig.reduce.saturation import is_clipped
-from labrig.region import Region, region_pixels
 
 Pixel = TypeVar("Pixel", np.uint16, np.bool_)
 

@@ -16,10 +16,10 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import IO, Any
 
-from labrig.errors import DataError
-from labrig.processors import n_processors
+from labrig.foundation.errors import DataError
+from labrig.foundation.processors import n_processors
+from labrig.foundation.signals import name_of
 from labrig.reduce.decoding import Reduction
-from labrig.signals import name_of
 
 #: Memory of this process and its workers together, and that of this process alone, in bytes.
 MEMORY_BYTES, OWN_BYTES = 1_000_000_000, 400_000_000

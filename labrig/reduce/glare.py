@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
+from labrig.foundation.region import Region
 from labrig.optics import Glare
-from labrig.region import Region
 from labrig.results import Series
 
 #: The frame as a region, and its name among the patches of a sample.

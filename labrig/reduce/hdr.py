@@ -7,13 +7,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.reduce.channels import PixelMask
 from labrig.reduce.frame import LinearFrame
 from labrig.reduce.frame_reduction import Exposure
 from labrig.reduce.raw import RawFrame, read_raw
 
-FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 #: Fraction of the range above which single pixels are left out: noise carries some of those at the

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.reduce.channels import OUTLIER_SIGMAS, PixelMask
 from labrig.reduce.dark import SAME_EXPOSURE
 from labrig.reduce.frame_reduction import Exposure, reduce_frames

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
-from labrig.errors import UsageError
-from labrig.input_file import open_regular
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import open_regular
 from labrig.record import FRAMES
 from labrig.reduce.codec import decoded, encoded
 from labrig.reduce.frame_reduction import StoredFrame

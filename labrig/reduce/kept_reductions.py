@@ -15,9 +15,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import DiskError, LabrigError
-from labrig.input_file import read_bytes, read_text
-from labrig.output_file import make_folder_in, write_text
+from labrig.foundation.errors import DiskError, LabrigError
+from labrig.foundation.input_file import read_bytes, read_text
+from labrig.foundation.output_file import make_folder_in, write_text
 from labrig.record import CACHE, own_digest
 from labrig.reduce.codec import encoded
 
@@ -28,7 +28,11 @@ MAX_CACHE_BYTES = 200_000_000
 #: Libraries whose version changes what is reduced from a frame.
 _LIBRARIES = ("labrig", "numpy", "scipy", "rawpy")
 #: Modules beside those of `labrig.reduce` whose code reduces frames.
-_MODULES = ("labrig.nonnegative", "labrig.region", "labrig.optics.camera_model")
+_MODULES = (
+    "labrig.foundation.nonnegative",
+    "labrig.foundation.region",
+    "labrig.optics.camera_model",
+)
 
 
 class KeptReductions:

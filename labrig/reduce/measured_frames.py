@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.reduce.channels import FrameMeasurement, measure_regions
 from labrig.reduce.frame_reduction import StoredFrame, reduce_frames
 from labrig.reduce.hot_pixels import HotPixels
 from labrig.reduce.pair_noise import strip_deviations
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
-from labrig.region import Region
 
 
 @dataclass(frozen=True)

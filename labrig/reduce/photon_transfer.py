@@ -8,11 +8,9 @@ Transfer*, 2007; EMVA Standard 1288).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.nonnegative import nonnegative_least_squares
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 
 
 @dataclass(frozen=True)

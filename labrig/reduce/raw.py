@@ -17,8 +17,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import FrameError
-from labrig.input_file import MAX_FRAME_BYTES, read_bytes
+from labrig.foundation.errors import FrameError
+from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.reduce.black_cut_off import BlackCutOff, find_cut_off
 from labrig.reduce.dng import (
     MONOCHROME,

@@ -14,9 +14,8 @@ variance v has the same error: structure dithers as well as noise.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Variance of rounding to integers in DN² (uniform distribution), the least of a digital value.
 ROUNDING_VARIANCE = 1 / 12

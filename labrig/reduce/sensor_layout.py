@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.foundation.region import Region, region_pixels
 from labrig.reduce.dng import channels_of, side_of
 from labrig.reduce.frame_reduction import StoredFrame, reduce_frames
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
-from labrig.region import Region, region_pixels
 
 
 @dataclass(frozen=True)

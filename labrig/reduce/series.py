@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.optics import CameraModel
 from labrig.reduce.dark import DarkModel, fit_dark
 from labrig.reduce.glare import FRAME_TILES, frame_series, subtract_glare
@@ -33,7 +34,6 @@ from labrig.reduce.pair_noise import (
     rows_of_units,
 )
 from labrig.reduce.plane_noise import Floats
-from labrig.region import Region
 from labrig.results import Series, add_flag, is_usable
 
 

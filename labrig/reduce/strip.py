@@ -7,10 +7,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import SLICES, Strip
 from labrig.reduce.hdr import HdrFrame, Image
-from labrig.results import FloatArray, StripProfile
+from labrig.results import StripProfile
 
 #: Least brightness of a lit pixel in units of the noise of the dark surroundings,
 SEEN_SIGMA = 6.0

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.region import Region
 from labrig.optics import CameraModel, Strip
 from labrig.reduce.frame_reduction import Exposure, reduce_groups
 from labrig.reduce.hdr import HdrFrame, hdr_frame
@@ -14,8 +16,7 @@ from labrig.reduce.measured_frames import SeriesFrame
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.series import reduce_patches
 from labrig.reduce.strip import FoundStrip, find_strip, strip_profile
-from labrig.region import Region
-from labrig.results import FloatArray, Series, SliceValues, StripProfile
+from labrig.results import Series, SliceValues, StripProfile
 
 #: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
 FLICKER = 0.005

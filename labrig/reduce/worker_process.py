@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 import cv2
 
-from labrig.errors import LabrigError, memory_shortage
+from labrig.foundation.errors import LabrigError, memory_shortage
 from labrig.reduce.decoding import reduced_text
 
 _STDOUT, _STDERR = 1, 2

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from labrig.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus
 from labrig.report.figure_style import (
     BAND_OPACITY,
     DASHED,

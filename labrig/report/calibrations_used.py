@@ -1,8 +1,8 @@
 """Section on the calibrations that a run found beside the runs or the rig file."""
 
+from labrig.foundation.yaml_file import read_yaml
 from labrig.record import CALIBRATIONS_FILE, RunRecord
 from labrig.report.sections import Section, Table
-from labrig.yaml_file import read_yaml
 
 TEXT = (
     "The rig file names none of these: they were found beside the runs or the rig file, the newest "

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from labrig.calibration import CameraFile, Linearity, Noise
-from labrig.number_format import exposure_text, plus_minus, rounded
+from labrig.foundation.number_format import exposure_text, plus_minus, rounded
 from labrig.optics import Factor
 from labrig.report.figure_style import (
     INK,

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from labrig.number_format import rounded
+from labrig.foundation.number_format import rounded
 from labrig.report.figure_style import (
     DASHED,
     INK,

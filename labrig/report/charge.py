@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit import ChargeFit
+from labrig.foundation.arrays import FloatArray
 from labrig.record import RunDescription
 from labrig.report.chart import (
     Axis,
@@ -24,7 +25,6 @@ from labrig.report.figure_style import INK, MUTED, OTHER_CHANNELS, SHADE
 from labrig.report.interval_table import interval_tables
 from labrig.report.page import Report
 from labrig.report.sections import Picture, Section, Table
-from labrig.results import FloatArray
 
 #: Largest number of points of each part; more readings are averaged.
 MOST_POINTS = 150

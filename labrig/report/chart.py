@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.number_format import rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
 from labrig.report.figure_style import (
     BAND_OPACITY,
     LEFT_PT,
@@ -23,7 +23,6 @@ from labrig.report.figure_style import (
 )
 from labrig.report.ticks import Ticks, decade_ticks, linear_ticks
 
-FloatArray = NDArray[np.float64]
 NO_VALUES = np.empty(0)
 
 

@@ -4,8 +4,8 @@ import html
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.report.chart import Axis, Band, Chart, ErrorBars, Line, Mark, Panel, Points
 from labrig.report.figure_style import (
     CARET_DOWN,
@@ -18,8 +18,6 @@ from labrig.report.figure_style import (
     LineStyle,
     Marker,
 )
-
-FloatArray = NDArray[np.float64]
 
 TICK_PT, SHORT_TICK_PT = 3.5, 2.0
 #: Distance of the ticks' labels from the axes.

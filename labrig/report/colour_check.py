@@ -5,17 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.number_format import plus_minus
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import plus_minus
 from labrig.optics import XYZ_TO_SRGB
 from labrig.report.colours import css_colour, into_gamut
 from labrig.report.sections import Rendered, Section, Source, Table
-from labrig.results import (
-    CheckedColour,
-    CheckedPatch,
-    ColourCheckResult,
-    ColourSummary,
-    FloatArray,
-)
+from labrig.results import CheckedColour, CheckedPatch, ColourCheckResult, ColourSummary
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.number_format import rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
 from labrig.optics import (
     CIE_1931,
     XYZ_TO_SRGB,
@@ -16,8 +16,6 @@ from labrig.optics import (
     srgb_bytes,
 )
 from labrig.results import Series
-
-FloatArray = NDArray[np.float64]
 
 #: Colour temperature in K of a tungsten halogen lamp, the usual lamp for charging.
 HALOGEN_K = 3200.0

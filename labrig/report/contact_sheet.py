@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
 from labrig.report.figure_style import INK, MUTED, figure_style

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig import resources
-from labrig.input_file import read_text
-from labrig.number_format import aligned
+from labrig.foundation import resources
+from labrig.foundation.input_file import read_text
+from labrig.foundation.number_format import aligned
 from labrig.optics import (
     Curve,
     CurveFile,
@@ -148,7 +148,7 @@ def draw_curves(file: CurveFile, path: Path) -> None:
     >>> draw_curves(camera, Path("camera.svg"))
     >>> draw_curves(camera, Path("camera.bmp"))
     Traceback (most recent call last):
-    labrig.errors.UsageError: camera.bmp: expected a file name that ends in .png, .svg, .pdf
+    labrig.foundation.errors.UsageError: camera.bmp: expected a file name ...
     """
     from matplotlib.figure import Figure  # slow to load
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.number_format import power_of_ten, rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import power_of_ten, rounded
 from labrig.report.chart import (
     NO_VALUES,
     Axis,
@@ -39,7 +40,7 @@ from labrig.report.figure_style import (
 )
 from labrig.report.report_model import PatchReport
 from labrig.report.timing import FrameTiming
-from labrig.results import EXPONENTIALS, FittedDecay, FloatArray, NoiseBudget, Series
+from labrig.results import EXPONENTIALS, FittedDecay, NoiseBudget, Series
 
 #: Number of points of a fitted curve.
 POINTS = 160

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design import RGB_TO_Y, Design, NearestMaterial
-from labrig.number_format import rounded
-from labrig.quantity import duration_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
+from labrig.foundation.quantity import duration_text
 from labrig.report.colours import css_colour, into_gamut
 from labrig.report.figure_style import INK, MUTED, figure_style
 from labrig.report.picture_file import require_picture, save_picture
@@ -19,7 +19,6 @@ from labrig.results import with_uncertainty
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
 
 #: Lines of keys, conflicts and wishes that are written one by one.
 MOST_LINES = 20

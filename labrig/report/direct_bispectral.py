@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.number_format import plus_minus
 from labrig.material import ReradiationMatrix
-from labrig.number_format import plus_minus
 from labrig.report.chart import (
     Band,
     Chart,
@@ -37,13 +38,7 @@ from labrig.report.reradiation_spectra import (
     spectra_marks,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
-from labrig.results import (
-    BoolArray,
-    DirectBispectralResult,
-    DirectColumns,
-    FloatArray,
-    LightSpectrum,
-)
+from labrig.results import DirectBispectralResult, DirectColumns, LightSpectrum
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:

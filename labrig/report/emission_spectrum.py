@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.report.figure_style import (
     BAND_OPACITY,
     INK,
@@ -31,7 +32,6 @@ from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
     EmissionSpectrum,
     EmissionSpectrumResult,
-    FloatArray,
     PatchSpectrum,
     SpectralComparison,
 )

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.report.exciting_bands import band_lines, band_picture
 from labrig.report.figure_style import (
     INK,
@@ -35,7 +36,6 @@ from labrig.results import (
     Closure,
     ExcitationResult,
     FittedExcitation,
-    FloatArray,
     LayerEffect,
     LightScatter,
     Measured,

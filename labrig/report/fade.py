@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from labrig.calibration import Change, FadeFile, Warming
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.report.figure_style import (
     CHANNEL,
     INK,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from labrig.output_file import make_folder_in, write_text
+from labrig.foundation.output_file import make_folder_in, write_text
 from labrig.report.chart import Chart
 from labrig.report.chart_svg import svg_body
 from labrig.report.figure_style import VARIABLES, figure_style

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.report.ticks import Ticks, decade_ticks
 
 # matplotlib is slow to load, and most pages do not need it.
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-FloatArray = NDArray[np.float64]
 
 #: Width of figures in points, so that 10 pt is legible at half a desktop's or a phone's width.
 WIDTH_PT = 420.0

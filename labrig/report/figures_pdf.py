@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
-from labrig.output_file import make_folder, write_durably
+from labrig.foundation.output_file import make_folder, write_durably
 from labrig.report.figure_style import figure_style
 from labrig.report.sections import Section
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.report.figure_style import INK, MUTED, figure_style
 from labrig.report.picture_file import DPI, require_picture, save_picture
 

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.report.figure_style import INK
 
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 #: Width in nm of the bands for which re-radiation is shown, as in the instruments' files.
 BAND_NM = 10.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.report.chart import (
     Band,
     Chart,
@@ -30,7 +31,6 @@ from labrig.results import (
     LAW_LABELS,
     RATE_SPECTRUM,
     FittedDecay,
-    FloatArray,
     Series,
 )
 

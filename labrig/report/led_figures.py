@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.report.chart import (
     Band,
@@ -28,7 +29,6 @@ from labrig.report.heat_map import (
 )
 from labrig.report.reradiation_spectra import limits
 from labrig.results import (
-    FloatArray,
     FluorescentPatch,
     LedFluorescenceResult,
     ReradiatedSpectrum,

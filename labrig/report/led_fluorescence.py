@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
+from labrig.foundation.number_format import plus_minus
 from labrig.material import ReradiationMatrix, appearance
-from labrig.number_format import plus_minus
 from labrig.optics import Spectrum, read_light
 from labrig.report.colours import Screen, css_colour, into_gamut, screen_for
 from labrig.report.figure_style import VARIABLES

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.fluorescence import LedSet, usual_led
-from labrig.number_format import aligned
+from labrig.foundation.number_format import aligned
 from labrig.record import RunDescription
 from labrig.report.chart import (
     Axis,

@@ -7,8 +7,8 @@ from functools import partial
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from labrig.number_format import plus_minus, rounded
-from labrig.quantity import duration_text
+from labrig.foundation.number_format import plus_minus, rounded
+from labrig.foundation.quantity import duration_text
 from labrig.report.figure_style import (
     DASHED,
     INK,

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from labrig.calibration import LVF_KIND, LvfFile
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.optics import CameraResponse, WavelengthMap
 from labrig.report.figure_style import (
     DASHED,
@@ -23,7 +24,7 @@ from labrig.report.figure_style import (
     points,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
-from labrig.results import CameraCurves, FloatArray, LocatedLines, LvfCalibrationResult, StripLines
+from labrig.results import CameraCurves, LocatedLines, LvfCalibrationResult, StripLines
 
 _WAVELENGTH = "Wavelength / nm"
 #: Number of positions in the table; the file has all positions.

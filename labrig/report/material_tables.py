@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from labrig.foundation.number_format import aligned, plus_minus, rounded
 from labrig.material import Albedo, Material, MaterialComparison, RadianceFactor, State
-from labrig.number_format import aligned, plus_minus, rounded
 from labrig.report.sections import Table
 
 UNKNOWN = "–"

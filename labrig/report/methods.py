@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.errors import UsageError
-from labrig.number_format import exposure_text, rounded
-from labrig.quantity import duration_text
+from labrig.foundation.errors import UsageError
+from labrig.foundation.number_format import exposure_text, rounded
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.region import region_pixels
 from labrig.record import FrameRecord, FrameRole
-from labrig.region import region_pixels
 from labrig.report.photographs import Sensor
 from labrig.report.report_model import DecayReport
 from labrig.report.timing import ON_TIME_S, LatenessStatistics

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from labrig.fit import LightKept, MixtureCandidate, MixtureFit
+from labrig.foundation.number_format import aligned, rounded
 from labrig.material import (
     REFERENCE_Y,
     ColourDifference,
     ReradiationMatrix,
     compare_colours,
 )
-from labrig.number_format import aligned, rounded
 from labrig.optics import Spectrum
 from labrig.results import with_uncertainty
 

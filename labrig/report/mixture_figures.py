@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labrig.fit import FloatArray, MixtureFit
+from labrig.fit import MixtureFit
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import power_of_ten
 from labrig.material import ConditionalDensity, ReradiationMatrix
-from labrig.number_format import power_of_ten
 from labrig.report.chart import (
     Axis,
     Chart,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit import MixtureFit
+from labrig.foundation.number_format import rounded
 from labrig.material import ColourDifference, colour_pair, physical_warnings
-from labrig.number_format import rounded
 from labrig.optics import Spectrum
 from labrig.record import RunDescription
 from labrig.report.colours import css_colour

@@ -11,12 +11,12 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from labrig.errors import DiskError
-from labrig.input_file import read_text
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.errors import DiskError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.number_format import plus_minus, rounded
+from labrig.foundation.output_file import write_text
+from labrig.foundation.quantity import duration_text
 from labrig.optics import CameraResponse
-from labrig.output_file import write_text
-from labrig.quantity import duration_text
 from labrig.record import FrameRecord, RunDescription
 from labrig.report import parameters
 from labrig.report.figure_files import FigureFile, FigureFiles, chart_element

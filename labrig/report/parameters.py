@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.results import EXPONENTIALS, LAW_LABELS, FittedDecay
 
 #: Relative σ of a rate from which its reciprocal is given without σ.

@@ -6,7 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from labrig import resources
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, Spectrum, compare_materials, read_material
 from labrig.record import FrameRecord, FrameRole
 from labrig.report.chain import render_chain
@@ -17,7 +18,7 @@ from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.report_model import GlowPhotograph
 from labrig.report.sections import Picture, Rendered, Section, Source
-from labrig.results import DecayPatch, DecayResult, FloatArray, PhosphorResult
+from labrig.results import DecayPatch, DecayResult, PhosphorResult
 
 #: Legend entries of the emission spectrum and its band.
 NAMES = "Emission", "± 1 σ"

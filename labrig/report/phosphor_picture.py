@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.number_format import rounded
 from labrig.material import Material, State
-from labrig.number_format import rounded
 from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
 from labrig.report.material_tables import UNITS
 from labrig.report.picture_file import require_picture, save_picture

@@ -8,8 +8,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import LabrigError, UsageError
-from labrig.number_format import exposure_text, rounded
+from labrig.foundation.errors import LabrigError, UsageError
+from labrig.foundation.number_format import exposure_text, rounded
+from labrig.foundation.region import region_pixels
 from labrig.optics import srgb_bytes
 from labrig.record import FrameRecord
 from labrig.reduce import (
@@ -20,7 +21,6 @@ from labrig.reduce import (
     jpeg,
     reduce_frames,
 )
-from labrig.region import region_pixels
 from labrig.report.colours import Screen, into_gamut
 from labrig.report.report_model import GlowPhotograph, PatchReport
 

@@ -4,8 +4,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labrig.errors import UsageError
-from labrig.output_file import write_durably
+from labrig.foundation.errors import UsageError
+from labrig.foundation.output_file import write_durably
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:

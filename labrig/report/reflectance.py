@@ -6,7 +6,7 @@ from functools import partial
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from labrig.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,

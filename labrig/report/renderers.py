@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from labrig.plugins import REPORTS, load, names
+from labrig.foundation.plugins import REPORTS, load, names
 from labrig.report import any_result
 from labrig.report.budgets import budget_lines, budget_sections
 from labrig.report.sections import Rendered, Renderer, Source

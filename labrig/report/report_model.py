@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from labrig.foundation.region import Region
 from labrig.optics import CameraResponse
 from labrig.record import FrameRecord, RunDescription
-from labrig.region import Region
 from labrig.results import FittedDecay, NoiseBudget, Series
 
 #: Assumptions of every decay measured with a camera.

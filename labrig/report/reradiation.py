@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.material import Appearance, ReradiationMatrix, appearance, reradiates
-from labrig.number_format import plus_minus, rounded
 from labrig.optics import XYZ_TO_SRGB, Spectrum, edges_from_centres, is_narrow
 from labrig.report.colours import css_colour, into_gamut
 from labrig.report.figure_style import INK, MUTED, RULE, figure_style
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 
 #: X, Y, Z of a screen's white, D65.
 SCREEN_WHITE = np.array([0.95047, 1.0, 1.08883])

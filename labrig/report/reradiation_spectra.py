@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.report.chart import (
     Band,
@@ -20,9 +20,6 @@ from labrig.report.chart import (
 )
 from labrig.report.figure_style import MUTED, OTHER_CHANNELS, RULE
 from labrig.report.heat_map import BAND_NM
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: Least distance in nm of two wavelengths whose spectra are drawn.
 APART_NM = 40.0

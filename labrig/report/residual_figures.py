@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.report.chart import (
     Axis,
     Band,
@@ -24,7 +25,7 @@ from labrig.report.decay_figures import (
     time_axis,
 )
 from labrig.report.figure_style import INK, MUTED, SHADE
-from labrig.results import FittedDecay, FloatArray, Series
+from labrig.results import FittedDecay, Series
 
 RESIDUALS_HEIGHT_PT = 268.0
 LOW_HEIGHT_PT = 200.0

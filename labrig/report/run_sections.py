@@ -4,9 +4,9 @@ from collections.abc import Collection
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.quantity import duration_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.quantity import duration_text
 from labrig.record import (
     SMOOTHED_S,
     RunRecord,
@@ -20,8 +20,6 @@ from labrig.report.chart import Band, Chart, Line, Margins, Panel, Points, linea
 from labrig.report.figure_style import INK, MUTED, SHADE
 from labrig.report.sections import Picture, Section
 from labrig.report.timing import moves_text
-
-FloatArray = NDArray[np.float64]
 
 HEIGHT_PT = 180.0
 #: Longest run in s whose time axis is in minutes; that of longer runs is in hours.

@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from labrig.number_format import plus_minus, rounded
-from labrig.quantity import duration_text
+from labrig.foundation.number_format import plus_minus, rounded
+from labrig.foundation.quantity import duration_text
 from labrig.report.figure_style import (
     DASHED,
     INK,

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design import RGB_TO_Y, SceneDesign, SpreadDesign
-from labrig.number_format import rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
 from labrig.optics import srgb_bytes
 from labrig.report.design import (
     SHOWN_Y,
@@ -25,7 +25,6 @@ from labrig.report.picture_file import require_picture, save_picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
 
 #: Frames that are drawn, spread over the keys.
 MOST_FRAMES = 6

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 
-from labrig.number_format import power_of_ten, rounded
+from labrig.foundation.number_format import power_of_ten, rounded
 
 #: Ticks as pairs of value and label, by rising value.
 Ticks = tuple[tuple[float, str], ...]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.number_format import rounded
+from labrig.foundation.number_format import rounded
 from labrig.record import ActionRecord, FrameRecord, FrameRole
 from labrig.report.report_model import PatchReport
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.quantity import ZERO_C_K
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.quantity import ZERO_C_K
 from labrig.record import RunDescription
 from labrig.report.chart import (
     Axis,
@@ -21,7 +22,7 @@ from labrig.report.figure_style import INK, MARKERS, OTHER_CHANNELS
 from labrig.report.page import Report
 from labrig.report.sections import Picture, Section, Table
 from labrig.report.ticks import linear_ticks
-from labrig.results import FloatArray, StateDepth
+from labrig.results import StateDepth
 
 HEIGHT_PT = 300.0
 COLOURS = (INK, OTHER_CHANNELS[1], OTHER_CHANNELS[0], OTHER_CHANNELS[2])

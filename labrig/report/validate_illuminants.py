@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.number_format import plus_minus, rounded
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.optics import XYZ_TO_SRGB
 from labrig.report.colours import css_colour, into_gamut
 from labrig.report.sections import Rendered, Section, Source, Table

@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 #: File of the working folder by which Numba is configured, whoever put it there.
 NUMBA_CONFIGURATION = ".numba_config.yaml"

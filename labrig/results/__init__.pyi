@@ -187,9 +187,6 @@ from .lvf_calibration import (
     StripProfile as StripProfile,
 )
 from .measured import (
-    BoolArray as BoolArray,
-    FloatArray as FloatArray,
-    IntArray as IntArray,
     Measured as Measured,
     OneSided as OneSided,
     field_unit as field_unit,

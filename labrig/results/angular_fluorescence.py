@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from labrig.foundation.arrays import FloatArray
 from labrig.results.budget import Budget
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

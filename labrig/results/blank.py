@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import BLANK_KIND, BlankFile
+from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.results.budget import Budget
-from labrig.results.measured import BoolArray, FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 
 

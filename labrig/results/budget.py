@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
-from labrig.number_format import digits_of_range, plus_minus, rounded
+from labrig.foundation.number_format import digits_of_range, plus_minus, rounded
 from labrig.results.measured import Measured
 
 #: Wavelengths in nm near which a spectrum has headline values.

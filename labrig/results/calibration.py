@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import REFERENCE_KIND, ReferenceFile
-from labrig.output_file import make_folder_in
+from labrig.foundation.output_file import make_folder_in
 from labrig.results.run_result import AnyResult, RunResult
 
 

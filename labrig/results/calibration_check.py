@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from labrig.results.measured import FloatArray, Measured
+from labrig.foundation.arrays import FloatArray
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import CAMERA_KIND, CameraFile, Noise
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Flat
 from labrig.results.budget import Budget
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.output_file import write_text
 from labrig.optics import CHART_PATCHES, CURVES_FILE, CameraResponse
-from labrig.output_file import write_text
-from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.text_table import table_text
 

@@ -11,8 +11,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.errors import FitError
-from labrig.results.measured import BoolArray, FloatArray, IntArray
+from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
+from labrig.foundation.errors import FitError
 
 #: Delay of the first photograph, in multiples of the median, beyond which a charge is left out
 #: (metering charges are photographed only before the next charge).

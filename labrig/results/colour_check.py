@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.results.budget import Budget
-from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

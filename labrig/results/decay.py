@@ -7,14 +7,15 @@ from typing import ClassVar
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.output_file import make_folder
+from labrig.foundation.region import Region
 from labrig.material import Material, write_material
-from labrig.output_file import make_folder
-from labrig.region import Region
 from labrig.results.budget import Budget, named
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_decay_file import write_fitted_decay
 from labrig.results.fitted_law import EXPONENTIALS
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series, write_series
 

@@ -8,11 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.output_file import make_folder_in
 from labrig.material import ReradiationMatrix, write_fluorescent, write_reradiation
 from labrig.optics import edges_from_centres
-from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
-from labrig.results.measured import BoolArray, FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

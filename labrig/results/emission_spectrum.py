@@ -7,18 +7,19 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 from scipy.interpolate import CubicSpline
 
-from labrig.finite import Finite, NotNegative
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.models import Finite, FrozenModel, NotNegative
+from labrig.foundation.output_file import make_folder_in
+from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.material import Spectrum
 from labrig.optics import band_means, edges_from_centres
-from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
-from labrig.yaml_file import read_model, write_yaml
 
 #: Grid of wavelengths in nm, from section 4.7 of the paper (Nalbach et al.).
 WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)
@@ -26,7 +27,7 @@ WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)
 CREDIBLE = 0.6827
 
 
-class EmissionSpectrum(BaseModel):
+class EmissionSpectrum(FrozenModel):
     """Emission spectrum Λ* on a grid, normalised to a maximum of 1.
 
     Attributes
@@ -47,8 +48,6 @@ class EmissionSpectrum(BaseModel):
     run
         Name of the run in which it was measured.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["emission_spectrum"] = "emission_spectrum"
     sample: str

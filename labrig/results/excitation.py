@@ -8,14 +8,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import IrradianceFile
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.output_file import make_folder_in
 from labrig.material import Material, write_material
-from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
 from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_excitation import BandTests, FittedExcitation
 from labrig.results.layer_effect import THICKNESS, LayerEffect
-from labrig.results.measured import FloatArray, Measured, measured_number
+from labrig.results.measured import Measured, measured_number
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 from labrig.results.text_files import finite, write_json

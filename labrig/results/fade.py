@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import FADE_KIND, FadeFile
+from labrig.foundation.arrays import FloatArray, IntArray
 from labrig.results.budget import Budget
-from labrig.results.measured import FloatArray, IntArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 
 

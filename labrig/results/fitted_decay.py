@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.errors import DataError, FitError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, FitError
+from labrig.foundation.number_format import aligned, rounded
 from labrig.material import exponential_means_and_slopes
-from labrig.number_format import aligned, rounded
 from labrig.results.decay_reference import DecayReference
 from labrig.results.fitted_law import (
     EXPONENTIALS,
@@ -23,7 +24,7 @@ from labrig.results.fitted_law import (
     interval_name,
 )
 from labrig.results.interval import ProfileInterval, interval_lines
-from labrig.results.measured import FloatArray, Measured, with_uncertainty
+from labrig.results.measured import Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text
 from labrig.results.unseen_flicker import UnseenFlicker
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from labrig.errors import DataError, LabrigError
-from labrig.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.errors import DataError, LabrigError
+from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.results.decay_reference import DecayReference
 from labrig.results.fitted_decay import (
     SCHEMA_VERSION,

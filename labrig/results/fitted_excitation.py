@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
 from labrig.material import MAX_ORDER
 from labrig.results.interval import ProfileInterval
 from labrig.results.layer_effect import LayerEffect
-from labrig.results.measured import BoolArray, FloatArray, IntArray, Measured, OneSided
+from labrig.results.measured import Measured, OneSided
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.number_format import aligned, rounded
+from labrig.foundation.quantity import duration_text
 from labrig.material import DECAY_LAWS, exponential_means
-from labrig.number_format import aligned, rounded
-from labrig.quantity import duration_text
 from labrig.results.measured import (
     ONE_SIDED_SIGMAS,
-    FloatArray,
     Measured,
     OneSided,
     measured_number,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from labrig.number_format import aligned, digits_of_range, rounded
+from labrig.foundation.number_format import aligned, digits_of_range, rounded
 from labrig.results.text_files import finite
 
 #: Ratio of the distances of both limits, or of the larger one to σ, from which σ misleads.

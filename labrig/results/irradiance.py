@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import IRRADIANCE_KIND, IrradianceFile
+from labrig.foundation.arrays import FloatArray
 from labrig.results.budget import HEADLINE_NM, Budget
-from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 
 

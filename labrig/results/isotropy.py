@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray, IntArray
 from labrig.results.budget import Budget, named
-from labrig.results.measured import FloatArray, IntArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from labrig.number_format import rounded
-from labrig.results.measured import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
 
 #: Name of the cause in budgets.
 THICKNESS = "thickness"

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import LEDS_KIND, LedsFile, UvScale
+from labrig.foundation.arrays import FloatArray
 from labrig.results.budget import Budget
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 
 

@@ -8,10 +8,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.output_file import make_folder_in
 from labrig.material import Provenance, ReradiationMatrix, write_fluorescent
-from labrig.output_file import make_folder_in
 from labrig.results.budget import Budget, named
-from labrig.results.measured import BoolArray, FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.reradiation_methods import (
     EstimateMethod,
     MethodDifference,

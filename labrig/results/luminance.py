@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
-from labrig.number_format import aligned
-from labrig.quantity import TIME_S, duration_text, parse
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import aligned
+from labrig.foundation.quantity import TIME_S, duration_text, parse
 from labrig.results.budget import Budget
 from labrig.results.interval import NORMAL_95
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.text_files import finite, json_text
 
 #: Unit of luminances.

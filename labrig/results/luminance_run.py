@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from labrig.output_file import make_folder, write_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.output_file import make_folder, write_text
 from labrig.results.budget import Budget, named
 from labrig.results.luminance import TABLE_S, LuminanceDecay
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

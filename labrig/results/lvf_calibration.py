@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import LVF_KIND, LvfFile
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Strip
 from labrig.results.budget import Budget
-from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 
 

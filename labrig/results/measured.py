@@ -3,42 +3,12 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Annotated, Any
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, PlainSerializer, PlainValidator
+from pydantic import BaseModel
 
-from labrig.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus
 from labrig.results.run_result import RunResult
-
-
-def _to_lists(array: NDArray[Any]) -> Any:
-    """Return nested lists, in which infinity and NaN, unknown to JSON, are texts."""
-    if array.dtype.kind != "f" or np.isfinite(array).all():
-        return array.tolist()
-    texts = array.astype(object)
-    texts[np.isnan(array)] = "NaN"
-    texts[array == np.inf] = "Infinity"
-    texts[array == -np.inf] = "-Infinity"
-    return texts.tolist()
-
-
-_AS_LISTS = PlainSerializer(_to_lists)
-
-#: Real numbers of any shape.
-FloatArray = Annotated[
-    NDArray[np.float64], PlainValidator(lambda values: np.asarray(values, np.float64)), _AS_LISTS
-]
-#: Truth values of any shape.
-BoolArray = Annotated[
-    NDArray[np.bool_], PlainValidator(lambda values: np.asarray(values, np.bool_)), _AS_LISTS
-]
-#: Whole numbers of any shape.
-IntArray = Annotated[
-    NDArray[np.intp], PlainValidator(lambda values: np.asarray(values, np.intp)), _AS_LISTS
-]
-
 
 #: Fewest decimals of a rounded value; a larger σ is written with a power of ten.
 MAX_ROUNDED = -2

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from labrig.foundation.output_file import make_folder_in
 from labrig.material import Material, write_material
-from labrig.output_file import make_folder_in
 from labrig.results.run_result import AnyResult, RunResult
 
 

@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import REFLECTANCE_KIND, PatchReflectance, ReflectanceFile
+from labrig.foundation.arrays import FloatArray
 from labrig.results.budget import HEADLINE_NM, Budget, named
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

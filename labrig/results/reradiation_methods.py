@@ -5,8 +5,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMixture
-from labrig.results.measured import FloatArray
 
 #: All LEDs together, the thesis's method of one LED by itself.
 EstimateMethod = Literal["joint", "per-led"]

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
-from labrig.errors import DataError, LabrigError, UsageError
-from labrig.input_file import MAX_JSON_BYTES, read_text
-from labrig.output_file import write_text
-from labrig.plugins import RESULTS, load
+from labrig.foundation.errors import DataError, LabrigError, UsageError
+from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.output_file import write_text
+from labrig.foundation.plugins import RESULTS, load
 from labrig.results.text_files import finite
 
 if TYPE_CHECKING:

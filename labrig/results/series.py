@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import DataError
-from labrig.results.measured import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.results.table_clock import TableClock
 from labrig.results.text_files import write_csv
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import DataError, LabrigError, UsageError
-from labrig.results.measured import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 from labrig.results.table_clock import TableClock, is_far
 from labrig.results.table_columns import (

@@ -1,6 +1,6 @@
 """Unit of a column of uncertainties, and its conversion to the unit of the values."""
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 #: Fractions of the value by the names of units that are relative.
 _RELATIVE = {"%": 1e-2, "percent": 1e-2, "pct": 1e-2, "prozent": 1e-2, "‰": 1e-3}

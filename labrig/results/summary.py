@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from labrig.errors import LabrigError
-from labrig.input_file import read_text
-from labrig.output_file import write_text
+from labrig.foundation.errors import LabrigError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.output_file import write_text
 
 SUMMARY = "summary.txt"
 

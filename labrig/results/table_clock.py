@@ -6,7 +6,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from labrig.results.measured import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.text_table.names import time_unit_s
 
 #: Spans of the rows from which the clock's zero is so far away that it tells nothing of lamp off.

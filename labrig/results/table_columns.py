@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import UsageError
-from labrig.results.measured import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME
 from labrig.results.sigma_unit import sigma_scale
 from labrig.results.table_layout import TableLayout

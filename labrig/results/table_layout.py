@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.text_table import DECIMAL_MARKS
 from labrig.text_table.names import time_unit_s
 from labrig.text_table.times import is_clock_form, parse_width

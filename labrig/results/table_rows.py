@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.results.series import Series, add_flag
 from labrig.text_table import Block
 from labrig.text_table.rows import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.results.table_layout import TableLayout
 from labrig.text_table import EXPECTED, Block, Line, is_clock
 from labrig.text_table.names import (

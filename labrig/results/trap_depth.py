@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from labrig.number_format import aligned, rounded
-from labrig.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import aligned, rounded
+from labrig.foundation.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
 from labrig.results.budget import Budget
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.text_files import finite, json_text
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.number_format import rounded
+from labrig.foundation.number_format import rounded
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.region import Region
 from labrig.optics import Spectrum
-from labrig.region import Region
 from labrig.results.budget import Budget
 from labrig.results.led_fluorescence import MatrixOnBands
-from labrig.results.measured import FloatArray, Measured
+from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from hashlib import file_digest
 from pathlib import Path
 
-from labrig.errors import DataError, DiskError
-from labrig.input_file import open_regular
+from labrig.foundation.errors import DataError, DiskError
+from labrig.foundation.input_file import open_regular
 
 #: Files and folders of a run that a seal covers: what was asked, what happened, and the result.
 #: Earlier results, comparisons and the cache can be made again from these.

@@ -15,9 +15,9 @@ from cryptography.hazmat.primitives.serialization import (
     load_ssh_private_key,
 )
 
-from labrig.errors import UsageError
-from labrig.input_file import open_regular, read_text
-from labrig.output_file import write_private, write_text
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import open_regular, read_text
+from labrig.foundation.output_file import write_private, write_text
 from labrig.seal.signature import ED25519, PublicKey
 
 _MOST_BYTES = 100_000

@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from labrig.errors import DataError, UsageError
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes, read_text
-from labrig.output_file import write_text
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes, read_text
+from labrig.foundation.output_file import write_text
 from labrig.seal.file_list import FileList, list_files
 from labrig.seal.lab_key import LabKey
 from labrig.seal.signature import PublicKey, signature_text, signer_of

@@ -16,7 +16,7 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 
 #: Purpose of a signature of labrig, `-n` of ssh-keygen.
 NAMESPACE = "labrig-run"
@@ -144,7 +144,7 @@ def signer_of(message: bytes, signature: str) -> PublicKey:
     >>> signer_of(b"other numbers", text)
     Traceback (most recent call last):
         ...
-    labrig.errors.DataError: the signature is not of this list: one of both was changed
+    labrig.foundation.errors.DataError: the signature is not of this list: one of both was changed
     """
     try:
         key, hash_name, raw = _parse(signature)

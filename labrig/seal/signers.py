@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from labrig.errors import UsageError
-from labrig.input_file import read_text
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_text
 from labrig.seal.signature import ED25519, NAMESPACE, PublicKey
 
 _MOST_BYTES = 1_000_000

@@ -19,7 +19,7 @@ from labrig.acquire import (
     Suggestion,
 )
 from labrig.bench import Bench
-from labrig.errors import DeviceError, LabrigError
+from labrig.foundation.errors import DeviceError, LabrigError
 from labrig.record import size_text
 from labrig.reduce import FrameMeasurement, measure, read_raw
 from labrig.setup.picture_stats import decode

@@ -12,11 +12,11 @@ from pathlib import Path
 import yaml
 
 from labrig.acquire import read_protocol
-from labrig.errors import UsageError
-from labrig.input_file import read_text
-from labrig.output_file import write_durably
-from labrig.region import Region
-from labrig.yaml_file import parse_yaml
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.output_file import write_durably
+from labrig.foundation.region import Region
+from labrig.foundation.yaml_file import parse_yaml
 
 KEY = "patches"
 #: Decimals of written fractions: finer than a pixel of a live picture, still readable.

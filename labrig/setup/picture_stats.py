@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DeviceError
-from labrig.picture_file import decoded
-from labrig.region import Region, region_pixels
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.picture_file import decoded
+from labrig.foundation.region import Region, region_pixels
 
 #: Level from which a pixel counts as clipped; JPEG artefacts lower 255 a little next to edges. For
 #: display only: clipping of measurements is `labrig.reduce.saturation.is_clipped`.

@@ -7,8 +7,8 @@ from typing import Never
 
 from labrig.acquire import CAMERA, VIEWFINDER, LiveView, Rig, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import Clock
-from labrig.errors import UsageError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import UsageError
 from labrig.setup.view_server import EditableProtocol, LivePictures, ViewServer
 
 #: Period of the pictures: enough for focusing by hand, with pauses for the camera.
@@ -48,7 +48,7 @@ def view_rig(
     --------
     >>> import signal
     >>> from pathlib import Path
-    >>> from labrig.clock import Interrupted
+    >>> from labrig.foundation.clock import Interrupted
     >>> from labrig.setup import view_rig
     >>> def tell(url):
     ...     print(url.partition(":")[0])

@@ -7,15 +7,16 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import Field, StringConstraints
 
 from labrig.acquire import read_protocol
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.region import Region, parse_region
+from labrig.foundation.yaml_file import validate
 from labrig.local_server import LocalConversation, LocalServer
-from labrig.region import Region, parse_region
 from labrig.setup.patches_block import KEY, rounded, write_patches
 from labrig.setup.picture_stats import decode, picture_stats
-from labrig.yaml_file import validate
 
 
 @dataclass(frozen=True)
@@ -141,19 +142,15 @@ Name = Annotated[
 ]
 
 
-class DrawnPatch(BaseModel):
+class DrawnPatch(FrozenModel):
     """A region in fractions of the frame, with its name."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Name
     region: Region
 
 
-class DrawnPatches(BaseModel):
+class DrawnPatches(FrozenModel):
     """All regions drawn on the page."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     patches: tuple[DrawnPatch, ...] = Field(min_length=1, max_length=MAX_PATCHES)
 

@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.design import (
     RGB_TO_Y,
@@ -20,11 +19,10 @@ from labrig.design import (
     WishFile,
     visible_conflicts,
 )
-from labrig.finite import NotNegative, Positive, UnitFraction
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.models import FrozenModel, NotNegative, Positive, UnitFraction
+from labrig.foundation.yaml_file import validate
 from labrig.studio.timeline import timeline_of
-from labrig.yaml_file import validate
-
-FloatArray = NDArray[np.float64]
 
 #: Name of the page in messages about what it sent.
 SOURCE = "the page"
@@ -34,7 +32,7 @@ MOST_STATES, MOST_BANDS = 2, 100
 DIGITS = 5
 
 
-class SetByHand(BaseModel):
+class SetByHand(FrozenModel):
     """Parameters of a material that were set with the sliders.
 
     Attributes
@@ -42,8 +40,6 @@ class SetByHand(BaseModel):
     k_r_per_s, k_e_per_s, reradiation, albedo, order
         As of `labrig.design.Parameters`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     k_r_per_s: Annotated[tuple[Positive, ...], Field(max_length=MOST_STATES)]
     k_e_per_s: Annotated[tuple[tuple[NotNegative, ...], ...], Field(max_length=MOST_STATES)]
@@ -58,7 +54,7 @@ class SetByHand(BaseModel):
         )
 
 
-class Asked(BaseModel):
+class Asked(FrozenModel):
     """What the page asks about.
 
     Attributes
@@ -70,8 +66,6 @@ class Asked(BaseModel):
     is_draft
         Whether the wish still changes: the energy is then not kept, which takes up to a second.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     wish: dict[str, Any]
     by_hand: SetByHand | None = None

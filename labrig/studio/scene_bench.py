@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from labrig.design import (
@@ -29,9 +28,10 @@ from labrig.design import (
     three_bands,
     to_wish,
 )
-from labrig.errors import UsageError
-from labrig.finite import Finite, UnitFraction
-from labrig.input_file import MAX_PICTURE_BYTES, read_bytes
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_PICTURE_BYTES, read_bytes
+from labrig.foundation.models import Finite, UnitFraction
+from labrig.foundation.yaml_file import validate
 from labrig.material import Material, material_text
 from labrig.optics import srgb_bytes
 from labrig.report import describe_energy, draw_scene_design
@@ -44,9 +44,6 @@ from labrig.studio.messages import (
     wish_content,
 )
 from labrig.studio.workbench import Designed, Workbench
-from labrig.yaml_file import validate
-
-FloatArray = NDArray[np.float64]
 
 #: Width of the picture, and paths for each of its pixels and each place: answered while a dot is
 #: dragged.

@@ -7,14 +7,14 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, ClassVar, Never
 
-from labrig.clock import Clock
 from labrig.design import WishFile
-from labrig.errors import UsageError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import beside
+from labrig.foundation.yaml_file import read_model
 from labrig.local_server import LocalConversation, LocalServer
-from labrig.named_files import beside
 from labrig.studio.scene_bench import SceneBench
 from labrig.studio.workbench import Workbench
-from labrig.yaml_file import read_model
 
 #: Longest real time until Ctrl-C is answered.
 CHECK_PERIOD_S = 0.2
@@ -175,7 +175,7 @@ def design_on_page(
     Examples
     --------
     >>> import signal
-    >>> from labrig.clock import Interrupted, SystemClock
+    >>> from labrig.foundation.clock import Interrupted, SystemClock
     >>> from labrig.studio import design_on_page
     >>> clock = SystemClock()
     >>> def tell(url):

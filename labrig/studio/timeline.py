@@ -8,11 +8,9 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design import Wish
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Frames of a programme, and the least of one light in it.
 FRAMES, LEAST = 200, 4

@@ -23,8 +23,9 @@ from labrig.design import (
     to_wish,
     written_factor,
 )
-from labrig.errors import UsageError
-from labrig.input_file import MAX_PICTURE_BYTES, read_bytes
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_PICTURE_BYTES, read_bytes
+from labrig.foundation.yaml_file import parse_yaml, validate, yaml_text
 from labrig.material import Material, material_text
 from labrig.report import describe_energy, describe_factor, describe_nearest, draw_design
 from labrig.studio.messages import (
@@ -35,7 +36,6 @@ from labrig.studio.messages import (
     parameters_content,
     wish_content,
 )
-from labrig.yaml_file import parse_yaml, validate, yaml_text
 
 #: Name of a file that was opened, in messages.
 OPENED = "the opened file"

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.text_table.header import COMMENT, Header, find_header, names_in
 from labrig.text_table.jcamp import jcamp_curves
 from labrig.text_table.names import ABSCISSAS, is_abscissa, is_time

@@ -4,8 +4,8 @@ import codecs
 import re
 from pathlib import Path
 
-from labrig.errors import UsageError
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 
 #: Limit of the lines, above those of a year with a reading each minute: each takes memory and time.
 MAX_LINES = 600_000

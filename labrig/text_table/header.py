@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.text_table.names import is_abscissa, is_abscissa_unit, is_time
 from labrig.text_table.numbers import DECIMAL_MARKS, is_clock, parse_number
 from labrig.text_table.style import FEWEST, SEPARATORS, Line, Style

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.text_table.style import Line
 
 _LABEL = re.compile(r"##([^=]*)=(.*)")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.text_table.numbers import DECIMAL_MARKS, is_clock, parse_number
 
 #: Separators in the order in which they are tried; None are blanks.

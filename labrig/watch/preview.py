@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.region import Region
 from labrig.reduce import binned, measure, read_raw, small
-from labrig.region import Region
 
 #: Quantile of the pixels that becomes full brightness, so that hot pixels have no influence.
 BRIGHT_QUANTILE = 0.995

@@ -13,7 +13,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import LabrigError
+from labrig.foundation.errors import LabrigError
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from typing import Any
 
 from labrig.acquire import ProtocolModel, plan, read_protocol, read_rig_file
 from labrig.catalogue import RunStatus, status_of
-from labrig.errors import DataError, LabrigError, UsageError
+from labrig.foundation.errors import DataError, LabrigError, UsageError
+from labrig.foundation.region import Region
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
-from labrig.region import Region
 from labrig.results import parameter_text, read_fitted_decays
 from labrig.watch.planned_unit import PlannedUnit, planned_units
 from labrig.watch.preview import Preview, glance

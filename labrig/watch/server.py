@@ -7,8 +7,8 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, ClassVar, Never
 
-from labrig.clock import Clock
-from labrig.input_file import read_text
+from labrig.foundation.clock import Clock
+from labrig.foundation.input_file import read_text
 from labrig.local_server import KINDS, LocalConversation, LocalServer
 from labrig.watch.run_follower import RunFollower
 
@@ -223,7 +223,7 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     --------
     >>> import signal
     >>> from pathlib import Path
-    >>> from labrig.clock import Interrupted, SystemClock
+    >>> from labrig.foundation.clock import Interrupted, SystemClock
     >>> from labrig.watch import watch_run
     >>> clock = SystemClock()
     >>> def tell(url):

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-import numpy.typing as npt
 
-from labrig.errors import DeviceError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DeviceError
 
 from .darkness import clips, levels
 from .exposure_metering import MeteringFrame
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Limits of detection of a glow above darkness, in standard uncertainties and in counts.
 SEEN_SIGMA = 5.0

@@ -3,11 +3,12 @@
 import math
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import MAX_STEPS, TOLERANCE_S, CameraOffers
-from labrig.errors import ProtocolError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import duration_text
 
 
 def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]:
@@ -70,7 +71,7 @@ Iso = Annotated[int, Field(ge=1, le=10_000_000)]
 FNumber = Annotated[float, Field(ge=0.1, le=1000)]
 
 
-class CameraSettings(BaseModel):
+class CameraSettings(FrozenModel):
     """Sensitivity and aperture of the camera; the shutter time has a key of its own.
 
     Attributes
@@ -80,8 +81,6 @@ class CameraSettings(BaseModel):
     f_number
         Aperture as f-number, for example `4`; null for a lens that reports none.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     iso: Iso = 400
     f_number: FNumber | None = 4.0

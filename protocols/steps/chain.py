@@ -5,11 +5,11 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from labrig import plugins
 from labrig.acquire import CameraOffers, PartUnit, ProtocolModel, RigFile, Sample
+from labrig.foundation import plugins
+from labrig.foundation.region import Region
+from labrig.foundation.yaml_file import validate
 from labrig.record import unit_in, unit_within
-from labrig.region import Region
-from labrig.yaml_file import validate
 
 from .scenes import Arrangement, Scene, ScenesProtocol
 

@@ -8,11 +8,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.fit import least_squares
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Number of a patch's places that decide: the brightest, where noise does not matter.
 BRIGHTEST = 6

@@ -4,15 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from labrig.errors import DataError, DeviceError
-from labrig.quantity import duration_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, DeviceError
+from labrig.foundation.quantity import duration_text
 from labrig.reduce import is_clipped
 
 from .exposure_metering import MeteringFrame
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Largest error of a camera's black level, as a fraction of the range from black to white.
 BLACK_ERROR = 0.005

@@ -2,16 +2,17 @@
 
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire import LAMP_OFF, LAMP_ON, LEDS_OFF, LedSwitch, Switch
+from labrig.foundation.models import FrozenModel
 
 from .scenes import Arrangement, Stage
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class ExcitingLights(BaseModel):
+class ExcitingLights(FrozenModel):
     """Lights that are selected one after another, in one of three ways.
 
     Attributes
@@ -26,8 +27,6 @@ class ExcitingLights(BaseModel):
     leds
         LEDs of the rig's bank, which shine in place of the lamp, for example `[450 nm, 525 nm]`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     filters: tuple[str, ...] = ()
     monochromator: tuple[Nanometres, ...] = ()

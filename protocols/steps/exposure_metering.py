@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from labrig.acquire import CameraOffers
-from labrig.quantity import duration_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.region import Region
 from labrig.record import FrameRecord
 from labrig.reduce import ChannelStats, FrameMeasurement, measure, measure_regions, read_raw
-from labrig.region import Region
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Fraction of the range between black and white that the brightest frame may fill. The rest is room
 #: for a longer charge, the lamp's drift and the shutter's flicker.

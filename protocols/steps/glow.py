@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, ProtocolModel, Session, Shoot, at
-from labrig.quantity import DurationS, duration_text
+from labrig.foundation.quantity import DurationS, duration_text
+from labrig.foundation.region import Region
 from labrig.record import FrameRole
-from labrig.region import Region
 
 from .afterglow import glow
 from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s, longest_exposure_s

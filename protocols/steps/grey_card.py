@@ -12,10 +12,10 @@ from labrig.acquire import (
     Session,
     Shoot,
 )
-from labrig.errors import DeviceError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.region import Region
 from labrig.record import FrameRole
-from labrig.region import Region
 
 from .darkness import range_dn
 from .exposure_metering import SEEN_SIGMA, MeteringFrame, measure_frame

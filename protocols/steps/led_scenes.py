@@ -19,7 +19,7 @@ from labrig.acquire import (
     Session,
     Shoot,
 )
-from labrig.quantity import Count, DurationS
+from labrig.foundation.quantity import Count, DurationS
 
 from .camera_settings import CameraSettings
 from .scenes import Arrangement, Bracketing

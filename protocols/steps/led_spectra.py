@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.acquire import SPECTROMETER, ReadSpectrum, Session
+from labrig.foundation.quantity import duration_text
 from labrig.optics import read_spectrometer_reading
-from labrig.quantity import duration_text
 from labrig.record import FrameRole, SpectrumRecord
 
 from .scenes import ENOUGH

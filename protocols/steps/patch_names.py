@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from labrig.region import Region
+from labrig.foundation.region import Region
 
 #: Characters of paths, devices or patterns, or refused ones, on some system.
 _FORBIDDEN = './\\:*?"<>|'

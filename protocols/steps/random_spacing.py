@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from labrig.acquire import CameraOffers
-from labrig.quantity import duration_text
+from labrig.foundation.quantity import duration_text
 
 #: Spacing of the begins of photographs.
 Spacing = Literal["random", "even"]

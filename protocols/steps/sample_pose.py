@@ -21,8 +21,8 @@ from labrig.acquire import (
     TimedAction,
     at,
 )
-from labrig.errors import ProtocolError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.quantity import duration_text
 
 #: Time until a halogen lamp is dark (Nalbach et al., section 4.6); a shield is faster.
 LAMP_DARK_S = 0.32

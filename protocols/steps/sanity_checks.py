@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.acquire import LAMP_OFF, ExposureSettings, Session, Shoot, at
-from labrig.errors import DeviceError
-from labrig.quantity import duration_text
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.region import Region
 from labrig.record import FrameRecord, FrameRole
-from labrig.region import Region
 
 from .afterglow import (
     LOOK_AGAIN_S,

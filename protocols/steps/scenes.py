@@ -27,12 +27,12 @@ from labrig.acquire import (
     TurnWheel,
     Unit,
 )
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.region import CENTRE
 from labrig.optics import CHART_PATCHES
-from labrig.quantity import duration_text
 from labrig.record import PERSON, FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw
-from labrig.region import CENTRE
 
 from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
 from .exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET

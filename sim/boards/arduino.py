@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 VERSION = "labrig relays 1"
 #: Characters of a line that are kept; a longer one is no command.

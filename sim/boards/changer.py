@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 
 class ChangerBoard:

@@ -2,7 +2,7 @@ r"""An Oriel Cornerstone 260 as its serial line shows it, with its echo, and its
 
 from collections.abc import Callable
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 LINE_LENGTH = 64
 #: Speed of its wavelength, and limits of its grating, in nm.

@@ -2,7 +2,7 @@ r"""A Thorlabs FW102C as its serial line shows it, echo, answer and prompt, and 
 
 from collections.abc import Callable
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 SLOTS = 6
 LINE_LENGTH = 64

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 CHANNELS = 24
 DEVICE_NUMBER = 12

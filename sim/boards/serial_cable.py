@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from ..faults import FaultTime
 

@@ -2,9 +2,10 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from labrig.quantity import DurationS
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS
 
 from . import codes
 
@@ -17,7 +18,7 @@ def _on_the_dial(iso: object) -> object:
     return iso
 
 
-class BodySettings(BaseModel):
+class BodySettings(FrozenModel):
     """Dial, lens switch and menus of the simulated camera; by default set for photometry.
 
     Attributes
@@ -44,8 +45,6 @@ class BodySettings(BaseModel):
         Whether the EOS's custom function of this name is on. It is reported; its effect is not
         simulated.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     body: Literal["eos", "standard"] = "eos"
     exposure_mode: Literal["P", "Tv", "Av", "M", "B"] = "M"

@@ -1,6 +1,6 @@
 """A camera on a simulated cable, composed of its parts."""
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .body_settings import BodySettings
 from .eos.body import EosBody

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from .datasets import ObjectInfo, ptp_time, storage_info
 from .photograph import Photograph

@@ -1,6 +1,6 @@
 """A simulated room in real time, for programs that have no simulated clock."""
 
-from labrig.clock import Clock, VirtualClock
+from labrig.foundation.clock import Clock, VirtualClock
 
 
 class Pace:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 
 class AutoPowerOff:

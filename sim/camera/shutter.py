@@ -11,7 +11,7 @@ import random
 from dataclasses import dataclass
 from enum import IntFlag
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 #: Time of autofocus on a visible object.
 FOCUS_S = 0.1

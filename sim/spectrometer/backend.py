@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from .. import usb_errors
 from ..camera.usb.cable import BYTES_PER_S, TRANSACTION_S

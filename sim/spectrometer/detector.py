@@ -7,9 +7,9 @@ dark noise 50 counts, 2048 pixels) and users' spectra of its ILX511B.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lamp import WAVELENGTH_NM
+from labrig.foundation.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+from ..lamp import WAVELENGTH_NM
 
 PIXELS, FULL = 2048, 65535
 #: Coefficients of the wavelength over the pixel's place, as its EEPROM has them.

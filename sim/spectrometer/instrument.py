@@ -9,13 +9,11 @@ import struct
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.clock import Clock
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.clock import Clock
 
 from .detector import FULL, NONLINEARITY_TEXTS, PIXELS, WAVELENGTH_TEXTS, Detector
-
-FloatArray = NDArray[np.float64]
 
 #: Endpoints: commands, answers, spectra.
 COMMANDS, ANSWERS, SPECTRA = 0x01, 0x81, 0x82

@@ -10,13 +10,11 @@ the reflectances are lit by the light of the published colours, which is adapted
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig import colour_science
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CIE_1931, Spectrum, delta_e, illuminant, lab, observer, white_xyz
 from labrig.reproduce import tristimulus
-
-FloatArray = NDArray[np.float64]
 
 REFLECTANCES = ("BabelColor Average", "ColorChecker N Ohta")
 PUBLISHED = {

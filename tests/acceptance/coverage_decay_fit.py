@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
 from tests.fit import truths
 
 DOUBLE = ((0.08, 1.0), (0.015, 0.4))
@@ -48,7 +49,7 @@ def _with_dark_errors(
     )
 
 
-def _drifting(t: truths.FloatArray) -> truths.FloatArray:
+def _drifting(t: FloatArray) -> FloatArray:
     return truths.exponentials(*DOUBLE)(t) + 0.01 * t / 180
 
 

@@ -26,23 +26,21 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from labrig.analyse import Overrides, fit_series
 from labrig.analyse.frames import intact_frames
 from labrig.cli.exit_codes import guarded
-from labrig.errors import FitError
 from labrig.fit import DecayFit
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.region import Region
 from labrig.material import read_material
 from labrig.record import RunRecord, read_run
 from labrig.reduce import reduce_patches
-from labrig.region import Region
 from labrig.results import Series
 from tests.acceptance.cramer_rao import Noise, rate_bound
 from tests.acceptance.decays_of_all_materials import shipped_rig
 from tests.real_data import SHARED
-
-FloatArray = NDArray[np.float64]
 
 SENSOR = {"width": 96, "height": 64}
 OTHER_CURVES = (

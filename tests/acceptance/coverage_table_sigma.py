@@ -25,11 +25,11 @@ from pathlib import Path
 import numpy as np
 
 from labrig.analyse import TableFitOptions, fit_table
-from labrig.errors import FitError
 from labrig.fit import fit_decay
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from tests.fit import truths
 
-FloatArray = truths.FloatArray
 SPAN_S = 200.0
 #: Values below this fraction of the first do not count for σ: there a count or none is all noise.
 FAINT = 0.02

@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.region import Region, region_pixels
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.region import Region, region_pixels
 from labrig.results import Series
 from labrig.sim.sensor import BAYER_RGGB, gain_electrons_per_dn, read_noise_electrons
-
-FloatArray = NDArray[np.float64]
 
 NODES, FRACTIONS = np.polynomial.legendre.leggauss(24)
 

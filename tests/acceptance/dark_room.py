@@ -26,10 +26,10 @@ from typing import Any
 
 import numpy as np
 
-from labrig import resources
 from labrig.analyse import fit_series
 from labrig.compare import RenderedPatch, compare_rendered
 from labrig.fit import DecayFit
+from labrig.foundation import resources
 from labrig.material import Albedo, read_material, write_material
 from labrig.results import Series
 from tests.quick_yaml import read_quickly, write_quickly

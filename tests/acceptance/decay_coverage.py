@@ -17,6 +17,7 @@ from functools import partial
 import numpy as np
 
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
 from tests.fit import truths
 
@@ -55,7 +56,7 @@ def exponentials(
 def law(name: str, rate_per_s: float, shape: float, label: str, *right: str) -> Truth:
     """Return a law of `labrig.material.DECAY_LAWS` with its rate and shape."""
 
-    def decay(t: truths.FloatArray) -> truths.FloatArray:
+    def decay(t: FloatArray) -> FloatArray:
         return DECAY_LAWS[name].value(rate_per_s * t, np.full_like(t, shape))
 
     return Truth(label, decay, (rate_per_s, shape), (name, *right))
@@ -112,7 +113,7 @@ def fit(truth: Truth, seed: int) -> DecayFit:
     )
 
 
-def pulls(truth: Truth, fits: Iterable[DecayFit]) -> truths.FloatArray:
+def pulls(truth: Truth, fits: Iterable[DecayFit]) -> FloatArray:
     """Return (found − true)/σ of rates, or of a law's rate and shape, where the model is right."""
     if truth.n_states == 0:
         own = [next(one for one in each.laws if one.name == truth.right[0]) for each in fits]
@@ -183,7 +184,7 @@ def hidden_line(truth: Truth, share: float, fits: list[DecayFit]) -> str:
     )
 
 
-def _off_and_stated(truth: Truth, each: DecayFit) -> tuple[truths.FloatArray, truths.FloatArray]:
+def _off_and_stated(truth: Truth, each: DecayFit) -> tuple[FloatArray, FloatArray]:
     """Return errors of the slow rates, and what an unseen state is said to change, both in σ."""
     rates = np.array([(state.k_r_per_s, state.k_r_sigma_per_s) for state in each.states])
     unseen = each.unseen_state

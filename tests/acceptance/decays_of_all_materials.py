@@ -22,8 +22,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from labrig import resources
 from labrig.cli.exit_codes import guarded
+from labrig.foundation import resources
 from labrig.material import read_material
 
 WITHOUT_TRUE_STATES = "power-law"

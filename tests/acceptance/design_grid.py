@@ -20,12 +20,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.design import Keys, LightProgramme, solve, three_bands
+from labrig.foundation.arrays import FloatArray
 from tests.design.scenes import film
-
-FloatArray = NDArray[np.float64]
 
 #: Ranges of k_e per unit of light, of k_r in 1/s, and of Λ k_r in units of the brightest key.
 K_E, K_R, LAMBDA_K_R = (0.003, 3.0), (0.02, 10.0), (0.03, 30.0)

@@ -21,8 +21,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 from labrig.record import RunRecord, read_run
-from labrig.yaml_file import read_yaml, yaml_text
 from tests.acceptance.labrig_process import Ended, forked_labrig
 from tests.acceptance.short_protocols import KNOWN, SHORTER, Case, with_what_they_need
 

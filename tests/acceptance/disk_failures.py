@@ -34,10 +34,10 @@ from typing import BinaryIO
 
 import yaml
 
-from labrig import resources
 from labrig.cli.exit_codes import guarded
-from labrig.errors import LabrigError
-from labrig.output_file import RealDisk
+from labrig.foundation import resources
+from labrig.foundation.errors import LabrigError
+from labrig.foundation.output_file import RealDisk
 from labrig.record import read_run
 from tests.forked import forked
 

@@ -23,12 +23,12 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from labrig import resources
 from labrig.cli.exit_codes import guarded
-from labrig.errors import LabrigError
+from labrig.foundation import resources
+from labrig.foundation.errors import LabrigError
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 from labrig.process import process_run, seal_run, verify_run
 from labrig.seal import SEAL, SIGNATURE, LabKey, Signers, create_key
-from labrig.yaml_file import read_yaml, yaml_text
 from tests.resealed import reseal
 
 DECAY = {

@@ -17,10 +17,11 @@ import numpy as np
 
 from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse
+from labrig.foundation.arrays import FloatArray
 from labrig.record import read_run
 from labrig.results.emission_spectrum import EmissionSpectrum
 from tests.analyse.recorded import part_of
-from tests.analyse.spectral_bench import FloatArray, emitted, record
+from tests.analyse.spectral_bench import emitted, record
 
 MATERIALS = ("blue-paint", "green-paint", "orange-paint", "red-paint", "white-paint")
 PROTOCOL = {"protocol": "emission_spectrum", "charge": "5 min", "times": ["2 s", "12 s", "30 s"],

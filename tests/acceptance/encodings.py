@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig import resources
+from labrig.foundation import resources
 
 LONGEST_S = 900.0
 SERVES_S = 20.0

@@ -20,13 +20,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
 from labrig.reproduce import Field, FieldParameters
-
-FloatArray = NDArray[np.float64]
 
 MATERIALS = ("red-paint", "blue-paint", "green-paint", "yellow-paint")
 LIT_S, PERIOD_S = 60.0, 4.0

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 import yaml
 
-from labrig import resources
 from labrig.analyse.excitation.closure import predicted_charging
 from labrig.analyse.excitation.lamp_light import (
     LAMP_SIGMA,
@@ -30,13 +29,14 @@ from labrig.analyse.excitation.lamp_light import (
 )
 from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
 from labrig.optics import SLICES, Strip
 from labrig.results import (
     BandTests,
     ChargingSeries,
     FittedExcitation,
-    FloatArray,
     LightScatter,
     PatchCharging,
     Series,

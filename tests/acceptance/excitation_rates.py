@@ -12,15 +12,13 @@ by parameter.
 import argparse
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, read_material
 from labrig.results import FittedExcitation
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
-
-FloatArray = NDArray[np.float64]
 
 TABLE_1 = ("blue", "green", "orange", "pink", "purple", "red", "white", "yellow")
 CHARGES_S = (8, 16, 32, 64, 128, 256, 512)

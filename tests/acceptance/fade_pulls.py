@@ -23,8 +23,8 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.process import process_run
 from labrig.results import SwitchedFrames
 from labrig.sim import lamp as room_lamp
@@ -32,8 +32,6 @@ from labrig.sim.optics import bent_curves
 from labrig.sim.room import CURVES_STREAM
 from labrig.sim.simulation import LampSettings
 from tests.analyse.recorded import record
-
-FloatArray = NDArray[np.float64]
 
 PROTOCOL = {"protocol": "fade", "sample": {"name": "lamp"}, "passes": 2}
 #: Times after the switch in ms at which the tables are looked at, and bands of theirs.

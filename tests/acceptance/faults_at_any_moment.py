@@ -25,12 +25,12 @@ from typing import Any
 import event_model
 import yaml
 
-from labrig import resources
 from labrig.bench import Bench, Recording, open_bench, recording
 from labrig.cli import app as _preloaded  # noqa: F401
 from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import progress
-from labrig.clock import VirtualClock
+from labrig.foundation import resources
+from labrig.foundation.clock import VirtualClock
 from labrig.record import read_run
 from labrig.record.journal import read_journal
 

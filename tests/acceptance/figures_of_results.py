@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from labrig.yaml_file import read_yaml
+from labrig.foundation.yaml_file import read_yaml
 
 Figures = dict[str, tuple[float, float]]
 

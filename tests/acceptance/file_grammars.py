@@ -24,7 +24,7 @@ from time import perf_counter
 import numpy as np
 import OpenEXR
 
-from labrig.errors import LabrigError
+from labrig.foundation.errors import LabrigError
 from labrig.material import read_reradiation
 from labrig.optics import read_camera
 from labrig.reproduce import read_linear_exr

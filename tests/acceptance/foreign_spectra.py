@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import MatrixLayout, read_reradiation
 from labrig.optics import read_curve_file, read_spectrum, read_transmittance
 from tests.real_data import REAL, SHARED

@@ -20,9 +20,9 @@ from contextlib import closing, contextmanager
 from typing import Any
 
 from labrig.acquire import ExposureSettings
-from labrig.clock import SystemClock, VirtualClock
 from labrig.drivers.gphoto2_camera import Gphoto2Camera
 from labrig.drivers.ptp import PtpCamera
+from labrig.foundation.clock import SystemClock, VirtualClock
 from labrig.sim.camera import BodySettings, Pace, PtpIpServer, SimulatedCamera
 from tests.drivers.gphoto2_camera.bench import TIFF, Loopback
 

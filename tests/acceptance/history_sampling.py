@@ -33,11 +33,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import Float32Array, FloatArray
 from labrig.material import read_material
 from labrig.reproduce import Field, FieldParameters
-
-FloatArray = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
 
 PERIOD_S, HALF_BLADE, PENUMBRA = 4.0, math.radians(60), math.radians(10)
 FRAME_S, TIMES_S = 0.04, (1.0, 10.0, 100.0, 1000.0)

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.report.figure_style import CHANNEL, DASHED, INK, MUTED, OTHER_CHANNELS, figure_style
 from tests.acceptance.history_sampling import (
     CHECKED,
@@ -23,7 +23,6 @@ from tests.acceptance.history_sampling import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
 
 SIZE = 128
 SHOWN_S = (1.0, 10.0, 100.0)

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from labrig.errors import FitError
 from labrig.fit import fit_charge_and_decay, fit_decay
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import read_material
 from labrig.results import NORMAL_95, Measured, ProfileInterval
 from labrig.sim.kinetics_settings import KineticsSettings
@@ -40,7 +41,7 @@ class Case:
     fitted: Callable[[int], Estimates]
 
 
-def noise(rng: np.random.Generator, size: int, *, is_heavy: bool) -> truths.FloatArray:
+def noise(rng: np.random.Generator, size: int, *, is_heavy: bool) -> FloatArray:
     """Return noise of σ 1, of a normal distribution or Student's t with 4 degrees of freedom."""
     return rng.standard_t(4, size) / np.sqrt(2) if is_heavy else rng.standard_normal(size)
 
@@ -91,13 +92,13 @@ CHARGE_T_S = np.concatenate(
 )
 
 
-def charge_light(kappa: float, k: float, order: float) -> truths.FloatArray:
+def charge_light(kappa: float, k: float, order: float) -> FloatArray:
     """Return the light of one state, charged from 20 to 220 s, integrated numerically."""
     light, r = np.zeros(len(CHARGE_T_S)), 0.0
     for begin, end, lamp in ((20.0, 220.0, kappa), (220.0, 3001.0, 0.0)):
         own = (begin <= CHARGE_T_S) & (end > CHARGE_T_S)
 
-        def growth(_: float, r: truths.FloatArray, lamp: float = lamp) -> truths.FloatArray:
+        def growth(_: float, r: FloatArray, lamp: float = lamp) -> FloatArray:
             return np.asarray((1 - r) * lamp - k * np.maximum(r, 0) ** order)
 
         solved = solve_ivp(
@@ -178,8 +179,8 @@ def becquerel(tau_s: float, exponent: float) -> Mapping[str, float]:
 def one_trap(rate_per_s: float, shape: float) -> truths.Decay:
     """Return the light of one trap, its rate equation integrated numerically."""
 
-    def light(t: truths.FloatArray) -> truths.FloatArray:
-        def fall(_: float, level: truths.FloatArray) -> truths.FloatArray:
+    def light(t: FloatArray) -> FloatArray:
+        def fall(_: float, level: FloatArray) -> FloatArray:
             return np.asarray(-rate_per_s * level**2 / (shape + (1 - shape) * level))
 
         solved = solve_ivp(

@@ -27,8 +27,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Self
 
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 from labrig.record import read_run
-from labrig.yaml_file import read_yaml, yaml_text
 from tests.acceptance.figures_of_results import figures, furthest_in_sigma
 from tests.acceptance.labrig_process import Labrig
 from tests.acceptance.short_protocols import SHORTER, Case, with_what_they_need

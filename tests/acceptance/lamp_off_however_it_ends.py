@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from labrig.signals import STOP_SIGNALS, name_of
+from labrig.foundation.signals import STOP_SIGNALS, name_of
 from tests.lit_bench import BoardProcess, LitBench, Stubborn, lit_bench
 
 PATIENCE_S = 60.0

@@ -29,15 +29,15 @@ from typing import Any
 import numpy as np
 import yaml
 
-from labrig import resources
 from labrig.analyse import Overrides, fit_series
 from labrig.analyse.frames import intact_frames
 from labrig.cli.exit_codes import guarded
 from labrig.fit import DecayFit
+from labrig.foundation import resources
+from labrig.foundation.region import Region
 from labrig.material import read_material
 from labrig.record import read_run
 from labrig.reduce import reduce_patches
-from labrig.region import Region
 from labrig.results import FORECAST_SPANS, Series
 from tests.acceptance.decays_of_all_materials import shipped_rig
 from tests.fit import truths

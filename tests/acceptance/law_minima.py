@@ -23,13 +23,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import least_squares
 
-from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
 from labrig.fit.decay.law_search import FASTEST_STEPS, SLOWEST_SPANS
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS
 from tests.fit import truths
 
-FloatArray = truths.FloatArray
 #: Differences of χ² that are counted.
 FAR, NEAR = 9.0, 1e-3
 GRID, STARTS, LARGEST_SHAPE = (40, 9), 10, 3.0

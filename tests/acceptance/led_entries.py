@@ -13,8 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.fit import FloatArray
 from labrig.fit.fluorescence import JointEstimator
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix, corrected, matrix_files, read_reradiation
 from labrig.optics import read_camera
 from tests.acceptance.led_matrices import (

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from labrig import resources
-from labrig.yaml_file import read_yaml, yaml_text
+from labrig.foundation import resources
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 
 Content = dict[str, Any]
 #: Outputs of the shipped rig's LEDs that are behind relays here, where no head tells its colour.

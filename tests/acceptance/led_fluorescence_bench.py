@@ -32,9 +32,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from labrig import resources
 from labrig.analyse.led_fluorescence import analyse
 from labrig.bench import Recording
+from labrig.foundation import resources
 from labrig.material import (
     ReradiationMatrix,
     appearance,

@@ -23,7 +23,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from labrig.fit import FloatArray
 from labrig.fit.fluorescence import (
     Exposure,
     FluorescenceFit,
@@ -34,6 +33,7 @@ from labrig.fit.fluorescence import (
     predicted_colour,
 )
 from labrig.fit.spectrum import CurveError
+from labrig.foundation.arrays import FloatArray
 from labrig.material import (
     ReradiationMatrix,
     appearance,

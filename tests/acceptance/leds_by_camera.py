@@ -13,11 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.process import process_run
 from labrig.results import IrradianceResult
 from tests.analyse.lvf_calibration.room_truth import simulation_of
 from tests.analyse.recorded import record
-from tests.analyse.selected_lights import BANDS_NM, LED_NAMES, SITES, FloatArray, bench, true_light
+from tests.analyse.selected_lights import BANDS_NM, LED_NAMES, SITES, bench, true_light
 from tests.real_data import SHARED
 
 CURVES = SHARED / "camera_sensitivity"

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import LineFit, SpectralSystem, fit_line, fit_spectrum
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Spectrum, read_curve_file
 from labrig.optics.piecewise import hat_functions, quadrature
 from tests.real_data import REAL

@@ -20,10 +20,10 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from labrig import resources
 from labrig.cli.exit_codes import guarded
+from labrig.foundation import resources
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 from labrig.record import AttemptWriter, FrameRecord
-from labrig.yaml_file import read_yaml, yaml_text
 
 SHARES = 12
 PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 1e6 if hasattr(os, "sysconf") else 0.0

@@ -22,10 +22,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import FitError
 from labrig.fit import fit_decay, fit_luminance
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS
-from labrig.results import NORMAL_95, VISIBLE_MCD_PER_M2, FloatArray
+from labrig.results import NORMAL_95, VISIBLE_MCD_PER_M2
 
 PARTS = (0.1, 0.3, 0.5, 0.9)
 LEVEL = 0.05

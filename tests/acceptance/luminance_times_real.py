@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from labrig.fit import fit_luminance
-from labrig.results import VISIBLE_MCD_PER_M2, FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.results import VISIBLE_MCD_PER_M2
 from tests.acceptance.luminance_times import (
     HEAD,
     PARTS,

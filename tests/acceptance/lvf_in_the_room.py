@@ -22,10 +22,10 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from labrig import resources
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.cli.exit_codes import guarded
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import read_curve_file
 from tests.analyse.lvf_calibration.room_truth import (
     FINE_NM,

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from labrig import resources
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
 from labrig.material import write_reradiation
 from tests.material.reradiation.formats.matrices import two_dyes
 from tests.real_data import SHARED

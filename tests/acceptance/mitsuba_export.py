@@ -13,11 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.reproduce import ExportedMesh, Glow, Pinhole, write_mitsuba_scene
-
-FloatArray = NDArray[np.float64]
 
 #: Largest relative error that passes.
 LIMIT = 0.02

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.reproduce import (
     Geometry,
     Lamp,
@@ -28,8 +28,6 @@ from labrig.reproduce import (
     Tracer,
     fold,
 )
-
-FloatArray = NDArray[np.float64]
 
 CAMERA = Pinhole((0.5, -1.38, 0.5), (0.5, 0, 0.5), vertical_fov_deg=40, width_px=128, height_px=128)
 DEPTHS = (1, 2, 4, 8, 12)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.material import (
     ReradiationMatrix,
     compare_colours,

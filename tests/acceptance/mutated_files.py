@@ -18,8 +18,8 @@ from pathlib import Path
 
 import yaml
 
-from labrig import resources
 from labrig.cli.exit_codes import guarded
+from labrig.foundation import resources
 from tests.mutated_files import Outcome, try_one, victims
 
 PROTOCOL = {

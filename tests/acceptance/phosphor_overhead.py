@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig import resources
+from labrig.foundation import resources
 from labrig.reproduce import Renderer, Scene, load_scene
 from tests.quick_yaml import read_quickly, write_quickly
 

@@ -27,7 +27,7 @@ from labrig.analyse.frames import intact_frames
 from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.series_fit import fit_series
 from labrig.cli.exit_codes import guarded
-from labrig.errors import FitError
+from labrig.foundation.errors import FitError
 from labrig.record import read_run
 from labrig.reduce import reduce_patches
 from tests.acceptance.decays_of_all_materials import shipped_rig

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig import resources
+from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.optics import read_spectrum
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from labrig.analyse.reflectance import analyse
 from labrig.calibration import LVF_KIND, LvfFile
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import Albedo, Material, read_material, write_material
 from labrig.optics import Strip
 from labrig.optics.piecewise import band_means, edges_from_centres

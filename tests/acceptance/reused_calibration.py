@@ -25,9 +25,9 @@ from typing import Any
 
 import yaml
 
-from labrig import resources
+from labrig.foundation import resources
+from labrig.foundation.quantity import duration_text
 from labrig.material import read_material
-from labrig.quantity import duration_text
 from labrig.record import size_text
 from tests.acceptance.whole_phosphor import PAINTS, Errors, errors, rig_file, summary
 

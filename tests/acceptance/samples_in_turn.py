@@ -20,11 +20,11 @@ from typing import Any
 
 import yaml
 
-from labrig import resources
 from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.bench.found_calibrations import find_calibrations
+from labrig.foundation import resources
+from labrig.foundation.quantity import duration_text
 from labrig.material import read_material
-from labrig.quantity import duration_text
 from labrig.record import read_run
 from tests.acceptance.reused_calibration import labrig
 from tests.acceptance.whole_phosphor import PAINTS, Errors, errors, summary

@@ -20,14 +20,12 @@ from contextlib import redirect_stdout
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.cli.exit_codes import guarded
 from labrig.fit import ChargeFit, LeastSquaresFit, fit_charge_and_decay, least_squares
+from labrig.foundation.arrays import FloatArray
 from labrig.material.rates import concentration, phi1
 from tests.real_data import SHARED
-
-FloatArray = NDArray[np.float64]
 
 TABLE = SHARED / "decay/perslqy_sao/sample_400_524_300s.txt"
 ON_S, OFF_S, DARK_UNTIL_S = 30.0, 330.0, 29.0

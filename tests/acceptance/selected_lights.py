@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
 from labrig.process import process_run
 from labrig.results import ExcitationResult, IrradianceResult
@@ -30,7 +31,6 @@ from tests.analyse.selected_lights import (
     QUICK,
     SELECTIONS,
     SITES,
-    FloatArray,
     bench,
     recorded,
 )

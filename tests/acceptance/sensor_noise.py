@@ -23,14 +23,12 @@ import argparse
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.analyse.camera_calibration.bend import Bend, fit_bend
 from labrig.analyse.camera_calibration.photon_transfer import Pair, measure_pair, photon_transfer
+from labrig.foundation.arrays import FloatArray
 from labrig.reduce import RawFrame
 from labrig.results import PhotonTransfer
-
-FloatArray = NDArray[np.float64]
 
 SHAPE = 120, 160
 WHOLE = (0.0, 0.0, 1.0, 1.0)

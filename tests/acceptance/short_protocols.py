@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
-from labrig import resources
-from labrig.yaml_file import read_yaml, yaml_text
+from labrig.foundation import resources
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 
 FILTERS = [
     "longpass-440", "longpass-490", "longpass-540", "longpass-600",

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 #: Folders of the product, each a part of the package labrig.
 _PRODUCT = ("labrig", "drivers", "protocols", "sim", "config")
 #: Whoever loads by name or starts labrig in a process of its own may reach all of the product.
-_REACHES_ALL = ("labrig.plugins", "tests.acceptance.labrig_process")
+_REACHES_ALL = ("labrig.foundation.plugins", "tests.acceptance.labrig_process")
 _DIGITS = 12
 
 

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import fit_spectrum, system_through_lvf
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Spectrum, band_means
 from tests.fit import lvf_pictures as made
 

@@ -18,13 +18,13 @@ import colour
 import numpy as np
 
 from labrig.analyse.strip_model import conditioned_on_white
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import (
     CurveError,
     SpectralSystem,
     fit_spectrum,
     system_through_lvf,
 )
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Lvf, Spectrum, signal_through
 from labrig.optics.piecewise import band_means
 from tests.fit import lvf_pictures as made

@@ -21,11 +21,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.analyse import Overrides
 from labrig.calibration import FADE_KIND, Change, FadeFile, Warming
 from labrig.calibration.irradiance_file import IRRADIANCE_KIND
+from labrig.foundation.arrays import FloatArray
 from labrig.material import (
     Material,
     dark_concentration,
@@ -41,8 +41,6 @@ from labrig.sim.phosphor import band_cells, phosphor
 from labrig.sim.simulation import LampSettings
 from tests.analyse.excitation.bench import HEIGHT, true_irradiance
 from tests.analyse.recorded import record
-
-FloatArray = NDArray[np.float64]
 
 WIDTH = 384
 PROTOCOL: dict[str, Any] = {

@@ -30,12 +30,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit import fit_mixture
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix, ReradiationMixture, corrected, read_reradiation
 from labrig.optics import CIE_1931, observer
 from labrig.reproduce import LampWavelengths, WavelengthShift, direct_light, rotated_wavelengths
 from tests.real_data import SHARED
-
-FloatArray = NDArray[np.float64]
 
 LOW_NM, HIGH_NM, BANDS, FINE = 300.0, 780.0, 24, 480
 EDGES_NM = np.linspace(LOW_NM, HIGH_NM, BANDS + 1)

@@ -27,9 +27,9 @@ from typing import NamedTuple
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
-from labrig import resources
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, read_material
 from labrig.process import process_run
 from labrig.record import read_run
@@ -37,8 +37,6 @@ from labrig.sim.lamp import BURNING_K, Lamp, filament_spectrum
 from labrig.sim.optics import emission
 from labrig.sim.phosphor import band_cells
 from labrig.sim.simulation import LampSettings
-
-FloatArray = NDArray[np.float64]
 
 PAINTS = ("blue", "green", "orange", "pink", "purple", "red", "white", "yellow")
 #: Of the room's lamp, in multiples of the irradiance to which Table 1's rates belong.

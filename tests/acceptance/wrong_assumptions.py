@@ -36,14 +36,14 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig import sim
 from labrig.calibration import CAMERA_KIND
 from labrig.cli.exit_codes import guarded
-from labrig.errors import LabrigError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import LabrigError
+from labrig.foundation.region import region_pixels
 from labrig.process import process_run
-from labrig.region import region_pixels
 from labrig.results import (
     EXPONENTIALS,
     DecayPatch,
@@ -56,8 +56,6 @@ from labrig.sim.optics import CHANNELS, vignetting
 from labrig.sim.truth import TrueState, Truth
 from tests.acceptance.wrong_charging import CHARGES, Charging
 from tests.acceptance.wrong_rooms import BESIDE, CLEAN, DECAYS, Case
-
-FloatArray = NDArray[np.float64]
 
 #: Deviation in σ from which a result is wrong.
 WRONG_SIGMAS = 3.0

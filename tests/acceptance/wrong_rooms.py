@@ -7,8 +7,8 @@ from typing import Any
 
 import yaml
 
-from labrig import resources
 from labrig.calibration import CAMERA_KIND
+from labrig.foundation import resources
 from tests.acceptance.decays_of_all_materials import shipped_rig
 
 #: Sensor that is read in milliseconds and has four thousand pixels for each sample.

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from labrig.acquire import CameraOffers, ExposureSettings, Frame, ManualStep
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.record import FrameRecord
 
 Note = Callable[[str], None]

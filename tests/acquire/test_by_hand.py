@@ -17,8 +17,8 @@ from labrig.acquire import (
     Shoot,
     run_units,
 )
-from labrig.clock import Interrupted, VirtualClock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Interrupted, VirtualClock
+from labrig.foundation.errors import DeviceError
 from labrig.record import RunFolder, RunRecord
 
 from .fakes import NotingCamera, NotingLamp, Watching

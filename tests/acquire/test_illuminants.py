@@ -22,7 +22,7 @@ from labrig.acquire import (
 )
 from labrig.bench import open_bench
 from labrig.bench_optics import illuminant_exposures
-from labrig.errors import ProtocolError, UsageError
+from labrig.foundation.errors import ProtocolError, UsageError
 from labrig.optics import read_light
 from labrig.record import RunFolder
 from tests.quick_yaml import read_quickly, write_quickly

@@ -31,8 +31,8 @@ from labrig.acquire import (
 from labrig.acquire.roles.light_bank import PlannedLightBank
 from labrig.bench import open_bench
 from labrig.bench.guard import guarding
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError, ProtocolError, UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, ProtocolError, UsageError
 from labrig.record import RunFolder
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.conftest import Ended

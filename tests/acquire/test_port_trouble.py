@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from labrig.acquire import PORT_FAILURES, Program, gone, linux_programs, not_opened
-from labrig.clock import SystemClock
 from labrig.drivers.serial_line import SerialLine
-from labrig.errors import DeviceLostError
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import DeviceLostError
 
 Programs = Callable[[], Iterable[Program]]
 

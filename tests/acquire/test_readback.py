@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from labrig.acquire import LAMP_OFF, LAMP_ON, Rig, Session, at, run_units
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 from labrig.record import RunFolder, RunRecord
 
 from .fakes import NotingLamp, Watching

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from labrig.acquire import LAMP_OFF, LAMP_ON, Device, Rig, Session, run_units
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError, ProtocolError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, ProtocolError
 from labrig.record import RunFolder
 
 from .fakes import NotingLamp, Watching

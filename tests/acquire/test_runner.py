@@ -17,8 +17,8 @@ from labrig.acquire import (
     at,
     run_units,
 )
-from labrig.clock import Interrupted, VirtualClock
-from labrig.errors import DeviceError, ProtocolError
+from labrig.foundation.clock import Interrupted, VirtualClock
+from labrig.foundation.errors import DeviceError, ProtocolError
 from labrig.record import RunFolder
 
 from .fakes import NotingCamera, NotingLamp, Watching

@@ -6,8 +6,8 @@ import pytest
 
 from labrig.acquire import CAMERA, LAMP, Device, Rig
 from labrig.acquire.rig import PATIENCE_S
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
 from tests.acquire.fakes import NotingCamera, NotingDoor, NotingLamp
 
 

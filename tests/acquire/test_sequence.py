@@ -20,8 +20,8 @@ from labrig.acquire import (
     run_units,
 )
 from labrig.acquire.rig import in_safe_order
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError, ProtocolError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, ProtocolError
 from labrig.record import Attempt, RunFolder
 
 from .fakes import NotingCamera, NotingDoor, NotingLamp, NotingShield, Watching

@@ -26,7 +26,7 @@ from labrig.acquire import (
 from labrig.analyse import Overrides, verify_frames
 from labrig.analyse.frames import require_intact
 from labrig.bench import open_bench
-from labrig.errors import DataError, DeviceLostError, ProtocolError
+from labrig.foundation.errors import DataError, DeviceLostError, ProtocolError
 from labrig.optics import read_spectrometer_reading
 from labrig.record import FRAMES, RunFolder, damaged_frames, read_run
 from tests.conftest import Ended

@@ -20,8 +20,8 @@ from labrig.acquire import (
     at,
     run_units,
 )
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 from labrig.record import RunFolder, RunRecord
 
 from .fakes import NotingCamera, NotingLamp, Watching

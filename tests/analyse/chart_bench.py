@@ -5,16 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.calibration import LVF_KIND
+from labrig.foundation.arrays import FloatArray
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from labrig.sim.optics import bent_curves, measured_curves
 from tests.analyse.recorded import recorded, shipped_rig
 from tests.analyse.spectral_bench import true_lvf_of
 
-FloatArray = NDArray[np.float64]
 WIDTH, HEIGHT = 240, 160
 
 

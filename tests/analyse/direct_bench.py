@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig import resources
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.material import read_any_material
 from labrig.optics import band_integrals, edges_from_centres
 from labrig.sim.bench_settings import LedSettings
@@ -18,8 +18,6 @@ from labrig.sim.spectrometer import Detector
 from labrig.sim.surfaces import Surfaces
 from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly
-
-FloatArray = NDArray[np.float64]
 
 MATERIALS = ("yellow-textile", "orange-textile", "white-paper", "grey-felt")
 #: Outputs of the shipped rig's LEDs, by their names.

@@ -5,17 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig import resources
 from labrig.acquire import RigFile, read_rig_file
 from labrig.bench import open_bench
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.protocols.luminance import LuminanceFrames
 from labrig.record import PERSON, read_run
 from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly
-
-FloatArray = NDArray[np.float64]
 
 #: A protocol of some minutes, with a sample that is dim by then.
 QUICK: dict[str, Any] = {

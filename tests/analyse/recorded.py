@@ -9,12 +9,12 @@ from typing import Any
 
 from filelock import FileLock
 
-from labrig import resources
 from labrig.acquire import Plan, RunObserver
 from labrig.analyse import Inputs, Overrides, Part
 from labrig.analyse.overrides import read_run_protocol
 from labrig.bench import Recording, Watch, resume_run
-from labrig.clock import Clock
+from labrig.foundation import resources
+from labrig.foundation.clock import Clock
 from labrig.process.provenance import describe_run
 from labrig.record import RunRecord, read_run
 from labrig.report import Source

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.calibration import IrradianceFile
+from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
 from labrig.sim.filters import Filters
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
@@ -20,8 +20,6 @@ from labrig.sim.monochromator import passed_by
 from labrig.sim.phosphor import band_cells
 from labrig.sim.simulation import Simulation
 from tests.analyse.recorded import record
-
-FloatArray = NDArray[np.float64]
 
 WIDTH, HEIGHT = 96, 64
 FILTERS = (

@@ -5,15 +5,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig import resources
 from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.region import region_pixels
 from labrig.material import read_material
 from labrig.optics import Bands, Strip
 from labrig.optics.piecewise import band_means, edges_from_centres
-from labrig.region import region_pixels
 from labrig.results.emission_spectrum import WAVELENGTH_NM
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
@@ -21,8 +21,6 @@ from labrig.sim.lvf import PIECES, Lvf, pieces
 from labrig.sim.optics import emission
 from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly
-
-FloatArray = NDArray[np.float64]
 
 #: Left out at the strip's long sides, as a fraction of its height.
 MARGIN = 0.12

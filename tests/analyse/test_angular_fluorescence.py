@@ -10,7 +10,7 @@ import pytest
 
 from labrig.analyse import Inputs, Part
 from labrig.analyse.angular_fluorescence import analyse
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_and_report
 from labrig.protocols.angular_fluorescence import Circle
 from labrig.record import Attempt

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.analyse import TableFitOptions, fit_table
-from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.errors import FitError
 from labrig.process import report_table
 from tests.acceptance.coverage_table_sigma import (
     SINGLE,

@@ -10,7 +10,7 @@ import pytest
 
 import labrig
 from labrig.analyse import TableFitOptions, fit_table
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.results import FittedDecay
 
 STEP, N = Decimal("1.5"), 40

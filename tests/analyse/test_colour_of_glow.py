@@ -5,9 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from labrig import resources
 from labrig.acquire import RigFile, read_rig_file
 from labrig.analyse.colour_of_glow import ColourScale, Emission, colour_scale
 from labrig.bench_optics import (
@@ -17,13 +15,13 @@ from labrig.bench_optics import (
     card_reflectance,
     luminance,
 )
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Spectrum, photopic_efficacy, scotopic_efficacy
 from labrig.sim.cards import reflectances
 from labrig.sim.lamp import BURNING_SPECTRUM, CELL_NM, WAVELENGTH_NM
 from labrig.sim.optics import CameraCurves, bent_curves, measured_curves
 from tests.pulls import assert_sigma_is_right
-
-FloatArray = NDArray[np.float64]
 
 NM = np.arange(380.0, 721.0, 5.0)
 NOISE = 0.002

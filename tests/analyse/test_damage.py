@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 
 from labrig.analyse.frames import IntactFrames, intact_frames, timing_warnings
 from labrig.analyse.overrides import Overrides
-from labrig.errors import DataError, LabrigError
+from labrig.foundation.errors import DataError, LabrigError
 from labrig.record import read_run
 from tests.conftest import Ended
 from tests.resealed import reseal

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from labrig.analyse import Part
 from labrig.analyse.direct_bispectral import analyse
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.material import read_reradiation
 from labrig.optics import SpectrometerReading, read_spectrometer_reading
 from labrig.process import process_and_report
@@ -30,7 +30,6 @@ from tests.results.made import assert_read_back
 
 pytest.importorskip("seabreeze")
 
-FloatArray = NDArray[np.float64]
 
 #: Two that tell one another's reflectance, and one far off.
 LEDS = ["430 nm", "455 nm", "625 nm"]

@@ -24,12 +24,13 @@ from labrig.analyse.emission_spectrum.comparison import (
 from labrig.analyse.emission_spectrum.forward_model import forward_models
 from labrig.analyse.emission_spectrum.reduction import reduce_places
 from labrig.analyse.inputs import Inputs
-from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import SpectrumFit, fit_spectrum, system_through_lvf
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.region import region_pixels
 from labrig.optics import Spectrum
 from labrig.record import read_run
 from labrig.reduce import SeriesFrame
-from labrig.region import region_pixels
 from labrig.report import figure_style
 from labrig.report.emission_spectrum import render
 from labrig.results.emission_spectrum import (
@@ -42,13 +43,7 @@ from labrig.results.emission_spectrum import (
 )
 from tests.analyse.recorded import part_of, source_of
 from tests.analyse.small_runs import EMISSION
-from tests.analyse.spectral_bench import (
-    HEIGHT,
-    WIDTH,
-    FloatArray,
-    emitted,
-    record,
-)
+from tests.analyse.spectral_bench import HEIGHT, WIDTH, emitted, record
 from tests.fit import lvf_pictures as made
 from tests.quick_yaml import read_quickly, write_quickly
 

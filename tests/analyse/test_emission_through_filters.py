@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labrig.bench import Recording
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.process import process_run
 from labrig.results import EmissionSpectrumResult, ExcitationResult, PhosphorResult
 from tests.analyse.camera_filters_bench import FILTERS, IN_WHEEL, PLACE, QUICK, recorded

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from labrig.calibration import CAMERA_KIND, CameraFile
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import read_material
 from labrig.process import process_run
 from tests.analyse.recorded import record

@@ -8,10 +8,10 @@ import pytest
 
 from labrig.analyse.irradiance import in_bands, mean_ratio, strip_scale
 from labrig.calibration import IRRADIANCE_KIND
-from labrig.errors import DataError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
 from labrig.process import process_run

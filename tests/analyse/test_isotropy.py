@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labrig.analyse.isotropy import analyse
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.process import process_and_report
 from labrig.results.isotropy import IsotropyResult
 from tests.analyse.recorded import part_of

@@ -7,7 +7,7 @@ import pytest
 
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BLANK_KIND
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.process import process_run
 from tests.analyse.recorded import record
 from tests.calibration.blanks import BLANK

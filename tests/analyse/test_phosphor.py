@@ -12,9 +12,9 @@ from labrig.calibration import (
     PatchReflectance,
     ReflectanceFile,
 )
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.number_format import plus_minus
 from labrig.material import read_material
-from labrig.number_format import plus_minus
 from labrig.process import process_and_report
 from labrig.record import read_run
 from labrig.results.phosphor import PhosphorResult

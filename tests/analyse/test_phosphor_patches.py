@@ -15,13 +15,13 @@ from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.strip import StripPatch, for_each_patch, slice_strip, tilt_offset
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.compare.run import read_patches
-from labrig.errors import DataError, FitError, UsageError
+from labrig.foundation.errors import DataError, FitError, UsageError
+from labrig.foundation.region import Region
 from labrig.material import read_material
 from labrig.optics import Strip
 from labrig.process import Processed, process_and_report
 from labrig.record import read_run
 from labrig.reduce import SensorLayout
-from labrig.region import Region
 from labrig.results import read_fitted_decays
 from labrig.results.emission_spectrum import read_emission_spectrum
 from tests.analyse.excitation.bench import QUICK, true_irradiance

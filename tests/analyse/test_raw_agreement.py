@@ -20,7 +20,7 @@ from labrig.analyse import (
 from labrig.cli import guarded
 from labrig.drivers.gphoto2_camera import Gphoto2Camera
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.record import RunRecord
 from labrig.reduce import read_exif
 from labrig.sim.dng import Shot, encode_dng

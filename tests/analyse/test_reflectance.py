@@ -10,7 +10,7 @@ from labrig.analyse import Inputs
 from labrig.analyse.reflectance import analyse
 from labrig.analyse.surface import with_reflectance, with_reflectances
 from labrig.calibration import LVF_KIND, REFLECTANCE_KIND
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Albedo, read_material, write_material
 from labrig.optics import Strip
 from labrig.report import describe_phosphor, draw_phosphor

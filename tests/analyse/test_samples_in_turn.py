@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
 from labrig.analyse import Overrides
 from labrig.analyse.excitation.charge_intervals import charge_frames
 from labrig.analyse.phosphor import analyse
 from labrig.calibration import IRRADIANCE_KIND
 from labrig.compare.run import read_patches
+from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.process import process_and_report
 from labrig.record import RunRecord, read_run

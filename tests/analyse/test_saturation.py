@@ -12,7 +12,7 @@ from labrig.analyse.kinetic_order import compare_levels
 from labrig.analyse.saturation import analyse, charge_level, charged, compare_rates
 from labrig.analyse.series_fit import fit_series
 from labrig.bench import open_bench
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.process import process_and_report
 from labrig.results import Measured, PatchSaturation, Series
 from labrig.results.saturation import Curve, SaturationResult

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labrig.calibration import IRRADIANCE_KIND
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_run
 from labrig.results import ExcitationResult, IrradianceResult
 from labrig.sim.simulation import Simulation

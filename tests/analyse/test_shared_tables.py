@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from labrig.analyse import TableFitOptions, fit_shared_tables
-from labrig.errors import FitError, UsageError
 from labrig.fit import DecayTable, fit_shared_rates
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError, UsageError
 from labrig.process import report_shared_decay
-from labrig.results import FloatArray, OneSided
+from labrig.results import OneSided
 
 T_S = np.linspace(0, 60, 50)
 RATES = (0.3, 0.04)

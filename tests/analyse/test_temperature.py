@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import plan, read_protocol, read_rig_file
+from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.process import process_run
 from labrig.record import read_run

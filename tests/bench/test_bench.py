@@ -9,8 +9,8 @@ import serial
 
 from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import SystemClock
-from labrig.errors import DeviceError, UsageError
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import DeviceError, UsageError
 from labrig.sim.boards import NumatoBoard
 from tests.terminal import idle_guard, on_a_terminal
 

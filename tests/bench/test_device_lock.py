@@ -15,7 +15,7 @@ from labrig.bench.device_lock import (
     serial_devices,
     usb_device,
 )
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
 

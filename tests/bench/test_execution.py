@@ -11,8 +11,8 @@ import pytest
 
 from labrig.acquire import Plan, RunObserver
 from labrig.bench import Recording
-from labrig.clock import Clock, Interrupted
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock, Interrupted
+from labrig.foundation.errors import DeviceError
 from labrig.record import read_run
 from labrig.sim.camera.usb.backend import CameraBackend
 from tests.acquire.fakes import Watching

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig import resources
 from labrig.acquire import CalibrationRules, RigFile, read_protocol, read_rig_file
 from labrig.bench import Recording
 from labrig.bench.found_calibrations import find_calibrations
@@ -26,8 +25,9 @@ from labrig.calibration import (
     keep_calibration,
     kept_calibrations,
 )
-from labrig.errors import DataError, ProtocolError, UsageError
 from labrig.fit.lvf import compare_card_pictures, place_means
+from labrig.foundation import resources
+from labrig.foundation.errors import DataError, ProtocolError, UsageError
 from labrig.optics import Flat, Strip
 from labrig.process import process_run
 from labrig.protocols.phosphor import Phosphor

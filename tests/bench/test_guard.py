@@ -15,7 +15,7 @@ import serial
 from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import Bench, guard as guard_module, guard_process, open_bench
 from labrig.bench.guard import ALL_OFF, MAY_BE_ON, Guard, guarding
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 from labrig.record import read_run
 
 pytest.importorskip("pty", reason="Windows has no pseudo terminals")

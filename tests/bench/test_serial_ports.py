@@ -7,7 +7,7 @@ from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
 from labrig.bench.serial_ports import SerialPorts
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 NUMATO, MAESTRO, CH340 = (0x2A19, 0x0C01), (0x1FFB, 0x0089), (0x1A86, 0x7523)
 Plug = Callable[..., None]

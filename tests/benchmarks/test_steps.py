@@ -8,7 +8,6 @@ from typing import BinaryIO, TypeVar
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import (
     LAMP_OFF,
     LAMP_ON,
@@ -21,7 +20,8 @@ from labrig.acquire import (
     run_units,
 )
 from labrig.acquire.values import Frame
-from labrig.clock import VirtualClock
+from labrig.foundation import resources
+from labrig.foundation.clock import VirtualClock
 from labrig.optics import SpectrometerReading
 from labrig.protocols.decay import Decay
 from labrig.record import ActionRecord, FrameRecord, RunFolder, SpectrumRecord

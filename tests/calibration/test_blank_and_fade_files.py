@@ -13,7 +13,7 @@ from labrig.calibration import (
     Change,
     FadeFile,
 )
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.results import Transient
 from tests.calibration.blanks import BLANK
 from tests.quick_yaml import write_quickly

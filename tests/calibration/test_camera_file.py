@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.calibration import CAMERA_KIND, Linearity, Noise
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import Factor, Flat
 from tests.calibration.cameras import BODY, camera
 from tests.quick_yaml import write_quickly

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.calibration import IRRADIANCE_KIND, IrradianceFile
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import yaml_text
 from labrig.optics import Strip
-from labrig.yaml_file import yaml_text
 
 Row = st.tuples(*[st.floats(0, 1e6)] * 2)
 

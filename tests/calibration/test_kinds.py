@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from labrig import plugins
 from labrig.acquire import read_rig_file
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import CalibrationKind, kinds
-from labrig.errors import UsageError
+from labrig.foundation import plugins
+from labrig.foundation.errors import UsageError
 
 RIG = """name: x
 devices: {{camera: {{driver: ptp_camera, address: "usb://04a9:3199"}}}}

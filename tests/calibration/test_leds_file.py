@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig import resources
 from labrig.acquire import RigFile, read_rig_file
 from labrig.bench_optics import led_exposures
 from labrig.calibration import LEDS_KIND, LedsFile
-from labrig.errors import UsageError
 from labrig.fit.fluorescence import Exposure
-from labrig.yaml_file import yaml_text
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import yaml_text
 
 UNKNOWN = {"brightness": None, "brightness_sigma": None}
 

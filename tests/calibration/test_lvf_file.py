@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import Bands, Strip, WavelengthMap
 
 STRIP = Strip(left=(0.1, 0.45), right=(0.9, 0.5), height=0.3, rising=False)

@@ -13,12 +13,12 @@ from zlib import crc32
 import pytest
 from filelock import FileLock
 
-from labrig import resources
 from labrig.acquire import ProtocolModel, read_protocol
 from labrig.catalogue import RunFilter, RunSummary, find_run, list_runs, summarise
+from labrig.foundation import resources
+from labrig.foundation.yaml_file import yaml_text
 from labrig.record import RunFolder, add_note
 from labrig.results import write_fitted_decay, write_summary
-from labrig.yaml_file import yaml_text
 from tests.conftest import Ended
 from tests.results.made import decay_result
 

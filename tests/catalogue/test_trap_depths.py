@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from labrig.catalogue import trap_depths
-from labrig.errors import FitError, UsageError
+from labrig.foundation.errors import FitError, UsageError
 from labrig.process import process_run
 from labrig.sim.temperature import TRAP_K
 from tests.analyse.recorded import record

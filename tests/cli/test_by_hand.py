@@ -24,8 +24,8 @@ from labrig.bench import Recording
 from labrig.bench.found_calibrations import FoundCalibrations
 from labrig.cli.progress import progress
 from labrig.cli.prompt import Terminal
-from labrig.clock import Interrupted
-from labrig.errors import UsageError
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import UsageError
 from labrig.record import read_run
 from tests.frame_middle import middle_dn
 from tests.quick_yaml import read_quickly, write_quickly

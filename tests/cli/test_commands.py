@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig import plugins
+from labrig.foundation import plugins
 from labrig.record import RunLock, own_digest, read_run
 from labrig.results import DecayResult, read_result
 from tests.conftest import Ended

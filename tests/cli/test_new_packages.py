@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig import resources
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
 from labrig.package_template import create_package
 from tests.conftest import Ended
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from labrig.acquire import DOOR, plan, planned_rig, read_protocol, read_rig_file
+from labrig.foundation.yaml_file import read_yaml
 from labrig.record import RunSize, read_run
-from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 
@@ -108,7 +108,7 @@ def test_the_first_frame_of_a_shipped_decay_is_after_the_door_is_open(
 
 
 def test_planned_devices_take_the_time_of_their_driver() -> None:
-    from labrig import resources
+    from labrig.foundation import resources
 
     rig = read_rig_file(resources.find("config", "rig", "sim-phosphor"))
     assert planned_rig(rig, "rig")[DOOR].travel_s() == 0.3

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 
-from labrig import colour_science
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import (
     CHART_PATCHES,
     CIE_1931,
@@ -32,7 +33,6 @@ from labrig.reproduce import (
     read_spectral_exr,
     tristimulus,
 )
-from labrig.results import FloatArray
 from tests.conftest import Ended
 
 SMALL = ("--size", "12x9", "--paths", "4")

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
-from labrig import resources
 from labrig.acquire import read_rig_file
 from labrig.drivers.numato import NumatoRelay
 from labrig.drivers.ptp.camera import PtpCamera
 from labrig.drivers.serial_relay import SerialRelay
-from labrig.errors import DeviceError
+from labrig.foundation import resources
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.yaml_file import read_yaml, validate, yaml_text
 from labrig.setup import Host
-from labrig.yaml_file import read_yaml, validate, yaml_text
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 

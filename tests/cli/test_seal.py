@@ -11,7 +11,7 @@ import pytest
 import typer
 from hypothesis import given, strategies as st
 
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.record import read_run
 from labrig.seal import create_key, read_key, read_signers, signature_text, signer_of
 from tests.conftest import Ended

@@ -13,7 +13,7 @@ from labrig.compare.nalbach2017 import TABLE_1, emission
 from labrig.compare.residuals import equally_weighted, fits_by_states, residuals
 from labrig.compare.spectra_figure import spectra_figure
 from labrig.compare.viewing import viewing
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Material, State, dark_concentration, read_material
 from labrig.optics import (
     CIE_1931,

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 
 import pytest
 
-from labrig import resources
 from labrig.calibration import LVF_KIND, LvfFile
 from labrig.calibration.lvf_file import CurveColumns
 from labrig.cli.exit_codes import guarded
+from labrig.foundation import resources
 from labrig.optics import read_camera
 from labrig.results import RunResult
 from labrig.results.phosphor import PhosphorResult

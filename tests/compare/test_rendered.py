@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from labrig import resources
 from labrig.acquire import read_rig_file
 from labrig.calibration import FADE_KIND
 from labrig.cli.exit_codes import guarded
 from labrig.compare.glow import glow_sigma, state_signals
 from labrig.compare.photographed_room import PhotographedRoom
 from labrig.compare.rendered import charging_doubts
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.material import (
     SEEN_FACTOR,
     Albedo,
@@ -29,7 +30,7 @@ from labrig.material import (
     write_material,
 )
 from labrig.reproduce import Renderer, load_scene
-from labrig.results import FloatArray, PhosphorResult, Series, read_result
+from labrig.results import PhosphorResult, Series, read_result
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.optics import REFLECTED, emission
 from labrig.sim.phosphor import band_cells

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from unittest.mock import patch
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.camera import BodySettings
 from labrig.sim.camera.ptpip import server as ptpip_server
 from labrig.sim.camera.ptpip.connection import Connection

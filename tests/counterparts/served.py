@@ -7,7 +7,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from labrig.clock import Interrupted, SystemClock, VirtualClock
+from labrig.foundation.clock import Interrupted, SystemClock, VirtualClock
 from labrig.sim.camera import BodySettings, Pace, PtpIpServer, Sensor, SimulatedCamera
 
 EPOCH_S = 1_767_225_600.0

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.room import Room
 from labrig.sim.simulation import Simulation
 

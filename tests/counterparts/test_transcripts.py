@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp.codes import StandardEvent
 from labrig.drivers.ptp.containers import Kind, command
 from labrig.drivers.ptp.device_info import parse_device_info
 from labrig.drivers.ptp.eos.events import Event, ObjectOffered, parse_events
 from labrig.drivers.ptp.standard.object_info import parse_object_info
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.camera.ptpip.packets import Packet
 from labrig.sim.camera.ptpip.transactions import Transactions
 from tests.drivers.ptp.ip.wire import saying

@@ -15,7 +15,6 @@ import usb.core
 
 from labrig.acquire import Camera, ExposureSettings
 from labrig.acquire.connections import SerialPort
-from labrig.clock import SystemClock
 from labrig.drivers.ptp import PtpCamera
 from labrig.drivers.ptp.codes import Standard, StandardEvent, StandardProperty
 from labrig.drivers.ptp.device_info import DeviceInfo, parse_device_info
@@ -25,7 +24,8 @@ from labrig.drivers.ptp.standard.frames import StandardFrames
 from labrig.drivers.ptp.standard.object_info import FOLDER, parse_object_info
 from labrig.drivers.ptp.standard.properties import StandardProperties
 from labrig.drivers.ptp.usb.link import UsbLink
-from labrig.errors import DeviceError
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import DeviceError
 
 from .vusb import VirtualBus, VirtualCamera
 

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from labrig.design import Keys, LightProgramme
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+from labrig.foundation.yaml_file import validate, write_yaml
 from labrig.reproduce import SceneFile
-from labrig.yaml_file import validate, write_yaml
 
 LUX = 2000.0
 #: One metre upwards, and one wall behind it that sends light back.

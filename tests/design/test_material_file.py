@@ -18,7 +18,7 @@ from labrig.design import (
     to_material,
     written_differences,
 )
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.material import read_material, write_material
 from labrig.reproduce import Field, FieldParameters
 from tests.design.scenes import COLOURED, Truth, keys_of

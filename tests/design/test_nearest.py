@@ -13,7 +13,7 @@ from labrig.design import (
     spectral_bands,
     three_bands,
 )
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import Material, State, read_material
 
 EDGES_NM = np.linspace(400.0, 700.0, 9)

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from numpy.typing import NDArray
 
 from labrig.design import Reach, propagate
-from labrig.errors import UsageError
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 
 
 def halves(size: int = 24) -> FloatArray:

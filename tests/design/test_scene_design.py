@@ -16,10 +16,10 @@ from labrig.design import (
     solve_in_scene,
     to_wish,
 )
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import read_model, write_yaml, yaml_text
 from labrig.material import read_material, write_material
 from labrig.reproduce import Renderer, load_scene
-from labrig.yaml_file import read_model, write_yaml, yaml_text
 from tests.conftest import Ended
 from tests.design.small_scene import corner
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from labrig.design import (
     Design,
@@ -19,7 +18,8 @@ from labrig.design import (
     to_material,
     written_differences,
 )
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import read_material, write_material
 from labrig.optics import read_light
 from labrig.reproduce import (
@@ -31,8 +31,6 @@ from labrig.reproduce import (
     tristimulus,
 )
 from tests.design.small_scene import FLOOR, LUX, corner
-
-FloatArray = NDArray[np.float64]
 
 #: Where the floor and the wall are seen.
 FRONT, BEHIND = (0.5, 0.62), (0.5, 0.2)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from labrig.design import (
@@ -13,10 +12,9 @@ from labrig.design import (
     spectral_bands,
     three_bands,
 )
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from tests.design.scenes import COLOURED, OFTEN_S, Truth, film, keys_of
-
-FloatArray = NDArray[np.float64]
 
 RGB = three_bands()
 ONE_STATE = Truth.of([0.05], [[0.002, 0.03, 0.2]], [[0.1, 4.0, 2.0]], [0.1, 0.3, 0.2])

@@ -7,7 +7,6 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from labrig.design import (
     RGB_TO_Y,
@@ -16,15 +15,14 @@ from labrig.design import (
     read_wish,
     solve_spread,
 )
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import yaml_text
 from labrig.reproduce import Renderer, load_scene, read_scene
-from labrig.yaml_file import yaml_text
 from tests.conftest import Ended
 from tests.design.small_scene import corner
 from tests.design.spread_keys import GLOWS, OBJECTS, PIXELS, TIMES_S, keys
 
 Labrig = Callable[..., Ended]
-FloatArray = NDArray[np.float64]
 
 
 def written(folder: Path, objects: dict[str, Any] = OBJECTS, **changed: Any) -> Path:

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.design import read_wish, to_material, written_differences
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import yaml_text
 from labrig.material import read_material
-from labrig.yaml_file import yaml_text
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]

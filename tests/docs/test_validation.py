@@ -94,7 +94,7 @@ def test_a_quotation_is_renewed_where_the_page_breaks_its_lines() -> None:
 
 
 def test_a_digest_is_of_the_sources_that_a_module_reaches() -> None:
-    assert digest("labrig.errors") != digest("labrig.clock")
+    assert digest("labrig.foundation.errors") != digest("labrig.foundation.clock")
     assert digest("tests.acceptance.labrig_process") == digest("tests.acceptance.labrig_process")
 
 

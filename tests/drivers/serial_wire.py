@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import NoReturn, Protocol
 
-from labrig.clock import Interrupted, VirtualClock
+from labrig.foundation.clock import Interrupted, VirtualClock
 
 #: What must be written, and what comes back for it.
 Script = list[tuple[bytes, bytes]]

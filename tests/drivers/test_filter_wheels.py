@@ -7,13 +7,13 @@ from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
 from labrig.acquire import FilterWheel, TurnWheel
-from labrig.clock import VirtualClock
 from labrig.drivers.maestro import MaestroFilterWheel
 from labrig.drivers.serial_relay import SerialFilterWheel
 from labrig.drivers.thorlabs_fw102c import ThorlabsFilterWheel
-from labrig.errors import DeviceError, ProtocolError, UnclearAnswerError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, ProtocolError, UnclearAnswerError
+from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import Fw102cBoard, MaestroBoard
-from labrig.yaml_file import validate
 from tests.drivers.serial_wire import BoardPort, Script, ScriptedPort, Wired
 
 OPENED: Script = [

@@ -5,15 +5,15 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.clock import VirtualClock
 from labrig.drivers.lcus import LcusRelay
 from labrig.drivers.maestro import MaestroDoor
 from labrig.drivers.numato import NumatoRelay
 from labrig.drivers.serial_relay import SerialRelay
 from labrig.drivers.text_changer import TextChanger
-from labrig.errors import UnclearAnswerError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UnclearAnswerError
+from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import ArduinoBoard, ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard
-from labrig.yaml_file import validate
 from tests.drivers.serial_wire import Board, BoardPort, InterruptingClock, Wired
 
 LATE_S = 0.06

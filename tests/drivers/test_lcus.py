@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Checkable, Lamp
-from labrig.clock import VirtualClock
 from labrig.drivers.lcus import LcusRelay, command, relay_states
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.sim.boards import LcusBoard
 from labrig.sim.boards.lcus import Answers
 from tests.drivers.serial_wire import (

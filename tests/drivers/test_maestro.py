@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Guarded, LampShield, TrapDoor
-from labrig.clock import VirtualClock
 from labrig.drivers.maestro import MaestroDoor, MaestroShield
 from labrig.drivers.maestro.servo import ERRORS, Wire, error_text, quarters, seven_bits
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, DeviceLostError
+from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import MaestroBoard
-from labrig.yaml_file import validate
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
 
 KEYS = {"channel": 2, "closed": "1000 us", "open": "1500 us", "travel": "280 ms"}

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Lamp
-from labrig.clock import VirtualClock
 from labrig.drivers.numato import NumatoRelay
 from labrig.drivers.serial_line import SerialLine
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, ScriptedPort, Wired
 

@@ -5,9 +5,9 @@ from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
 from labrig.acquire import LedBank
-from labrig.clock import VirtualClock
 from labrig.drivers.numato import NumatoLedBank, NumatoRelay
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.acquire import Thermometer
-from labrig.clock import Interrupted, VirtualClock
 from labrig.drivers.numato import NumatoRelay, NumatoThermometer
 from labrig.drivers.numato.thermometer import CONVERSIONS, PLAUSIBLE_C
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Interrupted, VirtualClock
+from labrig.foundation.errors import DeviceError
 from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
 

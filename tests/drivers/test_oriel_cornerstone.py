@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Monochromator, Tune
-from labrig.clock import VirtualClock
 from labrig.drivers.oriel_cornerstone import OrielCornerstone
-from labrig.errors import ProtocolError, UnclearAnswerError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import ProtocolError, UnclearAnswerError
 from labrig.sim.boards import CornerstoneBoard
 from tests.drivers.serial_wire import BoardPort, Script, ScriptedPort, Wired
 

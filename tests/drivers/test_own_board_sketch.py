@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.boards import ArduinoBoard
 
 PAGE = Path(__file__).parents[2] / "docs/how-to/own_board.md"

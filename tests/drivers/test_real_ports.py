@@ -8,7 +8,7 @@ import pytest
 
 from labrig.acquire import DOOR, LAMP, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.boards import ArduinoBoard, LcusBoard, MaestroBoard
 from tests.drivers.serial_wire import Board
 from tests.terminal import idle_guard, on_a_terminal

@@ -6,12 +6,12 @@ import pytest
 from pydantic import ValidationError
 
 from labrig.acquire import SampleChanger
-from labrig.clock import VirtualClock
 from labrig.drivers.maestro import MaestroSampleChanger
 from labrig.drivers.serial_relay import SerialSampleChanger
-from labrig.errors import UnclearAnswerError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UnclearAnswerError
+from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import MaestroBoard
-from labrig.yaml_file import validate
 from tests.drivers.serial_wire import BoardPort, ScriptedPort, Wired
 
 SERVO = {

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 import usb.core
-from numpy.typing import NDArray
 
 from labrig.acquire import Checkable, Connections, Spectrometer
-from labrig.clock import Clock, Interrupted
 from labrig.drivers.seabreeze_spectrometer import SeabreezeSpectrometer, _serial_number
-from labrig.errors import (
+from labrig.foundation.clock import Clock, Interrupted
+from labrig.foundation.errors import (
     DeviceError,
     DeviceLostError,
     ProtocolError,
@@ -29,7 +28,6 @@ from labrig.sim.spectrometer.detector import UNIT_IRRADIANCE, Detector
 
 pytest.importorskip("seabreeze")
 
-FloatArray = NDArray[np.float64]
 ROOM: dict[str, Any] = {
     "sample": "blue-paint",
     "sensor": {"width": 32, "height": 32},

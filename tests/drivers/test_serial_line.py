@@ -2,9 +2,9 @@
 
 import pytest
 
-from labrig.clock import VirtualClock
 from labrig.drivers.serial_line import SerialLine
-from labrig.errors import UnclearAnswerError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UnclearAnswerError
 
 
 class FullPort:

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Checkable, Guarded, Lamp, LedBank
-from labrig.clock import VirtualClock
 from labrig.drivers.serial_relay import SerialLedBank, SerialRelay
-from labrig.errors import DeviceError, DeviceLostError, UnclearAnswerError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, DeviceLostError, UnclearAnswerError
+from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import ArduinoBoard, LcusBoard, NumatoBoard
-from labrig.yaml_file import validate
 from tests.drivers.serial_wire import (
     Board,
     BoardPort,

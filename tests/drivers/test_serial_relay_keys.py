@@ -7,8 +7,8 @@ from hypothesis import given, strategies as st
 
 from labrig.drivers.serial_relay import SerialLedBank, SerialRelay
 from labrig.drivers.serial_relay.wire_text import wire_text
-from labrig.errors import UsageError
-from labrig.yaml_file import validate
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import validate
 
 Keys = dict[str, Any]
 MINIMAL: Keys = {"on": "1", "off": "0"}

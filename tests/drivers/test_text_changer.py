@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Changer
-from labrig.clock import VirtualClock
 from labrig.drivers.text_changer import TextChanger
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.sim.boards import ChangerBoard
 from tests.drivers.serial_wire import BoardPort, Script, ScriptedPort, Wired
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
 from labrig.acquire import LedBank
-from labrig.clock import VirtualClock
 from labrig.drivers.thorlabs_dc4100 import ThorlabsLedBank
-from labrig.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
 from labrig.sim.boards import Dc4100Board
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
 

@@ -10,7 +10,7 @@ import pytest
 from labrig.acquire import ROLES, LiveView
 from labrig.acquire.connections import Connections
 from labrig.drivers.uvc_preview import UvcPreview
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 
 def eye(address: str) -> UvcPreview:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import Plan, RunObserver, read_rig_file
 from labrig.analyse.overrides import read_run_protocol
 from labrig.bench import Recording
-from labrig.clock import Clock
+from labrig.foundation import resources
+from labrig.foundation.clock import Clock
 from labrig.process import process_run
 from labrig.process.provenance import describe_run
 from labrig.record import read_run

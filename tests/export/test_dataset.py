@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import labrig
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from tests.export.conftest import Finished
 
 

@@ -15,8 +15,8 @@ from nexusformat.nexus.validate import validate_file
 from silx.io import nxdata
 
 import labrig
-from labrig.errors import DiskError
 from labrig.export import write_nexus
+from labrig.foundation.errors import DiskError
 from labrig.record import read_run
 from tests.export.conftest import Finished
 

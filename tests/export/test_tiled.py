@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import labrig
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.record import read_run
 from labrig.record.journal import read_journal
 from tests.export.conftest import Finished

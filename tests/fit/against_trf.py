@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 from scipy import optimize
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import EPSILON, FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import EPSILON, LeastSquaresFit, least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from tests.fit.fit_problems import Problem
 
 #: Ratio of χ² from which one fit is worse than another.

@@ -8,16 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, read_material
 from labrig.results import Charge, ChargingSeries, Transient
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import LampSettings
-
-FloatArray = NDArray[np.float64]
 
 #: From lamp off until the door stands still.
 DOOR_S = 0.6

@@ -6,7 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from tests.fit.strd import ComplexArray, FloatArray
+from labrig.foundation.arrays import FloatArray
+from tests.fit.strd import ComplexArray
 
 STEP = 1e-200
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import skewnorm
 
-from labrig.fit import FloatArray
 from labrig.fit.fluorescence import Exposure, FluorescenceSystem, fluorescence_system
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum, read_camera
 

@@ -1,6 +1,6 @@
 """Layers that light is absorbed in."""
 
-from labrig.results import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.sim.kinetics import layers_of
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import Lamp

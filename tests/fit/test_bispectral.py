@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from numpy.typing import NDArray
 
-from labrig.errors import DataError
 from labrig.fit import LitSpectrum, bispectral_columns, separate_columns
 from labrig.fit.bispectral import band_weights_nm
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import band_integrals, edges_from_centres
 from tests.pulls import assert_sigma_is_right
 
-FloatArray = NDArray[np.float64]
 NM = np.arange(380.0, 781.0, 1.0)
 OUTPUT_NM = np.arange(400.0, 761.0, 10.0)
 EDGES_NM = edges_from_centres(OUTPUT_NM)

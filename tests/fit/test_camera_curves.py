@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
 from labrig.fit.camera_curves import GRID_NM, ChartReadings, fit_camera_curves
+from labrig.foundation.errors import FitError
 from labrig.optics import (
     CIE_1931,
     CameraResponse,

@@ -4,15 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from labrig.errors import FitError
 from labrig.fit import ChargeFit, fit_charge_and_decay
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.results import OneSided
 from tests.pulls import assert_sigma_is_right
-
-FloatArray = NDArray[np.float64]
 
 ON_S, OFF_S = 20.0, 220.0
 T_S = np.concatenate([np.arange(0.0, 400.0, 1.0), np.geomspace(400.0, 3000.0, 200)])

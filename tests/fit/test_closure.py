@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from labrig.errors import DataError
 from labrig.fit.excitation import closure
+from labrig.foundation.errors import DataError
 from labrig.report import figure_style
 from labrig.report.excitation import closure_picture
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from labrig.fit import fit_luminance
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
-from labrig.results import FloatArray, ForecastTime, LuminanceDecay
+from labrig.results import ForecastTime, LuminanceDecay
 
 END_S = 20_000.0
 Curve = Callable[[FloatArray], FloatArray]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
 from tests.fit import truths
 
 SNR = 1000.0
@@ -14,7 +15,7 @@ FIRST = float(np.exp(-0.03 * 0.3) * -np.expm1(-0.03 * 1.5) / (0.03 * 1.5))
 
 
 def fitted(
-    seed: int, bend: float = 0.0, colour: float = 0.0, t_s: truths.FloatArray = truths.TIMES_S
+    seed: int, bend: float = 0.0, colour: float = 0.0, t_s: FloatArray = truths.TIMES_S
 ) -> DecayFit:
     """One state seen by a sensor that is off by `bend` at signal 1, and a light of other colour."""
     seen = truths.observe(truths.exponentials((0.03, 1.0)), seed, snr=SNR, t_s=t_s)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.errors import FitError
 from tests.fit import truths
 
 RATE = 0.02

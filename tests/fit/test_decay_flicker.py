@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.fit import DecayFit, FloatArray, fit_decay, periodogram
+from labrig.fit import DecayFit, fit_decay, periodogram
 from labrig.fit.decay.periodic_flicker import unseen_flicker
+from labrig.foundation.arrays import FloatArray
 from labrig.protocols.steps.random_spacing import RandomSpacing
 
 EVEN_S = np.linspace(0.5, 175.5, 36)

@@ -11,13 +11,14 @@ import pytest
 
 from labrig.analyse import TableFitOptions, fit_table
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
 from tests.acceptance.decay_coverage import LAWS, exponentials, fit, hidden_truth, is_right
 from tests.fit import truths
 from tests.pulls import assert_sigma_is_right
 
 DOUBLE = ((0.1, 1.0), (0.02, 0.5))
 #: So many frames tell a drift.
-DENSE_S: truths.FloatArray = 0.3 + 2.5 * np.arange(74, dtype=np.float64)
+DENSE_S: FloatArray = 0.3 + 2.5 * np.arange(74, dtype=np.float64)
 #: A lamp that drifts: flicker of 0.7 %, correlated by so much from frame to frame.
 DRIFT = 0.9
 

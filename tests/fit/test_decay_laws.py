@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import least_squares
 
-from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
 from labrig.fit.decay import laws
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS, DecayLaw, exponential_means
-from labrig.results import FORECAST_SPANS, FittedDecay, FloatArray, OneSided
+from labrig.results import FORECAST_SPANS, FittedDecay, OneSided
 from tests.fit import truths
 from tests.pulls import assert_sigma_is_right
 

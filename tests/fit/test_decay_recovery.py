@@ -9,6 +9,7 @@ from labrig.fit.decay.joint import JointProblem, covariance_under_flicker, fit_j
 from labrig.fit.decay.series import decay_series
 from labrig.fit.decay.states import exponentials
 from labrig.fit.decay.whitening import whitened
+from labrig.foundation.arrays import FloatArray
 from tests.fit import truths
 from tests.pulls import assert_sigma_is_right
 
@@ -36,9 +37,7 @@ def _fit(seen: truths.Observed, **options: object) -> DecayFit:
     )
 
 
-def _exact(
-    truth: States, exposure_s: float | truths.FloatArray, snr: float = 300.0
-) -> truths.Observed:
+def _exact(truth: States, exposure_s: float | FloatArray, snr: float = 300.0) -> truths.Observed:
     """Without a trace of noise, at the σ of a measurement of `snr`."""
     exposure = np.broadcast_to(np.asarray(exposure_s), truths.TIMES_S.shape)
     signal = truths.exposed(truths.exponentials(*truth), truths.TIMES_S, exposure)

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from tests.fit import truths
 
 DOUBLE = truths.exponentials((0.08, 1.0), (0.015, 0.4))
 T = truths.TIMES_S
 #: Frames of what fades within seconds.
-FAST_S: truths.FloatArray = 0.3 + 2.0 * np.arange(31, dtype=np.float64)
+FAST_S: FloatArray = 0.3 + 2.0 * np.arange(31, dtype=np.float64)
 SEEN = truths.observe(DOUBLE, seed=11)
 
 
@@ -244,7 +245,7 @@ def test_amplitude_at_lamp_off_is_as_uncertain_as_the_rate_that_leads_there() ->
     sigma = np.full(30, 1e-3)
     values = np.exp(-k_per_s * t_s) + sigma * np.random.default_rng(5).normal(size=30)
 
-    def signal(t_s: truths.FloatArray, k_per_s: float, amplitude: float) -> truths.FloatArray:
+    def signal(t_s: FloatArray, k_per_s: float, amplitude: float) -> FloatArray:
         return amplitude * np.exp(-k_per_s * t_s)
 
     best, covariance = curve_fit(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import exponential_means, exponential_means_and_slopes
 from tests.fit import truths
 

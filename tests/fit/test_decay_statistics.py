@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
 from tests.fit import truths
 
 SINGLE = ((0.02, 1.0),)
@@ -41,7 +42,7 @@ def _fits(
     ]
 
 
-def _pulls(fits: list[DecayFit], truth: tuple[tuple[float, float], ...]) -> truths.FloatArray:
+def _pulls(fits: list[DecayFit], truth: tuple[tuple[float, float], ...]) -> FloatArray:
     return np.array(
         [
             (state.k_r_per_s - k) / state.k_r_sigma_per_s
@@ -173,7 +174,7 @@ def test_growing_exposures_improve_the_slow_rate() -> None:
     growing_s = np.minimum(0.25 * 1.085 ** np.arange(37), 4.0)
     decay = truths.exponentials(*DOUBLE)
 
-    def sigma(exposure_s: float | truths.FloatArray) -> float:
+    def sigma(exposure_s: float | FloatArray) -> float:
         seen = truths.observe(decay, 1, snr=100, flicker=0, exposure_s=exposure_s)
         # Photons collect in proportion to the exposure.
         noise = seen.sigma * np.sqrt(0.25 / seen.exposure_s)[:, None]

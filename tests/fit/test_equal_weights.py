@@ -7,7 +7,7 @@ import pytest
 
 import labrig
 from labrig.analyse import TableFitOptions, fit_table
-from labrig.errors import FitError, UsageError
+from labrig.foundation.errors import FitError, UsageError
 from labrig.results import FittedDecay
 
 #: Lanczos3 of the Statistical Reference Datasets of NIST, in the public domain: x is 0, 0.05, ….

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from labrig.errors import FitError
 from labrig.fit.excitation import RelativeSigmas, fit_excitation as fit, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
+from labrig.foundation.errors import FitError
 from labrig.material import Material, dark_step, read_material
 from labrig.results import Charge, ChargingSeries, EarlierCharges, FittedExcitation, Transient
 from tests.fit.charged_samples import BARE, DOOR_S, WEIGHTS, Bench, lvf_windows, two_states

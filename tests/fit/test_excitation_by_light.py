@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.results import ChargingSeries
-from tests.fit.charged_samples import BARE, Bench, FloatArray, lvf_windows, two_states
+from tests.fit.charged_samples import BARE, Bench, lvf_windows, two_states
 
 #: Band-pass filters of about the width of the bands.
 WINDOWS = lvf_windows(np.array([420.0, 455.0, 495.0, 530.0, 570.0, 605.0, 645.0, 680.0]), 30.0)

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from labrig.fit.excitation import excitation_course
-
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 BANDS_NM: dict[str, FloatArray] = {
     "wide": np.linspace(400.0, 700.0, 9),

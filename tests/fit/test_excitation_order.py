@@ -8,9 +8,10 @@ import pytest
 from labrig.analyse import Overrides
 from labrig.analyse.excitation.closure import predicted_charging
 from labrig.analyse.excitation.orders import OrderFits
-from labrig.errors import UsageError
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation, levels_at_off
 from labrig.fit.excitation.levels import levels
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import becquerel_of, read_material
 from labrig.results import (
     Charge,
@@ -18,7 +19,6 @@ from labrig.results import (
     Closure,
     EarlierCharges,
     FittedExcitation,
-    FloatArray,
     PatchCharging,
     Series,
 )

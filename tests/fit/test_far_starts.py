@@ -5,9 +5,9 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from labrig.fit import Ending, least_squares
+from labrig.foundation.arrays import FloatArray
 from tests.fit.against_trf import WORSE, compared, is_at_minimum
 from tests.fit.fit_problems import FAMILIES, PLACES, Problem, classical, generated
-from tests.fit.strd import FloatArray
 
 #: With these no data determine all parameters.
 UNDETERMINED = ("product", "duplicate column", "no effect", "fewer values than parameters")

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from labrig.errors import UsageError
-from labrig.fit import FloatArray
 from labrig.fit.fluorescence import (
     Exposure,
     ExtrapolatedExcitation,
@@ -23,6 +21,8 @@ from labrig.fit.fluorescence import (
     predicted_colour,
     study_leds,
 )
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, appearance, compare_colours, read_reradiation
 from labrig.optics import Spectrum, read_camera, read_light
 from tests.fit.fluorescent_samples import (

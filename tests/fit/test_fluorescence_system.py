@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from labrig.errors import UsageError
 from labrig.fit.fluorescence import (
     Exposure,
     FluorescenceSystem,
@@ -19,6 +18,7 @@ from labrig.fit.fluorescence import (
     predicted_colour,
 )
 from labrig.fit.spectrum import CurveError
+from labrig.foundation.errors import UsageError
 from labrig.material import appearance
 from labrig.optics import CameraResponse, Spectrum, Transmittance, read_camera, read_light
 from tests.fit.fluorescent_samples import (

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labrig.foundation.arrays import FloatArray
 from tests.conftest import Ended
 from tests.fit import truths
 
@@ -17,7 +18,7 @@ NOISE = np.random.default_rng(3).normal(size=len(T))
 DECAY = 100 * np.exp(-0.02 * T)
 
 
-def with_frame(row: int, value: float) -> truths.FloatArray:
+def with_frame(row: int, value: float) -> FloatArray:
     """A decay in which one frame was disturbed."""
     return np.where(np.arange(len(T)) == row, value, DECAY + 0.3 * NOISE)
 
@@ -27,11 +28,11 @@ class Case:
     """A table, what is asked, and what is said."""
 
     name: str
-    values: truths.FloatArray
+    values: FloatArray
     sigma: float
     said: str
     options: Sequence[str] = ()
-    t_s: truths.FloatArray = field(default_factory=T.copy)
+    t_s: FloatArray = field(default_factory=T.copy)
 
 
 REFUSED = [

@@ -4,17 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from labrig.fit import DecayFit, fit_charge_and_decay, fit_decay
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.foundation.arrays import FloatArray
 from labrig.material import dark_concentration, lit_concentration, read_material
 from labrig.results import read_fitted_decay, write_fitted_decay
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit import truths
 from tests.fit.charged_samples import Bench, lvf_windows
-
-FloatArray = NDArray[np.float64]
 
 T_S: FloatArray = 0.5 + 4.5 * np.arange(40.0)
 

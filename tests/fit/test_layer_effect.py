@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from labrig.fit.excitation import RelativeSigmas, fit_excitation, layer_effect
+from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
-from labrig.results import DensityBasis, FittedExcitation, FloatArray, LayerEffect
+from labrig.results import DensityBasis, FittedExcitation, LayerEffect
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.phosphor import phosphor
 from tests.fit.charged_samples import Bench, lvf_windows

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import Ending, FloatArray, least_squares
+from labrig.fit.least_squares import Ending, least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from tests.fit import strd
 
 CERTIFIED_DIGITS = 9

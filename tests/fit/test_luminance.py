@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
 from labrig.fit import fit_luminance
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS, exponential_means
-from labrig.results import FloatArray, LuminanceDecay, LuminanceRequirement, Measured, Verdict
+from labrig.results import LuminanceDecay, LuminanceRequirement, Measured, Verdict
 from tests.pulls import assert_sigma_is_right
 
 LOGGED_S = np.geomspace(60, 40_000, 60)

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import LvfCalibration, calibrate_lvf
 from labrig.fit.lvf.calibration import LOG_ORDER_SIGMA
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import (
     Bands,
     CameraResponse,

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import MERCURY, Line, fit_wavelengths, locate_lines
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import (
     Bands,
     CameraResponse,

@@ -13,8 +13,8 @@ from hypothesis import given, settings, strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import skewnorm
 
-from labrig.errors import DataError, UsageError
 from labrig.fit import MixtureFit, fit_mixture
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture, compare_colours
 from labrig.optics import read_light
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.testing import assert_allclose
 
-from labrig.errors import UsageError
 from labrig.fit import fit_mixture, fit_mixture_texture
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture
 
 INPUT_NM = np.arange(300.0, 781.0, 10.0)

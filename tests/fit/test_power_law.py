@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import FitError
 from labrig.fit import PowerLaw, fit_power_law
+from labrig.foundation.errors import FitError
 from labrig.results import Measured
 from tests.pulls import assert_sigma_is_right
 

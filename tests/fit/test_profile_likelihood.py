@@ -6,7 +6,6 @@ import lmfit  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from labrig.fit.bounded_limits import away_from_bound, toward_bound
@@ -18,9 +17,8 @@ from labrig.fit.profile_likelihood import (
     Quantity,
     parameter,
 )
+from labrig.foundation.arrays import FloatArray
 from labrig.results import NORMAL_95, ProfileInterval
-
-FloatArray = NDArray[np.float64]
 
 T_S = np.arange(0.0, 60.0, 1.5)
 NO_BOUND = np.full(4, np.inf)

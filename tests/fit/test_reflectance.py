@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.reflectance import (
     LitStrip,
     Luminescence,
@@ -16,6 +14,8 @@ from labrig.fit.reflectance import (
     relative_to_card,
 )
 from labrig.fit.spectrum import SpectralSystem, fit_spectrum
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import Transmittance
 from tests.pulls import assert_sigma_is_right
 

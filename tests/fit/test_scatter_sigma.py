@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
 from labrig.fit import fit_decay
+from labrig.foundation.errors import FitError
 from tests.acceptance.coverage_table_sigma import DECAYS, NOISES, coverage
 from tests.fit import truths
 from tests.pulls import assert_sigma_is_right

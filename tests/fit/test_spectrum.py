@@ -7,8 +7,6 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import (
     CurveError,
     SpectralSystem,
@@ -16,7 +14,9 @@ from labrig.fit.spectrum import (
     nonnegative_minimum,
     system_through_lvf,
 )
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.optics import CameraResponse, Spectrum
 from tests.fit import lvf_pictures as made
 

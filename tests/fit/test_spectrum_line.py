@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import (
     CurveError,
     LineFit,
@@ -12,6 +10,8 @@ from labrig.fit.spectrum import (
     fit_line,
     system_through_lvf,
 )
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import Spectrum
 from tests.fit import lvf_pictures as made
 

@@ -6,8 +6,8 @@ Errors over σ of many lights, and false alarms: `tests.acceptance.spectrum_line
 import numpy as np
 import pytest
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import SpectrumFit, fit_spectrum, system_through_lvf
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Spectrum, band_means
 from tests.acceptance.spectrum_lines import FINE_NM, light_of
 from tests.fit import lvf_pictures as made

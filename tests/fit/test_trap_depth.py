@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import FitError
 from labrig.fit import fit_trap_depth
-from labrig.results import FloatArray, TrapDepth
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.results import TrapDepth
 from tests.pulls import assert_sigma_is_right
 
 CELSIUS = np.array([5.0, 14.0, 22.0, 31.0, 40.0])

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Gauss–Legendre on [0, 1]: exact to rounding for any decay that varies less than e^10 in a frame.
 _NODES, _FRACTIONS = np.polynomial.legendre.leggauss(24)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig import resources
 from labrig.fit.camera_curves import (
     GRID_NM,
     CameraCurvesFit,
@@ -13,7 +12,8 @@ from labrig.fit.camera_curves import (
     FilterReadings,
     fit_camera_curves,
 )
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import (
     CameraResponse,
     Lvf,

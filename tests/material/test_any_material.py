@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_array_equal
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import (
     Material,
     ReradiationMatrix,

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig import resources
 from labrig.compare.nalbach2017 import TABLE_1
+from labrig.foundation import resources
 from labrig.material import IrradianceNorm, Material, State, compare_materials, read_material
 from labrig.report.material_tables import comparison_table
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
-from labrig.results import FloatArray
 
 T_S = np.array([0.0, 0.3, 5.0, 50.0, 175.0])
 EXPOSURE_S = np.array([0.0, 1e-3, 0.5, 2.0, 5.0])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import CameraResponse, read_camera
 
 NAME = "canon_eos_5d_mark_ii"

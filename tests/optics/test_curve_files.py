@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import (
     Spectrum,
     Transmittance,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import read_curve_file, read_spectrum, read_transmittance
 from tests.written_spectra import FRACTIONS, LIGHTS, spectrum_text
 

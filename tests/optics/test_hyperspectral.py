@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import DataError, LabrigError, UsageError
 from labrig.fit.bispectral import LitSpectrum, bispectral_columns, separate_columns
+from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import HyperspectralCube, Spectrum, read_hyperspectral_cube
 
 NM = np.arange(380.0, 781.0, 4.0)

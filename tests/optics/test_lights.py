@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from labrig import colour_science
-from labrig.errors import UsageError
+from labrig.foundation import colour_science
+from labrig.foundation.errors import UsageError
 from labrig.optics import CIE_1931, illuminant, is_narrow, lab, observer, read_light
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import read_camera, shipped_camera, shipped_cameras
 
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from numpy.typing import NDArray
 
-from labrig.errors import DataError, LabrigError, UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import (
     MeasuredSpectrum,
     SpectrometerReading,
@@ -17,7 +17,6 @@ from labrig.optics import (
     read_spectrometer_reading,
 )
 
-FloatArray = NDArray[np.float64]
 GRID_NM = np.linspace(340.0, 1020.0, 400)
 DARK_PIXELS = tuple(range(5, 20))
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
 from labrig.predict.information import information
 from labrig.predict.patch import chance_of_all_states
 from labrig.predict.series import DARK, FLICKER, PHOTONS, READING, ExpectedSeries
@@ -21,7 +22,7 @@ TELLING_SNR, TELLING_RATE_PER_S = 200.0, 0.2
 def series(
     states: tuple[tuple[float, float], ...] = ((0.03, 1.0),),
     *,
-    times_s: truths.FloatArray = truths.TIMES_S,
+    times_s: FloatArray = truths.TIMES_S,
     exposure_s: float = 1.5,
     snr: float = 300.0,
     flicker: float = 0.007,
@@ -49,7 +50,7 @@ def series(
     )
 
 
-def fitted(expected: ExpectedSeries, values: truths.FloatArray, flicker: float | None) -> DecayFit:
+def fitted(expected: ExpectedSeries, values: FloatArray, flicker: float | None) -> DecayFit:
     return fit_decay(
         expected.t_s,
         values,
@@ -62,7 +63,7 @@ def fitted(expected: ExpectedSeries, values: truths.FloatArray, flicker: float |
     )
 
 
-def without_noise(expected: ExpectedSeries) -> truths.FloatArray:
+def without_noise(expected: ExpectedSeries) -> FloatArray:
     return np.multiply.outer(expected.curve, expected.weights)
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
 from labrig.cli.exit_codes import guarded
+from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.predict.reference import read_reference
 from labrig.record import read_run

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
 from tests.quick_yaml import write_quickly
 
 

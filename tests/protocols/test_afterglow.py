@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 from labrig.protocols.steps.afterglow import (
     Afterglow,
     Glow,

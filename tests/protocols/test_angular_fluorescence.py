@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 from labrig.protocols.angular_fluorescence import AngularFluorescence, AngularFrames
 from labrig.record import read_run
 from tests.analyse.angular_bench import record_angular

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import Plan, read_protocol
 from labrig.fit.lvf import most_informative_filters
+from labrig.foundation import resources
 from labrig.optics import read_transmittance
 from labrig.protocols.calibration import Calibration
 from tests.protocols.protocol_files import (

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from labrig.acquire import read_protocol
-from labrig.errors import DeviceError, ProtocolError
+from labrig.foundation.errors import DeviceError, ProtocolError
 from tests.analyse.recorded import record
 from tests.protocols.protocol_files import (
     assert_one_clear_line,

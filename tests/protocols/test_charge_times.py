@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from labrig.foundation.arrays import FloatArray
 from labrig.protocols.steps.charge_times import (
     CANDIDATES,
-    FloatArray,
     fades_below_s,
     most_informative_s,
     still_grows,

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import read_rig_file
+from labrig.foundation import resources
 from labrig.protocols.camera_curves import CameraCurves
 from labrig.protocols.colour_check import ColourCheck
 from tests.protocols.protocol_files import (

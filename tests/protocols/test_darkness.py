@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import DataError, DeviceError
+from labrig.foundation.errors import DataError, DeviceError
 from labrig.protocols.steps.darkness import DARK, Darkness, darkness
 from tests.protocols.metering import RANGE_DN, measure_frame
 

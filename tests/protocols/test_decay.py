@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
-from labrig.errors import ProtocolError, UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import ProtocolError, UsageError
+from labrig.foundation.yaml_file import read_yaml
 from labrig.record import read_run
-from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
 from tests.quick_yaml import write_quickly
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
-from labrig.errors import ProtocolError, UsageError
+from labrig.foundation.errors import ProtocolError, UsageError
 from tests.analyse.selected_lights import FILTERS, LED_NAMES, QUICK, SELECTIONS, bench
 from tests.quick_yaml import read_quickly, write_quickly
 

@@ -7,7 +7,7 @@ import pytest
 
 from labrig.acquire import read_protocol
 from labrig.cli.exit_codes import guarded
-from labrig.errors import ProtocolError
+from labrig.foundation.errors import ProtocolError
 from labrig.record import read_run
 from tests.analyse.spectral_bench import write_bench
 from tests.protocols.protocol_files import (

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import plan, read_protocol, read_rig_file
+from labrig.foundation import resources
 from tests.protocols.protocol_files import (
     assert_one_clear_line,
     assert_timeline_as_agreed,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.errors import LabrigError
+from labrig.foundation.errors import LabrigError
 from labrig.protocols.led_fluorescence import LedFluorescence
 from tests.protocols.protocol_files import (
     assert_one_clear_line,

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from labrig.acquire import read_protocol, read_rig_file
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.protocols.luminance import PRESETS, Luminance
 from tests.analyse.luminance_bench import write_rig
 from tests.protocols.protocol_files import (

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig import resources
 from labrig.acquire import ManualStep, Plan, RunObserver, plan, read_protocol, read_rig_file
 from labrig.bench import Recording, resume_run
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
-from labrig.clock import Clock, Interrupted
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.clock import Clock, Interrupted
+from labrig.foundation.errors import UsageError
 from labrig.process import process_run
 from labrig.record import read_run
 from labrig.results import read_result

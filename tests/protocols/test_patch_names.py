@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.yaml_file import read_yaml
+from labrig.foundation.yaml_file import read_yaml
 from tests.conftest import Ended
 
 WHOLE = "[0, 0, 1, 1]"

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from labrig import resources
 from labrig.acquire import Plan, RigFile, plan, read_protocol, read_rig_file
-from labrig.errors import ProtocolError
-from labrig.quantity import duration_text
+from labrig.foundation import resources
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.quantity import duration_text
 from labrig.schema import schema
 from tests.protocols.protocol_files import assert_one_clear_line, written
 from tests.quick_yaml import read_quickly, write_quickly

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from labrig.acquire import read_protocol
-from labrig.errors import LabrigError
+from labrig.foundation.errors import LabrigError
 from labrig.protocols.validate_illuminants import ValidateIlluminants
 from tests.protocols.protocol_files import (
     assert_one_clear_line,

@@ -13,9 +13,9 @@ from hypothesis import given, strategies as st
 
 from labrig.acquire import Plan, RigFile, RunObserver, read_protocol, read_rig_file
 from labrig.bench import Recording, Watch
-from labrig.clock import Clock, Interrupted
-from labrig.errors import DataError, UsageError
 from labrig.fit import fit_power_law
+from labrig.foundation.clock import Clock, Interrupted
+from labrig.foundation.errors import DataError, UsageError
 from labrig.queue import (
     Queue,
     QueuedRun,

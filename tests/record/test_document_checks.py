@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.record import ActionRecord, RunFolder, TemperatureRecord, read_run
 from tests.resealed import reseal
 

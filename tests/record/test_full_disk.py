@@ -12,7 +12,7 @@ from typing import BinaryIO
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.errors import DiskError
+from labrig.foundation.errors import DiskError
 from labrig.record import RunFolder, read_run, sealed_line
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import Journal, read_journal

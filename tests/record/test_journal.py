@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.record import sealed_line
 from labrig.record.journal import Journal, read_journal
 

@@ -9,7 +9,7 @@ from typing import Any
 import event_model
 import pytest
 
-from labrig.errors import DataError, DiskError, UsageError
+from labrig.foundation.errors import DataError, DiskError, UsageError
 from labrig.record import ActionRecord, FrameRecord, RunFolder, TemperatureRecord, read_run
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import read_journal

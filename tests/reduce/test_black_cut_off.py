@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labrig.analyse import fit_series
-from labrig.errors import FrameError
+from labrig.foundation.errors import FrameError
 from labrig.material import read_material
 from labrig.record import read_run
 from labrig.reduce import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.errors import DataError, FrameError, UsageError
+from labrig.foundation.errors import DataError, FrameError, UsageError
 from labrig.reduce import RawFrame, measure, read_raw
 from labrig.reduce.channels import isolated_outliers
 from labrig.reduce.plane_noise import plane_noise

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.reduce import find_colour_chart, measure, read_raw
 from labrig.sim.dng import Shot, encode_dng
 

@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.reduce import RawFrame, fit_dark, hot_pixels
 
 MakeRaw = Callable[..., RawFrame]

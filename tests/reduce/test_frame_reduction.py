@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from labrig.errors import DataError, FrameError, UsageError
+from labrig.foundation.errors import DataError, FrameError, UsageError
 from labrig.record import own_digest
 from labrig.reduce import RawFrame, Reduction, SeriesFrame, reduce_frames, reduce_groups
 from labrig.reduce.codec import decoded, encoded

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.reduce import read_raw
 from labrig.reduce.hdr import hdr_frame
 from labrig.sim.dng import Shot, encode_dng

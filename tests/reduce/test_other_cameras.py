@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from labrig.errors import DataError, FrameError
+from labrig.foundation.errors import DataError, FrameError
 from labrig.reduce import RawFrame, SeriesFrame, hot_pixels, measure, read_raw, reduce_series
 
 WriteDng = Callable[..., bytes]

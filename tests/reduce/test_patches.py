@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from labrig.errors import DataError, FrameError
+from labrig.foundation.errors import DataError, FrameError
 from labrig.optics import CameraModel, Flat
 from labrig.reduce import SeriesFrame, reduce_patches, reduce_series
 from labrig.reduce.series import TWO_DEGREES

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 from tifffile import imwrite
 
-from labrig.errors import FrameError, UsageError
+from labrig.foundation.errors import FrameError, UsageError
 from labrig.reduce import RawFrame, read_raw
 from labrig.reduce.raw import libraw_stderr
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.errors import FrameError
+from labrig.foundation.errors import FrameError
 from labrig.reduce.raw import sensor_pattern
 
 X_TRANS = "GGRGGBGGBGGRBRGRBGGGBGGRGGRGGBRBGBRG"

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.reduce.hdr import HdrFrame
 from labrig.reduce.strip import FoundStrip, find_strip
-from labrig.results import FloatArray
 from tests.analyse.lvf_calibration.strip_pictures import Scene, bracket, halogen
 
 SMALL = Scene(96, 64)

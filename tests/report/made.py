@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import tifffile
-from numpy.typing import NDArray
 
 from labrig.analyse.decay import noise_budget
-from labrig.errors import LabrigError
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import LabrigError
 from labrig.optics import read_camera
 from labrig.record.frames import FrameRecord
 from labrig.record.history import DeviceLine, RunDescription
@@ -17,8 +17,6 @@ from labrig.report import Report
 from labrig.report.decay import decay_sections
 from labrig.report.report_model import DecayReport, GlowPhotograph, PatchReport
 from labrig.results import Series
-
-FloatArray = NDArray[np.float64]
 
 RATES = np.array([0.08, 0.015])
 AMPLITUDES = np.array([3000.0, 900.0])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from labrig import colour_science
+from labrig.foundation import colour_science
 from labrig.optics import XYZ_TO_SRGB, CameraResponse, read_camera, srgb_bytes
 from labrig.report.colours import (
     HALOGEN_K,

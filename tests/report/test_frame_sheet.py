@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.report import draw_frames
 
 Bytes = NDArray[np.uint8]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import (
     Material,
     compare_materials,

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from labrig.number_format import exposure_text, plus_minus, rounded
+from labrig.foundation.number_format import exposure_text, plus_minus, rounded
 
 
 @pytest.mark.parametrize(

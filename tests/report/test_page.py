@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import DiskError
 from labrig.fit import DecayFit
-from labrig.number_format import plus_minus
+from labrig.foundation.errors import DiskError
+from labrig.foundation.number_format import plus_minus
 from labrig.record.history import Interruption
 from labrig.report import write_report
 from labrig.report.parameters import quality_rows

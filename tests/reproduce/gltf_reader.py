@@ -9,9 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.reproduce import ExportedMesh, Glow
-
-FloatArray = NDArray[np.float64]
 
 TIMES_S = np.array([0.0, 0.5, 2.0, 7.0])
 

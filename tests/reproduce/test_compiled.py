@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, read_material
 from labrig.reproduce import Field, FieldParameters, WavelengthShift
 

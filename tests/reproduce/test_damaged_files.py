@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import LabrigError
 from labrig.fit import fit_mixture
+from labrig.foundation.errors import LabrigError
 from labrig.material import read_mixture
 from labrig.reproduce import (
     Mesh,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig import resources
+from labrig.foundation import resources
 from labrig.optics import absolute_irradiance, read_spectrum, read_transmittance
 from labrig.reproduce import (
     DarkRoomLamp,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 
 import labrig
-from labrig import colour_science
-from labrig.errors import UsageError
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import (
     CHART_PATCHES,
     CIE_1931,
@@ -25,8 +25,6 @@ from labrig.reproduce import (
     camera_values,
     tristimulus,
 )
-
-FloatArray = NDArray[np.float64]
 
 EDGES_NM = np.linspace(300.0, 780.0, 25)
 WHITE = white_xyz("D65", observer(CIE_1931))

@@ -5,14 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import Material, read_material
 from labrig.reproduce import Field, FieldParameters
-
-FloatArray = NDArray[np.float64]
 
 BANDS, SAMPLES = 8, 200
 STEPS_S = (0.02, 0.5, 3.0, 40.0, 0.5, 600.0)

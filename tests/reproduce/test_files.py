@@ -10,7 +10,8 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from labrig.errors import DiskError, UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DiskError, UsageError
 from labrig.material import read_spectral_image
 from labrig.optics import XYZ_TO_SRGB
 from labrig.reproduce import (
@@ -22,8 +23,6 @@ from labrig.reproduce import (
     write_png,
     write_spectral_exr,
 )
-
-FloatArray = NDArray[np.float64]
 
 EDGES_NM = np.linspace(300.0, 780.0, 25)
 

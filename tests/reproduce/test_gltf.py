@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import DiskError, UsageError
+from labrig.foundation.errors import DiskError, UsageError
 from labrig.reproduce import ExportedMesh, Glow, Pinhole, write_gltf
 from tests.reproduce.gltf_reader import CORNERS, FACES, GREY, TIMES_S, Read, mesh
 

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.reproduce import Mesh, read_mesh
 from tests.reproduce.gltf_files import GltfFile
 from tests.reproduce.mesh_truth import Truth, truth
-
-FloatArray = NDArray[np.float64]
 
 MADE = Path(__file__).parent / "meshes"
 #: Area, volume, and bounds along x.

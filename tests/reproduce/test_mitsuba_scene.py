@@ -8,10 +8,9 @@ import OpenEXR
 import pytest
 from numpy.typing import NDArray
 
-from labrig.errors import DiskError, UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DiskError, UsageError
 from labrig.reproduce import ExportedMesh, Glow, Pinhole, write_mitsuba_scene
-
-FloatArray = NDArray[np.float64]
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.5]])
 FACES = np.array([[0, 1, 2], [0, 2, 3]])

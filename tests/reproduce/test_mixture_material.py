@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.errors import DataError, LabrigError, UsageError
 from labrig.fit import fit_mixture
+from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.material import (
     ReradiationMixture,
     corrected,

@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import illuminant, read_colour_chart, scotopic_efficacy
 from labrig.reproduce import Display, NightLook, night_view, scotopic_luminance, tristimulus
-
-FloatArray = NDArray[np.float64]
 
 EDGES_NM = np.linspace(300.0, 780.0, 25)
 STILL = NightLook(rods=1.0, noise=0.0, blur_px=0.0)

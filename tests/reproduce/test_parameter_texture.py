@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labrig.design import propagate
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import read_material, write_material
 from labrig.reproduce import (
     ParameterTexture,

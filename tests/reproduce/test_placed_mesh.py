@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.reproduce import (
     Mesh,
     Renderer,
@@ -22,8 +21,6 @@ from labrig.reproduce import (
 )
 from tests.reproduce.gltf_files import GltfFile
 from tests.reproduce.mesh_truth import truth
-
-FloatArray = NDArray[np.float64]
 
 PAIR = Path(__file__).parent / "meshes" / "pair_one_mirrored.glb"
 

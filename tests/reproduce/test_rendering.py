@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import write_yaml
 from labrig.material import Material, State, read_material, write_material
 from labrig.optics import absolute_irradiance, read_light
 from labrig.reproduce import (
@@ -19,7 +20,6 @@ from labrig.reproduce import (
     load_scene,
     read_mesh,
 )
-from labrig.yaml_file import write_yaml
 from tests.reproduce.small_scenes import LUX, kappa_of, scene
 
 PAINT = {"file": "blue-paint", "assume_albedo": 0.6}

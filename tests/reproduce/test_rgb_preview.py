@@ -5,8 +5,9 @@ from pathlib import Path
 import colour
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix, read_any_material
 from labrig.optics import CIE_1931, XYZ_TO_SRGB, illuminant, observer, read_light
 from labrig.reproduce import (
@@ -22,7 +23,6 @@ from labrig.reproduce import (
 )
 from tests.reproduce.gltf_reader import Read
 
-FloatArray = NDArray[np.float64]
 BANDS = Bands.even()
 LIGHTS = ("D65", "A", "FL2", "450nm")
 TEXTILES = ("yellow-textile", "orange-textile", "white-paper")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import illuminant
 from labrig.reproduce import SpectralFrame, shown_frames, white_under
 

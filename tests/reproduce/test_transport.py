@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.reproduce import (
     Geometry,
     Lamp,
@@ -23,8 +23,6 @@ from labrig.reproduce import (
     fold,
 )
 from labrig.reproduce.transport.tracing_kernels import located_in_texture, rasterised
-
-FloatArray = NDArray[np.float64]
 
 BANDS = 24
 ROOM = Mesh.box((0, 0, 0), (2, 3, 2.5), inward=True)

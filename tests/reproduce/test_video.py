@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from labrig.errors import DiskError, UsageError
+from labrig.foundation.errors import DiskError, UsageError
 from labrig.reproduce import write_video
 
 Bytes = NDArray[np.uint8]

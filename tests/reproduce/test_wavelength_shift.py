@@ -8,8 +8,9 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from labrig.errors import UsageError
 from labrig.fit import fit_mixture
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture, corrected
 from labrig.reproduce import (
     LampWavelengths,
@@ -22,8 +23,6 @@ from labrig.reproduce.transport.wavelength_shift import Start
 from tests.material.reradiation import bfc450
 from tests.material.reradiation.formats.matrices import two_dyes
 from tests.material.reradiation.mixtures import random_mixture
-
-FloatArray = NDArray[np.float64]
 
 NM = np.arange(305.0, 780.0, 10.0)
 REFLECTANCE = 0.3 + 0.4 * (NM - 300) / 480

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig import plugins
 from labrig.fit import fit_luminance
+from labrig.foundation import plugins
 from labrig.report.budgets import budget_lines
 from labrig.results import (
     AngularGlow,

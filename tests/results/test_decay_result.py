@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.errors import DataError
 from labrig.fit import DecayFit, fit_decay
+from labrig.foundation.errors import DataError
 from labrig.results import (
     FittedDecay,
     Measured,

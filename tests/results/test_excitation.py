@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from labrig.analyse.excitation.material import excited_material
-from labrig.errors import DiskError
+from labrig.foundation.errors import DiskError
 from labrig.material import read_material
 from labrig.report import Source
 from labrig.report.excitation import render

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.errors import DataError, DiskError, LabrigError
+from labrig.foundation.errors import DataError, DiskError, LabrigError
 from labrig.results import Series, add_flag, parse_series, read_series, write_series
 
 number = st.floats(min_value=-1e100, max_value=1e100)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.errors import DataError, LabrigError, UsageError
+from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.results import TableLayout, parse_series, read_series
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.results import Series, parse_series
 
 T_S = np.arange(60.0)

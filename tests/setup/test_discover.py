@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 import usb.core
 
-from labrig import plugins
 from labrig.acquire import Program, linux_programs
 from labrig.acquire.rig_file import DeviceEntry
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
+from labrig.foundation import plugins
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.yaml_file import parse_yaml, validate
 from labrig.setup import Host, discover
 from labrig.sim import open_room
 from labrig.sim.camera import SimulatedCamera
-from labrig.yaml_file import parse_yaml, validate
 from tests.quick_yaml import read_quickly
 
 DRIVERS = ("numato_relay", "ptp_camera")

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig import resources
 from labrig.acquire import read_protocol
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import parse_yaml
 from labrig.setup.patches_block import rounded, with_patches, write_patches
-from labrig.yaml_file import parse_yaml
 
 TWO = {"blue paint": (0.1, 0.2, 0.3, 0.4), "glove": (0.5, 0.0, 0.25, 1.0)}
 BLOCK = '  "blue paint": [0.1, 0.2, 0.3, 0.4]\n  glove: [0.5, 0, 0.25, 1]\n'

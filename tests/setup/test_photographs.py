@@ -8,8 +8,8 @@ import pytest
 
 from labrig.acquire import CameraOffers, ExerciseContext, Exercised, ExposureSettings, Frame
 from labrig.acquire.roles.camera import exercise_camera
-from labrig.clock import VirtualClock
-from labrig.errors import FrameError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import FrameError
 from labrig.reduce import read_raw
 from labrig.setup.check import Photographs
 from labrig.setup.picture_stats import decode, picture_stats

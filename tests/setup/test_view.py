@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from labrig.acquire import read_protocol
-from labrig.clock import Interrupted, SystemClock
-from labrig.errors import DeviceError, UsageError
+from labrig.foundation.clock import Interrupted, SystemClock
+from labrig.foundation.errors import DeviceError, UsageError
+from labrig.foundation.region import CENTRE
 from labrig.local_server import KINDS
-from labrig.region import CENTRE
 from labrig.setup.picture_stats import decode, picture_stats, sharpness
 from labrig.setup.view import serve_pictures
 from labrig.setup.view_server import PAGES, EditableProtocol, LivePictures, ViewServer

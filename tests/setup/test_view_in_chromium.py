@@ -15,7 +15,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from labrig.acquire import CAMERA, LiveView, read_protocol, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import Interrupted
+from labrig.foundation.clock import Interrupted
 from labrig.setup.view import serve_pictures
 from labrig.setup.view_server import EditableProtocol, LivePictures, ViewServer
 

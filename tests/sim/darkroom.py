@@ -6,16 +6,14 @@ from typing import Any
 
 import numpy as np
 import rawpy
-from numpy.typing import NDArray
 
-from labrig.clock import VirtualClock
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.arrangement import Arrangement
 from labrig.sim.bench_settings import DoorSettings
 from labrig.sim.boards import ChangerBoard, Pulse
 from labrig.sim.room import Room
 from labrig.sim.simulation import Simulation
-
-FloatArray = NDArray[np.float64]
 
 SMALL: Mapping[str, Any] = {
     "sample": [{"material": "blue-paint", "region": [0.0, 0.1, 1.0, 0.8]}],

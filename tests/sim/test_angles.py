@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.sim.angles import Angles, Spheres
 from labrig.sim.arrangement import Arrangement
 from labrig.sim.simulation import Simulation

@@ -2,10 +2,10 @@
 
 import pytest
 
-from labrig import resources
 from labrig.acquire import Changer, read_rig_file
 from labrig.bench import open_bench
-from labrig.errors import DeviceError, UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import DeviceError, UsageError
 from labrig.sim import open_room
 from labrig.sim.arrangement import Arrangement, Arrangements
 from labrig.sim.boards import ChangerBoard

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labrig import colour_science
+from labrig.foundation import colour_science
 from labrig.sim.cards import COLUMNS, ROWS, reflectances, surfaces
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.optics import bent_curves

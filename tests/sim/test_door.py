@@ -13,8 +13,9 @@ import serial
 from hypothesis import given, settings, strategies as st
 from scipy.integrate import quad
 
-from labrig.clock import VirtualClock
-from labrig.errors import UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import validate
 from labrig.material.file import read_material
 from labrig.sim import open_room
 from labrig.sim.bench_settings import DoorSettings
@@ -26,7 +27,6 @@ from labrig.sim.lights import Lights
 from labrig.sim.phosphor import phosphor
 from labrig.sim.room import Room
 from labrig.sim.simulation import LampSettings, Simulation
-from labrig.yaml_file import validate
 
 SMALL = {"sample": "blue-paint", "sensor": {"width": 96, "height": 64, "flicker": 0.0}}
 DOOR = DoorSettings()

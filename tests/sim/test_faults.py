@@ -9,8 +9,8 @@ from typing import Any, BinaryIO, cast
 import pytest
 import serial
 
-from labrig.clock import VirtualClock
-from labrig.output_file import REAL_DISK
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.output_file import REAL_DISK
 from labrig.sim import OpenRoom, open_room
 from labrig.sim.disk import SimulatedDisk
 from labrig.sim.faults import AfterBytes, Slowness

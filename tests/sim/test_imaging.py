@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.sim.arrangement import Arrangement
 from labrig.sim.bench_settings import ImagingSettings, LvfSettings, StripSettings
 from labrig.sim.imaging import Imaging
@@ -15,8 +15,6 @@ from labrig.sim.sensor import BLACK_DN, Sensor, gain_electrons_per_dn
 from labrig.sim.simulation import LampSettings
 from labrig.sim.wander import ZERO_S, Ripple, Wander
 from tests.sim.darkroom import SMALL, Darkroom, colours
-
-FloatArray = NDArray[np.float64]
 
 #: A glowing sample in the left half of the frame; the right half is cloth.
 HALF = [{"material": "blue-paint", "region": [0.0, 0.0, 0.5, 1.0]}]

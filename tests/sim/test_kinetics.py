@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import least_squares
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import validate
 from labrig.material import Material, read_material, write_material
 from labrig.material.file import IrradianceNorm, State
 from labrig.sim.bench_settings import TemperatureSettings
@@ -21,10 +22,8 @@ from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import Simulation
 from labrig.sim.temperature import rate_factor
-from labrig.yaml_file import validate
 from tests.sim.darkroom import SMALL, Darkroom
 
-FloatArray = NDArray[np.float64]
 THERMAL_EV = BOLTZMANN_EV_K * RATES_K
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from labrig import resources
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import UsageError
 from labrig.sim.faults import FaultTime
 from labrig.sim.filters import Filters, read_curve
 from labrig.sim.lamp import (

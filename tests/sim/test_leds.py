@@ -5,14 +5,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import validate
 from labrig.sim.bench_settings import LedSettings
 from labrig.sim.lamp import BURNING_LIGHT, WAVELENGTH_NM, Lamp
 from labrig.sim.lamps import FilteredLamps
 from labrig.sim.leds import Leds, led_spectrum
 from labrig.sim.mercury import Mercury
 from labrig.sim.simulation import LampSettings, Simulation
-from labrig.yaml_file import validate
 from tests.sim.darkroom import Darkroom
 
 BLUE, GREEN = LedSettings(relay=1, centre=450), LedSettings(relay=2, centre=525, fwhm=40, level=0.2)

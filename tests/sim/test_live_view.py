@@ -9,7 +9,7 @@ import pytest
 
 from labrig.acquire import CAMERA, LAMP, LiveView, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.room import Room
 from labrig.sim.simulation import Simulation
 

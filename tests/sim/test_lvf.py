@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import validate
 from labrig.sim.bench_settings import LvfSettings, StripSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.lvf import PIECES, Lvf, pieces
 from labrig.sim.simulation import Simulation
-from labrig.yaml_file import validate
 from tests.sim.darkroom import DOOR, LVF, SMALL, STRIP, Darkroom, colours, columns, mosaic
 
 BENT = LvfSettings(centre=(400, 700), bend_nm=5, fwhm_nm=25, leakage=0.002)

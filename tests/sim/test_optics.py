@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material.file import Material, State, read_material
 from labrig.sim.lamp import CELL_NM, WAVELENGTH_NM
 from labrig.sim.optics import CameraCurves, bent_curves, emission, measured_curves, vignetting

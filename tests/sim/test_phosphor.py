@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from numpy.typing import NDArray
 from scipy.special import hyp1f1
 
-from labrig import resources
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
 from labrig.material.file import read_material
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, Lamp, filament_spectrum
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import LampSettings
 
-FloatArray = NDArray[np.float64]
 STEADY = LampSettings(warm_up_deficit=0.0, drift_per_hour=0.0)
 
 

@@ -12,9 +12,9 @@ import pytest
 import rawpy
 from numpy.typing import NDArray
 
-from labrig import resources
-from labrig.clock import VirtualClock
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UsageError
 from labrig.sim.room import Room
 from labrig.sim.simulation import Simulation
 

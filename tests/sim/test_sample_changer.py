@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.sim.simulation import Simulation
 from tests.sim.darkroom import SMALL, Darkroom
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import ScaleFactor, read_material, write_material
 from labrig.sim.bench_settings import TemperatureSettings
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp

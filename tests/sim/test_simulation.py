@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import parse_yaml, read_model, validate, write_yaml
 from labrig.sim.simulation import Simulation
-from labrig.yaml_file import parse_yaml, read_model, validate, write_yaml
 
 
 def parsed(text: str) -> Simulation:

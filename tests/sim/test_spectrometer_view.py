@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from labrig.clock import VirtualClock
-from labrig.errors import UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import UsageError
 from labrig.material import read_any_material
 from labrig.sim.cards import reflectances
 from labrig.sim.room import Room

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.bench_settings import TemperatureSettings
 from labrig.sim.boards import NumatoBoard
 from labrig.sim.faults import FaultTime

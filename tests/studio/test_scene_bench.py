@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from labrig.design import key_differences, read_wish, solve_in_scene
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import read_material
 from labrig.reproduce import Renderer, load_scene, tristimulus
 from labrig.studio.scene_bench import SceneBench

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from labrig.design import read_wish, solve_spread
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import parse_yaml
 from labrig.studio.scene_bench import SceneBench
-from labrig.yaml_file import parse_yaml
 from tests.design.small_scene import corner
 from tests.design.spread_keys import OBJECTS, PIXELS, keys
 

@@ -14,11 +14,11 @@ from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
 
 from labrig.design import read_wish, written_differences
+from labrig.foundation.yaml_file import parse_yaml
 from labrig.material import read_material
 from labrig.studio.scene_bench import SceneBench
 from labrig.studio.server import StudioServer
 from labrig.studio.workbench import Workbench
-from labrig.yaml_file import parse_yaml
 from tests.design.small_scene import corner
 from tests.design.spread_keys import OBJECTS, PIXELS, keys
 

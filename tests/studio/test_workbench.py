@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.design import Parameters, read_wish, to_wish, written_differences
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import read_material
 from labrig.studio.messages import Asked, wish_content
 from labrig.studio.server import StudioServer

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.text_table.times import ClockTimes, is_clock_form, read_clock
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.results import parse_series
 from labrig.text_table.names import log_scale
 

@@ -21,13 +21,14 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
-from labrig import resources
 from labrig.acquire import read_protocol
 from labrig.bench import resume_run
 from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import thumbnail
-from labrig.clock import Interrupted, SystemClock
-from labrig.errors import UsageError
+from labrig.foundation import resources
+from labrig.foundation.clock import Interrupted, SystemClock
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 from labrig.record import (
     UNDONE,
     ActionRecord,
@@ -39,7 +40,6 @@ from labrig.record import (
 from labrig.watch.previews import Previews
 from labrig.watch.run_follower import RunFollower, State
 from labrig.watch.server import UpdateFeed, WatchServer, watch_run
-from labrig.yaml_file import read_yaml, yaml_text
 from tests.analyse.recorded import quietly
 from tests.recordings import runs as recordings
 

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from ..device_info import DeviceInfo
 from ..failures import RefusedError

@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection
 
 from labrig.acquire import CameraOffers, ExposureSettings, frame_bytes
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 from ..settings import PtpCameraSettings
 from .codes import (

@@ -3,8 +3,8 @@
 import math
 import re
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from ..failures import RefusedError
 from ..session import USUAL

@@ -1,7 +1,7 @@
 """The shutter of an EOS: opened and closed, with times, and closed again after any error."""
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from ..device_info import DeviceInfo
 from ..failures import RefusedError

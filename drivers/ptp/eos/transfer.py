@@ -1,6 +1,6 @@
 """Transfer of a frame from an EOS, and its confirmation."""
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from ..codes import INVALID_OBJECT_HANDLE, Standard
 from ..device_info import DeviceInfo

@@ -7,8 +7,8 @@ EDSDK (`Evf_Mode` before `Evf_OutputDevice`). Not documented by Canon.
 
 import struct
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from ..codes import DEVICE_BUSY
 from ..device_info import DeviceInfo

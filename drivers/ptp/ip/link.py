@@ -10,8 +10,8 @@ import struct
 from collections import deque
 from collections.abc import Callable
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from ..containers import Container, Kind
 from ..failures import MalformedError, NoAnswerError, UnpluggedError, shown

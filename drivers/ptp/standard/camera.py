@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 
 from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from ..codes import Standard, StandardProperty
 from ..device_info import DeviceInfo

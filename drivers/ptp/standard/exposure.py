@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from labrig.acquire import CameraOffers, ExposureSettings, frame_bytes
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 from ..codes import StandardProperty
 from ..settings import PtpCameraSettings

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from ..codes import INVALID_OBJECT_HANDLE, Standard, StandardEvent
 from ..device_info import DeviceInfo

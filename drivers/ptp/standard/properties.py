@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from ..codes import (
     ACCESS_DENIED,

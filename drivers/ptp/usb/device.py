@@ -12,7 +12,7 @@ from typing import Any
 import usb.core
 import usb.util
 
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 from ..failures import NoAnswerError, StallError, UnpluggedError
 

@@ -8,8 +8,8 @@ import struct
 from contextlib import suppress
 from typing import Any
 
-from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import DeviceError
 
 from ..codes import DEVICE_BUSY, OK, response_text
 from ..containers import HEADER_BYTES, Container, Kind, announced_length, decode, encode

@@ -15,9 +15,9 @@ from labrig.acquire.roles.role import (
     spread_ms,
 )
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError
-from labrig.quantity import duration_text
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
+from labrig.foundation.quantity import duration_text
 
 #: Exercise: number and exposure time of the frames for timing, exposure time of that for noise.
 SHORT_FRAMES = 3

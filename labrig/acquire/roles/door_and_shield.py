@@ -12,7 +12,7 @@ from labrig.acquire.roles.role import (
     PlannedDevice,
     Role,
 )
-from labrig.quantity import duration_text
+from labrig.foundation.quantity import duration_text
 
 
 @runtime_checkable

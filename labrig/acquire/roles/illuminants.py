@@ -6,13 +6,13 @@ from typing import Annotated, Any, Protocol, runtime_checkable
 
 from pydantic import Field
 
-from labrig import resources
 from labrig.acquire.roles.leds import LedLight
 from labrig.acquire.roles.light_bank import BankSwitch, LightBank, PlannedLightBank, exercise
 from labrig.acquire.roles.role import Role
-from labrig.named_files import ShippedOrFile
+from labrig.foundation import resources
+from labrig.foundation.named_files import ShippedOrFile
+from labrig.foundation.quantity import DurationS
 from labrig.optics import Spectrum, read_light
-from labrig.quantity import DurationS
 
 
 class Illuminant(LedLight):

@@ -13,7 +13,7 @@ from labrig.acquire.roles.role import (
     Role,
     spread_ms,
 )
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 #: Number of switchings: enough to notice a slow line, too few to wear the relay.
 SWITCHINGS = 3

@@ -6,20 +6,21 @@ from functools import partial
 from typing import Annotated, Any, Protocol, Self, runtime_checkable
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from labrig.acquire.roles.light_bank import BankSwitch, LightBank, PlannedLightBank, exercise
 from labrig.acquire.roles.role import Role
-from labrig.named_files import FilePath
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.named_files import FilePath
+from labrig.foundation.quantity import DurationS
 from labrig.optics import Spectrum, read_spectrum
-from labrig.quantity import DurationS
 
 FWHM_OVER_SIGMA = 2 * math.sqrt(2 * math.log(2))
 #: Half width of the grid of a spectrum that is given by its centre and width, in widths.
 TAIL_WIDTHS = 3.0
 
 
-class LedLight(BaseModel):
+class LedLight(FrozenModel):
     """The light of an LED as far as it is known: keys that every bank of LEDs has for each of them.
 
     Attributes
@@ -49,8 +50,6 @@ class LedLight(BaseModel):
     >>> blue.peak_nm(), blue.settling
     (450.0, 0.5)
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     spectrum: FilePath | None = None
     centre: Annotated[float, Field(ge=200, le=1200)] | None = None

@@ -14,10 +14,10 @@ from labrig.acquire.roles.role import (
     PlannedDevice,
     spread_ms,
 )
-from labrig.errors import DeviceError, ProtocolError
+from labrig.foundation.errors import DeviceError, ProtocolError
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.optics import Spectrum
-from labrig.quantity import duration_text
-from labrig.yaml_file import did_you_mean
 
 
 @runtime_checkable

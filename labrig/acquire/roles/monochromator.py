@@ -5,7 +5,7 @@ from functools import partial
 from typing import Annotated, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire.roles.role import (
     Device,
@@ -15,10 +15,11 @@ from labrig.acquire.roles.role import (
     PlannedDevice,
     Role,
 )
-from labrig.clock import VirtualClock
-from labrig.errors import ProtocolError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.models import FrozenModel
+from labrig.foundation.quantity import DurationS, duration_text
 from labrig.optics import Transmittance
-from labrig.quantity import DurationS, duration_text
 
 #: Wavelengths in nm at which it is tried.
 TRIED_NM = (450.0, 550.0, 650.0)
@@ -26,7 +27,7 @@ TRIED_NM = (450.0, 550.0, 650.0)
 POINTS, BEYOND_NM = 20, 1.0
 
 
-class MonochromatorBand(BaseModel):
+class MonochromatorBand(FrozenModel):
     """What a monochromator lets through: keys that every one has in a rig file.
 
     Attributes
@@ -40,8 +41,6 @@ class MonochromatorBand(BaseModel):
     travel
         Longest time of a change of the wavelength, for example `20 s`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     fwhm: Annotated[float, Field(ge=0.5, le=100)]
     wavelength_sigma: Annotated[float, Field(ge=0, le=10)] = 0.5

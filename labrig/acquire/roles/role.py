@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from labrig.acquire.values import Frame
-from labrig.clock import Clock, VirtualClock
+from labrig.foundation.clock import Clock, VirtualClock
 
 #: `refuse`: the setting spoils photometry. `warn`: it may. `fine`: it is correct.
 Severity = Literal["refuse", "warn", "fine"]

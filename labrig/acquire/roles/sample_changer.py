@@ -14,10 +14,10 @@ from labrig.acquire.roles.role import (
     PlannedDevice,
     Role,
 )
-from labrig.clock import VirtualClock
-from labrig.errors import ProtocolError
-from labrig.quantity import duration_text
-from labrig.yaml_file import did_you_mean
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.quantity import duration_text
+from labrig.foundation.yaml_file import did_you_mean
 
 
 @runtime_checkable

@@ -14,10 +14,10 @@ from labrig.acquire.roles.role import (
     PlannedDevice,
     Role,
 )
-from labrig.clock import VirtualClock
-from labrig.errors import ProtocolError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import ProtocolError
+from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
-from labrig.quantity import duration_text
 
 #: Longest integration: one that runs cannot be interrupted, and dark current fills the pixels.
 LONGEST_S = 10.0

@@ -6,8 +6,8 @@ import numpy as np
 
 from labrig.acquire import RigFile, led_lights
 from labrig.bench_optics import camera_curves
-from labrig.errors import UsageError
-from labrig.results import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 
 #: Largest fraction of reflected light in a channel that is chosen.
 LARGEST_REFLECTED = 0.05

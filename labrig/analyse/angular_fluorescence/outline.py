@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage, optimize
 
-from labrig.errors import DataError
-from labrig.results import BoolArray, FloatArray
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import DataError
 
 #: Standard deviation in cells of the blur with which a first outline is looked for.
 _BLUR = 1.0

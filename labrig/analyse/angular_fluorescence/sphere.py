@@ -15,14 +15,15 @@ from labrig.analyse.angular_fluorescence.channels import (
 from labrig.analyse.angular_fluorescence.outline import Outline, find_outline
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.inputs import Part
-from labrig.errors import DataError
 from labrig.fit.angular import NearLight, SphereImage, fit_shading
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import region_pixels
 from labrig.optics import Flat, rho_squared
 from labrig.protocols.angular_fluorescence import AngularFrames, Pose
 from labrig.record import FrameRecord
 from labrig.reduce import binned, read_raw, saturated_cells
-from labrig.region import region_pixels
-from labrig.results import LEVEL, FloatArray, SphereViews
+from labrig.results import LEVEL, SphereViews
 
 #: Blocks of cells across a sphere, of which each is one place.
 BLOCKS_ACROSS = 40

@@ -15,11 +15,12 @@ from labrig.analyse.angular_fluorescence.channels import (
 )
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera, untimed
 from labrig.analyse.inputs import Part
-from labrig.errors import DataError
 from labrig.fit.angular import fit_dependence
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.protocols.angular_fluorescence import AngularFrames, Pose
 from labrig.reduce import reduce_series
-from labrig.results import LEVEL, FloatArray, Series, YarnViews, is_usable
+from labrig.results import LEVEL, Series, YarnViews, is_usable
 
 #: Least signal of a view over the median of all of them: another LED was lit, or none.
 LEAST_SIGNAL = 0.2

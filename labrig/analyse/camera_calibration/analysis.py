@@ -20,19 +20,14 @@ from labrig.analyse.camera_calibration.photon_transfer import (
 from labrig.analyse.frames import lens_of, part_frames, part_region, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.calibration import CameraFile, Linearity
-from labrig.errors import DataError
-from labrig.number_format import exposure_text, plus_minus
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.number_format import exposure_text, plus_minus
+from labrig.foundation.region import Region
 from labrig.protocols.camera_calibration import LINEARITY, CardFrames
 from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import measure_region, reduce_groups, reduce_patches
-from labrig.region import Region
-from labrig.results import (
-    CameraCalibrationResult,
-    FittedFlat,
-    FloatArray,
-    PhotonTransfer,
-    Series,
-)
+from labrig.results import CameraCalibrationResult, FittedFlat, PhotonTransfer, Series
 
 LIT = tuple(CardFrames)
 #: Deviation from linearity beyond which frames are not used for settings.

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.analyse.camera_calibration.linearity import CardRatios
-from labrig.results import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Fraction of the range above which levels do not determine the bend: pixels fill up.
 MAX_FRACTION = 0.85

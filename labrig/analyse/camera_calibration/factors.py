@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import Factor
 from labrig.protocols.camera_calibration import CardFrames
-from labrig.results import FloatArray, Measured
+from labrig.results import Measured
 
 Setting = float | None
 

@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region, region_pixels
 from labrig.optics import Flat, rho_squared
 from labrig.reduce import LinearFrame, RawFrame, StoredFrame, reduce_frames
-from labrig.region import Region, region_pixels
-from labrig.results import FittedFlat, FloatArray
+from labrig.results import FittedFlat
 
 #: Blocks across and down the card whose means are fitted.
 BLOCKS = (16, 12)

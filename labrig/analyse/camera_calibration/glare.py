@@ -7,7 +7,7 @@ import numpy as np
 from labrig.analyse.frames import timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.calibration import CameraFile
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.optics import Glare
 from labrig.protocols.camera_calibration import CardFrames
 from labrig.record import FrameRecord

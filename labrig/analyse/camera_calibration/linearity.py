@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.calibration import Linearity
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import hat_functions
-from labrig.results import FloatArray
 
 #: Knots of D, as fractions of the range up to saturation.
 KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)

@@ -22,7 +22,9 @@ from scipy.stats import chi2
 from labrig.analyse.camera_calibration.bend import Bend, photon_terms
 from labrig.analyse.camera_calibration.read_noise import RESOLVED, NumberCounts, counted_noise
 from labrig.calibration import Noise
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region, region_pixels
 from labrig.record import FrameRecord
 from labrig.reduce import (
     ROUNDING_VARIANCE,
@@ -30,8 +32,7 @@ from labrig.reduce import (
     RawFrame,
     measure,
 )
-from labrig.region import Region, region_pixels
-from labrig.results import FloatArray, Measured, PairScatter, PhotonTransfer
+from labrig.results import Measured, PairScatter, PhotonTransfer
 
 #: Standard deviations beyond which a pixel is hot, or was hit by a cosmic ray.
 OUTLIER_SIGMAS = 6.0

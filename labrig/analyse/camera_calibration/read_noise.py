@@ -23,8 +23,8 @@ from scipy.optimize import minimize
 from scipy.special import expit, ndtr
 from scipy.stats import chi2
 
+from labrig.foundation.arrays import FloatArray
 from labrig.reduce import rounding_slope, unrounded_variance
-from labrig.results import FloatArray
 
 #: Numbers on either side of the median that are counted.
 HALF = 8

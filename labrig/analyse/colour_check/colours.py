@@ -7,6 +7,7 @@ import numpy as np
 
 from labrig.fit.camera_curves import ADDED, COURSE, COURSE_NM, LEVEL
 from labrig.fit.spectrum import CurveError, smooth_modes
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import (
     CHART_PATCHES,
     CIE_1931,
@@ -18,7 +19,7 @@ from labrig.optics import (
     observer,
     white_xyz,
 )
-from labrig.results import CheckedColour, ColourSummary, FloatArray
+from labrig.results import CheckedColour, ColourSummary
 
 #: Wavelengths in nm of sums over spectra.
 GRID_NM: FloatArray = np.arange(380.0, 781.0, 5.0)

@@ -10,8 +10,8 @@ import numpy as np
 
 from labrig.analyse.chart_scene import ChartScene
 from labrig.analyse.colour_check.colours import DRAWS, GRID_NM, PublishedChart, drawn_curves
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Transmittance
-from labrig.results import FloatArray
 
 #: Relative σ of the grey card's reflectance: its level in all channels, and of each.
 CARD_LEVEL, CARD_EACH = 0.01, 0.005

@@ -21,12 +21,12 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
 from labrig.fit.spectrum import fit_spectrum
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Spectrum
 from labrig.protocols.colour_check import CheckFrames, patch_unit
 from labrig.protocols.steps.chart_scenes import THROUGH_UNIT
 from labrig.record import FrameRole
 from labrig.reduce import SeriesFrame, find_strip_in, hot_pixels_of
-from labrig.results import FloatArray
 
 #: The whole strip as the only patch of it.
 WHOLE = StripPatch("", "")

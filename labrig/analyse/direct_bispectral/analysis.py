@@ -21,8 +21,6 @@ from labrig.analyse.direct_bispectral.noise import ReadingNoise, reading_noise
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import card_reflectance, filter_transmittances
-from labrig.errors import DataError
-from labrig.fit import FloatArray
 from labrig.fit.bispectral import (
     BispectralColumns,
     LitSpectrum,
@@ -31,7 +29,9 @@ from labrig.fit.bispectral import (
     light_window_nm,
     separate_columns,
 )
-from labrig.number_format import plus_minus
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.number_format import plus_minus
 from labrig.optics import SpectrometerReading, Spectrum, Transmittance, read_spectrometer_reading
 from labrig.protocols.direct_bispectral import WHITE, DirectSpectra
 from labrig.results import DirectBispectralResult, DirectColumns, LightSpectrum, Measured

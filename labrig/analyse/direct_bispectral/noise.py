@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.fit import FloatArray
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.optics import SpectrometerReading
 
 #: Groups of pixels with similar light in a reading, whose variances are averaged.

@@ -36,8 +36,8 @@ from labrig.analyse.frames import (
 )
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, for_each_patch
-from labrig.errors import DataError
 from labrig.fit.spectrum import DECISIVE, SpectrumFit, fit_spectrum
+from labrig.foundation.errors import DataError
 from labrig.protocols.emission_spectrum import (
     CameraFilters,
     SpectrumFrames,

@@ -17,8 +17,9 @@ from labrig.analyse.exciting_lights import FILTER_NM, FILTER_SIGMA
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripPatch, strip_regions
 from labrig.bench_optics import filter_transmittances
-from labrig.errors import DataError
 from labrig.fit.spectrum import CurveError, SpectralSystem, camera_modes
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import Spectrum, Transmittance, hat_functions, quadrature
 from labrig.protocols.emission_spectrum import (
     AFTERWARDS,
@@ -28,7 +29,7 @@ from labrig.protocols.emission_spectrum import (
     white_unit,
 )
 from labrig.reduce import FLICKER, SeriesFrame, sensor_layout
-from labrig.results import FilterFrames, FloatArray
+from labrig.results import FilterFrames
 
 #: Name of the only place of a patch.
 PLACE = "sample"

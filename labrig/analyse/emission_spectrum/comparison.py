@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from labrig.errors import DataError
-from labrig.results import FilterFrames, FloatArray, SpectralComparison
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.results import FilterFrames, SpectralComparison
 
 #: Iterations of brightness and mean; each gains a digit or more.
 COMBINING_ROUNDS = 20

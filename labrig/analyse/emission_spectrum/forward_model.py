@@ -23,8 +23,10 @@ from labrig.analyse.strip_model import (
     strip_system,
 )
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import SpectralSystem
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.region import Region
 from labrig.optics import (
     CameraResponse,
     Lvf,
@@ -35,8 +37,7 @@ from labrig.optics import (
     signal_through,
 )
 from labrig.reduce import SeriesFrame, sensor_layout
-from labrig.region import Region
-from labrig.results import FilterFrames, FloatArray
+from labrig.results import FilterFrames
 
 #: Range in which the holder is read, in heights of the strip from its middle; the filter's own
 #: blurred edges end at 0.7.

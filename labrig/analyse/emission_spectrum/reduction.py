@@ -13,7 +13,9 @@ from typing import TypeVar
 import numpy as np
 
 from labrig.calibration import CameraFile
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.reduce import (
     ROUNDING_VARIANCE,
     STRIPS,
@@ -29,8 +31,7 @@ from labrig.reduce import (
     reduce_frames,
     variance_terms,
 )
-from labrig.region import Region
-from labrig.results import FilterFrames, FloatArray, is_usable
+from labrig.results import FilterFrames, is_usable
 
 Patch = TypeVar("Patch", bound=Hashable)
 

@@ -30,8 +30,8 @@ from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectance
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
-from labrig.errors import DataError
 from labrig.fit.excitation import RelativeSigmas
+from labrig.foundation.errors import DataError
 from labrig.record import FrameRole
 from labrig.results import (
     ChargingSeries,

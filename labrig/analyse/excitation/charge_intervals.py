@@ -8,7 +8,7 @@ from labrig.acquire import DARK, LAMP, LEDS
 from labrig.analyse.frames import left_out_lines
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.protocols.excitation import ExcitationFrames, UnitKind
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
 

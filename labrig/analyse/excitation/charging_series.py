@@ -21,21 +21,13 @@ from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions
 from labrig.calibration import IrradianceFile, Warming
-from labrig.errors import DataError
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.protocols.steps.exciting_lights import ExcitingLights
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches, sensor_layout
-from labrig.region import Region
-from labrig.results import (
-    BoolArray,
-    Charge,
-    ChargingSeries,
-    EarlierCharges,
-    FloatArray,
-    PatchCharging,
-    Series,
-    Transient,
-)
+from labrig.results import Charge, ChargingSeries, EarlierCharges, PatchCharging, Series, Transient
 
 #: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"

@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_off
+from labrig.foundation.arrays import FloatArray
 from labrig.material import dark_concentration
-from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
+from labrig.results import ChargingSeries, Closure, FittedExcitation, PatchCharging
 
 #: Step of the derivatives as a fraction of σ, or of the parameter where σ is larger than it.
 STEP = 0.01

@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.calibration import PatchReflectance
-from labrig.results import PRIOR_DENSITY, DensityBasis, FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.results import PRIOR_DENSITY, DensityBasis
 
 #: σ of an albedo by which less light may have come back.
 SIGMAS = 2.0

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.errors import DataError
-from labrig.results import ChargingSeries, FittedExcitation, FloatArray, PatchCharging
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.results import ChargingSeries, FittedExcitation, PatchCharging
 
 
 def evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:

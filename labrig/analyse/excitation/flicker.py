@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from labrig.analyse.series_fit import TYPICAL_FLICKER
-from labrig.results import ChargingSeries, FittedExcitation, FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.results import ChargingSeries, FittedExcitation
 
 
 def common_flicker(

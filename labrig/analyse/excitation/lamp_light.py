@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from labrig.calibration import Change, FadeFile, IrradianceFile
-from labrig.results import FittedExcitation, FloatArray, LightScatter, Transient
+from labrig.foundation.arrays import FloatArray
+from labrig.results import FittedExcitation, LightScatter, Transient
 
 #: Relative scatter of the light on single places: bands are calibrated place by place, and their
 #: flanks scatter, which smooth errors alone cannot describe; and error of a filter's wavelengths in

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from labrig.calibration import IrradianceFile
+from labrig.foundation.arrays import FloatArray
 from labrig.material import IrradianceNorm, Material, Provenance, State
-from labrig.results import EmissionSpectrum, ExcitedState, FittedExcitation, FloatArray
+from labrig.results import EmissionSpectrum, ExcitedState, FittedExcitation
 
 SOURCE = (
     "decay and excitation measured with labrig; amplitudes are those of the brightest channel, in "

@@ -18,6 +18,7 @@ from labrig.fit.excitation import (
     fit_excitation,
     layer_effect,
 )
+from labrig.foundation.arrays import FloatArray
 from labrig.results import (
     AUTO,
     ChargingSeries,
@@ -25,7 +26,6 @@ from labrig.results import (
     ExcitationModel,
     FittedDecay,
     FittedExcitation,
-    FloatArray,
 )
 
 #: Difference in BIC from which a model with more parameters is preferred: odds of e^3 = 20 : 1.

@@ -15,7 +15,8 @@ import numpy as np
 from labrig.analyse.excitation.lamp_light import KNOWN, WORST
 from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import ExcitationCourse, excitation_course
-from labrig.results import FittedExcitation, FloatArray, IntArray, PatchCharging
+from labrig.foundation.arrays import FloatArray, IntArray
+from labrig.results import FittedExcitation, PatchCharging
 
 #: Light that a filter or monochromator lets through far from its own band, over that in its middle:
 #: 10⁻⁴ to 10⁻⁵ in data sheets, so that it is known to a factor of some e. A narrow band passes

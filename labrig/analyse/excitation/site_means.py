@@ -13,8 +13,8 @@ from scipy.interpolate import CubicSpline
 
 from labrig.analyse.strip import Slices, tilt_offset
 from labrig.calibration import IrradianceFile
+from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.reduce import SensorLayout
-from labrig.results import BoolArray, FloatArray
 
 #: Weight from which a site is not known where another one is not.
 DEPENDS = 0.01

@@ -16,15 +16,16 @@ from labrig.analyse.frames import part_frames, part_region, require_calibrated_c
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
-from labrig.errors import DataError
 from labrig.fit.spectrum import CurveError, camera_modes
-from labrig.number_format import plus_minus
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.number_format import plus_minus
+from labrig.foundation.region import Region
 from labrig.optics import CameraResponse, Spectrum
 from labrig.protocols.fade import SWITCHED, LampFrames
 from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import sensor_layout
-from labrig.region import Region
-from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
+from labrig.results import FadeResult, LampChange, WarmingLight
 
 #: Relative flicker of a photograph without a camera file.
 TYPICAL_FLICKER = 0.007

@@ -12,7 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from labrig.results import FittedShape, FloatArray, LampChange, Measured, SwitchedFrames
+from labrig.foundation.arrays import FloatArray
+from labrig.results import FittedShape, LampChange, Measured, SwitchedFrames
 
 #: Wavelength in nm at which u is minus the logarithm of the fraction.
 REFERENCE_NM = 550.0

@@ -23,9 +23,10 @@ from labrig.analyse.fade.change import (
     Smooth,
     fraction_of,
 )
-from labrig.errors import FitError
 from labrig.fit import least_squares
-from labrig.results import FloatArray, SwitchedFrames
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.results import SwitchedFrames
 
 #: Step in seconds of the grid on which fractions are integrated.
 STEP_S = 2e-3

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from labrig.analyse.frames import switched_time, timed, untimed
 from labrig.calibration import CameraFile, Warming
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.protocols.fade import LampFrames
 from labrig.record import FrameRecord, RunRecord
 from labrig.reduce import reduce_patches
-from labrig.region import Region
-from labrig.results import FloatArray, Series, SwitchedFrames, WarmingLight
+from labrig.results import Series, SwitchedFrames, WarmingLight
 
 #: Fewest photographs of a transient.
 FEWEST = 6

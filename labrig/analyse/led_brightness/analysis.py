@@ -18,7 +18,6 @@ from labrig.analyse.led_brightness.readings import (
 )
 from labrig.bench_optics import DATA_SHEET_NM, camera_curves, card_reflectance, led_exposures
 from labrig.calibration import UV_NM, CalibratedLed, LedsFile, LedSource, UvScale
-from labrig.errors import DataError
 from labrig.fit.leds import (
     RESPONSE_CALIBRATED,
     RESPONSE_UNKNOWN,
@@ -29,17 +28,12 @@ from labrig.fit.leds import (
     changed_spectrum,
     fit_brightness,
 )
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import Spectrum
 from labrig.protocols.steps.led_scenes import AGAIN, CARD
 from labrig.reduce import FLICKER
-from labrig.results import (
-    FloatArray,
-    LedBrightnessResult,
-    LedFault,
-    LedFinding,
-    LedMeasured,
-    Measured,
-)
+from labrig.results import LedBrightnessResult, LedFault, LedFinding, LedMeasured, Measured
 
 #: Standard uncertainty in nm of a spectrometer's wavelengths, by its makers.
 SPECTROMETER_NM = 0.2

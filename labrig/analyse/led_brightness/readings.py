@@ -15,13 +15,14 @@ from labrig.analyse.frames import (
 )
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import card_reflectance
-from labrig.errors import DataError, UsageError
 from labrig.fit.leds import LedBand, led_band
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import CameraResponse, read_spectrometer_reading
 from labrig.protocols.led_brightness import BrightnessFrames
 from labrig.record import FrameRecord, FrameRole, SpectrumRecord
 from labrig.reduce import FLICKER, reduce_patches
-from labrig.results import FloatArray, Series
+from labrig.results import Series
 
 #: Relative independent error of a channel's value: the sensor's pattern, the shutter.
 PATTERN = 0.002

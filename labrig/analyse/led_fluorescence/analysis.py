@@ -33,7 +33,6 @@ from labrig.bench_optics import (
     illuminant_exposures,
     led_exposures,
 )
-from labrig.errors import DataError, UsageError
 from labrig.fit.fluorescence import (
     EstimatedFluorophore,
     FluorescenceFit,
@@ -42,16 +41,16 @@ from labrig.fit.fluorescence import (
     fit_per_led,
     predicted_colour,
 )
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import appearance, read_emissions
 from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
 from labrig.protocols.led_fluorescence import SAMPLE, LedFrames
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.results import (
-    BoolArray,
     ColourUnderLight,
     DirectBispectralResult,
     EstimateMethod,
-    FloatArray,
     FluorescentPatch,
     LedFluorescenceResult,
     MatrixOnBands,

@@ -14,8 +14,8 @@ from labrig.analyse.led_fluorescence.lit_patches import (
 )
 from labrig.analyse.led_fluorescence.warnings import exchanged_warnings, one_of
 from labrig.fit.leds import ChannelMatch, match_channels
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Spectrum, Transmittance
-from labrig.results import FloatArray
 
 #: Part of the brightest LED's signal from which the camera is expected to see an LED.
 VISIBLE = 0.01

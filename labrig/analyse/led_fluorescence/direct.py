@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from labrig.acquire import RigFile
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.results import DirectBispectralResult, read_result
 
 

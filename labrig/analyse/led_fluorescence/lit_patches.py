@@ -9,12 +9,13 @@ import numpy as np
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
-from labrig.errors import DataError
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
 from labrig.protocols.steps.led_scenes import AGAIN
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches
-from labrig.region import Region
-from labrig.results import BoolArray, FloatArray, Measured, Series
+from labrig.results import Measured, Series
 
 #: What lights are called in messages; both kinds together are lights.
 LightKind = Literal["LED", "lamp", "light"]

@@ -7,12 +7,12 @@ from itertools import combinations
 import numpy as np
 
 from labrig.fit.fluorescence import FluorescenceFit
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix, compare_colours
 from labrig.optics import Spectrum, edges_from_centres, read_light
 from labrig.results import (
     DirectBispectralResult,
     DirectColumns,
-    FloatArray,
     MeasuringMethod,
     MethodDifference,
     ReradiatedSpectrum,

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.errors import DataError, UsageError
 from labrig.fit import fit_mixture
+from labrig.foundation.arrays import BoolArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix
-from labrig.results import BoolArray, MixtureOfMatrix
+from labrig.results import MixtureOfMatrix
 
 #: Components of a mixture: with more it follows little but noise (Hua et al. 2021).
 COMPONENTS = 3

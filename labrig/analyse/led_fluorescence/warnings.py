@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from labrig.analyse.led_fluorescence.lit_patches import LightKind, LitPatch
-from labrig.errors import DataError
 from labrig.fit.fluorescence import (
     ExtrapolatedExcitation,
     FluorescenceFit,
@@ -13,8 +12,9 @@ from labrig.fit.fluorescence import (
     UnexplainedValues,
     UnknownBrightness,
 )
+from labrig.foundation.errors import DataError
+from labrig.foundation.number_format import plus_minus
 from labrig.material import physical_warnings
-from labrig.number_format import plus_minus
 from labrig.results import Measured
 
 #: Part of the lit value from which light without an LED counts.

@@ -29,18 +29,13 @@ from labrig.bench_optics import (
     lamp_spectrum,
 )
 from labrig.calibration import BandColumns, CurveColumns, LvfFile, WavelengthColumns
-from labrig.errors import DataError
 from labrig.fit.lvf import LvfCalibration
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import Strip, WavelengthMap
 from labrig.protocols.lvf_calibration import LvfFrames, filter_unit
 from labrig.reduce import slice_values, strip_profile_in
-from labrig.results import (
-    CameraCurves,
-    FilterMisfit,
-    FloatArray,
-    LvfCalibrationResult,
-    Stripes,
-)
+from labrig.results import CameraCurves, FilterMisfit, LvfCalibrationResult, Stripes
 
 #: Misfit of the filters in σ beyond which a warning is given.
 BAD_MISFIT = 3.0

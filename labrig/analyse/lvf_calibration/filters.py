@@ -7,6 +7,7 @@ import numpy as np
 
 from labrig.fit.lvf import LvfCalibration, calibrate_lvf
 from labrig.fit.spectrum import CurveError
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import (
     CameraResponse,
     Lvf,
@@ -17,7 +18,7 @@ from labrig.optics import (
     quadrature,
 )
 from labrig.reduce import FLICKER
-from labrig.results import FilterMisfit, FloatArray, SliceValues
+from labrig.results import FilterMisfit, SliceValues
 
 #: Root mean square error expected of transmittances along a strip: by the map, bands of another
 #: shape, a filter that differs from its table.

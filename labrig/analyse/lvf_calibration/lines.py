@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from labrig.errors import DataError, FitError
 from labrig.fit.lvf import WavelengthFit, fit_wavelengths, locate_lines
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.foundation.errors import DataError, FitError
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.optics import Lvf, Strip, WavelengthMap
 from labrig.results import PlacedStrip, Stripes, StripLines, StripProfile
 

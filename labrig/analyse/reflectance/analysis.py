@@ -10,12 +10,13 @@ from labrig.analyse.reflectance.lit_strips import Arranged, PatchStrip, both_arr
 from labrig.analyse.strip import StripFrames, StripPatch, for_each_patch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
 from labrig.calibration import ReflectanceFile
-from labrig.errors import DataError, FitError, UsageError
 from labrig.fit.reflectance import AlbedoFit, Luminescence, fit_albedo, unresolved
-from labrig.number_format import plus_minus
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, FitError, UsageError
+from labrig.foundation.number_format import plus_minus
 from labrig.optics import Transmittance, band_means, edges_from_centres
 from labrig.reduce import FLICKER
-from labrig.results import FloatArray, Measured, MeasuredReflectance, ReflectanceResult
+from labrig.results import Measured, MeasuredReflectance, ReflectanceResult
 
 #: Wavelengths of the results in nm: where filter, lamp and camera leave enough light.
 WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)

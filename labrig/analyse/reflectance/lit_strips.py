@@ -20,10 +20,11 @@ from labrig.fit.reflectance import (
     relative_to_card,
 )
 from labrig.fit.spectrum import SpectralSystem
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Lvf, Spectrum, Strip, Transmittance
 from labrig.protocols.reflectance import ReflectanceFrames
 from labrig.reduce import FLICKER, SensorLayout, SeriesFrame, region_values, sensor_layout
-from labrig.results import FloatArray, Measured, SliceValues
+from labrig.results import Measured, SliceValues
 
 #: Knots of the fitted reflectance: finer than the filter's band, and beyond the grid of results.
 KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)

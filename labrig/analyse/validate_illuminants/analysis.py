@@ -30,12 +30,12 @@ from labrig.bench_optics import (
     card_reflectance,
     illuminant_exposures,
 )
-from labrig.errors import DataError, UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import CameraResponse, is_narrow
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.protocols.validate_illuminants import SAMPLE, IlluminantFrames
 from labrig.results import (
-    FloatArray,
     LampComparison,
     LampPatch,
     MatrixOnBands,

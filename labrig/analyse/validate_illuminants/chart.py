@@ -4,10 +4,10 @@ import numpy as np
 
 from labrig.analyse.inputs import Part
 from labrig.analyse.led_fluorescence.lit_patches import lit_patches
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.protocols.validate_illuminants import CHART, IlluminantFrames
 from labrig.reduce import find_colour_chart
-from labrig.results import FloatArray
 
 #: ΔE2000 of a chart's patches, on average, from which it is not what was taken for one.
 ODD_CHART = 6.0

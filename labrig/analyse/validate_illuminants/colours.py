@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import (
     CIE_1931,
     Spectrum,
@@ -15,7 +16,7 @@ from labrig.optics import (
     read_colour_chart,
     white_xyz,
 )
-from labrig.results import FloatArray, Measured
+from labrig.results import Measured
 
 #: Number of draws of errors.
 DRAWS = 400

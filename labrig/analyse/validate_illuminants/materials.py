@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, read_any_material
 from labrig.results import LedFluorescenceResult, read_result
 

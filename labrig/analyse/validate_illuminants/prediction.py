@@ -19,9 +19,9 @@ from labrig.analyse.led_fluorescence.lit_system import (
 from labrig.bench_optics import LedExposure
 from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse, Transmittance
-from labrig.results import FloatArray
 
 #: Least light of the card, over that under the brightest lamp, each per power of the lamp, from
 #: which the card tells how bright a lamp is. A dark one shows the tails of its spectrum.

@@ -5,8 +5,9 @@ from functools import cache
 import numpy as np
 from scipy import optimize, stats
 
-from labrig.errors import DataError
-from labrig.results import LEVEL, POWER, AngleMeans, DependenceTest, FloatArray, Measured
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.results import LEVEL, POWER, AngleMeans, DependenceTest, Measured
 
 #: Iterations of the scatter that, with the camera's noise, explains the residuals.
 _ITERATIONS = 50

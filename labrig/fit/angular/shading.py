@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import optimize, stats
 
-from labrig.errors import DataError
 from labrig.fit.angular.dependence import detectable_sigmas, typical
-from labrig.results import LEVEL, DependenceTest, FloatArray, Measured, ShadingFit
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.results import LEVEL, DependenceTest, Measured, ShadingFit
 
 #: Angles beyond which texture and penumbra count for more than the law: cosines of incidence, view.
 LEAST_INCIDENCE, LEAST_VIEW = 0.35, 0.4

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import Spectrum, edges_from_centres
 
 #: Part of its peak down to which a light is followed on both sides, and the part of that distance

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit.bispectral.columns import BispectralColumns
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import edges_from_centres
 
 #: Least part of a light in a band from which its reflectance is read.

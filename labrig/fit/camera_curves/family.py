@@ -9,11 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse
-
-FloatArray = NDArray[np.float64]
 
 #: Wavelengths in nm of estimated curves.
 GRID_NM: FloatArray = np.arange(380.0, 781.0, 5.0)

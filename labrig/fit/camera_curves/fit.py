@@ -11,15 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from labrig.errors import FitError
-from labrig.fit.camera_curves.family import (
-    GRID_NM,
-    CurveFamily,
-    FloatArray,
-    camera_family,
-    correlation,
-)
+from labrig.fit.camera_curves.family import GRID_NM, CurveFamily, camera_family, correlation
 from labrig.fit.camera_curves.readings import ChartReadings, FilterReadings
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import CHANNELS, CameraResponse, Spectrum
 
 #: Relative σ of a lamp's spectrum whose file has none, and the distance in nm over which it errs.

@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from labrig.fit.camera_curves.family import GRID_NM, FloatArray, correlation
+from labrig.fit.camera_curves.family import GRID_NM, correlation
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Lvf, Transmittance
 
 #: Relative σ of a patch of one's own chart against the published means: its level and, smooth over

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from labrig.errors import FitError
 from labrig.fit.charge.intervals import ProfiledState, charge_intervals
 from labrig.fit.charge.model import (
     COMMON_PARAMETERS,
@@ -26,8 +25,10 @@ from labrig.fit.charge.model import (
 )
 from labrig.fit.charge.readings import Readings, readings_of
 from labrig.fit.charge.result import ChargeCandidate, ChargeFit, FittedReadings, OrderState
-from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import LeastSquaresFit, least_squares
 from labrig.fit.profile_likelihood import Likelihood
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import MAX_ORDER
 from labrig.results import Measured, OneSided
 

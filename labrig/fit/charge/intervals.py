@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from labrig.fit.charge.model import STATE_PARAMETERS, level_at_off, rates_of
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.profile_likelihood import (
     Likelihood,
     LowerMinimumError,
@@ -17,6 +16,7 @@ from labrig.fit.profile_likelihood import (
     exponential,
     parameter,
 )
+from labrig.foundation.arrays import FloatArray
 from labrig.material import MAX_ORDER
 from labrig.results import ProfileInterval
 

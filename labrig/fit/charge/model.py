@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS, becquerel_of, lit_concentration, lit_step
 
 #: Parameters of a state: log κ, log s, b, log g; and the place of b.

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import median_filter
 
-from labrig.errors import FitError
 from labrig.fit.charge.model import ChargeAndDecay
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 
 #: Readings nearer than this to a switching of the lamp, in steps between readings, are left out.
 SWITCHING_STEPS = 1.5

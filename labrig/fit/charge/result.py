@@ -5,15 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-from labrig.number_format import aligned
-from labrig.results import (
-    FloatArray,
-    Measured,
-    OneSided,
-    ProfileInterval,
-    interval_lines,
-    measured_number,
-)
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import aligned
+from labrig.results import Measured, OneSided, ProfileInterval, interval_lines, measured_number
 
 UNKNOWN = "–"
 #: Version of the JSON: another number means renamed keys or other meanings.

@@ -19,7 +19,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.least_squares import FloatArray, least_squares
+from labrig.fit.least_squares import least_squares
+from labrig.foundation.arrays import FloatArray
 from labrig.results import NORMAL_95, Measured
 
 #: Factors in time of the last readings that lines are laid through, and fewest readings of a line.

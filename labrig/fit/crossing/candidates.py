@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import expit
 
 from labrig.fit.crossing.readings import LogDecay
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
 
 #: Least and largest shape of a law of a rate and a shape.

@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 
-from labrig.errors import FitError
 from labrig.fit.crossing.bound import earliest_crossing, growing_rate
 from labrig.fit.crossing.candidates import candidates
 from labrig.fit.crossing.posterior import WALKS, Posterior, posteriors
 from labrig.fit.crossing.readings import LogDecay, reading_sigma
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.results import NORMAL_95, ForecastTime
 
 #: Part of the draws of what the record does not foretell.

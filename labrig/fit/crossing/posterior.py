@@ -22,7 +22,7 @@ import numpy as np
 
 from labrig.fit.crossing.candidates import Candidate
 from labrig.fit.crossing.readings import FEWEST_VALUES, LogDecay
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Steps δ of the walk of a slope per root of ln t.
 WALKS = (0.03, 0.1, 0.25)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.nonnegative import nonnegative_least_squares
 
 #: Most values, evenly spaced in ln t, and the fewest that a law is fitted to.
 MOST_VALUES, FEWEST_VALUES = 32, 5

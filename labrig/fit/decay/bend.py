@@ -15,7 +15,7 @@ from scipy.special import chdtrc
 from labrig.fit.decay.diagnostics import MISFIT_LEVEL
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.results import with_uncertainty
 
 #: Significance of a bend in σ, a chance of 6 in 100,000 without one.

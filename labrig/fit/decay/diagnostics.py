@@ -8,8 +8,8 @@ from scipy.special import chdtr, chdtrc, fdtrc, ndtr
 
 from labrig.fit.decay.periodic_flicker import Periodogram, periodogram
 from labrig.fit.decay.states import APART_SIGMAS, ILL_DETERMINED, sigmas_apart
-from labrig.fit.least_squares import FloatArray
-from labrig.number_format import rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
 from labrig.results import DecayState
 
 #: Significance level of each misfit test.

@@ -11,7 +11,7 @@ import numpy as np
 from labrig.fit.decay.further_state import RCOND
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Gauss–Legendre nodes and weights on [0, 1].
 _NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import FitError
 from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.material import exponential_means
-from labrig.nonnegative import nonnegative_least_squares
 
 COARSE_RATES = 48
 #: Logarithm of the slowest rate, in 1/spans, beside a free offset. Slower ones and a negative

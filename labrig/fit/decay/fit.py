@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.errors import FitError
 from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.fit_warnings import (
     Evidence,
@@ -31,7 +30,8 @@ from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.sigma_scale import sigma_scale
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.results import (
     AUTO,
     EXPONENTIALS,

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import FitError
 from labrig.fit.decay.bend import Bend, bend_warnings
 from labrig.fit.decay.diagnostics import (
     Misfit,
@@ -24,8 +23,9 @@ from labrig.fit.decay.selection import CLEAR_BIC
 from labrig.fit.decay.sigma_scale import SigmaScale
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
-from labrig.number_format import rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.number_format import rounded
 from labrig.results import (
     EXPONENTIALS,
     LAW_LABELS,

@@ -17,7 +17,7 @@ from scipy.special import log_ndtr, ndtri_exp
 from labrig.fit.decay.series import FASTEST_DECAYS
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import exponential_means
 
 #: Rates tried for a further state of any rate, and for one that is faster than all others.

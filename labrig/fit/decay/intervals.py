@@ -16,7 +16,6 @@ from labrig.fit.decay.joint import JointFit, JointProblem, Shape
 from labrig.fit.decay.laws import LawFit
 from labrig.fit.decay.states import StatesFit, exponentials
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.profile_likelihood import (
     Likelihood,
     LowerMinimumError,
@@ -25,6 +24,7 @@ from labrig.fit.profile_likelihood import (
     exponential,
     parameter,
 )
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
 from labrig.results import EXPONENTIALS, ProfileInterval
 

@@ -11,11 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import (
-    FloatArray,
-    LeastSquaresFit,
-    least_squares,
-)
+from labrig.fit.least_squares import LeastSquaresFit, least_squares
+from labrig.foundation.arrays import FloatArray
 
 #: Shape parameters (q,) → h (n,) and its Jacobian (n, q).
 Shape = Callable[[FloatArray], tuple[FloatArray, FloatArray]]

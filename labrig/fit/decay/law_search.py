@@ -22,7 +22,7 @@ from scipy.ndimage import maximum_filter
 from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import DecayLaw
 
 #: Largest rate at lamp off in inverse shortest steps between frames, and smallest in spans: laws

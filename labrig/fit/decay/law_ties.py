@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from labrig.fit.decay.selection import CLEAR_BIC
-from labrig.number_format import rounded
+from labrig.foundation.number_format import rounded
 from labrig.results import (
     EXPONENTIALS,
     LAW_LABELS,

@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.errors import FitError
 from labrig.fit.decay.joint import JointFit, Shape, covariance_under_flicker, fit_jointly
 from labrig.fit.decay.law_search import law_minima, log_rate_bounds
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray, parameter_covariance
+from labrig.fit.least_squares import parameter_covariance
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS, DecayLaw
 from labrig.results import FittedLaw
 

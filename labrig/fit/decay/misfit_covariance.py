@@ -11,7 +11,7 @@ import numpy as np
 from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.states import StatesFit, exponentials
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Step of the parameters, log k and amplitudes of order 1, by which derivatives are differenced.
 STEP = 1e-4

@@ -26,7 +26,7 @@ from labrig.fit.decay.diagnostics import BELOW_ZERO_SIGMAS
 from labrig.fit.decay.envelope import USUAL_FLICKER, Envelope
 from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Correlations of neighbouring values that are weighed, and the prior probability of none: who
 #: gives the flicker has measured it, and would have seen how a steady light drifts.

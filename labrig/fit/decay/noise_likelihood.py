@@ -14,7 +14,7 @@ import numpy as np
 from labrig.fit.decay.envelope import MAX_FLICKER, Envelope
 from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Values of ρ that are tried, dense near zero, where a small one already tells.
 FLICKERS = MAX_FLICKER * np.linspace(0, 1, 100) ** 2

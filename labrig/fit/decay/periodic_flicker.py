@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lombscargle
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.results import UnseenFlicker
 
 #: Values below which neither is looked for, and first values that are looked at.

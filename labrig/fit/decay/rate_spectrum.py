@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.search import projection
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.material import exponential_means
-from labrig.nonnegative import nonnegative_least_squares
 from labrig.results import FittedRateSpectrum
 
 #: Number of rates of the grid.

@@ -17,8 +17,8 @@ from labrig.fit.decay.periodic_flicker import unseen_flicker
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.propagation import propagated_covariance
+from labrig.foundation.arrays import FloatArray
 from labrig.results import (
     DecayReference,
     DecayState,

@@ -19,7 +19,8 @@ import numpy as np
 from labrig.fit.decay.envelope import envelope, monotone_curve
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import whitened
-from labrig.fit.least_squares import EPSILON, FloatArray
+from labrig.fit.least_squares import EPSILON
+from labrig.foundation.arrays import FloatArray
 from labrig.results import ScatterSigma
 
 #: Iterations in which the weights of the curve follow σ; the third changes σ by less than 1 %.

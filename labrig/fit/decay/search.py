@@ -18,7 +18,7 @@ import nlopt
 import numpy as np
 
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import exponential_means
 
 #: Largest number of combinations of rates, which limits the grid.

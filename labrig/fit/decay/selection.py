@@ -16,7 +16,7 @@ from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states, refit
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.results import Candidate
 
 #: Significance level of a further state of known rate. Searching the rate adds false positives,

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 
 #: Slowest rate searched: 1 / (this many spans of the data).
 SLOWEST_SPANS = 50.0

@@ -16,7 +16,7 @@ from labrig.fit.decay.diagnostics import MISFIT_LEVEL, order_p_value
 from labrig.fit.decay.envelope import MAX_FLICKER, monotone_curve
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import whitened
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Chance of right σ to scatter so much that they are scaled.
 SCALED_LEVEL = 5e-4

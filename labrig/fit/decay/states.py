@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import FitError
 from labrig.fit.decay.joint import JointFit, Shape, fit_jointly
 from labrig.fit.decay.search import projection, search_rates
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import Ending, FloatArray
+from labrig.fit.least_squares import Ending
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import exponential_means_and_slopes
 
 #: Amplitude at the first frame, relative to the largest, below which a state is dropped.

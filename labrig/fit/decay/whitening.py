@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.series import DecaySeries
-from labrig.fit.least_squares import EPSILON, FloatArray
+from labrig.fit.least_squares import EPSILON
+from labrig.foundation.arrays import FloatArray
 
 
 @dataclass(frozen=True)

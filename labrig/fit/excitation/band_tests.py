@@ -15,8 +15,9 @@ from scipy.special import chdtrc
 
 from labrig.fit.excitation.parameters import Rates
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.least_squares import EPSILON, FloatArray, LeastSquaresFit
-from labrig.results import BandQuantity, BandTests, IntArray, Measured
+from labrig.fit.least_squares import EPSILON, LeastSquaresFit
+from labrig.foundation.arrays import FloatArray, IntArray
+from labrig.results import BandQuantity, BandTests, Measured
 
 #: Step of the derivatives by logarithms.
 STEP = 1e-4

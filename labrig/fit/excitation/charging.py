@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.material import dark_concentration, lit_concentration, mean_emission
-from labrig.results import Closure, FloatArray, spans_decades
+from labrig.results import Closure, spans_decades
 
 #: Number of points of the predicted curve.
 POINTS = 200

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.results import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Distance in nm over which logarithms of excitation rates are correlated.
 CORRELATED_NM = 40.0

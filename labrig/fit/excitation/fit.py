@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import FitError
 from labrig.fit.excitation.band_tests import band_tests
 from labrig.fit.excitation.intervals import IntervalChoice, excitation_intervals
 from labrig.fit.excitation.lamp_pulls import law_test
@@ -22,9 +21,11 @@ from labrig.fit.excitation.order_gain import order_gain
 from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.start import channel_weights, starts
-from labrig.fit.least_squares import Ending, FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import Ending, LeastSquaresFit, least_squares
 from labrig.fit.propagation import propagated_covariance
-from labrig.number_format import rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
+from labrig.foundation.number_format import rounded
 from labrig.results import (
     BandTests,
     ChargingSeries,

@@ -21,8 +21,9 @@ from labrig.fit.profile_likelihood import (
     Value,
     parameter,
 )
+from labrig.foundation.arrays import FloatArray
 from labrig.material import MAX_ORDER
-from labrig.results import FloatArray, ProfileInterval
+from labrig.results import ProfileInterval
 
 #: Which intervals a fit has: none, where ±σ misleads, or all.
 IntervalChoice = Literal["none", "auto", "all"]

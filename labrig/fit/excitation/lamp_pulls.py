@@ -12,7 +12,8 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labrig.fit.excitation.parameters import Parameters, Rates, is_fitted
-from labrig.results import ChargingSeries, FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.results import ChargingSeries
 
 #: Probability of all pulls together below which the law does not hold, as of all misfit tests.
 UNLIKELY = 5e-4

@@ -23,7 +23,8 @@ from labrig.fit.excitation.light_errors import LightErrors
 from labrig.fit.excitation.parameters import RelativeSigmas
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.least_squares import least_squares
-from labrig.results import ChargingSeries, DensityBasis, FittedExcitation, FloatArray, LayerEffect
+from labrig.foundation.arrays import FloatArray
+from labrig.results import ChargingSeries, DensityBasis, FittedExcitation, LayerEffect
 
 #: Depths of equal weight of Chebyshev's quadrature, as fractions of the whole: exact within 10⁻⁴ up
 #: to an optical density of 2.

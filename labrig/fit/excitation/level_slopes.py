@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import phi1, phi2
-from labrig.results import FloatArray
 
 
 class Levels(NamedTuple):

@@ -13,8 +13,9 @@ import numpy as np
 
 from labrig.fit.excitation import levels_of_order
 from labrig.fit.excitation.level_slopes import Levels, mean_levels
+from labrig.foundation.arrays import FloatArray, IntArray
 from labrig.material import relaxation_with_slopes
-from labrig.results import ChargingSeries, FloatArray, IntArray
+from labrig.results import ChargingSeries
 
 
 class _Charges(NamedTuple):

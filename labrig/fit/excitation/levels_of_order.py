@@ -11,8 +11,9 @@ import numpy as np
 
 from labrig.fit.excitation.charging import LEAST_KAPPA
 from labrig.fit.excitation.level_slopes import Levels
+from labrig.foundation.arrays import FloatArray
 from labrig.material import dark_step, lit_step, mean_emission, relaxation_with_slopes
-from labrig.results import Charge, ChargingSeries, FloatArray, Transient
+from labrig.results import Charge, ChargingSeries, Transient
 
 #: Parts of a transient, each with its mean light.
 PARTS = 4

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit.excitation.parameters import Parameters, RelativeSigmas, is_fitted
-from labrig.fit.least_squares import FloatArray, LeastSquaresFit
+from labrig.fit.least_squares import LeastSquaresFit
+from labrig.foundation.arrays import FloatArray
 from labrig.results import ChargingSeries
 
 #: Sizes of a kind of error that are tried, the denser the smaller they are.

@@ -8,8 +8,8 @@ import numpy as np
 
 from labrig.fit.excitation.parameters import RelativeSigmas
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.nonnegative import nonnegative_least_squares
-from labrig.results import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 
 
 def order_gain(

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import helmert
 
-from labrig.errors import FitError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import MAX_ORDER
-from labrig.results import ChargingSeries, FloatArray
+from labrig.results import ChargingSeries
 
 #: Amplitudes over the largest value: of a state which is not there, and of one so far from
 #: saturation that its amplitude is without influence.

@@ -14,7 +14,8 @@ import numpy as np
 from labrig.fit.excitation.level_slopes import Levels
 from labrig.fit.excitation.levels import levels, levels_and_slopes
 from labrig.fit.excitation.parameters import Parameters, Rates, RelativeSigmas, is_fitted
-from labrig.results import ChargingSeries, FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.results import ChargingSeries
 
 
 class ExcitationProblem:

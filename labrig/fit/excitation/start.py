@@ -6,8 +6,9 @@ import numpy as np
 
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.nonnegative import nonnegative_least_squares
-from labrig.results import ChargingSeries, FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
+from labrig.results import ChargingSeries
 
 #: Guesses of the concentration of the brightest site, the least certain start value.
 GUESSED_LEVELS = (0.05, 0.2, 0.5, 0.9)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import UsageError
 from labrig.fit.fluorescence.result import FluorescenceFit
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import appearance
 from labrig.optics import (
     CIE_1931,

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from labrig.errors import UsageError
 from labrig.fit.fluorescence.joint import JointEstimator
 from labrig.fit.fluorescence.per_led import fit_per_led
 from labrig.fit.fluorescence.result import FluorescenceFit, Method
 from labrig.fit.fluorescence.system import FluorescenceSystem
+from labrig.foundation.errors import UsageError
 from labrig.optics import Spectrum
 
 

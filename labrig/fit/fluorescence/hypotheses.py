@@ -31,7 +31,7 @@ from labrig.fit.fluorescence.prior import (
 from labrig.fit.fluorescence.shapes import EmissionShapes
 from labrig.fit.fluorescence.system import FluorescenceSystem
 from labrig.fit.fluorescence.unknowns import Unknowns
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 MOST_FLUOROPHORES = 3
 #: Prior probability that a surface does not fluoresce, and that it has one fluorophore more.

@@ -37,7 +37,7 @@ from labrig.fit.fluorescence.system import (
     checked_values,
     require_scale,
 )
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from labrig.fit.fluorescence.result import EstimatedFluorophore, FluorescenceFit
 from labrig.fit.fluorescence.system import FluorescenceSystem, checked_values, require_scale
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum, band_means, edges_from_centres
 

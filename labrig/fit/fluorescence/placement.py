@@ -6,8 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from labrig.errors import UsageError
 from labrig.fit.fluorescence.study import LedStudy, gaussian_led, study_leds
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse, Spectrum
 

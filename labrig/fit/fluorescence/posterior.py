@@ -20,8 +20,8 @@ from labrig.fit.fluorescence.hypotheses import (
     Measured,
 )
 from labrig.fit.fluorescence.unknowns import covariance_root
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import nonnegative_minimum
+from labrig.foundation.arrays import FloatArray
 
 #: Iterations in which the deviations of an emission follow its excitation.
 ROUNDS = 2

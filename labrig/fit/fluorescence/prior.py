@@ -7,7 +7,7 @@ The numbers describe measured re-radiation matrices; they are no fit to any one 
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Mean reflectance, standard deviation of its level and correlation length of its course in nm.
 REFLECTANCE, LEVEL_SIGMA, REFLECTANCE_NM = 0.5, 0.5, 90.0

@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
 

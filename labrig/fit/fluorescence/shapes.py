@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import Spectrum, edges_from_centres
 
 #: Peaks in nm, full widths at half maximum in nm, and skews of the shapes that are tried.

@@ -7,7 +7,7 @@ import numpy as np
 
 from labrig.fit.fluorescence.joint import JointEstimator
 from labrig.fit.fluorescence.system import Exposure, fluorescence_system
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix, compare_colours
 from labrig.optics import CameraResponse, Spectrum
 

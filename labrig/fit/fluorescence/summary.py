@@ -16,7 +16,7 @@ from labrig.fit.fluorescence.result import (
     UnknownBrightness,
 )
 from labrig.fit.fluorescence.system import FluorescenceSystem
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum, edges_from_centres
 

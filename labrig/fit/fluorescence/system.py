@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_triangular
 
-from labrig.errors import UsageError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.leds import changed_spectrum
 from labrig.fit.spectrum import CurveError, camera_modes, curve_modes
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import (
     CameraResponse,
     Spectrum,

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Variance of the excitation, relative to its largest, below which it is 0.
 LEAST_VARIANCE = 1e-3

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError, camera_modes
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Spectrum, Transmittance, band_integrals
 
 #: Standard deviation of ln b and of ln g about a first guess: a factor of 20, and any at all.

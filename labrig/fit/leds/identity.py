@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.leds.brightness import (
     CLEAR,
     CURVES_OF_MODEL,
@@ -16,6 +15,7 @@ from labrig.fit.leds.brightness import (
     changed_spectrum,
 )
 from labrig.fit.spectrum import CurveError, camera_modes
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 
 #: Standard uncertainty in nm of an LED's wavelengths by its data sheet.

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import strip_problem
 from labrig.fit.lvf.strip_problem import (
     AlongStrip,
@@ -23,6 +21,8 @@ from labrig.fit.lvf.strip_problem import (
     StripSolution,
 )
 from labrig.fit.spectrum.system import CurveError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import (
     NOMINAL_FWHM_NM,
     Bands,

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Strip
-from labrig.results import FloatArray, Measured, PictureChange, StripProfile
+from labrig.results import Measured, PictureChange, StripProfile
 
 #: Wavelengths in nm between which the change of the lamp's colour is given.
 BLUE_NM, RED_NM = 420.0, 680.0

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Transmittance
-from labrig.results import FloatArray
 
 #: Centres in nm of the bands that are to be found, and full width of each at half maximum.
 CENTRES_NM: FloatArray = np.linspace(400.0, 700.0, 31)

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray, least_squares
+from labrig.fit.least_squares import least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import peak_shape
 from labrig.results import LocatedLines
 

@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks, peak_widths
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf.line_model import (
     FEWEST_LINES,
     MERCURY,
@@ -17,6 +15,8 @@ from labrig.fit.lvf.line_model import (
     Line,
     LineModel,
 )
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import NOMINAL_FWHM_NM
 from labrig.results import LocatedLines
 

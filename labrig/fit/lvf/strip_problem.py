@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.system import CurveError, camera_modes
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import (
     CameraResponse,
     Spectrum,

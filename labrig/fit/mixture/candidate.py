@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.least_squares import Ending, FloatArray
+from labrig.fit.least_squares import Ending
 from labrig.fit.mixture.entries import StokesEntries
 from labrig.fit.mixture.expectation_maximisation import LikelihoodFit, maximise_likelihood
 from labrig.fit.mixture.gaussians import Gaussians
@@ -17,6 +17,7 @@ from labrig.fit.mixture.refinement import refined
 from labrig.fit.mixture.scaling import masked_mse, with_integral
 from labrig.fit.mixture.skewed_refinement import refined_skewed
 from labrig.fit.mixture.starts import scattered_starts, with_one_more
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMixture
 
 #: Starts of expectation maximisation by light and by its square, which noise far from the dye

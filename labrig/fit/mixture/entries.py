@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from labrig.errors import DataError, UsageError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.mixture.gaussians import monomials_of
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix
 
 #: Expected fraction of noise among the entries that are kept (Benjamini and Hochberg, *Journal of

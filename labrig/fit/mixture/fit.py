@@ -12,7 +12,6 @@ from typing import Literal
 
 import numpy as np
 
-from labrig.errors import UsageError
 from labrig.fit.mixture.candidate import Candidate, candidates, likeliest
 from labrig.fit.mixture.cross_validation import held_out_errors
 from labrig.fit.mixture.entries import FALSE_DISCOVERY_RATE, StokesEntries, stokes_entries
@@ -21,6 +20,7 @@ from labrig.fit.mixture.refinement import PARAMETERS
 from labrig.fit.mixture.result import HeldOutError, MixtureCandidate, MixtureFit
 from labrig.fit.mixture.scaling import Scaling, chi2, masked_mse, with_colours, with_integral
 from labrig.fit.mixture.skewed_refinement import PARAMETERS as SKEWED_PARAMETERS
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.mixture.entries import StokesEntries
 from labrig.fit.mixture.result import LightKept
 from labrig.fit.mixture.scaling import modelled
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix, ReradiationMixture
 
 #: Least part of the light, and least number of its σ, with which a column is compared.

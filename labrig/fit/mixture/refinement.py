@@ -6,9 +6,10 @@ its peak; the error that is reported, and seen, is the squared one.
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import LeastSquaresFit, least_squares
 from labrig.fit.mixture.entries import StokesEntries
 from labrig.fit.mixture.gaussians import LEAST_WEIGHT, Gaussians
+from labrig.foundation.arrays import FloatArray
 
 #: Parameters of a component: log of its height, mean of the input, mean of the output, log of σ of
 #: the input, rise of the output with the input, log of σ of the output at one input. They are the

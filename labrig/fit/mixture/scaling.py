@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from labrig.errors import DataError, UsageError
 from labrig.fit.mixture.entries import StokesEntries
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture, compare_colours
 from labrig.optics import Spectrum
 

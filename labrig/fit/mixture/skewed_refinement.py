@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import LeastSquaresFit, least_squares
 from labrig.fit.mixture.entries import StokesEntries
 from labrig.fit.mixture.gaussians import Gaussians
 from labrig.fit.mixture.refinement import LARGEST_SD, LEAST_GAIN, LEAST_HEIGHT, TOLERANCE
+from labrig.foundation.arrays import FloatArray
 
 #: Parameters of a component: log of its height, then of input and of output the median, log of the
 #: width and skew, then artanh of the correlation.

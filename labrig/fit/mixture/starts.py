@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.mixture.entries import StokesEntries
 from labrig.fit.mixture.gaussians import Gaussians
+from labrig.foundation.arrays import FloatArray
 
 SEED = 2021
 #: Widest σ of an added component that is tried, and how often it is halved.

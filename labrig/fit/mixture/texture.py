@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from labrig.errors import UsageError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.mixture.candidate import LEAST_SD_BANDS
 from labrig.fit.mixture.expectation_maximisation import maximise_likelihood
 from labrig.fit.mixture.gaussians import AnyFloatArray, Gaussians, monomials_of, product
+from labrig.foundation.arrays import Float32Array, FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture
-
-SingleArray = NDArray[np.float32]
 
 #: Texels that are fitted at once: their densities stay in the cache of a core.
 CHUNK = 256
@@ -50,11 +48,11 @@ class MixtureTexture:
         Mean squared error per band of each texel as of `MixtureFit`, shape (B,).
     """
 
-    scale: SingleArray
-    weights: SingleArray
-    mean_nm: SingleArray
-    covariance_nm2: SingleArray
-    masked_mse: SingleArray
+    scale: Float32Array
+    weights: Float32Array
+    mean_nm: Float32Array
+    covariance_nm2: Float32Array
+    masked_mse: Float32Array
 
     def __len__(self) -> int:
         """Return the number of texels."""
@@ -153,9 +151,9 @@ class _Grid:
     """Entries on the Stokes side that all texels have in common."""
 
     is_stokes: NDArray[np.bool_]
-    input_width_nm: SingleArray
-    output_width_nm: SingleArray
-    monomials: SingleArray
+    input_width_nm: Float32Array
+    output_width_nm: Float32Array
+    monomials: Float32Array
     origin_nm: FloatArray
     least_variance: float
 
@@ -207,7 +205,7 @@ def _fit_chunk(
 
 
 def _along_longest_axis(
-    mass: SingleArray, monomials: SingleArray, components: int, least_variance: float
+    mass: Float32Array, monomials: Float32Array, components: int, least_variance: float
 ) -> Gaussians:
     """Return mixtures whose means divide each texel's light along its longest axis."""
     moments = product(mass, monomials.T) / mass.sum(axis=-1, keepdims=True)

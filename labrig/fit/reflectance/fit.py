@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.reflectance.luminescence import Luminescence
 from labrig.fit.spectrum import SpectralSystem, SpectrumFit, fit_spectrum
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.optics import Transmittance
 
 #: σ of the part of a sample's light that a filter close above it throws back onto it.

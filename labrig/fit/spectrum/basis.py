@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import toeplitz
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.line import line_at_knots
 from labrig.fit.spectrum.minimum import nonnegative_minimum
 from labrig.fit.spectrum.smooth import Prior, Whitened
 from labrig.fit.spectrum.system import SpectralSystem
+from labrig.foundation.arrays import FloatArray
 
 #: Full widths at half maximum of lines in nm.
 FWHM_NM = np.geomspace(0.7, 22.0, 9)

@@ -14,10 +14,10 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
-from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.system import SpectralSystem
 from labrig.fit.spectrum.values import measured
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 
 #: Full width at half maximum over σ of a Gaussian.
 FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))

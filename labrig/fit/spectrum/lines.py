@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.basis import FWHM_NM, Basis, Places, Problem, smooth
 from labrig.fit.spectrum.smooth import WEIGHTS, normalised
+from labrig.foundation.arrays import FloatArray
 
 #: Weights besides lines. At the least of them, knots 5 nm apart, the smooth spectrum may bend as
 #: much as a band of 40 nm with all the light: what is narrower is a matter of lines.

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
 
-from labrig.fit.least_squares import EPSILON, FloatArray
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.fit.least_squares import EPSILON
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 
 #: Number of exchanges after which block pivoting counts as cycling.
 MAX_EXCHANGES = 25

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_triangular
 
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.system import SpectralSystem
+from labrig.foundation.arrays import FloatArray
 
 #: Grid of weights of the prior, for a spectrum of about 1.
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import Bands, CameraResponse, Lvf, hat_functions, quadrature
-
-FloatArray = NDArray[np.float64]
 
 #: Steps of the derivatives by an LVF's parameters, relative to their σ.
 _STEP = 0.1

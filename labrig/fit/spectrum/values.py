@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import FitError
-from labrig.fit.spectrum.system import FloatArray, SpectralSystem
+from labrig.fit.spectrum.system import SpectralSystem
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 
 FEWEST_VALUES = 3
 

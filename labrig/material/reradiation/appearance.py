@@ -7,9 +7,9 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.material.reradiation.matrix import ReradiationMatrix
 from labrig.optics import (
     CIE_1931,
@@ -23,8 +23,6 @@ from labrig.optics import (
     quadrature,
     white_xyz,
 )
-
-FloatArray = NDArray[np.float64]
 
 #: `light`: a perfect white under the light itself. `D65`: that of a screen, on which the reference
 #: has the luminance `REFERENCE_Y`.

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from labrig.errors import DataError
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Radiance factors at 45°/0° are no energies: of 97 measured surfaces the brightest has 1.07.
 UNUSUAL_FRACTION = 1.0

@@ -10,12 +10,11 @@ expectation of a sample's weight is the integral.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import erfcx, log_ndtr, log_softmax, ndtri_exp, softmax
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.margin import Margin
-
-FloatArray = NDArray[np.float64]
 
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
 #: Truncation, in standard deviations above the mean, from which the tail is taken as exponential

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material.reradiation.evidence import reradiates
 from labrig.material.reradiation.formats import matrix_files, read_reradiation
 from labrig.material.reradiation.matrix import ReradiationMatrix

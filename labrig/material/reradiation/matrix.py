@@ -13,12 +13,10 @@ from functools import cached_property
 from typing import Literal, Self, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.optics import Spectrum, edges_from_centres
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: Unit of the re-radiation; `relative` is some multiple of 1/nm that is not known.
 Unit: TypeAlias = Literal["1/nm", "relative"]

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.conditional import ConditionalDensity
 from labrig.material.reradiation.margin import Margin
 from labrig.material.reradiation.matrix import SAME_NM, ReradiationMatrix
-
-FloatArray = NDArray[np.float64]
 
 #: Tolerance of the sum of the weights.
 WEIGHTS_SUM_SLACK = 1e-9

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from labrig.errors import UsageError
-from labrig.input_file import MAX_JSON_BYTES, read_text
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
+from labrig.material.reradiation.matrix import ReradiationMatrix
 from labrig.material.reradiation.mixture import ReradiationMixture
 
 #: Most bands of the incident light: a step of 1 nm over all that instruments measure.

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
-from labrig.material.reradiation.matrix import BoolArray, FloatArray, ReradiationMatrix
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import DataError
+from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Entries nearer to the diagonal than this many bands hold light that passes both monochromators.
 CLEAR_BANDS = 1.5

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix, are_same_bands
+from labrig.foundation.arrays import FloatArray
+from labrig.material.reradiation.matrix import ReradiationMatrix, are_same_bands
 from labrig.material.reradiation.noise import SIGMA_OF_MEDIAN
 
 #: Both parts above the diagonal over those below, on a BFC-450: -0.52 and -0.60 on 196 measurements

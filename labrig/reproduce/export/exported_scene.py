@@ -6,10 +6,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.export.rgb_preview import RgbPreview
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

@@ -13,17 +13,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.output_file import write_durably
 from labrig.optics import srgb_bytes
-from labrig.output_file import write_durably
 from labrig.reproduce.export.exported_scene import (
     ExportedMesh,
     Glow,
     frame_count,
 )
 from labrig.reproduce.transport.tracing import Pinhole
-
-FloatArray = NDArray[np.float64]
 
 STRENGTH, POINTER = "KHR_materials_emissive_strength", "KHR_animation_pointer"
 #: Name of what viewers do not know: what a fluorescent surface does to light.

@@ -11,19 +11,17 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.exr_file import write_exr
-from labrig.output_file import make_folder, write_durably, write_text
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.exr_file import write_exr
+from labrig.foundation.output_file import make_folder, write_durably, write_text
 from labrig.reproduce.export.exported_scene import (
     ExportedMesh,
     Glow,
     frame_count,
 )
 from labrig.reproduce.transport.tracing import Pinhole
-
-FloatArray = NDArray[np.float64]
 
 SCENE, PREVIEWS = "scene.xml", "reradiation_previews.json"
 #: Version of the scene's language.

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import (
     CIE_1931,
     XYZ_TO_SRGB,
@@ -26,8 +26,6 @@ from labrig.reproduce.picture.display import tristimulus
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.lamp import Lamp
-
-FloatArray = NDArray[np.float64]
 
 #: Illuminants over which matrices are fitted, and the wavelengths in nm between their parts: light
 #: in a scene has passed coloured walls, and three illuminants alone leave a matrix open.

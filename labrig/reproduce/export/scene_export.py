@@ -1,8 +1,9 @@
 """A rendered scene for other programs: its meshes, and their glow over the frames, in sRGB."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import XYZ_TO_SRGB, illuminant
 from labrig.reproduce.export.exported_scene import ExportedMesh, Glow
 from labrig.reproduce.export.rgb_preview import RgbPreview, rgb_preview
@@ -11,8 +12,6 @@ from labrig.reproduce.picture.render_folder import RenderFolder
 from labrig.reproduce.picture.rendering import Renderer
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.transport.geometry import Geometry
-
-FloatArray = NDArray[np.float64]
 
 
 def exported_meshes(scene: Scene, folder: RenderFolder) -> list[ExportedMesh]:

@@ -6,13 +6,12 @@ Khronos's specification of glTF 2.0; keys that say nothing of shapes are left ou
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.alias_generators import to_camel
 
-from labrig.finite import Finite
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.models import Finite
 
-FloatArray = NDArray[np.float64]
 Index = Annotated[int, Field(ge=0)]
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import validate
 from labrig.reproduce.mesh_file.gltf_document import (
     GltfDocument,
     GltfMesh,
@@ -21,9 +23,7 @@ from labrig.reproduce.mesh_file.gltf_document import (
 from labrig.reproduce.mesh_file.gltf_numbers import GltfNumbers, part_of
 from labrig.reproduce.mesh_file.polygons import strip_triangles
 from labrig.reproduce.transport.mesh import Mesh
-from labrig.yaml_file import validate
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _MAGIC, _VERSION = b"glTF", 2

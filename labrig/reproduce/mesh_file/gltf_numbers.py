@@ -11,11 +11,11 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.input_file import MAX_MESH_BYTES, read_bytes
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_MESH_BYTES, read_bytes
 from labrig.reproduce.mesh_file.gltf_document import Accessor, GltfDocument
 
-FloatArray = NDArray[np.float64]
 T = TypeVar("T")
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

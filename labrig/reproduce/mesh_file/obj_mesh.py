@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.mesh_file.polygons import triangles
 from labrig.reproduce.transport.mesh import PARTLY_UNWRAPPED, Mesh
-
-FloatArray = NDArray[np.float64]
 
 #: Statements that change no surface: lines, points, names, normals, materials, smoothing, looks.
 WITHOUT_SURFACE = frozenset({

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.mesh_file.polygons import strip_triangles, triangles
 from labrig.reproduce.transport.mesh import PARTLY_UNWRAPPED, Mesh
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 TYPES = {

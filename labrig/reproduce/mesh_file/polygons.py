@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.transport.mesh import frame
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 #: Parts of the square of a polygon's size below which an area is a rounding error.

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import UsageError
-from labrig.input_file import MAX_MESH_BYTES, read_bytes
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_MESH_BYTES, read_bytes
 from labrig.reproduce.mesh_file.gltf_mesh import gltf_mesh
 from labrig.reproduce.mesh_file.obj_mesh import obj_mesh
 from labrig.reproduce.mesh_file.ply_mesh import ply_mesh

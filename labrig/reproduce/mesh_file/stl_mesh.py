@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.mesh_file.polygons import triangles
 from labrig.reproduce.transport.mesh import Mesh
 

@@ -11,8 +11,9 @@ from typing import Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
-from labrig.number_format import rounded
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.number_format import rounded
 from labrig.optics import (
     CIE_1931,
     XYZ_TO_SRGB,
@@ -23,7 +24,6 @@ from labrig.optics import (
     srgb_bytes,
 )
 
-FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 White: TypeAlias = tuple[float, float, float]
 

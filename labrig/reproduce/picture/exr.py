@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
-from labrig.exr_file import read_exr, read_exr_header, write_exr
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.exr_file import read_exr, read_exr_header, write_exr
 from labrig.material import read_spectral_image
 from labrig.optics import XYZ_TO_SRGB, edges_from_centres
 from labrig.reproduce.picture.display import tristimulus
 
-FloatArray = NDArray[np.float64]
 Pixels = NDArray[np.float32]
 
 #: Unit of the radiance as the layout writes it.

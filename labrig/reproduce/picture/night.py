@@ -9,13 +9,12 @@ measures nothing.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import band_integrals, scotopic_efficacy
 from labrig.reproduce.picture.display import Display, tristimulus, weighted_bands
-
-FloatArray = NDArray[np.float64]
 
 #: Luminances in cd/m² below which rods see alone, and above which cones do.
 RODS_ALONE_CD_PER_M2, CONES_ALONE_CD_PER_M2 = 0.01, 10.0

@@ -3,16 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Float32Array, Int32Array
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.surface.field import Field
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.geometry import Geometry
-
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +34,8 @@ class PhosphorState:
 
     name: str
     material: int
-    places: IntArray
-    texels: IntArray | None
+    places: Int32Array
+    texels: Int32Array | None
     field: Field
     is_charged: bool
 
@@ -68,7 +65,7 @@ def phosphor_states(scene: Scene, geometry: Geometry) -> list[PhosphorState]:
     return states
 
 
-def _texels(material: SurfaceMaterial, number: int, geometry: Geometry) -> IntArray:
+def _texels(material: SurfaceMaterial, number: int, geometry: Geometry) -> Int32Array:
     """Return the texel of a material's texture at every place, zero of others, shape (places,)."""
     assert material.texture is not None
     texels = np.zeros(geometry.n_places, np.int32)

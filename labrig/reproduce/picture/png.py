@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.input_file import read_bytes
-from labrig.output_file import write_durably
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_bytes
+from labrig.foundation.output_file import write_durably
 
 Bytes = NDArray[np.uint8]
 

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.array_file import read_arrays, write_arrays
-from labrig.errors import UsageError
-from labrig.input_file import MAX_JSON_BYTES, read_text
-from labrig.output_file import make_folder, write_text
+from labrig.foundation.array_file import read_arrays, write_arrays
+from labrig.foundation.arrays import Float32Array
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.output_file import make_folder, write_text
 from labrig.reproduce.picture.exr import SpectralFrame, read_spectral_exr, write_spectral_exr
 from labrig.reproduce.picture.rendering import Frame, Renderer
 from labrig.reproduce.picture.view import Report
 from labrig.reproduce.scene.built_scene import Scene
-
-Float32Array = NDArray[np.float32]
 
 CONTENT = "render.json"
 #: What the names of materials follow in the file of levels.

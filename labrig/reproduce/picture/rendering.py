@@ -11,19 +11,17 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from labrig.errors import UsageError
-from labrig.processors import n_processors
+from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
+from labrig.foundation.processors import n_processors
 from labrig.reproduce.picture.phosphor_states import albedo_factor, phosphor_states
 from labrig.reproduce.picture.view import Report, View, require_memory
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.transport.colour_folding import colour_fold
 from labrig.reproduce.transport.folding import Matrices, fold
 
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 #: Is called for each step with its begin in s and the mean irradiance during it.
 Record = Callable[[float, FloatArray], None]
 
@@ -190,7 +188,7 @@ class Renderer:
             if t_s >= self._t_s:
                 yield self.frame(t_s)
 
-    def places_of(self, name: str) -> IntArray:
+    def places_of(self, name: str) -> Int32Array:
         """Return the places of a phosphor of the scene, none if it is nowhere (places,)."""
         own = [state.places for state in self._states if state.name == name]
         return own[0] if own else np.zeros(0, np.int32)
@@ -345,12 +343,12 @@ class Renderer:
         return Seen(geometry.surfaces[number].name, named, found)
 
     @property
-    def seen_places(self) -> IntArray:
+    def seen_places(self) -> Int32Array:
         """Places that some pixel shows, rising."""
         return self._view_at(self._t_s).seen_places()
 
     @property
-    def first_places(self) -> IntArray:
+    def first_places(self) -> Int32Array:
         """Places that the paths of each pixel meet first, shape (height, width, paths).
 
         A lamp is −2 less its number, and nothing −1.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import Spectrum
 from labrig.reproduce.picture.display import Display, White, is_white, tristimulus
 from labrig.reproduce.picture.exr import SpectralFrame

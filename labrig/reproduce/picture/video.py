@@ -13,8 +13,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DiskError, UsageError
-from labrig.output_file import replaced
+from labrig.foundation.errors import DiskError, UsageError
+from labrig.foundation.output_file import replaced
 
 Bytes = NDArray[np.uint8]
 
@@ -46,7 +46,7 @@ def require_ffmpeg(path: Path) -> str:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.errors import UsageError
+    >>> from labrig.foundation.errors import UsageError
     >>> from labrig.reproduce import require_ffmpeg
     >>> try:
     ...     require_ffmpeg(Path("glow.gif"))
@@ -89,7 +89,7 @@ def write_video(path: Path, frames: Iterable[Bytes], frames_per_s: float) -> Non
     --------
     >>> from pathlib import Path
     >>> import numpy as np
-    >>> from labrig.errors import UsageError
+    >>> from labrig.foundation.errors import UsageError
     >>> from labrig.reproduce import write_video
     >>> frames = [np.full((4, 6, 3), grey, np.uint8) for grey in (0, 255)]
     >>> try:

@@ -9,20 +9,16 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.colour_folding import Sequences
 from labrig.reproduce.transport.geometry import Surface
 from labrig.reproduce.transport.lamp import LampTable
 from labrig.reproduce.transport.tracing import Paths, Tracer
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 #: Part of the memory that paths and pictures may take, and copies of a picture at once.
 LARGEST_PART, MOST_COPIES = 0.7, 6
@@ -86,7 +82,7 @@ class View:
             self._has_many_sequences = self._sequences is None
         return self._sequences
 
-    def first_places(self, pixel: int) -> IntArray:
+    def first_places(self, pixel: int) -> Int32Array:
         """Return the places that the paths of a pixel meet first, -2 - n of lamp n (paths,)."""
         for paths in self.of_camera():
             if pixel < paths.n_targets:
@@ -95,7 +91,7 @@ class View:
             pixel -= paths.n_targets
         raise AssertionError("a pixel within the picture")
 
-    def seen_places(self) -> IntArray:
+    def seen_places(self) -> Int32Array:
         """Return the places that some path meets first, rising."""
         found = np.unique(np.concatenate([paths.first_places for paths in self.of_camera()]))
         return found[found >= 0]
@@ -156,7 +152,7 @@ class View:
         return self._of_places
 
 
-def _nearest_lit(lit: IntArray, surface: Surface) -> IntArray:
+def _nearest_lit(lit: Int32Array, surface: Surface) -> Int32Array:
     """Return for each place of a surface the nearest that lies on it, by its texture."""
     if not isinstance(surface.samples, tuple) or len(lit) == surface.n_places:
         return np.arange(surface.n_places, dtype=np.int32)

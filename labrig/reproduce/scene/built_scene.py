@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.named_files import beside
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import beside
+from labrig.foundation.yaml_file import did_you_mean, validate
 from labrig.optics import Spectrum, read_light
 from labrig.reproduce.scene.placed_objects import surface_over_time
 from labrig.reproduce.scene.scene_file import (
@@ -30,9 +31,6 @@ from labrig.reproduce.surface.surface_material import BenchLight, SurfaceMateria
 from labrig.reproduce.transport.geometry import Geometry, Surface
 from labrig.reproduce.transport.lamp import Lamp
 from labrig.reproduce.transport.tracing import PathLength, Pinhole
-from labrig.yaml_file import did_you_mean, validate
-
-FloatArray = NDArray[np.float64]
 
 #: White of a screen in sRGB.
 SCREEN_WHITE = "D65"

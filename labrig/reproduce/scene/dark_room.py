@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from labrig.region import Region
+from labrig.foundation.region import Region
 from labrig.reproduce.scene.lamp_entry import LampEntry
 from labrig.reproduce.scene.object_entry import ObjectEntry, RectangleEntry
 from labrig.reproduce.scene.scene_file import (

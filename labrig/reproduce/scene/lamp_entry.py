@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.finite import NotNegative
+from labrig.foundation.models import NotNegative
 from labrig.reproduce.scene.scene_part import Name, ScenePart, Time, Vector
 
 

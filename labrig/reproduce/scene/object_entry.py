@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.finite import Finite, Positive
+from labrig.foundation.models import Finite, Positive
 from labrig.reproduce.scene.scene_part import Count, Length, Name, ScenePart, Vector
 
 

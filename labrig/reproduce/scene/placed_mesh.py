@@ -4,14 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.mesh_file.read_mesh import read_mesh
 from labrig.reproduce.scene.object_entry import MeshEntry, ObjectEntry
 from labrig.reproduce.transport.mesh import Mesh, rotation
-
-FloatArray = NDArray[np.float64]
 
 #: Patches of one body that are looked at, the largest ones.
 MOST_PATCHES = 100

@@ -4,19 +4,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.array_file import read_arrays
-from labrig.errors import UsageError
-from labrig.picture_file import read_picture
+from labrig.foundation.array_file import read_arrays
+from labrig.foundation.arrays import FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
+from labrig.foundation.picture_file import read_picture
 from labrig.reproduce.scene.object_entry import MaterialMap, ObjectEntry
 from labrig.reproduce.scene.placed_mesh import placed_mesh
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.geometry import Samples, Surface
 from labrig.reproduce.transport.mesh import Mesh
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 #: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
 TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
@@ -150,7 +147,7 @@ def _mapped(
     folder: Path,
     samples: tuple[int, int],
     numbers: Mapping[str, int],
-) -> IntArray:
+) -> Int32Array:
     """Return the number of the material of each texel, by the nearest colour (rows, columns)."""
     import cv2
 

@@ -4,18 +4,16 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.named_files import beside
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import beside
 from labrig.optics import absolute_irradiance, read_light
 from labrig.reproduce.scene.lamp_entry import STRENGTHS, LampEntry
 from labrig.reproduce.scene.scene_file import SceneFile
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.surface_material import BenchLight
 from labrig.reproduce.transport.lamp import Lamp
-
-FloatArray = NDArray[np.float64]
 
 #: Part of a lamp's brightest band by which noise may make another negative.
 NOISE_OF_LAMP = 0.01

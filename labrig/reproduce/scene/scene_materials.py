@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import beside
 from labrig.material import Albedo, Material, read_any_material, read_mixture
-from labrig.named_files import beside
 from labrig.optics import Transmittance, read_colour_chart, read_transmittance
 from labrig.reproduce.scene.scene_file import AlbedoCurve, MaterialEntry
 from labrig.reproduce.surface.bands import Bands

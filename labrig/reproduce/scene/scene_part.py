@@ -2,7 +2,9 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from labrig.foundation.models import FrozenModel
 
 #: Lengths in m and times in s that single precision and a person can still tell apart.
 Length = Annotated[float, Field(gt=0, le=1e6)]
@@ -13,7 +15,5 @@ Name = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=1, le=8192)]
 
 
-class ScenePart(BaseModel):
+class ScenePart(FrozenModel):
     """A part of a scene file, which has no other keys than those it names."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")

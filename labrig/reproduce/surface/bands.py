@@ -6,12 +6,11 @@ from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.optics import Spectrum
-
-FloatArray = NDArray[np.float64]
 
 #: Bands of a rendering where nobody says otherwise: 20 nm wide, ultraviolet included.
 FIRST_NM, LAST_NM, COUNT = 300.0, 780.0, 24

@@ -13,16 +13,15 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Float32Array
+from labrig.foundation.errors import UsageError
+from labrig.foundation.processors import n_processors
 from labrig.material import dark_concentration, lit_concentration, steady_concentration
-from labrig.processors import n_processors
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.surface.field_parameters import FieldParameters
 from labrig.reproduce.surface.order_table import LONGEST, order_table
-
-Float32Array = NDArray[np.float32]
 
 IMPROPER = "expected an irradiance that is finite and ≥ 0, got a negative or infinite one, or NaN"
 #: Samples below which several threads cost more than they gain.

@@ -8,9 +8,8 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Float32Array = NDArray[np.float32]
+from labrig.foundation.arrays import Float32Array
 
 #: Samples whose intermediate values stay in the first cache.
 CHUNK = 2048

@@ -6,11 +6,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Float32Array, FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import Material
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

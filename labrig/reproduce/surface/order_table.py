@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import Float32Array
 from labrig.material import dark_concentration, lit_concentration
-
-Float32Array = NDArray[np.float32]
 
 SIZE = 129
 #: Longest step in lifetimes 1/k of a full state that a table describes.

@@ -8,11 +8,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.array_file import read_arrays, write_arrays
-from labrig.errors import UsageError
-
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
+from labrig.foundation.array_file import read_arrays, write_arrays
+from labrig.foundation.arrays import Float32Array, Int32Array
+from labrig.foundation.errors import UsageError
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +102,7 @@ class ParameterTexture:
         flat = array[::-1].reshape(-1, *array.shape[2:])
         return np.ascontiguousarray(np.moveaxis(flat, 0, -1))
 
-    def texel_at(self, uv: NDArray[np.float64]) -> IntArray:
+    def texel_at(self, uv: NDArray[np.float64]) -> Int32Array:
         """Return the numbers of the texels, as `texels` has them, in which points lie, shape (n,).
 
         Parameters

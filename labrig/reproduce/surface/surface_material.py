@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Float32Array, FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import (
     Albedo,
     Material,
@@ -19,9 +20,6 @@ from labrig.optics import Spectrum, Transmittance, edges_from_centres
 from labrig.reproduce.surface.bands import Bands
 from labrig.reproduce.surface.field_parameters import FieldParameters
 from labrig.reproduce.surface.parameter_texture import ParameterTexture
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 #: Negative re-radiation, as a part of the light of a band, that is told, and that is refused.
 TOLD_NEGATIVE, REFUSED_NEGATIVE = 0.005, 0.05

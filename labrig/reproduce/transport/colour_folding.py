@@ -13,15 +13,11 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.tracing import Paths
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 #: Sequences of coloured materials that are told apart.
 MOST_SEQUENCES = 30_000
@@ -48,9 +44,9 @@ class Sequences:
     """
 
     grey: Float32Array
-    number: IntArray
-    child: IntArray
-    of_vertex: tuple[IntArray, ...]
+    number: Int32Array
+    child: Int32Array
+    of_vertex: tuple[Int32Array, ...]
     carried: tuple[Float32Array, ...]
 
     @classmethod
@@ -58,7 +54,7 @@ class Sequences:
         cls,
         paths: Sequence[Paths],
         materials: Sequence[SurfaceMaterial],
-        material_of_place: IntArray,
+        material_of_place: Int32Array,
     ) -> Self | None:
         """Return the sequences of paths; None if there are too many to be kept.
 
@@ -100,7 +96,7 @@ class Sequences:
         return found
 
 
-def greys(materials: Sequence[SurfaceMaterial]) -> tuple[Float32Array, IntArray]:
+def greys(materials: Sequence[SurfaceMaterial]) -> tuple[Float32Array, Int32Array]:
     """Return the albedo of grey materials (materials,), and numbers of the others (materials,)."""
     grey = np.zeros(len(materials), np.float32)
     number = np.full(len(materials), -1, np.int32)
@@ -120,7 +116,7 @@ def colour_fold(
     paths: Sequence[Paths],
     sequences: Sequences,
     materials: Sequence[SurfaceMaterial],
-    material_of_place: IntArray,
+    material_of_place: Int32Array,
     glow: Float32Array,
     lamps: Float32Array,
     to_rgb: FloatArray,

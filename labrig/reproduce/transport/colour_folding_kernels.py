@@ -4,24 +4,22 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import Float32Array, Int32Array
 from labrig.reproduce.transport.folding_kernels import COMPILED
-
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
 
 
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def sequences(
     per_target: int,
     first: NDArray[np.int64],
-    place: IntArray,
+    place: Int32Array,
     weight: Float32Array,
-    material_of_place: IntArray,
+    material_of_place: Int32Array,
     grey: Float32Array,
-    number: IntArray,
-    child: IntArray,
+    number: Int32Array,
+    child: Int32Array,
     count: int,
-    of_vertex: IntArray,
+    of_vertex: Int32Array,
     carried: Float32Array,
 ) -> int:
     """Write the sequence and the factor of each vertex, and new sequences into `child`.
@@ -52,15 +50,15 @@ def sequences(
 def fold_colours(
     per_target: int,
     first: NDArray[np.int64],
-    place: IntArray,
+    place: Int32Array,
     light: Float32Array,
     seen_lamp: NDArray[np.int16],
-    of_vertex: IntArray,
+    of_vertex: Int32Array,
     carried: Float32Array,
-    material_of_place: IntArray,
+    material_of_place: Int32Array,
     grey: Float32Array,
-    number: IntArray,
-    child: IntArray,
+    number: Int32Array,
+    child: Int32Array,
     colours: Float32Array,
     glow: Float32Array,
     glows: NDArray[np.bool_],

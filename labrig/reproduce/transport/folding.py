@@ -8,12 +8,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import Float32Array, Int32Array
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
 from labrig.reproduce.transport.tracing import Paths
-
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +30,8 @@ class Matrices:
     """
 
     values: Float32Array
-    first: IntArray
-    last: IntArray
+    first: Int32Array
+    last: Int32Array
     is_diagonal: NDArray[np.bool_]
 
     @classmethod
@@ -54,7 +52,7 @@ class Matrices:
 def fold(
     paths: Iterable[Paths],
     matrices: Matrices,
-    material_of_place: IntArray,
+    material_of_place: Int32Array,
     glow: Float32Array,
     lamps: Float32Array,
     threads: int,

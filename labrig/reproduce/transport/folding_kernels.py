@@ -7,8 +7,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
+from labrig.foundation.arrays import Float32Array, Int32Array
 
 COMPILED: dict[str, Any] = {
     "nogil": True,
@@ -23,15 +22,15 @@ COMPILED: dict[str, Any] = {
 def fold_paths(
     per_target: int,
     first: NDArray[np.int64],
-    place: IntArray,
+    place: Int32Array,
     weight: Float32Array,
     light: Float32Array,
     seen_lamp: NDArray[np.int16],
     matrices: Float32Array,
-    row_first: IntArray,
-    row_last: IntArray,
+    row_first: Int32Array,
+    row_last: Int32Array,
     is_diagonal: NDArray[np.bool_],
-    material_of_place: IntArray,
+    material_of_place: Int32Array,
     albedo_factor: Float32Array,
     glow: Float32Array,
     lamps: Float32Array,

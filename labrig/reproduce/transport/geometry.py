@@ -6,16 +6,12 @@ from functools import cached_property
 from typing import Literal, Self, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.transport.mesh import Mesh
 from labrig.reproduce.transport.start_points import OnParticles, OnTexels, OnVertices, StartPoints
 from labrig.reproduce.transport.texel_map import TexelMap
-
-FloatArray = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
 
 #: How states lie on a surface: none of its own, texels (columns, rows), its vertices, or one for
 #: each of the particles that its mesh consists of.
@@ -53,7 +49,7 @@ class Surface:
     samples: Samples = None
     lamp: int = -1
     is_two_sided: bool = False
-    material_of_texel: IntArray | None = None
+    material_of_texel: Int32Array | None = None
 
     @property
     def n_places(self) -> int:
@@ -109,12 +105,12 @@ class Geometry:
     triangles: Float32Array
     normals: Float32Array
     uv: Float32Array
-    corner_place: IntArray
-    surface_of_face: IntArray
-    table: IntArray
-    material_of_place: IntArray
-    chart_of_face: IntArray
-    chart_of_place: IntArray
+    corner_place: Int32Array
+    surface_of_face: Int32Array
+    table: Int32Array
+    material_of_place: Int32Array
+    chart_of_face: Int32Array
+    chart_of_place: Int32Array
     texel_maps: Mapping[int, TexelMap]
     origin_m: FloatArray
 

@@ -5,13 +5,9 @@ from dataclasses import dataclass
 from typing import Literal, Self, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
 from labrig.reproduce.transport.geometry import Geometry
-
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
-FloatArray = NDArray[np.float64]
 
 LampKind: TypeAlias = Literal["point", "area", "distant", "sky"]
 KINDS: tuple[LampKind, ...] = ("point", "area", "distant", "sky")
@@ -45,10 +41,10 @@ class Lamp:
 class LampTable:
     """Lamps as the compiled functions take them; see `tracing_kernels.towards_lamps`."""
 
-    kind: IntArray
+    kind: Int32Array
     vector: Float32Array
-    first: IntArray
-    faces: IntArray
+    first: Int32Array
+    faces: Int32Array
     share: Float32Array
     area: Float32Array
 

@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 IntArray64 = NDArray[np.int64]
 
 PARTLY_UNWRAPPED = (
@@ -45,7 +44,7 @@ class Mesh:
     """
 
     vertices_m: FloatArray
-    faces: IntArray
+    faces: Int32Array
     uv: FloatArray | None = None
 
     @classmethod

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 SQRT_2PI, SQRT_HALF = math.sqrt(2 * math.pi), math.sqrt(0.5)
 #: One component of a mixture: its factor, its variates of the given and of the other wavelength

@@ -6,12 +6,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray, Int32Array
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.transport.mesh import Mesh
 from labrig.reproduce.transport.texel_map import TexelMap
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 #: What is surely below 1, also of a sum over many texels.
 BELOW_ONE = 1 - 1e-9
@@ -21,12 +19,12 @@ class StartPoints(Protocol):
     """Points on a surface, several for each of its places."""
 
     @property
-    def places(self) -> IntArray:
+    def places(self) -> Int32Array:
         """Places that lie on the surface, counted from its first, shape (n,)."""
 
     def at(
         self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
-    ) -> tuple[IntArray, FloatArray]:
+    ) -> tuple[Int32Array, FloatArray]:
         """Return triangles (points,) and weights of their corners (points, 3), place by place.
 
         Parameters
@@ -48,9 +46,9 @@ class OnVertices:
     mean over the points is that which the vertex stands for.
     """
 
-    places: IntArray
-    _face: IntArray
-    _corner: IntArray
+    places: Int32Array
+    _face: Int32Array
+    _corner: Int32Array
     _end: FloatArray
     _first: NDArray[np.int64]
     _last: NDArray[np.int64]
@@ -77,7 +75,7 @@ class OnVertices:
 
     def at(
         self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
-    ) -> tuple[IntArray, FloatArray]:
+    ) -> tuple[Int32Array, FloatArray]:
         """Return triangles and weights of their corners; see `StartPoints`."""
         per_place = scattered.shape[1]
         first, last = (each[chosen].repeat(per_place) for each in (self._first, self._last))
@@ -98,7 +96,7 @@ class OnVertices:
 class OnParticles:
     """Points on particles, each of so many triangles of the same size."""
 
-    places: IntArray
+    places: Int32Array
     _n_faces: int
 
     @classmethod
@@ -108,7 +106,7 @@ class OnParticles:
 
     def at(
         self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
-    ) -> tuple[IntArray, FloatArray]:
+    ) -> tuple[Int32Array, FloatArray]:
         """Return triangles and weights of their corners; see `StartPoints`."""
         own = self.places[chosen]
         turn = rng.integers(0, self._n_faces, len(own))[:, np.newaxis]
@@ -127,7 +125,7 @@ class OnTexels:
     surface is large that lies there.
     """
 
-    places: IntArray
+    places: Int32Array
     _map: TexelMap
     _corners: NDArray[np.float32]
     _density: FloatArray
@@ -149,7 +147,7 @@ class OnTexels:
 
     def at(
         self, chosen: slice, scattered: FloatArray, rng: np.random.Generator
-    ) -> tuple[IntArray, FloatArray]:
+    ) -> tuple[Int32Array, FloatArray]:
         """Return triangles and weights of their corners; see `StartPoints`."""
         texels, per_place = self.places[chosen], scattered.shape[1]
         across, up = self._map.across, self._map.up

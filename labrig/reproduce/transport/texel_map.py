@@ -9,17 +9,13 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.transport.mesh import Mesh
-
-FloatArray = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
 
 #: Points along each edge of a texel at which its place on the surface is looked up, at least; and
 #: along each edge of the texture.
@@ -52,9 +48,9 @@ class TexelMap:
     rows: int
     across: int
     up: int
-    face_at: IntArray
-    chart_of_face: IntArray
-    chart_of_texel: IntArray
+    face_at: Int32Array
+    chart_of_face: Int32Array
+    chart_of_texel: Int32Array
 
     @classmethod
     def of(cls, name: str, mesh: Mesh, samples: tuple[int, int]) -> Self:
@@ -95,7 +91,7 @@ class TexelMap:
         chart_of_texel = _majority(by_texel.reshape(rows * columns, up * across))
         return cls(columns, rows, across, up, face_at, chart_of_face, chart_of_texel)
 
-    def faces_in(self, texels: IntArray) -> IntArray:
+    def faces_in(self, texels: Int32Array) -> Int32Array:
         """Return the triangles at the points of some texels, shape (texels, up · across)."""
         row, column = np.divmod(texels, self.columns)
         blocks = self.face_at.reshape(self.rows, self.up, self.columns, self.across)
@@ -124,7 +120,7 @@ def texture_coordinates(name: str, mesh: Mesh) -> FloatArray:
     return uv
 
 
-def _charts(mesh: Mesh) -> IntArray:
+def _charts(mesh: Mesh) -> Int32Array:
     """Return the chart of each triangle: those that share vertices here and in the texture."""
     assert mesh.uv is not None
     low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
@@ -138,7 +134,7 @@ def _charts(mesh: Mesh) -> IntArray:
     return np.asarray(chart[a], dtype=np.int32)
 
 
-def _majority(charts: IntArray) -> IntArray:
+def _majority(charts: Int32Array) -> Int32Array:
     """Return what most of the numbers ≥ 0 in each row are, -1 of a row without (n, k)."""
     # The middle one of those in order is the majority wherever there is one.
     ordered = np.sort(charts, axis=1)

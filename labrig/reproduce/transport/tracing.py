@@ -14,14 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
+from labrig.foundation.errors import UsageError
 from labrig.reproduce.compiled import compiled
 from labrig.reproduce.transport.geometry import Geometry
 from labrig.reproduce.transport.lamp import LampTable
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 #: Positions are lifted off their surface by this part of the scene's size.
 LIFT = 1e-5
@@ -92,7 +89,7 @@ class Paths:
 
     per_target: int
     first: NDArray[np.int64]
-    place: IntArray
+    place: Int32Array
     weight: Float32Array
     light: Float32Array
     seen_lamp: NDArray[np.int16]
@@ -110,7 +107,7 @@ class Paths:
         return (len(self.first) - 1) // self.per_target
 
     @property
-    def first_places(self) -> IntArray:
+    def first_places(self) -> Int32Array:
         """Place that each path meets first; -1 is black or nothing, -2 - n lamp n (paths,)."""
         found = np.full(len(self.first) - 1, -1, np.int32)
         meets = self.first[1:] > self.first[:-1]
@@ -177,7 +174,7 @@ class Pinhole:
         return np.stack([right, np.cross(backwards, right), backwards])
 
     def rays(
-        self, pixels: IntArray, within: FloatArray, origin_m: FloatArray
+        self, pixels: Int32Array, within: FloatArray, origin_m: FloatArray
     ) -> tuple[Float32Array, Float32Array]:
         """Return origins and unit directions of rays.
 
@@ -216,7 +213,7 @@ class Met:
 
     position: Float32Array
     normal: Float32Array
-    place: IntArray
+    place: Int32Array
 
     def of(self, rays: NDArray[np.integer[Any]]) -> "Met":
         """Return where some of the rays arrive."""
@@ -283,7 +280,7 @@ class Tracer:
             rng = np.random.default_rng((self._seed, 0, number))
             even = _even(len(chosen), per_pixel, 4 + 2 * len(self._lamps), rng)
 
-            def rays(within: Float32Array, of: IntArray) -> tuple[Float32Array, Float32Array]:
+            def rays(within: Float32Array, of: Int32Array) -> tuple[Float32Array, Float32Array]:
                 where = within.astype(np.float64)
                 return camera.rays(of, where, self._geometry.origin_m)
 
@@ -378,7 +375,7 @@ class Tracer:
         n_paths, lamps = len(first.place), len(self._lamps)
         path = np.flatnonzero(first.place >= 0).astype(np.int32)
         here, even = first.of(path), even[path]
-        depths: list[tuple[IntArray, IntArray, Float32Array, Float32Array]] = []
+        depths: list[tuple[Int32Array, Int32Array, Float32Array, Float32Array]] = []
         depth = 0
         while len(path):
             chance = even if depth == 0 else rng.random((len(path), 2 + 2 * lamps), np.float32)
@@ -488,7 +485,7 @@ def _in_order(
     n_paths: int,
     per_target: int,
     seen: NDArray[np.int16],
-    depths: list[tuple[IntArray, IntArray, Float32Array, Float32Array]],
+    depths: list[tuple[Int32Array, Int32Array, Float32Array, Float32Array]],
     lamps: int,
     n_escaped: int,
 ) -> Paths:

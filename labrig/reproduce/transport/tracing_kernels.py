@@ -10,8 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Float32Array = NDArray[np.float32]
-IntArray = NDArray[np.int32]
+from labrig.foundation.arrays import Float32Array, Int32Array
 
 #: Kinds of lamps.
 POINT, AREA, DISTANT, SKY = 0, 1, 2, 3
@@ -29,7 +28,7 @@ COMPILED: dict[str, Any] = {
 
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def locate(
-    face: IntArray,
+    face: Int32Array,
     u: Float32Array,
     v: Float32Array,
     direction: Float32Array,
@@ -37,15 +36,15 @@ def locate(
     triangles: Float32Array,
     normals: Float32Array,
     uv: Float32Array,
-    corner_place: IntArray,
-    surface_of_face: IntArray,
-    table: IntArray,
-    chart_of_face: IntArray,
-    chart_of_place: IntArray,
+    corner_place: Int32Array,
+    surface_of_face: Int32Array,
+    table: Int32Array,
+    chart_of_face: Int32Array,
+    chart_of_place: Int32Array,
     offset: np.float32,
     position: Float32Array,
     normal: Float32Array,
-    place: IntArray,
+    place: Int32Array,
 ) -> None:
     """Write where rays arrived: position just above the surface, its normal, and the place.
 
@@ -153,10 +152,10 @@ def towards_lamps(
     chance: Float32Array,
     triangles: Float32Array,
     normals: Float32Array,
-    kind: IntArray,
+    kind: Int32Array,
     vector: Float32Array,
-    first: IntArray,
-    faces: IntArray,
+    first: Int32Array,
+    faces: Int32Array,
     share: Float32Array,
     area: Float32Array,
     size: np.float32,
@@ -257,7 +256,7 @@ def _first_not_below(values: Float32Array, low: int, high: int, wanted: np.float
 
 
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
-def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[IntArray, int]:
+def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[Int32Array, int]:
     """Return the triangle at each point of a grid over the texture, and how many have several.
 
     Parameters
@@ -302,8 +301,8 @@ def rasterised(corners: Float32Array, columns: int, rows: int) -> tuple[IntArray
 
 @numba.njit(**COMPILED)  # type: ignore[untyped-decorator]
 def located_in_texture(
-    corners: Float32Array, face_at: IntArray, uv: Float32Array, cell: IntArray
-) -> tuple[IntArray, NDArray[np.float64]]:
+    corners: Float32Array, face_at: Int32Array, uv: Float32Array, cell: Int32Array
+) -> tuple[Int32Array, NDArray[np.float64]]:
     """Return the triangles in which points of the texture lie, and the weights of their corners.
 
     Near an edge a point may lie in the triangle of a neighbouring cell of the grid. One beside all

@@ -15,12 +15,10 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture
 from labrig.reproduce.compiled import compiled
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 #: End of a path at which the wavelength is known: the output from the eye, the input from the lamp.
 Start: TypeAlias = Literal["eye", "lamp"]

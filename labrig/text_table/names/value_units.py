@@ -9,12 +9,10 @@ import re
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.text_table.names.columns import split_unit, time_unit_s
-
-FloatArray = npt.NDArray[np.float64]
 
 _DECIBEL = re.compile(
     r"(?:(?P<name>.+?)[\s_/]+)?(?P<unit>d[Bb][\s(]*(?P<to>[mnuµμ]?W|m|c|FS|[muµμ]?V|u|[muµμ]?A)?\)?)"

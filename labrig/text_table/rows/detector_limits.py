@@ -5,12 +5,9 @@ neighbours by little more than the last digit: a slow change repeats them, too.
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.text_table.rows.repeated_readings import last_digit
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 #: Distance to the values beside, in steps of the last digit, from which equal values are a limit.
 #: Photons that get rare go to zero from some counts at once.

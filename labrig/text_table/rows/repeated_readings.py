@@ -9,10 +9,8 @@ last digit.
 from decimal import Decimal
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from labrig.foundation.arrays import BoolArray, FloatArray
 
 #: Differences to the neighbours, in steps of the last digit, from which equal values are no chance.
 _STEPS = 10.0

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 #: Fraction of the rows from which rows whose time goes back are in no order at all.
 _NO_ORDER = 0.1

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from datetime import date
 from itertools import pairwise
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 _HOUR_S, _HALF_DAY_S, _DAY_S = 3600, 43200, 86400
 #: Rows before and after a jump whose spacing proves it, and the fewest of them.

@@ -15,7 +15,7 @@ from statistics import median
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.text_table.times.clock_jumps import Clock, continuous
 from labrig.text_table.times.clock_reading import ClockReading, full_year, parse_clock
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.text_table.names import split_time, split_unit, time_unit_s
 from labrig.text_table.style import Line
 

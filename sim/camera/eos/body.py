@@ -5,7 +5,7 @@ import struct
 from dataclasses import dataclass, replace
 from functools import partial
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from .. import codes
 from ..body_settings import BodySettings

@@ -5,7 +5,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from ..objects import ObjectStore, StoredObject
 from ..vocabulary import EosEvent, ObjectFormat

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from ..photograph import Sensor
 

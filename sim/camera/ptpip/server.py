@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from labrig.clock import CHECK_INTERVAL_S, Clock
-from labrig.errors import UsageError
+from labrig.foundation.clock import CHECK_INTERVAL_S, Clock
+from labrig.foundation.errors import UsageError
 
 from ..responder import Responder
 from . import packets as ptpip

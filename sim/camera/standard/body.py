@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from ..body_settings import BodySettings
 from ..faults import CameraFaults

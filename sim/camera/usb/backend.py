@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 from typing import Any, NoReturn
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from ... import usb_errors
 from ...usb_device import CONFIGURATION_VALUE, OneDeviceBackend, UsbHandle

@@ -2,7 +2,7 @@
 
 import math
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 from ... import usb_errors
 from ..faults import CameraFaults

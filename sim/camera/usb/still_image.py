@@ -2,7 +2,7 @@
 
 import struct
 
-from labrig.clock import Clock
+from labrig.foundation.clock import Clock
 
 from ... import usb_errors
 from ..faults import CameraFaults

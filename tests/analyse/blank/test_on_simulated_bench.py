@@ -12,7 +12,7 @@ from labrig.analyse import Overrides, decay as decay_analysis
 from labrig.analyse.frames import intact_frames
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import BLANK_KIND
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.process import process_run
 from labrig.record import read_run
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record

@@ -13,7 +13,7 @@ import pytest
 from labrig.analyse import decay as decay_analysis
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import CAMERA_KIND, CameraFile
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.process import Processed, process_and_report, process_run
 from labrig.record import read_run
 from labrig.results.camera_calibration import CameraCalibrationResult

@@ -3,19 +3,17 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from numpy.typing import NDArray
 
 from labrig.analyse.camera_calibration.bend import Bend, fit_bend
 from labrig.analyse.camera_calibration.factors import CardFrame, fit_factors
 from labrig.analyse.camera_calibration.linearity import fit_linearity
 from labrig.analyse.camera_calibration.photon_transfer import Pair, measure_pair, photon_transfer
 from labrig.calibration import Noise
-from labrig.errors import DataError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.reduce import RawFrame
 from labrig.results import PhotonTransfer
 from tests.pulls import assert_sigma_is_right
-
-FloatArray = NDArray[np.float64]
 
 GAIN, READ_E, BLACK = 2.0, 8.0, 1000.0
 WHOLE = (0.0, 0.0, 1.0, 1.0)

@@ -10,8 +10,8 @@ import pytest
 from labrig.analyse import Overrides, Part
 from labrig.analyse.camera_curves import analyse
 from labrig.bench_optics import camera_curves
-from labrig.errors import DataError, LabrigError, UsageError
 from labrig.fit.camera_curves import GRID_NM
+from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import CURVES_FILE, CameraResponse, read_camera
 from labrig.process import process_and_report
 from labrig.results import CameraCurvesResult

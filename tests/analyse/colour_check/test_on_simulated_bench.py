@@ -10,7 +10,7 @@ import pytest
 from labrig.analyse import Part
 from labrig.analyse.camera_curves import analyse as analyse_curves
 from labrig.analyse.colour_check import analyse
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.optics import CURVES_FILE
 from labrig.process import process_and_report
 from labrig.results import ColourCheckResult

@@ -15,7 +15,7 @@ from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IRRADIANCE_KIND
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.material import read_material
 from labrig.process import process_and_report, process_run
 from labrig.record import read_run

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from labrig.acquire import Plan, RunObserver
 from labrig.calibration import FADE_KIND, Change, FadeFile
-from labrig.clock import Clock
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.clock import Clock
+from labrig.foundation.errors import UsageError
 from labrig.process import Processed, process_and_report, process_run
 from labrig.record import read_run
 from labrig.results.fade import FadeResult
@@ -22,8 +22,6 @@ from tests.acquire.fakes import Watching
 from tests.analyse.recorded import cut_off_and_resumed, record
 from tests.analyse.small_runs import FADE
 from tests.results.made import assert_read_back
-
-FloatArray = NDArray[np.float64]
 
 #: Of a photograph, relative.
 FLICKER = 0.007

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 
 from labrig.analyse.led_brightness import analyse
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.yaml_file import validate
 from labrig.process import process_run
 from labrig.record import read_run
-from labrig.results import FloatArray, LedBrightnessResult, read_result
+from labrig.results import LedBrightnessResult, read_result
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.leds import led_spectrum
 from labrig.sim.opening import PIXEL_STREAM
 from labrig.sim.simulation import Simulation
 from labrig.sim.spectrometer import Detector
-from labrig.yaml_file import validate
 from tests.analyse.recorded import part_of, record, shipped_rig
 
 QUICK = {"protocol": "led_brightness", "sample": {"name": "bank"}, "exposures": 1, "repeats": 1,

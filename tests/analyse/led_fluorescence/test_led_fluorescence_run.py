@@ -12,7 +12,7 @@ import pytest
 from labrig.analyse import Overrides
 from labrig.analyse.led_fluorescence import analyse
 from labrig.analyse.led_fluorescence.methods import method_differences
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import (
     ReradiationMatrix,
     appearance,

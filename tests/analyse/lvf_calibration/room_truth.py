@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.region import region_pixels
 from labrig.optics import Strip
-from labrig.region import region_pixels
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.lvf import Lvf, pieces
 from labrig.sim.phosphor import band_cells

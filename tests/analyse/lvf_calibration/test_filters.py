@@ -14,7 +14,7 @@ from labrig.analyse.lvf_calibration.filters import (
     misfits,
     residuals,
 )
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
 from labrig.results.lvf_calibration import SliceValues

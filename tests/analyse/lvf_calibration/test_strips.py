@@ -11,8 +11,8 @@ from labrig.analyse.lvf_calibration.lines import (
     strip_lines,
     wavelengths_along,
 )
-from labrig.errors import DataError, FitError
-from labrig.fit.least_squares import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, FitError
 from labrig.optics import Spectrum, Strip, nominal_lvf
 from labrig.reduce.hdr import hdr_frame
 from labrig.reduce.strip import find_strip, strip_profile

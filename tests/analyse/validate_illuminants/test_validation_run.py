@@ -10,7 +10,7 @@ import pytest
 
 from labrig.analyse import Part
 from labrig.analyse.validate_illuminants import analyse
-from labrig.errors import DataError, UsageError
+from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_and_report
 from labrig.reduce import find_colour_chart
 from labrig.results import (

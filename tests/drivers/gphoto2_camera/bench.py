@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from labrig.acquire.connections import SerialPort
-from labrig.clock import Clock, SystemClock, VirtualClock
 from labrig.drivers.gphoto2_camera import Gphoto2Camera
+from labrig.foundation.clock import Clock, SystemClock, VirtualClock
 from labrig.sim.room import Room
 from labrig.sim.simulation import Simulation
 from tests.counterparts.served import EPOCH_S, Film, served

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake, LiveView
-from labrig.clock import Interrupted, SystemClock
 from labrig.drivers.gphoto2_camera import Gphoto2Camera
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.clock import Interrupted, SystemClock
+from labrig.foundation.errors import DeviceError, DeviceLostError
 from tests.conftest import Ended
 
 from .bench import JPEG, FastClock, Loopback, connected, photographing

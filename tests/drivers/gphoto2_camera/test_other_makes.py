@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from labrig.acquire import ExposureSettings
-from labrig.clock import VirtualClock
 from labrig.drivers.gphoto2_camera import Gphoto2Camera
-from labrig.errors import DeviceError, UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, UsageError
 
 from .bench import JPEG, TIFF, FastClock, Loopback, ToyBench
 

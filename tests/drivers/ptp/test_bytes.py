@@ -26,7 +26,7 @@ from labrig.drivers.ptp.eos.events import (
     ValueChanged,
     parse_events,
 )
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 from .eos.bench import bench, photograph
 from .usb.wire import Wire

@@ -11,7 +11,7 @@ from labrig.drivers.ptp.standard.property_description import (
     PropertyDescription,
     parse_property_description,
 )
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 #: ExposureTime of libgphoto2's virtual Nikon: 10 ms now, nine times from 1 s to 0.1 ms.
 EXPOSURE_TIME = bytes.fromhex(

@@ -4,11 +4,11 @@ from collections import deque
 
 import pytest
 
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import session as ptp
 from labrig.drivers.ptp.codes import OK, Standard
 from labrig.drivers.ptp.containers import Container, Kind
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 
 
 class Answering:

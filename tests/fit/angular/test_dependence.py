@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from labrig.errors import DataError
 from labrig.fit.angular import detectable_sigmas, fit_dependence, typical
-from labrig.results import AngleMeans, FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
+from labrig.results import AngleMeans
 
 ANGLES = np.array([30.0, 45.0, 60.0, 75.0, 90.0, 105.0])
 SEEDS = 300

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.errors import DataError
 from labrig.fit.angular import NearLight, SphereImage, fit_shading, incidence, oren_nayar
-from labrig.results import FloatArray
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 
 LIGHT = NearLight((-np.sqrt(0.5), 0.0, np.sqrt(0.5)), 10.0)
 

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import labrig
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.leds import (
     CURVES_OF_MODEL,
     RESPONSE_CALIBRATED,
@@ -21,6 +20,7 @@ from labrig.fit.leds import (
     match_channels,
 )
 from labrig.fit.spectrum import curve_modes
+from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 from tests.pulls import assert_sigma_is_right
 

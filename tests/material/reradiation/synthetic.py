@@ -9,11 +9,9 @@ monochromators beside the diagonal.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix
-
-FloatArray = NDArray[np.float64]
 
 INPUT_NM = np.arange(300.0, 781.0, 10.0)
 OUTPUT_NM = np.arange(380.0, 781.0, 10.0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from labrig import colour_science
-from labrig.errors import DataError
+from labrig.foundation import colour_science
+from labrig.foundation.errors import DataError
 from labrig.material import ReradiationMatrix, appearance, compare_colours
 from labrig.optics import read_light
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.material import ReradiationMatrix, physical_warnings, with_sigma
 from tests.material.reradiation import bfc450
 from tests.material.reradiation.synthetic import (

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import (
     ReradiationMatrix,
     emission_spectrum,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.testing import assert_allclose
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.material import (
     InstrumentNoise,
     ReradiationMatrix,

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.foundation.errors import DataError
 from labrig.material import (
     ReradiationMatrix,
     instrument_noise,

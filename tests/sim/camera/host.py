@@ -6,7 +6,7 @@ from typing import Any
 
 import usb.core
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera, StandardHabits
 
 IN, OUT, KNOCK = 0x81, 0x02, 0x83

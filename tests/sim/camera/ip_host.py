@@ -5,7 +5,7 @@ import struct
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.camera import PtpIpServer
 from tests.counterparts.served import EPOCH_S, Film, camera_on
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import parse_yaml, validate
 from labrig.sim.camera import BodySettings
 from labrig.sim.simulation import Simulation
-from labrig.yaml_file import parse_yaml, validate
 
 
 def parsed(text: str) -> BodySettings:

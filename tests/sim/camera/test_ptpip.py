@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.clock import Interrupted, SystemClock, VirtualClock
-from labrig.errors import UsageError
+from labrig.foundation.clock import Interrupted, SystemClock, VirtualClock
+from labrig.foundation.errors import UsageError
 from labrig.sim.camera import Pace, PtpIpServer
 from tests.conftest import Ended
 from tests.counterparts import transcript

@@ -4,7 +4,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire import Connections
 from labrig.drivers import SerialLine
-from labrig.errors import UnclearAnswerError
+from labrig.foundation.errors import UnclearAnswerError
 
 BAUDRATE = 19200
 ANSWER_S = 1.0

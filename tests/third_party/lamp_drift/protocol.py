@@ -17,8 +17,8 @@ from labrig.acquire import (
     Shoot,
     Unit,
 )
-from labrig.quantity import Count, DurationS
-from labrig.region import CENTRE, Region
+from labrig.foundation.quantity import Count, DurationS
+from labrig.foundation.region import CENTRE, Region
 
 
 class DriftFrames(StrEnum):

@@ -8,7 +8,7 @@ import pytest
 
 import labrig
 from labrig.acquire import LAMP, Lamp
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 from my_relay.driver import MyRelay
 
 RIG = Path(__file__).parents[1] / "rig.yaml"

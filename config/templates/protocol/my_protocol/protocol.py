@@ -18,8 +18,8 @@ from labrig.acquire import (
     Unit,
     at,
 )
-from labrig.quantity import Count, DurationS
-from labrig.region import CENTRE, Region
+from labrig.foundation.quantity import Count, DurationS
+from labrig.foundation.region import CENTRE, Region
 
 
 class MyProtocolFrames(StrEnum):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.formats.band_fractions import band_fractions, regular_grid
 from labrig.material.reradiation.formats.text_rows import (
     Line,
@@ -21,7 +22,7 @@ from labrig.material.reradiation.formats.text_rows import (
     one_line,
     shown,
 )
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix
+from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Beginning of every archive.
 MARK = "ART measurement archive"

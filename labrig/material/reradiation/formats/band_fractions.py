@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.formats.text_rows import check_fractions, check_wavelengths
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix, are_same_bands
+from labrig.material.reradiation.matrix import ReradiationMatrix, are_same_bands
 
 
 def band_fractions(matrix: ReradiationMatrix) -> FloatArray:

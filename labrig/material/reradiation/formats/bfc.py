@@ -8,6 +8,7 @@ are fractions per band, and reflectance where both wavelengths are the same.
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.formats.band_fractions import band_fractions, regular_grid
 from labrig.material.reradiation.formats.text_rows import (
     Line,
@@ -18,7 +19,7 @@ from labrig.material.reradiation.formats.text_rows import (
     one_line,
     shown,
 )
-from labrig.material.reradiation.matrix import SAME_NM, FloatArray, ReradiationMatrix
+from labrig.material.reradiation.matrix import SAME_NM, ReradiationMatrix
 
 ENCODING = "iso-8859-1"
 #: In the second line of a file.

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.formats.text_rows import (
     Line,
     check_fractions,
@@ -27,7 +28,7 @@ from labrig.material.reradiation.formats.text_rows import (
     shown,
     wavelengths,
 )
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix, are_same_bands
+from labrig.material.reradiation.matrix import ReradiationMatrix, are_same_bands
 from labrig.optics import edges_from_centres
 from labrig.text_table import cell_text, plain_text
 

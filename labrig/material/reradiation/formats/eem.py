@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.formats.eem_axes import emission_in_rows
 from labrig.material.reradiation.formats.eem_grid import Axis, read_grid
 from labrig.material.reradiation.formats.eem_scatter import without_scatter
@@ -22,7 +23,7 @@ from labrig.material.reradiation.formats.text_rows import (
     numbers,
     wavelengths,
 )
-from labrig.material.reradiation.matrix import FloatArray, ReradiationMatrix
+from labrig.material.reradiation.matrix import ReradiationMatrix
 
 _logger = logging.getLogger(__name__)
 

@@ -7,8 +7,8 @@ higher orders of the grating at twice the wavelength.
 
 import numpy as np
 
+from labrig.foundation.arrays import FloatArray
 from labrig.material.reradiation.formats.eem_grid import Axis, Grid
-from labrig.material.reradiation.matrix import FloatArray
 
 #: Distance from a line of scattered light in nm from which light is fluorescence.
 _BESIDE_NM = 15.0

@@ -12,9 +12,9 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from labrig.errors import LabrigError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import LabrigError
 from labrig.material.reradiation.formats.text_rows import PLAUSIBLE_NM, shown
-from labrig.material.reradiation.matrix import FloatArray
 from labrig.optics import Quantity, foreign_spectra
 from labrig.text_table import SEPARATORS, Block, Line, Style, parse_number, read_blocks
 from labrig.text_table.rows import no_measurements

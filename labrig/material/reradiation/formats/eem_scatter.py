@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labrig.material.reradiation.matrix import BoolArray, FloatArray
+from labrig.foundation.arrays import BoolArray, FloatArray
 
 #: Shift of light that water scatters, in 1/nm.
 _RAMAN_PER_NM = 3400e-7

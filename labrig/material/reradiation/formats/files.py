@@ -7,8 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from labrig.errors import UsageError
-from labrig.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
+from labrig.foundation.output_file import write_durably
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.material.reradiation.formats import ark, bfc
 from labrig.material.reradiation.formats.ark import ark_entries, ark_text, parse_ark_matrix
 from labrig.material.reradiation.formats.bfc import bfc_text, parse_bfc
@@ -16,9 +18,7 @@ from labrig.material.reradiation.formats.csv_table import csv_text, is_fraction_
 from labrig.material.reradiation.formats.eem import MatrixLayout, eem_text, parse_eem
 from labrig.material.reradiation.formats.spectral_exr import read_spectral_image, write_exr
 from labrig.material.reradiation.matrix import ReradiationMatrix
-from labrig.output_file import write_durably
 from labrig.text_table import read_table_text
-from labrig.yaml_file import did_you_mean
 
 ContentT = TypeVar("ContentT")
 T = TypeVar("T")

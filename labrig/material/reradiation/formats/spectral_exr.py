@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig import colour_science
-from labrig.errors import UsageError
-from labrig.exr_file import read_exr, read_exr_header, write_exr as write_exr_file
+from labrig.foundation import colour_science
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
+from labrig.foundation.exr_file import read_exr, read_exr_header, write_exr as write_exr_file
 from labrig.material.reradiation.formats.band_fractions import check_is_absolute
 from labrig.material.reradiation.formats.text_rows import (
     check_fractions,
@@ -29,7 +30,7 @@ from labrig.material.reradiation.formats.text_rows import (
     one_line,
     shown,
 )
-from labrig.material.reradiation.matrix import SAME_NM, FloatArray, ReradiationMatrix
+from labrig.material.reradiation.matrix import SAME_NM, ReradiationMatrix
 from labrig.optics import CIE_1931, Spectrum, edges_from_centres, illuminant, observer
 
 Pixels = NDArray[np.float32]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labrig.material.reradiation.matrix import FloatArray
+from labrig.foundation.arrays import FloatArray
 
 #: Range of wavelengths in nm, which excludes tables in µm or in Hz.
 PLAUSIBLE_NM = (100.0, 20_000.0)

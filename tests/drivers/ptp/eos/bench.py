@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from labrig.acquire.values import ExposureSettings, Frame
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
+from labrig.foundation.clock import VirtualClock
 
 from ..usb.wire import OneDevice, Wire
 from .toy import ToyEos

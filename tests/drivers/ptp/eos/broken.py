@@ -2,9 +2,9 @@
 
 import pytest
 
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 
 from .bench import Bench, photograph
 from .toy import Fault

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from labrig.acquire.values import ExposureSettings
-from labrig.clock import Interrupted
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import DeviceError
 
 from ..usb.wire import TRANSACTION_S
 from .bench import Bench, bench, photograph

@@ -10,7 +10,7 @@ import usb.core
 from labrig.acquire import Camera
 from labrig.acquire.values import CameraOffers, ExposureSettings
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError
+from labrig.foundation.errors import DeviceError
 
 from ..usb.wire import TRANSACTION_S, Wire
 from .bench import SHORT, Bench, bench, photograph

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from labrig.acquire.values import ExposureSettings
-from labrig.clock import Interrupted, VirtualClock
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Interrupted, VirtualClock
+from labrig.foundation.errors import DeviceError
 
 from ..usb.wire import OneDevice, Wire
 from .bench import ADDRESS, SHORT, bench, photograph

@@ -7,8 +7,8 @@ Texts in quotes stand for PTP strings (u8 letters, UTF-16, closing zero).
 import pytest
 
 from labrig.acquire.values import CameraOffers, ExposureSettings
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
+from labrig.foundation.clock import VirtualClock
 
 from ..usb.wire import TRANSACTION_S, OneDevice, Wire
 from .transcript import CONNECT, Transcript

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import LiveView
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
 from labrig.drivers.ptp.eos.viewfinder import READY_TIMEOUT_S, jpeg_in
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 
 from ..usb.wire import OneDevice, Wire
 from .bench import SHORT, bench

@@ -13,8 +13,8 @@ import usb.core
 from numpy.typing import NDArray
 
 from labrig.acquire.connections import Connections, SerialPort
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp.ip import link as ip_link
+from labrig.foundation.clock import VirtualClock
 from labrig.sim.camera import CameraFaults, PtpIpServer
 from labrig.sim.camera.responder import Responder
 from labrig.sim.camera.usb.still_image import CANCEL, RESET, StillImageFunction

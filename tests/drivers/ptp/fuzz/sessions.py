@@ -22,10 +22,10 @@ from types import MappingProxyType
 
 from labrig.acquire.connections import Connections
 from labrig.acquire.values import CameraOffers, ExposureSettings
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
 from labrig.drivers.ptp.failures import MalformedError, RefusedError
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 from tests.counterparts.served import EOS, EPOCH_S, STANDARD, camera_on
 
 from .lines import LiveFilm, Transport, over_network, over_usb

@@ -11,14 +11,14 @@ from hypothesis import given, strategies as st
 
 from labrig.acquire import CAMERA, ExposureSettings, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import SystemClock
 from labrig.drivers.ptp.codes import Standard
 from labrig.drivers.ptp.containers import Container, Kind, command
 from labrig.drivers.ptp.failures import MalformedError, NoAnswerError, UnpluggedError
 from labrig.drivers.ptp.ip import link as ip_link
 from labrig.drivers.ptp.ip.packets import PacketKind, encode
 from labrig.drivers.ptp.session import Session, Timeouts
-from labrig.errors import DeviceError, DeviceLostError, UsageError
+from labrig.foundation.clock import SystemClock
+from labrig.foundation.errors import DeviceError, DeviceLostError, UsageError
 from tests.counterparts import transcript
 from tests.counterparts.served import STANDARD, Film, Taken, served
 

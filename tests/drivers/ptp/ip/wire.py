@@ -4,9 +4,9 @@ import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
-from labrig.clock import SystemClock
 from labrig.drivers.ptp.ip.link import IpLink
 from labrig.drivers.ptp.ip.packets import PacketKind, encode
+from labrig.foundation.clock import SystemClock
 
 ADDRESS = "ptpip://camera"
 ACK = encode(PacketKind.INIT_COMMAND_ACK, (1).to_bytes(4, "little") + bytes(16) + bytes(6))

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake, Rig, Session
-from labrig.clock import Interrupted
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera
 from tests.drivers.ptp.simulated.wired import Picture, StoppingClock, Wired
 

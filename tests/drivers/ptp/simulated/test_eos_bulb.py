@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig import resources
 from labrig.acquire import ExposureSettings
-from labrig.clock import Interrupted
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation import resources
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.record import read_run
 from labrig.reduce.dark import fit_dark
 from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera

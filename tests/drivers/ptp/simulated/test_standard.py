@@ -8,9 +8,9 @@ import pytest
 
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake
 from labrig.acquire.values import Frame
-from labrig.clock import Interrupted
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera, StandardHabits
 from labrig.sim.camera.vocabulary import ObjectFormat
 from tests.conftest import Ended

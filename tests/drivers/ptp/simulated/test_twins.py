@@ -12,9 +12,9 @@ import usb.util
 
 from labrig.acquire import CAMERA, ExposureSettings, read_rig_file
 from labrig.bench import open_bench
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError, UsageError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError, UsageError
 from labrig.sim.camera import BodySettings, SimulatedCamera
 from tests.counterparts.served import EOS, STANDARD, Film
 from tests.drivers.ptp.simulated.wired import Wired

@@ -6,8 +6,8 @@ from typing import Any, NoReturn
 import usb.core
 
 from labrig.acquire.connections import SerialPort
-from labrig.clock import VirtualClock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 from labrig.sim.camera import SimulatedCamera
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from labrig.acquire.values import ExposureSettings
-from labrig.clock import Interrupted
-from labrig.errors import DeviceError
+from labrig.foundation.clock import Interrupted
+from labrig.foundation.errors import DeviceError
 
 from .toy import (
     ADDED,

@@ -4,12 +4,12 @@ import struct
 from collections import deque
 from dataclasses import dataclass, field
 
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp.containers import Container, Kind
 from labrig.drivers.ptp.device_info import parse_device_info
 from labrig.drivers.ptp.session import Session
 from labrig.drivers.ptp.settings import PtpCameraSettings
 from labrig.drivers.ptp.standard.camera import StandardCamera
+from labrig.foundation.clock import VirtualClock
 
 OK, NO_SUCH_OBJECT, STORE_IS_FULL, PROTECTED = 0x2001, 0x2009, 0x200C, 0x200D
 ADDED, STORE_FULL, DEVICE_INFO_CHANGED, COMPLETE = 0x4002, 0x400A, 0x4008, 0x400D

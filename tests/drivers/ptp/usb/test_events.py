@@ -8,11 +8,11 @@ import pytest
 import usb.core
 from hypothesis import given, strategies as st
 
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp.containers import Container, Kind
 from labrig.drivers.ptp.failures import MalformedError, StallError, UnpluggedError
 from labrig.drivers.ptp.usb.link import UsbLink
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 
 from ..eos.toy import ToyEos
 from .wire import INTERRUPT_PACKET, Wire

@@ -6,11 +6,11 @@ from collections import deque
 import pytest
 import usb.core
 
-from labrig.clock import VirtualClock
 from labrig.drivers.ptp.containers import Container, Kind, command
 from labrig.drivers.ptp.failures import MalformedError, NoAnswerError
 from labrig.drivers.ptp.usb.link import UsbLink
-from labrig.errors import DeviceError
+from labrig.foundation.clock import VirtualClock
+from labrig.foundation.errors import DeviceError
 
 from .wire import PACKET, Wire
 

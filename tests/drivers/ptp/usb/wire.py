@@ -10,7 +10,7 @@ import usb.backend
 import usb.core
 
 from labrig.acquire.connections import SerialPort
-from labrig.clock import VirtualClock
+from labrig.foundation.clock import VirtualClock
 
 PACKET, INTERRUPT_PACKET = 512, 8
 BULK_IN, BULK_OUT, INTERRUPT_IN = 0x81, 0x02, 0x83

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
-from labrig.errors import UsageError
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import UsageError
 from labrig.material import MatrixLayout, ReradiationMatrix, read_reradiation
 from tests.written_spectra import matrix_text
 
-FloatArray = NDArray[np.float64]
 EXCITATION_NM = np.arange(300.0, 465, 10)
 EMISSION_NM = np.arange(330.0, 701, 10)
 

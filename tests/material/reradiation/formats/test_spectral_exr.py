@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from labrig.errors import DiskError, UsageError
+from labrig.foundation.errors import DiskError, UsageError
 from labrig.material import (
     ReradiationMatrix,
     read_reradiation,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, read_reradiation, write_reradiation
 from tests.material.reradiation.formats.matrices import (
     assert_same,

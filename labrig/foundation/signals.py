@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
-from labrig.clock import Clock, Interrupted
+from labrig.foundation.clock import Clock, Interrupted
 
 #: Signals that end no process, and faults of machine code, after which no Python code runs (the
 #: guard switches the lights off). All others end a process.

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.input_file import MAX_PICTURE_BYTES, read_bytes
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import MAX_PICTURE_BYTES, read_bytes
 
 #: Formats that are read, as Pillow calls them.
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP")

@@ -3,11 +3,11 @@
 import os
 from pathlib import Path
 
-from labrig.errors import UsageError
-from labrig.named_files import is_path
-from labrig.yaml_file import did_you_mean
+from labrig.foundation.errors import UsageError
+from labrig.foundation.named_files import is_path
+from labrig.foundation.yaml_file import did_you_mean
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 #: Suffixes of shipped files: YAML, or measured curves in JSON.
 SUFFIXES = (".yaml", ".yml", ".json")
 

@@ -11,9 +11,9 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import UsageError
-from labrig.input_file import open_regular
-from labrig.output_file import write_durably
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import open_regular
+from labrig.foundation.output_file import write_durably
 
 #: Arrays that need no more are read whatever their packing; larger ones need no more than
 #: `MAX_UNPACKING` times their file, which no measurement is packed to.

@@ -39,7 +39,7 @@ def is_path(named: str) -> bool:
 
     Examples
     --------
-    >>> from labrig.named_files import is_path
+    >>> from labrig.foundation.named_files import is_path
     >>> is_path("lamp.csv"), is_path("./lamp"), is_path("halogen_3000k"), is_path("FL3.15")
     (True, True, False, False)
     """
@@ -76,7 +76,7 @@ def with_absolute_paths(
     --------
     >>> from pathlib import Path
     >>> from pydantic import BaseModel
-    >>> from labrig.named_files import ShippedOrFile, with_absolute_paths
+    >>> from labrig.foundation.named_files import ShippedOrFile, with_absolute_paths
     >>> class Sample(BaseModel):
     ...     name: str
     ...     material: ShippedOrFile

@@ -12,7 +12,7 @@ C. L. Lawson, R. J. Hanson, *Solving least squares problems* (1974), chapter 23.
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from labrig.foundation.arrays import FloatArray
 
 
 def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatArray:

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from pydantic import BaseModel
 
-from labrig import plugins, resources
 from labrig.acquire import DeviceEntry, RigFile
-from labrig.errors import UsageError
+from labrig.foundation import plugins, resources
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import parse_yaml, read_yaml, validate
 from labrig.material import Material
 from labrig.sim import Simulation
-from labrig.yaml_file import parse_yaml, read_yaml, validate
 
 Content = dict[str, Any]
 #: Words of pydantic that mean nothing to who writes a file.

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from labrig import plugins
 from labrig.drivers.numato import NumatoRelay
+from labrig.foundation import plugins
 
 FOLDERS = ("drivers", "protocols", "sim", "config")
 NOTEBOOK = """
@@ -17,9 +17,9 @@ import sys
 sys.path.insert(0, {folder!r})
 {before}
 import labrig
-from labrig import resources
+from labrig.foundation import resources
 from labrig.bench import opening as bench
-from labrig import plugins
+from labrig.foundation import plugins
 import labrig.drivers.numato, labrig.protocols.decay, labrig.sim
 for module in (labrig.drivers, labrig.protocols, labrig.sim):
     assert "trap" not in vars(module), module

@@ -5,7 +5,13 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.quantity import LENGTH_MM, MASS_PER_AREA_G_PER_M2, TIME_S, duration_text, parse
+from labrig.foundation.quantity import (
+    LENGTH_MM,
+    MASS_PER_AREA_G_PER_M2,
+    TIME_S,
+    duration_text,
+    parse,
+)
 
 
 @pytest.mark.parametrize(

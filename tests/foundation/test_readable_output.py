@@ -14,7 +14,7 @@ import typer
 from hypothesis import given, strategies as st
 from rich.console import Console
 
-from labrig.readable_output import make_streams_readable, spelled
+from labrig.foundation.readable_output import make_streams_readable, spelled
 from labrig.record import RunFolder
 from tests.conftest import Ended
 

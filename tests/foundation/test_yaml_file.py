@@ -8,8 +8,15 @@ import pytest
 from hypothesis import example, given, strategies as st
 from pydantic import BaseModel, ConfigDict
 
-from labrig.errors import UsageError
-from labrig.yaml_file import did_you_mean, parse_yaml, read_model, validate, write_yaml, yaml_text
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import (
+    did_you_mean,
+    parse_yaml,
+    read_model,
+    validate,
+    write_yaml,
+    yaml_text,
+)
 
 
 class Inner(BaseModel):

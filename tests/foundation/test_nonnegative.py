@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from labrig.nonnegative import FloatArray, nonnegative_least_squares
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.nonnegative import nonnegative_least_squares
 
 
 @pytest.fixture(params=["SciPy as it is", "SciPy stops short", "SciPy gives up"], autouse=True)

@@ -16,10 +16,10 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from yaml.composer import Composer
 
-from labrig.errors import UsageError
-from labrig.input_file import read_text
-from labrig.model_errors import is_rule, lacks_item, place, refusal
-from labrig.output_file import write_text
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_text
+from labrig.foundation.model_errors import is_rule, lacks_item, place, refusal
+from labrig.foundation.output_file import write_text
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from labrig.clock import Interrupted, VirtualClock
-from labrig.signals import STOP_SIGNALS, interrupting, name_of, pausing
+from labrig.foundation.clock import Interrupted, VirtualClock
+from labrig.foundation.signals import STOP_SIGNALS, interrupting, name_of, pausing
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows knows few signals")
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 #: Limit above the width of any sensor, which excludes infinity.
 MAX_PIXELS = 1_000_000

@@ -10,8 +10,8 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from labrig.errors import UsageError
-from labrig.yaml_file import did_you_mean
+from labrig.foundation.errors import UsageError
+from labrig.foundation.yaml_file import did_you_mean
 
 DRIVERS = "labrig.drivers"
 PROTOCOLS = "labrig.protocols"

@@ -6,7 +6,7 @@ import stat
 from io import BufferedReader
 from pathlib import Path
 
-from labrig.errors import DiskError, UsageError
+from labrig.foundation.errors import DiskError, UsageError
 
 #: Errors of the disk, which no other name and no permission would resolve.
 DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDOUT}

@@ -49,7 +49,7 @@ def spelled(text: str, encoding: str, errors: str = "strict") -> str:
 
     Examples
     --------
-    >>> from labrig.readable_output import spelled
+    >>> from labrig.foundation.readable_output import spelled
     >>> spelled("σ = (2 ± 1) s⁻¹", "cp1252"), spelled("χ² ≤ 1.2 · 10¹⁵", "ascii")
     ('sigma = (2 ± 1) s^-1', 'chi^2 <= 1.2 * 10^15')
     """

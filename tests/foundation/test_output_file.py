@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from labrig.errors import DiskError, UsageError
-from labrig.file_lock import plain_lock
-from labrig.output_file import make_folder_in, replaced, write_durably, write_text
+from labrig.foundation.errors import DiskError, UsageError
+from labrig.foundation.file_lock import plain_lock
+from labrig.foundation.output_file import make_folder_in, replaced, write_durably, write_text
 
 
 def by_replacing(path: Path, data: bytes) -> None:

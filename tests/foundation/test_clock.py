@@ -8,8 +8,15 @@ from typing import Any
 
 import pytest
 
-from labrig.clock import SLEEP_CLOCKS, Clock, Interrupted, Slept, SystemClock, VirtualClock
-from labrig.errors import DeviceError
+from labrig.foundation.clock import (
+    SLEEP_CLOCKS,
+    Clock,
+    Interrupted,
+    Slept,
+    SystemClock,
+    VirtualClock,
+)
+from labrig.foundation.errors import DeviceError
 
 
 @pytest.mark.parametrize("clock", [SystemClock(), VirtualClock(1e9)], ids=["system", "virtual"])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from filelock import FileLock
 
-from labrig.errors import UsageError
+from labrig.foundation.errors import UsageError
 
 
 def plain_lock(path: Path, timeout_s: float = -1, every_s: float = 0.05) -> FileLock:

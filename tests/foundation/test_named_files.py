@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 import labrig
 from labrig.acquire import changes_with_absolute_paths
 from labrig.bench import with_frame_size
-from labrig.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
+from labrig.foundation.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
 from labrig.optics import read_light
 from labrig.protocols.luminance import Luminance
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.array_file import read_arrays
-from labrig.errors import UsageError
-from labrig.input_file import read_text
+from labrig.foundation.array_file import read_arrays
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import read_text
 from labrig.reproduce.mesh_file.read_mesh import read_mesh
 
 FEW_BYTES = 20_000_000

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from labrig.errors import UsageError
-from labrig.input_file import open_regular
-from labrig.output_file import replaced
+from labrig.foundation.errors import UsageError
+from labrig.foundation.input_file import open_regular
+from labrig.foundation.output_file import replaced
 
 #: Pixels that need no more are read whatever their packing: three channels of a 4K picture. Others
 #: need no more than `MAX_UNPACKING` times their file, which no rendered picture is packed to.

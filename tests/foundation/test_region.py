@@ -3,8 +3,8 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.errors import UsageError
-from labrig.region import parse_region, region_pixels
+from labrig.foundation.errors import UsageError
+from labrig.foundation.region import parse_region, region_pixels
 
 
 def test_pixels_and_fractions() -> None:

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
-from labrig.errors import DiskError
+from labrig.foundation.errors import DiskError
 
 
 class Disk(Protocol):
@@ -68,7 +68,7 @@ def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.output_file import write_durably
+    >>> from labrig.foundation.output_file import write_durably
     >>> write_durably(Path("serial-number.txt"), b"0123456789")
     >>> Path("serial-number.txt").read_bytes()
     b'0123456789'

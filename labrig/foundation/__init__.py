@@ -1,0 +1,4 @@
+"""Shared ground of all packages: errors, clock, numbers, models, files; it knows nothing of them.
+
+Modules are imported by their own names.
+"""
