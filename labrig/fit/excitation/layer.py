@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from labrig.fit.excitation.light_errors import LightErrors
+from labrig.fit.excitation.model_tests import LightErrors
 from labrig.fit.excitation.parameters import RelativeSigmas
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.least_squares import least_squares

@@ -4,19 +4,20 @@ One light after the other, and an RGB camera, after P. McEvoy, *Capture and simu
 fluorescence in fabrics* (Chalmers, 2020), called the thesis here.
 """
 
-from labrig.fit.fluorescence.colour import PredictedColour, predicted_colour
-from labrig.fit.fluorescence.estimate import fit_fluorescence
-from labrig.fit.fluorescence.joint import JointEstimator
-from labrig.fit.fluorescence.per_led import fit_per_led
-from labrig.fit.fluorescence.placement import (
+from labrig.fit.fluorescence.estimate import JointEstimator, fit_fluorescence
+from labrig.fit.fluorescence.led_sets import (
     RECOMMENDED_NM,
     LedSet,
+    LedStudy,
     even_peaks_nm,
+    gaussian_led,
     moved_leds,
     require_peaks,
+    study_leds,
     study_set,
     usual_led,
 )
+from labrig.fit.fluorescence.per_led import fit_per_led
 from labrig.fit.fluorescence.result import (
     EstimatedFluorophore,
     EstimateFact,
@@ -25,11 +26,12 @@ from labrig.fit.fluorescence.result import (
     FluorophoreNumber,
     Method,
     MoreThanWhite,
+    PredictedColour,
     Surfaces,
     UnexplainedValues,
     UnknownBrightness,
+    predicted_colour,
 )
-from labrig.fit.fluorescence.study import LedStudy, gaussian_led, study_leds
 from labrig.fit.fluorescence.system import Exposure, FluorescenceSystem, fluorescence_system
 
 __all__ = [

@@ -1,11 +1,8 @@
 """Calibration of a linear variable filter: mercury lines, and colour filters over a grey card."""
 
-from labrig.fit.lvf.calibration import LvfCalibration, calibrate_lvf
+from labrig.fit.lvf.calibration import LvfCalibration, calibrate_lvf, most_informative_filters
 from labrig.fit.lvf.card_pictures import compare_card_pictures, place_means
-from labrig.fit.lvf.filter_choice import most_informative_filters
-from labrig.fit.lvf.line_model import MERCURY, Line
-from labrig.fit.lvf.lines import locate_lines
-from labrig.fit.lvf.wavelength_fit import WavelengthFit, fit_wavelengths
+from labrig.fit.lvf.lines import MERCURY, Line, WavelengthFit, fit_wavelengths, locate_lines
 
 __all__ = [
     "MERCURY",

@@ -7,12 +7,12 @@ from labrig.fit.spectrum.fit import (
 )
 from labrig.fit.spectrum.line import LineFit, fit_line
 from labrig.fit.spectrum.lines import DECISIVE
-from labrig.fit.spectrum.minimum import nonnegative_minimum
 from labrig.fit.spectrum.system import (
     CurveError,
     SpectralSystem,
     camera_modes,
     curve_modes,
+    nonnegative_minimum,
     smooth_modes,
     system_through_lvf,
 )

@@ -3,32 +3,217 @@
 Values are linear in the curves, and the family of cameras is their prior, so that mean and
 covariance of the posterior are closed forms. Two factors are found with them, by their evidence:
 how unusual the camera is among the family, and how much more the values err than they should.
+
+Jiang et al. describe a channel by its mean and a few principal components. Here all components are
+kept, each weighed by its variance, and channels vary together, since lens and infrared filter are
+common to them. What some tens of cameras cannot show is added as a smooth random difference.
+
+Each kind of readings gives its design, linear in the curves, and the covariance of its errors for
+given curves: noise, and what is not known of chart, light and filter.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import eigh
 
-from labrig.fit.camera_curves.family import GRID_NM, CurveFamily, camera_family, correlation
-from labrig.fit.camera_curves.readings import ChartReadings, FilterReadings
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
-from labrig.optics import CHANNELS, CameraResponse, Spectrum
+from labrig.optics import CHANNELS, CameraResponse, Lvf, Spectrum, Transmittance
+
+#: Wavelengths in nm of estimated curves.
+GRID_NM: FloatArray = np.arange(380.0, 781.0, 5.0)
+
+#: Part of the variance between cameras that is a smooth difference of no other camera, and the
+#: distance in nm at which it is independent. Both were chosen by leaving out each shipped camera.
+OWN_SHARE, OWN_NM = 0.08, 12.0
+
+#: Relative prior σ of the scale of each channel, which the chart's own greys tell better.
+SCALE_SIGMA = 0.1
+
+#: Fewest cameras that tell how cameras differ.
+FEWEST = 8
+
+
+@dataclass(frozen=True, eq=False)
+class CurveFamily:
+    """Normal density of the curves of cameras, each channel scaled by its response to a grey.
+
+    Attributes
+    ----------
+    mean
+        Mean curves on `GRID_NM`, shape (k, n).
+    covariance
+        Covariance of all k · n values, channel by channel.
+    count
+        Number of cameras.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    count: int
+
+
+def camera_family(cameras: Sequence[CameraResponse], grey_light: FloatArray) -> CurveFamily:
+    """Return mean and covariance of the curves of some cameras.
+
+    Parameters
+    ----------
+    cameras
+        Measured cameras of the same channels.
+    grey_light
+        Light of a grey surface per cell of `GRID_NM`, to which every channel responds by 1, (n,).
+
+    Raises
+    ------
+    ValueError
+        There are too few cameras.
+    """
+    if len(cameras) < FEWEST:
+        raise ValueError(f"expected {FEWEST} or more cameras, got {len(cameras)}")
+    curves = np.stack([camera.at(GRID_NM).T for camera in cameras]).clip(0.0)
+    curves = curves / (curves @ grey_light)[:, :, np.newaxis]
+    mean = curves.mean(axis=0)
+    differences = (curves - mean).reshape(len(cameras), -1)
+    between = differences.T @ differences / (len(cameras) - 1)
+    sigma = np.sqrt(np.diag(between))
+    smooth = np.kron(np.eye(len(mean)), correlation(OWN_NM))
+    own = sigma[:, np.newaxis] * smooth * sigma
+    covariance = (1 - OWN_SHARE) * between + OWN_SHARE * own
+    for channel in range(len(mean)):
+        scaled = np.zeros_like(mean)
+        scaled[channel] = SCALE_SIGMA * mean[channel]
+        covariance += np.outer(scaled, scaled)
+    return CurveFamily(mean, covariance, len(cameras))
+
+
+def correlation(distance_nm: float) -> FloatArray:
+    """Return the correlation (n, n) on `GRID_NM` of a smooth random function."""
+    off = (GRID_NM[:, np.newaxis] - GRID_NM) / distance_nm
+    return np.asarray(np.exp(-(off**2) / 2))
+
+
+#: Relative σ of a patch of one's own chart against the published means: its level and, smooth over
+#: so many nm, its course; and what is added to every reflectance, as by a dusty black.
+LEVEL, COURSE, ADDED, COURSE_NM = 0.02, 0.015, 0.002, 60.0
+
+#: Relative σ of the brightness of a scene against another one.
+BRIGHTNESS = 0.05
+
+#: Relative σ of a filter's transmittance, smooth over so many nm: its calibration rests on other
+#: curves of the camera; and of a single place.
+TRANSMITTANCE, TRANSMITTANCE_NM, ROUGH = 0.1, 60.0, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class ChartReadings:
+    """Readings of p patches in k channels.
+
+    Attributes
+    ----------
+    value, sigma
+        Values in DN/s and σ by noise, shape (p, k).
+    reflectance
+        Reflectances on `GRID_NM`, shape (p, n).
+    place
+        Places of the patches, from −1 to 1 across and down the chart, shape (p, 2).
+    unevenness
+        Relative σ of the light at the chart's edge against its middle.
+    """
+
+    value: FloatArray
+    sigma: FloatArray
+    reflectance: FloatArray
+    place: FloatArray
+    unevenness: float
+
+    def design(self, light: FloatArray) -> FloatArray:
+        """Return responses (p, n) per unit of a curve under light per cell of the grid (n,)."""
+        return np.asarray(self.reflectance * light)
+
+    def errors(self, light: FloatArray, curves: FloatArray) -> FloatArray:
+        """Return the covariance (p, k, p, k) of errors of chart and light for curves (k, n)."""
+        seen = curves * light
+        by_patch = self.reflectance[:, np.newaxis, :] * seen
+        smooth = correlation(COURSE_NM)
+        relative = LEVEL**2 + COURSE**2 * smooth
+        added = ADDED**2 * seen @ smooth @ seen.T
+        p, k = self.value.shape
+        covariance = np.zeros((p, k, p, k))
+        for patch, part in enumerate(by_patch):
+            covariance[patch, :, patch, :] = part @ relative @ part.T + added
+        predicted = by_patch.sum(axis=2)
+        modes = [BRIGHTNESS * predicted]
+        modes += [self.unevenness * across[:, np.newaxis] * predicted for across in self.place.T]
+        for mode in modes:
+            covariance += np.multiply.outer(mode, mode)
+        return covariance
+
+
+@dataclass(frozen=True, eq=False)
+class FilterReadings:
+    """Readings of a grey card through a variable filter before the camera, at p places.
+
+    Attributes
+    ----------
+    value, sigma
+        Values in DN/s and σ by noise, shape (p, k); NaN where a value is missing.
+    lvf
+        The filter at these places.
+    card
+        Reflectance of the card.
+    """
+
+    value: FloatArray
+    sigma: FloatArray
+    lvf: Lvf
+    card: Transmittance
+
+    @cached_property
+    def _passed(self) -> FloatArray:
+        return np.asarray(self.lvf.transmission(GRID_NM) * self.card.at(GRID_NM))
+
+    def design(self, light: FloatArray) -> FloatArray:
+        """Return responses (p, n) per unit of a curve under light per cell of the grid (n,)."""
+        return np.asarray(self._passed * light)
+
+    def errors(self, light: FloatArray, curves: FloatArray) -> FloatArray:
+        """Return the covariance (p, k, p, k) of errors of filter and light for curves (k, n)."""
+        seen = curves * light
+        predicted = self._passed @ seen.T
+        centre_nm = self.lvf.bands.centre_nm
+        off = (centre_nm[:, np.newaxis] - centre_nm) / TRANSMITTANCE_NM
+        gain = TRANSMITTANCE**2 * np.exp(-(off**2) / 2) + ROUGH**2 * np.eye(len(centre_nm))
+        # One factor for the whole scene is open: the filter's scale is not known.
+        covariance = np.einsum("pk,pq,ql->pkql", predicted, gain + 1.0, predicted)
+        if self.lvf.sigma is not None:
+            slope = -np.gradient(self._passed, GRID_NM, axis=1) @ seen.T
+            shift = self.lvf.sigma.centre_nm[:, np.newaxis] * slope
+            for place, change in enumerate(shift):
+                covariance[place, :, place, :] += np.outer(change, change)
+        return np.asarray(covariance)
+
 
 #: Relative σ of a lamp's spectrum whose file has none, and the distance in nm over which it errs.
 LAMP_SIGMA, LAMP_NM = 0.01, 60.0
+
 #: Factors of the family's covariance and of the errors' that are tried, and how firmly both are
 #: expected to be 1: degrees of freedom of an inverse χ².
 UNUSUAL = np.geomspace(0.1, 40.0, 25)
+
 MISFITS = np.geomspace(0.4, 60.0, 18)
+
 UNUSUAL_DOF, MISFIT_DOF = 4.0, 12.0
+
 #: Iterations in which errors relative to the curves follow the curves.
 ROUNDS = 4
+
 #: Reflectances from which a patch tells the scale of the channels, and their largest relative range
 #: over the wavelengths of a grey.
 GREY_REFLECTANCE, GREY_RANGE = 0.15, 0.25
+
 #: Wavelengths in nm between which a reflectance's range is that of a grey.
 GREY_NM = (450.0, 700.0)
 
