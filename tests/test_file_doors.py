@@ -49,7 +49,6 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "labrig/foundation/output_file.py",
             "labrig/record/run_folder.py",
             "labrig/record/checksums.py",
-            "labrig/record/run_lock.py",
             "labrig/process/run.py",
             "labrig/calibration/kept.py",
             "labrig/reproduce/compiled.py",
@@ -116,7 +115,7 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
     ("socket",): {
         "labrig/bench/opening.py",  # by consent
         "labrig/bench/device_lock.py",
-        "labrig/record/run_lock.py",  # the name of this PC
+        "labrig/record/run_folder.py",  # the name of this PC
         "labrig/acquire/connections.py",  # the type
         "drivers/ptp/ip/link.py",
         "sim/camera/ptpip/server.py",

@@ -11,6 +11,8 @@ from labrig.calibration.camera_file import (
     CameraFile,
     Linearity,
     Noise,
+    Settings,
+    relative_sensitivity,
 )
 from labrig.calibration.fade_file import (
     FADE_KIND,
@@ -54,7 +56,6 @@ from labrig.calibration.reflectance_file import (
     PatchReflectance,
     ReflectanceFile,
 )
-from labrig.calibration.sensitivity import Settings, relative_sensitivity
 
 __all__ = [
     "BLANK_KIND",

@@ -4,7 +4,7 @@ from .compare import (
     PatchComparison as PatchComparison,
     compare_runs as compare_runs,
 )
-from .listing import (
+from .index import (
     RunFilter as RunFilter,
     find_run as find_run,
     list_runs as list_runs,
@@ -14,8 +14,6 @@ from .run_summary import (
     RunStatus as RunStatus,
     RunSummary as RunSummary,
     status_of as status_of,
-)
-from .summarising import (
     summarise as summarise,
 )
 from .trap_depths import (

@@ -1,13 +1,15 @@
 """Spectra and the optical elements between light and camera signal."""
 
-from labrig.optics.absolute_irradiance import absolute_irradiance
 from labrig.optics.camera import (
     CHANNELS,
     CURVES_FILE,
     CameraResponse,
+    ShippedCamera,
     read_camera,
     read_checked_curves,
     read_monochrome_camera,
+    shipped_camera,
+    shipped_cameras,
 )
 from labrig.optics.camera_model import (
     CameraModel,
@@ -21,11 +23,13 @@ from labrig.optics.chart import CHART_PATCHES, read_colour_chart
 from labrig.optics.colorimetry import (
     CIE_1931,
     CIE_2015,
+    XYZ_TO_SRGB,
     Observer,
     delta_e,
     illuminant,
     lab,
     observer,
+    srgb_bytes,
     white_xyz,
 )
 from labrig.optics.curve_file import (
@@ -40,15 +44,17 @@ from labrig.optics.hyperspectral import HyperspectralCube, read_hyperspectral_cu
 from labrig.optics.lights import is_narrow, read_light
 from labrig.optics.lvf import (
     NOMINAL_FWHM_NM,
+    SLICES,
     Bands,
     Lvf,
+    Strip,
     WavelengthMap,
     nominal_lvf,
     peak_shape,
     signal_through,
 )
-from labrig.optics.ordinate import Quantity
 from labrig.optics.photometry import (
+    absolute_irradiance,
     mesopic_adaptation,
     mesopic_ratio,
     photopic_efficacy,
@@ -61,7 +67,7 @@ from labrig.optics.piecewise import (
     hat_functions,
     quadrature,
 )
-from labrig.optics.shipped_cameras import ShippedCamera, shipped_camera, shipped_cameras
+from labrig.optics.spectral_columns import Quantity
 from labrig.optics.spectrometer import (
     MeasuredSpectrum,
     SpectrometerReading,
@@ -69,8 +75,6 @@ from labrig.optics.spectrometer import (
     read_spectrometer_reading,
 )
 from labrig.optics.spectrum import Spectrum, Transmittance
-from labrig.optics.srgb import XYZ_TO_SRGB, srgb_bytes
-from labrig.optics.strip import SLICES, Strip
 
 __all__ = [
     "CHANNELS",

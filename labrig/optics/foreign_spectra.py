@@ -14,8 +14,17 @@ import numpy as np
 
 from labrig.foundation.errors import LabrigError
 from labrig.optics.curve_table import NamedCurve, sorted_columns
-from labrig.optics.ordinate import UNKNOWN, Ordinate, Quantity, read_ordinate
-from labrig.optics.spectral_axis import AxisUnit, axis_unit, plain, read_axis, wavelengths_nm
+from labrig.optics.spectral_columns import (
+    UNKNOWN,
+    AxisUnit,
+    Ordinate,
+    Quantity,
+    axis_unit,
+    plain,
+    read_axis,
+    read_ordinate,
+    wavelengths_nm,
+)
 from labrig.text_table import SEPARATORS, Block, Line, Style, read_blocks
 from labrig.text_table.names import is_row_number, is_sigma, sigma_of
 from labrig.text_table.rows import no_measurements

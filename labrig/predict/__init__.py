@@ -2,7 +2,6 @@
 
 from labrig.predict.assumptions import Sources
 from labrig.predict.patch import PatchPrediction
-from labrig.predict.prediction import Prediction, predict
-from labrig.predict.remedies import Remedy
+from labrig.predict.prediction import Prediction, Remedy, predict
 
 __all__ = ["PatchPrediction", "Prediction", "Remedy", "Sources", "predict"]

@@ -12,18 +12,14 @@ from labrig.material.reradiation.appearance import (
 from labrig.material.reradiation.checks import (
     physical_warnings,
 )
-from labrig.material.reradiation.conditional import (
-    ConditionalDensity,
-)
 from labrig.material.reradiation.correction import (
     corrected,
+    without_offset,
+    without_spill,
 )
 from labrig.material.reradiation.emission import (
     emission_spectrum,
     read_emissions,
-)
-from labrig.material.reradiation.evidence import (
-    reradiates,
 )
 from labrig.material.reradiation.formats import (
     MatrixLayout,
@@ -38,6 +34,7 @@ from labrig.material.reradiation.matrix import (
     SeenSpectrum,
 )
 from labrig.material.reradiation.mixture import (
+    ConditionalDensity,
     ReradiationMixture,
 )
 from labrig.material.reradiation.mixture_file import (
@@ -47,13 +44,8 @@ from labrig.material.reradiation.mixture_file import (
 from labrig.material.reradiation.noise import (
     InstrumentNoise,
     instrument_noise,
+    reradiates,
     with_sigma,
-)
-from labrig.material.reradiation.offset import (
-    without_offset,
-)
-from labrig.material.reradiation.spill import (
-    without_spill,
 )
 
 __all__ = [

@@ -19,25 +19,35 @@ from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Entries nearer to the diagonal than this many bands hold light that passes both monochromators.
 CLEAR_BANDS = 1.5
+
 #: Entries beyond this many times the column's median are no noise; of 10⁹ normal ones, 2 are.
 CLIP_SIGMAS = 6.0
+
 #: Normal σ over the median of the absolute values.
 SIGMA_OF_MEDIAN = 1.4826
+
 #: Weight of what is expected of a column, in entries. With 4, rms pulls of held-out tiles are 0.96
 #: to 1.03 in all regions; with 1 they are up to 1.12, with 16 down to 0.93.
 EXPECTED_ENTRIES = 4.0
+
 #: Entries that are averaged for what is expected of a column, and for a row's factor.
 POOLED_COLUMN_ENTRIES, POOLED_ROW_ENTRIES = 10, 15
+
 #: The parabola of the rows ends where fewer entries than this are known, and goes on level. With 4,
 #: rms pulls of tiles at 700 to 780 nm are 1.08; to the end, a parabola has 0.94 and scatters more.
 LAST_ROW_ENTRIES = 4
+
 #: σ of the columns 300 to 390 nm (rms over them) over that of the nearest columns with an
 #: anti-Stokes side is 1.1 on the tiles; the column of 300 nm alone is 2 times as noisy.
 UNSEEN_COLUMN_RATIO = 1.2
+
 #: Scatter of a tile's reflectance beyond the noise: a part of it, and a wrong wavelength.
 REFLECTANCE_SCATTER = 0.0016
+
 WAVELENGTH_SCATTER_NM = 0.2
+
 ITERATIONS = 10
+
 #: Correlation of any two entries of a column: what makes the scatter of sums over columns.
 COLUMN_CORRELATION = 0.55
 
@@ -324,3 +334,56 @@ def _same_bands(
         len(a) == len(b) and np.allclose(a, b, rtol=0, atol=1e-6)
         for a, b in ((one.input_nm, other.input_nm), (one.output_nm, other.output_nm))
     )
+
+
+#: Significance of an entry, and of those beside it: noise has stripes along the output, since one
+#: dark reading serves a whole column, but never three columns side by side.
+CLEAR_SIGMAS, BESIDE_SIGMAS = 5.0, 3.0
+
+
+def reradiates(matrix: ReradiationMatrix) -> bool:
+    """Return whether a surface re-radiates more than its noise.
+
+    Parameters
+    ----------
+    matrix
+        A matrix with σ of its re-radiation.
+
+    Returns
+    -------
+    bool
+        Whether some entry is 5 σ above zero, and both entries beside it, of the neighbouring input
+        bands, are 3 σ above zero. Where one of these was not measured, as beside the only light
+        that excites a sample, the neighbouring output bands stand for it.
+
+    Raises
+    ------
+    DataError
+        The re-radiation has no σ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.material import ReradiationMatrix, reradiates, with_sigma
+    >>> nm = np.arange(400.0, 701.0, 10.0)
+    >>> values = 0.5 * np.eye(31) + 1e-3 * np.random.default_rng(1).standard_normal((31, 31))
+    >>> before = with_sigma(ReradiationMatrix.from_bands("", nm, nm, values))
+    >>> values[12, 3:8] += 0.02
+    >>> reradiates(before), reradiates(with_sigma(ReradiationMatrix.from_bands("", nm, nm, values)))
+    (False, True)
+    """
+    sigma = required_sigma(matrix)
+    used = matrix.is_stokes & ~near_diagonal(matrix)
+    is_measured = np.isfinite(matrix.reradiation)
+    used &= (sigma > 0) & is_measured
+    pulls = np.divide(matrix.reradiation, sigma, out=np.zeros_like(sigma), where=used)
+    # An entry on the edge has no neighbour that could agree.
+    ends = np.pad(pulls, ((1, 1), (0, 0)))
+    same_light = np.minimum(ends[:-2], ends[2:])
+    beside = np.where(is_measured, pulls, np.nan)
+    left, right = (
+        np.where(np.isnan(near), same_light[:, 1:-1], near)
+        for near in (beside[:, :-2], beside[:, 2:])
+    )
+    clear = (pulls[:, 1:-1] > CLEAR_SIGMAS) & (np.minimum(left, right) > BESIDE_SIGMAS)
+    return bool(clear.any())

@@ -1,7 +1,12 @@
 """Times of rows: clocks in a column, units and widths of channels in lines about the table."""
 
-from labrig.text_table.times.clock_reading import ClockReading, parse_clock
-from labrig.text_table.times.clock_times import ClockTimes, is_clock_form, read_clock
+from labrig.text_table.times.clock_times import (
+    ClockReading,
+    ClockTimes,
+    is_clock_form,
+    parse_clock,
+    read_clock,
+)
 from labrig.text_table.times.statements import (
     ChannelWidth,
     axis_times_s,

@@ -1,11 +1,15 @@
-"""What the values of a spectrum's column are, told from its name and unit, and made linear.
+"""Columns of a spectrum in a text: the axis in nm, the values linear, by their names and units.
 
 Fractions of light become fractions: from per cent, and from absorbance A by 10^-A. Irradiances and
 radiances become W m⁻² nm⁻¹ (sr⁻¹). What has no such meaning, such as a column in dB, is refused by
 its name.
+
+Wavelengths count as those in air wherever a file does not say more: the 0.03 % to those in a
+vacuum, which an energy or a wavenumber means, are less than the pass band of most spectrometers.
 """
 
 import re
+import unicodedata
 from dataclasses import dataclass
 from enum import Enum
 from math import log, log10
@@ -13,8 +17,161 @@ from math import log, log10
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
-from labrig.optics.spectral_axis import plain
 from labrig.optics.spectrum import FRACTION_SLACK
+
+#: Range of wavelengths in nm, which excludes tables in µm or in Hz.
+PLAUSIBLE_NM = (100.0, 20_000.0)
+
+#: Range in nm of an axis without a unit: beyond it are wavenumbers, Å, numbers of pixels.
+UNSTATED_NM = (150.0, 3000.0)
+
+
+class AxisUnit(Enum):
+    """Unit of a spectrum's axis: its symbol, its size in nm, whether the axis is reciprocal."""
+
+    NM = ("nm", 1.0, False)
+    ANGSTROM = ("Å", 0.1, False)
+    UM = ("µm", 1e3, False)
+    PER_CM = ("cm⁻¹", 1e7, True)
+    # h c / e and c, exact in the SI of 2019.
+    EV = ("eV", 1239.8419843320026, True)
+    THZ = ("THz", 299_792.458, True)
+
+    def __init__(self, symbol: str, size_nm: float, is_reciprocal: bool) -> None:
+        self.symbol = symbol
+        self.size_nm = size_nm
+        self.is_reciprocal = is_reciprocal
+
+    def in_nm(self, axis: FloatArray) -> FloatArray:
+        """Return the wavelengths in nm of an axis in this unit."""
+        if not self.is_reciprocal:
+            return axis * self.size_nm
+        with np.errstate(divide="ignore"):
+            return self.size_nm / axis
+
+
+_UNITS = {
+    word: unit
+    for unit, words in (
+        (AxisUnit.NM, "nm nanometer nanometers nanometre nanometres"),
+        (AxisUnit.ANGSTROM, "å angstrom angstroms ångström ångstrom angström aa"),
+        (AxisUnit.UM, "μm um micron microns micrometer micrometers micrometre mikrometer"),
+        (AxisUnit.PER_CM, "cm-1 cm^-1 1/cm /cm kayser kaysers"),
+        (AxisUnit.EV, "ev electronvolt electronvolts"),
+        (AxisUnit.THZ, "thz terahertz"),
+    )
+    for word in words.split()
+}
+
+_WAVELENGTH = (
+    "wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "λ", "wellenlänge",
+    "longueur d'onde", "longitud de onda", "lunghezza d'onda",
+)  # fmt: skip
+
+_WAVENUMBER = ("wavenumber", "wavenumbers", "wave number", "wellenzahl", "nombre d'onde")
+
+_ENERGY = ("energy", "photon energy", "energie", "frequency", "frequenz")
+
+#: Axes over which a table is no spectrum of light.
+_OTHER_AXES = (
+    "raman shift", "raman", "shift", "pixel", "pixels", "time", "temperature", "delay",
+    "2theta", "binding energy", "kinetic energy",
+)  # fmt: skip
+
+#: What follows the name: a unit in brackets, after a slash, a comma, a blank, `_` or `in`.
+_AFTER_NAME = re.compile(r"[\s_.,]*[\s_.,/(\[]\s*(?:in )?(.*?)\s*[)\]]?")
+
+_NAMES = (*_WAVELENGTH, *_WAVENUMBER, *_ENERGY)
+
+
+def plain(text: str) -> str:
+    """Return a name or a unit in lower case, with one sign for each that is written in two ways."""
+    same = unicodedata.normalize("NFKC", text).lower()
+    for old, new in (("−", "-"), ("–", "-"), ("’", "'"), ("`", "'"), ("^-", "-"), ("å", "å")):
+        same = same.replace(old, new)
+    return " ".join(same.strip(" \t#:=\"'").split())
+
+
+def axis_unit(text: str) -> AxisUnit | None:
+    """Return the unit of a spectrum's axis that a text is; None if it is none."""
+    word = plain(text).strip(" ()[]{}./,;")
+    # The stripped point and slash belong to some units.
+    return _UNITS.get(word) or _UNITS.get(plain(text).strip(" ()[]{}"))
+
+
+def read_axis(name: str, unit: str) -> tuple[bool, AxisUnit | None]:
+    """Return whether a column is a spectrum's axis, and its unit where it is stated.
+
+    Parameters
+    ----------
+    name
+        Name of the column, perhaps with its unit, as in `wavelength_nm` or `Wave length/µm`.
+    unit
+        Unit of the column where it stands apart; else empty.
+
+    Raises
+    ------
+    ValueError
+        The column is the axis of something else than a spectrum, such as `Raman shift`, or of
+        energies or frequencies without a unit.
+    """
+    text = plain(name).strip(".")
+    shown = " ".join(name.split())
+    if axis_unit(text) is not None:
+        return True, axis_unit(unit) or axis_unit(text)
+    base, inner = _split(text)
+    stated = axis_unit(unit) or axis_unit(inner)
+    if base in _OTHER_AXES:
+        raise ValueError(f"expected an axis of wavelengths, got '{shown}'")
+    if base not in _NAMES:
+        return False, None
+    if stated is not None:
+        return True, stated
+    if unit or inner:
+        raise ValueError(
+            f"expected an axis in nm, Å, µm, cm⁻¹, eV or THz, got '{shown}'"
+            + (f" in '{unit}'" if unit else "")
+        )
+    if base in _ENERGY:
+        raise ValueError(
+            f"expected the unit of '{shown}', such as eV, got none; write it into the header"
+        )
+    return True, AxisUnit.PER_CM if base in _WAVENUMBER else None
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Divide a plain name into that of the axis and what follows it, perhaps its unit."""
+    for name in sorted((*_NAMES, *_OTHER_AXES), key=len, reverse=True):
+        if text == name:
+            return name, ""
+        if text.startswith(name) and (inner := _AFTER_NAME.fullmatch(text[len(name) :])):
+            return name, inner[1]
+    return text, ""
+
+
+def wavelengths_nm(axis: FloatArray, unit: AxisUnit | None) -> FloatArray:
+    """Return the wavelengths in nm of an axis; without a unit it is taken for nm.
+
+    Raises
+    ------
+    ValueError
+        These are no wavelengths of light, or without a unit they need not be nm.
+    """
+    low, high = UNSTATED_NM if unit is None else PLAUSIBLE_NM
+    nm = (unit or AxisUnit.NM).in_nm(axis)
+    if ((nm >= low) & (nm <= high)).all():
+        return nm
+    got = f"{axis.min():g} to {axis.max():g}"
+    if unit is None:
+        raise ValueError(
+            f"expected the unit of the first column, got none with {got}, which need not be nm; "
+            "write a header, such as wavelength_nm,value"
+        )
+    of_unit = "" if unit is AxisUnit.NM else f" (from {unit.symbol})"
+    raise ValueError(
+        f"expected wavelengths from {low:g} to {high:g} nm{of_unit}, got {got} {unit.symbol}"
+    )
+
 
 #: Largest value from which fractions whose unit is not stated must be per cent. Between fractions
 #: and this, a dark filter in per cent and a noisy one in fractions look alike.
@@ -108,6 +265,7 @@ class Ordinate:
 
 #: Absorbance that no instrument measures.
 _LARGEST_ABSORBANCE = 20.0
+
 UNKNOWN = Ordinate(Quantity.UNKNOWN)
 
 _REFUSED = {
@@ -127,18 +285,22 @@ _REFUSED = {
         (r"\b[µμu]?mol\b|photons? ?(/|per|s-1)|quanta", "counts photons, not energy"),
     )
 }
+
 _ABSORBANCE = re.compile(
     r"abs|absorbance|absorbanz|absorption|extinction|extinktion|od|optical ?density|"
     r"optische dichte|densité optique|m?au|log10 ?\(1/[rt]\)|log ?\(1/[rt]\)"
 )
+
 _TRANSMITTANCE = re.compile(
     r"t|trans|transm|transmittance|transmission|transmissivity|transmissionsgrad|transmisson|"
     r"transmisión|transmissão|trasmissione|trasmittanza|transmitancia|durchlässigkeit|durchlass"
 )
+
 _REFLECTANCE = re.compile(
     r"r|refl|reflectance|reflection|reflectivity|reflexion|reflexionsgrad|remission|réflectance|"
     r"reflectancia|albedo"
 )
+
 _LIGHT_WORDS = frozenset(
     {
         "count", "counts", "intensity", "intensität", "intensité", "intensidad", "int",
@@ -148,9 +310,13 @@ _LIGHT_WORDS = frozenset(
         "s1c/r1", "s1c/r1c", "irr",
     }
 )  # fmt: skip
+
 _WORDS = re.compile(r"[^\W\d_][\w'./]*")
+
 _PER_CENT_WORDS = re.compile(r"%|\b(percent|per cent|prozent|pct|pour cent)\b")
+
 _FRACTION_WORDS = re.compile(r"\b(fraction|frac|anteil|0-1|0\.\.1)\b")
+
 _BRACKETS = re.compile(r"[(\[].*?[)\]]")
 
 
@@ -228,8 +394,11 @@ def _in_brackets(name: str) -> str:
 
 
 _PREFIXES = {"": 1.0, "k": 1e3, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+
 _AREAS_M2 = {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "sqm": 1.0, "sqcm": 1e-4}
+
 _LENGTHS_NM = {"nm": 1.0, "µm": 1e3, "μm": 1e3, "um": 1e3, "å": 0.1, "a": 0.1, "m": 1e9}
+
 _SYMBOL = re.compile(r"([a-zµμå]+)\^?(-?\d)?")
 
 
