@@ -1,4 +1,4 @@
-"""From light to photo-electrons: the simulated camera's own curves, aperture and lens.
+"""From light to photo-electrons: the simulated camera's curves, aperture and lens, and luminance.
 
 The curves are the shipped ones of a Canon EOS 5D Mark II, changed smoothly by as much as three
 laboratories disagree about that camera: labrig, which has the shipped ones, must tolerate it.
@@ -17,16 +17,20 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.material import Material
 
-from .lamp import CELL_NM, IS_VISIBLE, WAVELENGTH_NM
+from .lamp import BURNING_SPECTRUM, CELL_NM, IS_VISIBLE, WAVELENGTH_NM
 from .phosphor import band_cells
+from .simulation import LampSettings
 
 CURVES = "canon_eos_5d_mark_ii"
+
 CHANNELS = ("R", "G", "B")
 
 #: Three published sets of this camera's curves, peak-normalised, differ by 0.02–0.06 RMS.
 DISAGREEMENT_RMS = (0.022, 0.058)
+
 #: Distance of the random knots of that difference: smooth like a wrong reference diode.
 KNOTS_NM: FloatArray = np.arange(340.0, 840.0, 40.0)
+
 #: Fraction of it that is stray light and dark error, added where the curve itself is nearly zero.
 ADDED = 0.05
 
@@ -37,20 +41,24 @@ STRENGTHS = (1.0, 2.0, 4.0, 8.0, 16.0)
 #: sensitivity 1. Chosen: blue paint just after a long charge fills half of the range at ISO 400,
 #: f/4, 1 s.
 ELECTRONS_PER_S_NM = 33_000.0
+
 #: Radiance that a white surface reflects at irradiance 1. Chosen: under the default lamp a grey
 #: card fills half of the range at ISO 100, f/5.6, 1/60 s, about 500 times the glow of blue paint.
 REFLECTED = 12.5
+
 #: Reflectance of the black cloth around the samples.
 CLOTH_REFLECTANCE = 0.03
 
 #: Distance in nm over which a lens's glass absorbs e times less: an exponential edge (Urbach's).
 GLASS_EDGE_NM = 6.0
+
 #: Polariser of iodine in stretched film: part of unpolarised, or depolarised, light that it passes,
 #: wavelength of the half of that, and width of the edge in nm.
 FILM, FILM_EDGE_NM, FILM_WIDTH_NM = 0.4, 395.0, 7.0
 
 #: From the middle to the corner of a full-format frame, and the lens that a camera usually has.
 CORNER_MM = 21.75
+
 FOCAL_MM = 75.0
 
 
@@ -182,3 +190,38 @@ def vignetting(height: int, width: int, focal_mm: float = FOCAL_MM) -> FloatArra
     tangent2 = corner**2 * (x**2 + y**2) / ((height / 2) ** 2 + (width / 2) ** 2)
     falloff: FloatArray = (1 + tangent2) ** -2
     return falloff
+
+
+#: Luminous efficacy of light of 540 THz in lm/W (SI, since 2019), and mcd in a cd.
+KM_LM_PER_W = 683.0
+
+MCD = 1000.0
+
+
+#: V(λ) of CIE 1924 from 380 nm to 780 nm in steps of 10 nm.
+STEPS_NM: FloatArray = np.arange(380.0, 781.0, 10.0)
+
+STEPS = (
+    3.9e-05, 0.00012, 0.000396, 0.00121, 0.004, 0.0116, 0.023, 0.038,
+    0.06, 0.09098, 0.13902, 0.20802, 0.323, 0.503, 0.71, 0.862,
+    0.954, 0.99495, 0.995, 0.952, 0.87, 0.757, 0.631, 0.503,
+    0.381, 0.265, 0.175, 0.107, 0.061, 0.032, 0.017, 0.00821,
+    0.004102, 0.002091, 0.001047, 0.00052, 0.0002492, 0.00012, 6e-05, 3e-05,
+    1.499e-05,
+)  # fmt: skip
+
+PHOTOPIC: FloatArray = np.nan_to_num(
+    PchipInterpolator(STEPS_NM, STEPS, extrapolate=False)(WAVELENGTH_NM)
+)
+
+
+def luminance_mcd_per_m2(radiance: FloatArray, lamp: LampSettings) -> FloatArray:
+    """Return the luminance of spectra (…, wavelengths) in the room's scale of radiance, (…).
+
+    In that scale a white surface under the lamp has `REFLECTED` times the irradiance; its
+    luminance is the illuminance over π.
+    """
+    seen = CELL_NM * KM_LM_PER_W * (radiance @ PHOTOPIC)
+    white = CELL_NM * KM_LM_PER_W * float(BURNING_SPECTRUM @ PHOTOPIC)
+    scale = lamp.illuminance / np.pi / (REFLECTED * lamp.irradiance * white)
+    return np.asarray(MCD * scale * seen)

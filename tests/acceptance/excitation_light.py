@@ -43,7 +43,7 @@ from labrig.results import (
 )
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM
-from labrig.sim.lvf import Lvf
+from labrig.sim.layout import Lvf
 from tests.fit.charged_samples import Bench
 from tests.fit.layers import Layer
 

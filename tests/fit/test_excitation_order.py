@@ -22,7 +22,7 @@ from labrig.results import (
     PatchCharging,
     Series,
 )
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.simulation import LampSettings
 from tests.fit.charged_samples import BARE, LVF, Bench, lvf_windows, two_states
 from tests.results.made import decay_result

@@ -16,8 +16,7 @@ from labrig.foundation.yaml_file import validate
 from labrig.material import Material, read_material, write_material
 from labrig.material.file import IrradianceNorm, State
 from labrig.sim.bench_settings import TemperatureSettings
-from labrig.sim.kinetics import BOLTZMANN_EV_K, RATES_K
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import BOLTZMANN_EV_K, RATES_K, KineticsSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import Simulation
