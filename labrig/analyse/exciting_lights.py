@@ -22,7 +22,7 @@ from labrig.optics import (
     Transmittance,
     read_spectrometer_reading,
 )
-from labrig.protocols.irradiance import CardSpectra, light_unit
+from labrig.protocols.irradiance.protocol import CardSpectra, light_unit
 from labrig.protocols.steps.exciting_lights import ExcitingLights
 from labrig.record import SpectrumRecord
 

@@ -23,6 +23,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse
+from labrig.protocols.validate_illuminants.result import LampPatch, ValidateIlluminantsResult
 from labrig.record import FrameRole, read_run
 from labrig.reduce import sensor_layout
 from labrig.reproduce import (
@@ -39,7 +40,6 @@ from labrig.reproduce import (
     tristimulus,
     under_lamps,
 )
-from labrig.results import LampPatch, ValidateIlluminantsResult
 
 #: What the card shows of a lamp that is hardly seen: the tails of its spectrum, whose shape is not
 #: known, as a light of the scene.

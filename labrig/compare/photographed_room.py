@@ -28,10 +28,12 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.region import Region
 from labrig.material import Material
+from labrig.protocols.decay.result import DecayResult
+from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import FrameRole, RunRecord, read_run
 from labrig.reduce import SensorLayout, SeriesFrame, reduce_patches, sensor_layout
 from labrig.reproduce import DarkRoomLamp
-from labrig.results import DecayResult, PhosphorResult, RunResult, Series
+from labrig.results import RunResult, Series
 
 FileT = TypeVar("FileT", bound=BaseModel)
 

@@ -26,9 +26,11 @@ from labrig.compare.run import MeasuredPatch, measured_camera, read_patches, ref
 from labrig.compare.viewing import DEFAULT_WHITE, Viewing, viewing
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Material
+from labrig.protocols.excitation.result import ExcitationResult
+from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import read_run
 from labrig.reproduce import Assumptions
-from labrig.results import ExcitationResult, PhosphorResult, RunResult, read_result
+from labrig.results import RunResult, read_result
 
 NOTHING_ASSUMED = Assumptions()
 

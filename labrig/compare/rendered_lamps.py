@@ -21,14 +21,11 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.yaml_file import read_yaml
 from labrig.optics import CIE_1931, delta_e, lab, observer, white_xyz
-from labrig.results import (
-    AngularFluorescenceResult,
-    DirectBispectralResult,
-    LampPatch,
-    LedFluorescenceResult,
-    ValidateIlluminantsResult,
-    read_result,
-)
+from labrig.protocols.angular_fluorescence.result import AngularFluorescenceResult
+from labrig.protocols.direct_bispectral.result import DirectBispectralResult
+from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
+from labrig.protocols.validate_illuminants.result import LampPatch, ValidateIlluminantsResult
+from labrig.results import read_result
 
 #: Protocols that measure fluorescence, and photograph nothing under lamps of daily life.
 WITHOUT_LAMPS = tuple(

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.foundation.errors import UsageError
+from labrig.protocols.decay.result import DecayResult
+from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import read_run
 from labrig.results import (
-    DecayResult,
     FittedDecay,
     Measured,
-    PhosphorResult,
     RunResult,
     Series,
     field_unit,

@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.acquire import CAMERA, DARK, LIGHTS
 from labrig.foundation.output_file import write_durably
+from labrig.protocols.decay.result import DecayResult
+from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import DeviceLine, RunDescription, RunRecord
 from labrig.results import (
     DecayPatch,
-    DecayResult,
     FittedDecay,
     Measured,
-    PhosphorResult,
     RunResult,
     Series,
     field_unit,

@@ -18,7 +18,7 @@ from labrig.predict.expectation import Bench, predictable
 from labrig.predict.glow import Glow, check_states
 from labrig.predict.reference import Reference, read_reference, result_places, run_of
 from labrig.predict.variants import changed
-from labrig.protocols.decay import Decay
+from labrig.protocols.decay.protocol import Decay
 
 #: Assumed first exposure as a fraction of the longest, so that it may grow.
 FIRST_EXPOSURE_FRACTION = 1 / 8

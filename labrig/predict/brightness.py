@@ -12,7 +12,7 @@ from labrig.predict.camera import CameraFigures
 from labrig.predict.expectation import Bench, expected_schedule
 from labrig.predict.glow import Glow, laws, measured_amplitudes, radiated
 from labrig.predict.reference import Reference
-from labrig.protocols.decay import Decay
+from labrig.protocols.decay.protocol import Decay
 
 #: Range of the bisection in DN/s, and number of its steps.
 DIMMEST, BRIGHTEST = 1e-3, 1e9

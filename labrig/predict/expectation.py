@@ -12,7 +12,7 @@ from labrig.predict.frames import dark_frames, glow_frames
 from labrig.predict.glow import Glow
 from labrig.predict.information import Information, information
 from labrig.predict.series import ExpectedSeries, expected_series, repeated
-from labrig.protocols.decay import Decay
+from labrig.protocols.decay.protocol import Decay
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.exposure_metering import Schedule
 from labrig.reduce import FrameMeasurement, is_clipped

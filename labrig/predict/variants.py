@@ -8,7 +8,7 @@ from typing import Any
 from labrig.acquire import CameraOffers, ProtocolModel
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import Region
-from labrig.protocols.decay import Decay
+from labrig.protocols.decay.protocol import Decay
 
 #: Factor of the number of decays that halves uncorrelated noise.
 REPEATS = 4

@@ -14,8 +14,10 @@ from labrig.foundation.yaml_file import write_yaml
 from labrig.process.provenance import library_versions
 from labrig.process.run import Processed, new_result, put_in_place
 from labrig.process.without_run import describe_without_run
-from labrig.report import Report, table_sections, write_report
-from labrig.results import DecayPatch, DecayResult, TableLayout, write_result
+from labrig.protocols.decay.report import table_sections
+from labrig.protocols.decay.result import DecayResult
+from labrig.report import Report, write_report
+from labrig.results import DecayPatch, TableLayout, write_result
 
 
 class TableProvenance(FrozenModel):

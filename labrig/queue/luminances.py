@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.foundation.errors import LabrigError
-from labrig.results import LuminanceResult, Measured, read_result
+from labrig.protocols.luminance.result import LuminanceResult
+from labrig.results import Measured, read_result
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import CameraOffers, PartUnit, ProtocolModel, RigFile, Sample
-from labrig.foundation import plugins
+from labrig.foundation.plugins import measurement
 from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import validate
 from labrig.record import unit_in, unit_within
@@ -136,7 +136,7 @@ class Part:
         if not isinstance(kind, str) or kind in (chain, "phosphor", "calibration"):
             raise ValueError("expected 'protocol: NAME' in every part, the name of another one")
         name = str(keys.pop("part", kind))
-        model = plugins.load(plugins.PROTOCOLS, kind, f"part {name}")
+        model = measurement(kind, f"part {name}").load("protocol")
         return cls(name, validate(keys, model, f"part {name}"))
 
     def scenes(self) -> list[Scene]:

@@ -1,0 +1,9 @@
+"""Registration of the measurement `angular_fluorescence`."""
+
+from labrig.foundation.plugins import Measurement
+
+ANGULAR_FLUORESCENCE = Measurement(
+    package=__package__,
+    protocol=".protocol:AngularFluorescence",
+    result=".result:AngularFluorescenceResult",
+)

@@ -1,0 +1,10 @@
+"""Registration of the measurement `decay`."""
+
+from labrig.foundation.plugins import Measurement
+
+DECAY = Measurement(
+    package=__package__,
+    protocol=".protocol:Decay",
+    result=".result:DecayResult",
+    is_per_patch=True,
+)
