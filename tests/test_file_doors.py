@@ -281,7 +281,8 @@ def test_every_door_is_needed(sources: dict[str, str]) -> None:
     [
         "open('x')", "path.open()", "(folder / name).read_text()", "path.write_bytes(b'')",
         "io.open('x')", "np.load('x.npy')", "cv2.imwrite('x.png', picture)", "figure.savefig('x')",
-        "yaml.safe_load(text)", "FileLock('x')", "exec(text)", "importlib.import_module(name)", "resolve_name(name)",
+        "yaml.safe_load(text)", "FileLock('x')", "exec(text)", "importlib.import_module(name)",
+        "resolve_name(name)",
         "shutil.copytree(a, b)", "path.mkdir()", "os.system('x')", "import subprocess",
         "from urllib.request import urlopen", "import pickle", "draft.replace(path)",
         "import h5py", "from PIL import Image", "from os import open as look", "import rawpy",

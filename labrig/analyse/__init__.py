@@ -1,5 +1,6 @@
 """From the frames of a run to its typed result: one module or package for each protocol."""
 
+from labrig.analyse.bench_reference import reference_of
 from labrig.analyse.charge_table import ChargeTableOptions, fit_charge_table
 from labrig.analyse.frames import verify_frames
 from labrig.analyse.hyperspectral import CubeList, matrix_from_cubes
@@ -16,7 +17,6 @@ from labrig.analyse.series_fit import fit_series
 from labrig.analyse.shared_tables import fit_shared_tables
 from labrig.analyse.table_fit import FittedTable, TableFitOptions, fit_table
 from labrig.analyse.temperature import temperature_warnings
-from labrig.protocols.calibration.analysis import reference_of
 
 __all__ = [
     "ChargeTableOptions",

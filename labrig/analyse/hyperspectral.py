@@ -11,6 +11,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from labrig.analyse.direct_columns import direct_columns
 from labrig.fit import LitSpectrum, bispectral_columns
 from labrig.fit.bispectral import light_window_nm
 from labrig.foundation import resources
@@ -24,7 +25,6 @@ from labrig.optics import (
     read_hyperspectral_cube,
     read_transmittance,
 )
-from labrig.protocols.direct_bispectral.analysis import direct_columns
 from labrig.results import DirectColumns, Measured
 
 #: Width of the bands of the light that comes back, and the longest wavelength, in nm.

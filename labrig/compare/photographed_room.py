@@ -28,12 +28,10 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.region import Region
 from labrig.material import Material
-from labrig.protocols.decay.result import DecayResult
-from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import FrameRole, RunRecord, read_run
 from labrig.reduce import SensorLayout, SeriesFrame, reduce_patches, sensor_layout
 from labrig.reproduce import DarkRoomLamp
-from labrig.results import RunResult, Series
+from labrig.results import ChainResult, ResultWithDecays, RunResult, Series
 
 FileT = TypeVar("FileT", bound=BaseModel)
 
@@ -276,14 +274,14 @@ class PhotographedRoom:
         return burning_s
 
 
-def _decay(folder: Path, result: RunResult) -> tuple[RunRecord, DecayResult]:
+def _decay(folder: Path, result: RunResult) -> tuple[RunRecord, ResultWithDecays]:
     """Return the run, or the part of a chain, that photographed a decay, and its result."""
     run = read_run(folder)
-    if isinstance(result, DecayResult):
+    if isinstance(result, ResultWithDecays):
         return run, result
-    if isinstance(result, PhosphorResult):
+    if isinstance(result, ChainResult):
         decays = {
-            name: part for name, part in result.parts.items() if isinstance(part, DecayResult)
+            name: part for name, part in result.parts.items() if isinstance(part, ResultWithDecays)
         }
         samples = sorted({name.rpartition("/")[0] for name in decays})
         if len(samples) > 1:

@@ -21,6 +21,9 @@ MEASUREMENTS = "labrig.measurements"
 _KINDS = {DRIVERS: "driver", MEASUREMENTS: "protocol"}
 
 
+Part = Literal["protocol", "result", "analysis", "report", "table_report", "calibration"]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
     """Registration of a measurement: where its parts are, and how it takes part in chains.
@@ -40,6 +43,8 @@ class Measurement:
         Function that analyses an `AnalysisContext` to the result.
     report
         Function that renders the result; None for plain tables of its fields.
+    table_report
+        Function that renders the result of another program's table; None where there is no such.
     calibration
         The `CalibrationKind` that it measures; None for other measurements.
     of
@@ -52,8 +57,11 @@ class Measurement:
         Whether a chain on a bench that was calibrated before first checks that nothing moved.
     is_bench_check
         Whether it is that check.
-    is_last_on_sample
-        Whether it charges a sample longest, so that in a chain nothing waits for the sample's glow.
+    is_of_fluorescence
+        Whether it measures fluorescence, of samples that need no charge.
+    has_short_charges
+        Whether its charges are short: in a chain it comes before those that charge for long, so
+        that nothing waits for their glow to fade.
 
     Examples
     --------
@@ -68,15 +76,17 @@ class Measurement:
     result: str
     analysis: str = ".analysis:analyse"
     report: str | None = ".report:render"
+    table_report: str | None = None
     calibration: str | None = None
     of: Literal["bench", "sample"] = "sample"
     options: tuple[str, ...] = ()
     is_per_patch: bool = False
     needs_checked_bench: bool = False
     is_bench_check: bool = False
-    is_last_on_sample: bool = False
+    has_short_charges: bool = False
+    is_of_fluorescence: bool = False
 
-    def load(self, part: Literal["protocol", "result", "analysis", "report", "calibration"]) -> Any:
+    def load(self, part: Part) -> Any:
         """Import a part; None if there is none.
 
         Raises

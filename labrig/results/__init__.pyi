@@ -9,6 +9,7 @@ from .budget import (
     UNDIVIDED as UNDIVIDED,
     Budget as Budget,
 )
+from .chain_result import ChainResult as ChainResult
 from .charge_closure import (
     Closure as Closure,
     spans_decades as spans_decades,
@@ -22,6 +23,7 @@ from .charging_series import (
 from .decay_patch import (
     DecayPatch as DecayPatch,
     NoiseBudget as NoiseBudget,
+    ResultWithDecays as ResultWithDecays,
 )
 from .decay_reference import (
     DecayReference as DecayReference,
@@ -29,6 +31,7 @@ from .decay_reference import (
 )
 from .direct_columns import (
     DirectColumns as DirectColumns,
+    DirectMeasurement as DirectMeasurement,
     LightSpectrum as LightSpectrum,
 )
 from .emission_spectrum import (
@@ -176,6 +179,13 @@ from .trap_depth import (
     TrapDepth as TrapDepth,
     state_name as state_name,
     trap_depths_json as trap_depths_json,
+)
+from .under_lamps import (
+    LampComparison as LampComparison,
+    LampPatch as LampPatch,
+    PredictedUnderLamps as PredictedUnderLamps,
+    SeenColour as SeenColour,
+    ValidatedSample as ValidatedSample,
 )
 from .unseen_flicker import (
     UnseenFlicker as UnseenFlicker,

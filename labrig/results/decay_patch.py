@@ -1,6 +1,6 @@
 """Decay of one patch: its series, fit, noise and material."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_decay_file import write_fitted_decay
 from labrig.results.fitted_law import EXPONENTIALS
 from labrig.results.measured import Measured
+from labrig.results.run_result import RunResult
 from labrig.results.series import Series, write_series
 
 
@@ -133,3 +134,43 @@ class DecayPatch:
             write_fitted_decay(folder / "fit.json", self.fit)
         if self.material is not None:
             write_material(folder / "material.yaml", self.material)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResultWithDecays(RunResult):
+    """Base of the results that are decays of patches.
+
+    Attributes
+    ----------
+    patches
+        Decay of each patch by its name.
+    """
+
+    patches: Mapping[str, DecayPatch]
+
+    @property
+    def fits(self) -> dict[str, FittedDecay]:
+        """Fits of the patches that could be fitted, by name."""
+        return {name: patch.fit for name, patch in self.patches.items() if patch.fit is not None}
+
+    def provides(self) -> dict[str, dict[str, FittedDecay]]:
+        """Return the fits by patch."""
+        return {"decays": self.fits}
+
+    def budgets(self) -> dict[str, Budget]:
+        """Return the budgets of rates and amplitudes of every patch."""
+        several = len(self.patches) > 1
+        return {
+            quantity: budget
+            for name, patch in self.patches.items()
+            for quantity, budget in patch.budgets(name if several else "")
+        }
+
+    def failures(self) -> tuple[str, ...]:
+        """Return the reasons why no patch at all could be fitted."""
+        return () if self.fits else tuple(patch.failure for patch in self.patches.values())
+
+    def write_files(self, folder: Path) -> None:
+        """Write the files of each patch; of several patches, each into a folder of its name."""
+        for name, patch in self.patches.items():
+            patch.write_files(folder / name if len(self.patches) > 1 else folder)

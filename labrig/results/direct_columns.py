@@ -1,5 +1,6 @@
 """Columns of a re-radiation matrix, measured directly."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -204,3 +205,19 @@ class DirectColumns:
                 widest = self.reflectance_sigma[[left, right]].max()
                 sigma[gap] = np.hypot(widest, (ends[1] - ends[0]) / 2)
         return value, sigma
+
+
+@dataclass(frozen=True, eq=False)
+class DirectMeasurement:
+    """Direct measurement of samples, with which estimates of their matrices are compared.
+
+    Attributes
+    ----------
+    lights
+        Lights by rising wavelength.
+    samples
+        Columns of each sample by its name.
+    """
+
+    lights: tuple[LightSpectrum, ...]
+    samples: Mapping[str, DirectColumns]

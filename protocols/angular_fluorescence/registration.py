@@ -6,4 +6,5 @@ ANGULAR_FLUORESCENCE = Measurement(
     package=__package__,
     protocol=".protocol:AngularFluorescence",
     result=".result:AngularFluorescenceResult",
+    is_of_fluorescence=True,
 )

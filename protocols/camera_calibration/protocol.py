@@ -26,14 +26,14 @@ from labrig.foundation.region import CENTRE, Region
 from labrig.protocols.steps.camera_settings import CameraSettings, FNumber, Iso
 from labrig.protocols.steps.grey_card import (
     CARD_REASON,
+    HALF,
+    CardDarkUnit,
     CardLight,
     CardMeterUnit,
     card_light,
     light_card,
 )
-from labrig.protocols.steps.sanity_checks import SanityChecks
 from labrig.protocols.steps.scenes import Arrangement, Scene, ScenesProtocol
-from labrig.record import FrameRole
 
 
 class CardFrames(StrEnum):
@@ -48,10 +48,8 @@ class CardFrames(StrEnum):
 #: Name of the unit whose bracket shows the deviation from linearity.
 LINEARITY = "linearity"
 
-#: Fractions of the range that the lit card fills: the reference exposure of brackets, flats,
-#: repeats.
-HALF = 0.4
-#: … of a bracket: less is noise, more may clip where the lens is brightest.
+#: Fractions of the range that the lit card fills in a bracket: less is noise, more may clip where
+#: the lens is brightest.
 LEAST, MOST = 0.012, 0.7
 #: … of the photon transfer.
 PHOTON_FRACTIONS = (0.03, 0.75)
@@ -59,38 +57,10 @@ PHOTON_FRACTIONS = (0.03, 0.75)
 LINEARITY_FRACTIONS = (0.015, 2.0)
 #: Number of exposures of a bracket between two of its reference.
 REFERENCE_EVERY = 3
-DARKS_EACH = 4
 FLATS = 4
 
 #: The settings of a bracket, its reference first.
 Bracket = Callable[[CardLight, CameraOffers, ExposureSettings], Sequence[ExposureSettings]]
-
-
-@dataclass(frozen=True)
-class CardDarkUnit:
-    """Dark frames at one ISO, with the card in its place."""
-
-    reference: ExposureSettings
-    card: Region
-    iso: int
-    longest_s: float
-
-    @property
-    def name(self) -> str:
-        """Name of the unit, for example `dark-iso-100`."""
-        return f"dark-iso-{self.iso}"
-
-    def run(self, session: Session) -> None:
-        """Photograph at the shortest and the longest exposure, and check that it is dark."""
-        session.wait_until_warm("camera")
-        offers = session.rig[CAMERA].offers()
-        longest_s = offers.exposure_at_most(self.longest_s)
-        for exposure_s in (offers.exposures_s[0], longest_s):
-            shot = ExposureSettings(exposure_s, self.iso, self.reference.f_number)
-            for _ in range(DARKS_EACH):
-                session.perform(Shoot(FrameRole.DARK, shot))
-        shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
-        SanityChecks(session, self.name, [self.card], None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from pydantic import Field
 from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
-from labrig.protocols.lvf_calibration.protocol import StripUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.chart_scenes import (
     CARD_UNIT,
@@ -32,6 +31,7 @@ from labrig.protocols.steps.scenes import (
     SceneUnit,
     StillDarkUnit,
 )
+from labrig.protocols.steps.strip_scenes import StripUnit
 
 
 class CurvesFrames(StrEnum):

@@ -15,7 +15,6 @@ from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
 from labrig.optics import CHART_PATCHES
-from labrig.protocols.lvf_calibration.protocol import StripUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.chart_scenes import (
     CARD_UNIT,
@@ -34,6 +33,7 @@ from labrig.protocols.steps.scenes import (
     SceneUnit,
     StillDarkUnit,
 )
+from labrig.protocols.steps.strip_scenes import StripUnit
 
 
 class CheckFrames(StrEnum):

@@ -6,5 +6,6 @@ DECAY = Measurement(
     package=__package__,
     protocol=".protocol:Decay",
     result=".result:DecayResult",
+    table_report=".report:table_sections",
     is_per_patch=True,
 )

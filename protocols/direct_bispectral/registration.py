@@ -6,4 +6,5 @@ DIRECT_BISPECTRAL = Measurement(
     package=__package__,
     protocol=".protocol:DirectBispectral",
     result=".result:DirectBispectralResult",
+    is_of_fluorescence=True,
 )

@@ -10,7 +10,7 @@ import numpy as np
 from labrig.foundation.output_file import make_folder_in
 from labrig.material import write_fluorescent, write_reradiation
 from labrig.results.budget import Budget, named
-from labrig.results.direct_columns import DirectColumns, LightSpectrum
+from labrig.results.direct_columns import DirectColumns, DirectMeasurement, LightSpectrum
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 
@@ -44,6 +44,10 @@ class DirectBispectralResult(RunResult):
     samples: Mapping[str, DirectColumns]
     reference_sigma: float
     scale_sigma: float
+
+    def provides(self) -> Mapping[str, Any]:
+        """Return the measurement with which estimates are compared."""
+        return {"direct": DirectMeasurement(self.lights, self.samples)}
 
     def budgets(self) -> dict[str, Budget]:
         """Return the budgets of the re-radiated part of every light's power."""

@@ -5,8 +5,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
@@ -14,27 +12,25 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import plus_minus, rounded
 from labrig.protocols.emission_spectrum.result import EmissionSpectrumResult, PatchSpectrum
 from labrig.report.figure_style import (
-    BAND_OPACITY,
     INK,
     LEFT_PT,
     MARKERS,
     MUTED,
     OTHER_CHANNELS,
-    band_entry,
     error_bars,
     legend_above,
-    line_entry,
     marker_entry,
     new_figure,
     place,
     points,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
+from labrig.report.spectrum_figure import (
+    COLUMNS,
+    spectrum_axes,
+    spectrum_figure,
+)
 from labrig.results import EmissionSpectrum, SpectralComparison
-
-HEIGHT_PT = 256.0
-WAVELENGTH_LABEL = "Wavelength / nm"
-COLUMNS = 4
 
 
 def render(result: EmissionSpectrumResult, source: Source) -> Rendered:
@@ -214,39 +210,9 @@ def _table(head: str, comparisons: Sequence[SpectralComparison]) -> Table:
     )
 
 
-def spectrum_figure(
-    nm: FloatArray,
-    value: FloatArray,
-    band: tuple[FloatArray, FloatArray] | None,
-    names: tuple[str, str],
-) -> Figure:
-    """Draw an emission spectrum.
-
-    Parameters
-    ----------
-    nm
-        Wavelengths in nm, shape (n,).
-    value
-        Spectrum with largest value 1, shape (n,).
-    band
-        Lower and upper limit of the spectrum, each of shape (n,); None if they are not known.
-    names
-        Names of the spectrum and of the band in the legend.
-    """
-    figure, axes = _axes(f"{names[0]} (largest value 1)")
-    entries: list[Artist] = [line_entry(names[0], INK)]
-    if band is not None:
-        axes.fill_between(nm, *band, color=INK, alpha=BAND_OPACITY, linewidth=0)
-        entries.append(band_entry(names[1], INK))
-    axes.plot(nm, value, color=INK, linewidth=1.4)
-    axes.set_ylim(0, 1.05 * float(np.max(value if band is None else band[1])))
-    legend_above(figure, entries, COLUMNS)
-    return figure
-
-
 def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
     """Draw several spectra, each normalised to its integral."""
-    figure, axes = _axes("Fraction of the emission per 10 nm / %")
+    figure, axes = spectrum_axes("Fraction of the emission per 10 nm / %")
     entries = []
     for number, (name, spectrum) in enumerate(spectra.items()):
         colour, marker = _colour_and_marker(number)
@@ -291,16 +257,6 @@ def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) ->
     reach = 1.2 * float(np.max(np.abs(shift) + sigma, initial=0.1))
     axes.set_ylim(-reach, reach)
     return figure
-
-
-def _axes(label: str) -> tuple[Figure, Axes]:
-    """Return a figure with axes over wavelength; `label` is that of the vertical axis."""
-    figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
-    axes.set_xlabel(WAVELENGTH_LABEL)
-    axes.set_ylabel(label)
-    axes.set_xlim(395, 705)
-    return figure, axes
 
 
 def _colour_and_marker(number: int) -> tuple[str, str]:

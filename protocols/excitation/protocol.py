@@ -4,7 +4,7 @@ After Nalbach et al., sec. 4.5 and 4.6, where bands are charged one by one with 
 can be done, too, by filters, a monochromator or LEDs.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
@@ -203,7 +203,6 @@ class ExcitationSettings(ProtocolModel):
         is fitted to the data.
     """
 
-    rate_frames = tuple(ExcitationFrames)
     rests_on = (IRRADIANCE_KIND,)
 
     protocol: Literal["excitation"] = "excitation"
@@ -697,6 +696,11 @@ class DirectUnit(_ChargeUnit):
 
 class Excitation(ExcitationSettings, ScenesProtocol):
     """Excitation protocol; `excitation.yaml` is the commented example."""
+
+    @property
+    def rate_frames(self) -> Collection[str]:
+        """Roles of the frames to which rates are fitted."""
+        return tuple(ExcitationFrames)
 
     def scenes(self) -> Sequence[Scene]:
         """Return darks, then metering and charges by bands, then the same by the lamp itself."""

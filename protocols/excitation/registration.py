@@ -8,5 +8,5 @@ EXCITATION = Measurement(
     result=".result:ExcitationResult",
     is_per_patch=True,
     needs_checked_bench=True,
-    is_last_on_sample=True,
+    has_short_charges=True,
 )

@@ -129,8 +129,11 @@ class ExcitationResult(RunResult):
         return position_nm
 
     def provides(self) -> Mapping[str, Any]:
-        """Return the materials by patch."""
-        return {"materials": {name: patch.material for name, patch in self.patches.items()}}
+        """Return the materials and the fits by patch."""
+        return {
+            "materials": {name: patch.material for name, patch in self.patches.items()},
+            "excitations": {name: patch.fit for name, patch in self.patches.items()},
+        }
 
     def budgets(self) -> dict[str, Budget]:
         """Return the budgets of k_r, of k_e in the bands that are seen to excite, and of Λ."""

@@ -26,10 +26,11 @@ from labrig.acquire import (
 )
 from labrig.foundation.quantity import Count, DurationS, duration_text
 from labrig.foundation.region import CENTRE, Region
-from labrig.protocols.camera_calibration.protocol import HALF, CardDarkUnit
 from labrig.protocols.steps.camera_settings import CameraSettings, frame_times_s
 from labrig.protocols.steps.grey_card import (
     CARD_REASON,
+    HALF,
+    CardDarkUnit,
     CardLight,
     CardMeterUnit,
     card_light,

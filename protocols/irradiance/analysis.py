@@ -24,9 +24,9 @@ from labrig.optics import (
     band_integrals,
     quadrature,
 )
-from labrig.protocols.irradiance.protocol import CardFrames, Irradiance, light_unit
+from labrig.protocols.irradiance.protocol import CardFrames, Irradiance
 from labrig.protocols.irradiance.result import CardRatio, IrradianceResult, StripScale
-from labrig.protocols.steps.exciting_lights import ExcitingLights
+from labrig.protocols.steps.exciting_lights import ExcitingLights, light_unit
 from labrig.reduce import FLICKER, region_values, sensor_layout, slice_values
 from labrig.results import SliceValues
 

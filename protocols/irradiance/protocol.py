@@ -26,9 +26,13 @@ from labrig.acquire import (
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
 from labrig.foundation.region import Region
-from labrig.protocols.lvf_calibration.protocol import StripUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
-from labrig.protocols.steps.exciting_lights import ExcitingLights, Nanometres
+from labrig.protocols.steps.exciting_lights import (
+    CardSpectra,
+    ExcitingLights,
+    Nanometres,
+    light_unit,
+)
 from labrig.protocols.steps.led_spectra import SpectrumReadings
 from labrig.protocols.steps.sample_pose import LAMP_DARK_S, face_lamp
 from labrig.protocols.steps.scenes import (
@@ -39,6 +43,7 @@ from labrig.protocols.steps.scenes import (
     SceneUnit,
     StillDarkUnit,
 )
+from labrig.protocols.steps.strip_scenes import StripUnit
 
 
 class CardFrames(StrEnum):
@@ -48,23 +53,10 @@ class CardFrames(StrEnum):
     THROUGH = "irradiance-through"
 
 
-class CardSpectra(StrEnum):
-    """Roles of a spectrometer's readings of the card under the same lights."""
-
-    DIRECT = "spectrum-direct"
-    LIGHT = "spectrum-light"
-    DARK = "spectrum-dark"
-
-
 #: Edges of the bands of Table 1 of the paper.
 BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
 _DIRECT = Arrangement("grey card")
 _THROUGH = Arrangement("grey card", "on sample")
-
-
-def light_unit(name: str, number: int) -> str:
-    """Return the name of the unit that photographs the card under a selected light."""
-    return f"light-{name}-{number}"
 
 
 @dataclass(frozen=True)

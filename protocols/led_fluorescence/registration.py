@@ -6,4 +6,5 @@ LED_FLUORESCENCE = Measurement(
     package=__package__,
     protocol=".protocol:LedFluorescence",
     result=".result:LedFluorescenceResult",
+    is_of_fluorescence=True,
 )

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -68,6 +68,10 @@ class LedFluorescenceResult(RunResult):
     def is_lamp(self) -> BoolArray:
         """Whether a light is a broadband lamp, which has no wavelength of its own, shape (m,)."""
         return np.isin(self.leds, self.lamps)
+
+    def provides(self) -> Mapping[str, Any]:
+        """Return the re-radiation matrices by patch."""
+        return {"matrices": {name: patch.matrix for name, patch in self.patches.items()}}
 
     def budgets(self) -> dict[str, Budget]:
         """Return the budgets of quantum yields and of the colour under the first light.

@@ -6,7 +6,7 @@ is charged only once, so that the exposures follow from the frames before them.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -289,8 +289,6 @@ class Luminance(ProtocolModel):
         `auto` is that of the rig file's reading.
     """
 
-    rate_frames = (LuminanceFrames.GLOW,)
-
     protocol: Literal["luminance"] = "luminance"
     excitation: Excitation = Excitation()
     until: DurationS = Field(7200.0, gt=0)
@@ -360,6 +358,11 @@ class Luminance(ProtocolModel):
             )
         )
         return (f"not according to {conditions.name}: {deviations}",) if deviations else ()
+
+    @property
+    def rate_frames(self) -> Collection[str]:
+        """Roles of the frames to which rates are fitted."""
+        return (LuminanceFrames.GLOW,)
 
     def units(self) -> Sequence[Unit]:
         """Return darks at every ISO, card and glow, the bench put back."""

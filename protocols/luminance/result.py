@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.output_file import make_folder, write_text
@@ -159,6 +159,10 @@ class LuminanceResult(RunResult):
             return 0.0 if known is None else known.value
 
         return tuple(sorted(self.patches, key=luminance, reverse=True))
+
+    def provides(self) -> Mapping[str, Any]:
+        """Return the luminances by patch."""
+        return {"luminances": {name: patch.decay for name, patch in self.patches.items()}}
 
     def budgets(self) -> dict[str, Budget]:
         """Return the budgets of luminances, light sums and times of every patch."""

@@ -5,7 +5,6 @@ After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appea
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -33,43 +32,10 @@ from labrig.protocols.steps.scenes import (
     frames_of,
     light,
 )
+from labrig.protocols.steps.strip_scenes import NO_FILTER, LvfFrames, StripUnit, filter_unit
 
-
-class LvfFrames(StrEnum):
-    """Roles of frames of card, strip before camera and on sample, mercury lines and stripes."""
-
-    CARD = "lvf-card"
-    FILTER = "lvf-filter"
-    STRIP_ON_SAMPLE = "lvf-strip-on-sample"
-    LINES = "lvf-lines"
-    LINES_ON_SAMPLE = "lvf-lines-on-sample"
-    STRIPES = "lvf-stripes"
-
-
-#: Name of the unit without a colour filter.
-NO_FILTER = "none"
 #: Shutter times of the stripes' photographs, as fractions of the longest.
 STRIPES_LADDER = (1 / 512, 1 / 64, 1 / 8, 1)
-
-
-def filter_unit(name: str | None) -> str:
-    """Return the name of the unit of a colour filter."""
-    return f"filter-{name or NO_FILTER}"
-
-
-@dataclass(frozen=True)
-class StripUnit(SceneUnit):
-    """The strip under a halogen lamp, before the camera or on the sample."""
-
-    def check(self, session: Session) -> None:
-        """Check that the strip is visible, whole and straight."""
-        session.choose("strip", lambda: self._strip(session), worst="found")
-
-    def _strip(self, session: Session) -> str:
-        # Takes a while to load, and plans do without.
-        from labrig.protocols.steps.strip_checks import strip_found
-
-        return strip_found(self.own(session))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from pydantic import BeforeValidator, Field, model_validator
 from labrig.acquire import (
     SAMPLE_CHANGER,
     PartUnit,
-    ProtocolModel,
     RigFile,
     Sample,
     Unit,
@@ -23,24 +22,13 @@ from labrig.acquire import (
 from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, kinds
 from labrig.foundation.errors import ProtocolError
+from labrig.foundation.plugins import measurement, measurements
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
-from labrig.protocols.excitation.protocol import ExcitationFrames
 from labrig.protocols.steps.chain import Chain, Part
 from labrig.protocols.steps.patch_names import FilterPatches, sample_folders
 from labrig.protocols.steps.sample_turns import SampleScene, in_sample_turns
 from labrig.protocols.steps.scenes import Arrangement, Scene, in_turn
-
-#: Protocols that measure the bench and not the sample.
-BENCH = frozenset({"camera_calibration", "blank", "lvf_calibration", "fade", "irradiance"})
-#: Protocols that use the variable filter on a sample, and the one that checks the bench for them.
-THROUGH_THE_FILTER = frozenset({"emission_spectrum", "excitation"})
-CHECK = "calibration_check"
-#: Protocols that are run once, with all samples of a changer in the dark.
-OF_ALL_SAMPLES = BENCH | {CHECK, "camera_curves", "colour_check"}
-#: Protocols that measure every patch of the chain.
-OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation", "reflectance")
-
 
 #: Why samples do not rest while another one is measured.
 NOT_DARK = (
@@ -81,8 +69,6 @@ class Phosphor(Chain):
         Which parts that calibrate the bench are run: with `as needed` those whose result the rig
         file does not name and no kept calibration has; with `always` all.
     """
-
-    rate_frames = (*ProtocolModel.rate_frames, *ExcitationFrames)
 
     protocol: Literal["phosphor"] = "phosphor"
     patches: FilterPatches = Field(default_factory=dict)
@@ -150,7 +136,8 @@ class Phosphor(Chain):
             The part has other patches than the chain.
         """
         keys = super()._part_keys(content)
-        if not self.patches or keys.get("protocol") not in OF_PATCHES:
+        kind = keys.get("protocol")
+        if not self.patches or not isinstance(kind, str) or not measurement(kind).is_per_patch:
             return keys
         patches = keys.get("patches")
         if isinstance(patches, dict) and set(map(str, patches)) != set(self.patches):
@@ -171,9 +158,9 @@ class Phosphor(Chain):
         links = self._links()
         if not self.samples:
             return links
-        own = [part for part in links if part.protocol.protocol not in OF_ALL_SAMPLES]
+        own = [part for part in links if part.registered.of == "sample"]
         return (
-            *(part for part in links if part.protocol.protocol in OF_ALL_SAMPLES),
+            *(part for part in links if part.registered.of == "bench"),
             *(part.of_sample(sample) for sample in self.samples for part in own),
         )
 
@@ -199,18 +186,20 @@ class Phosphor(Chain):
         known = {kind.protocol for kind in kinds() if rig.optics.named(kind) is not None}
         chain = list(zip(self.parts, self._links(), strict=True))
         kept = [
-            (content, part.protocol.protocol)
+            (content, part)
             for content, part in chain
-            if part.protocol.protocol not in BENCH & known
+            if part.registered.of != "bench" or part.protocol.protocol not in known
         ]
         if not kept:
             return super().suited_to(rig)
         parts = [content for content, _ in kept]
-        names = {name for _, name in kept}
+        registered = [part.registered for _, part in kept]
         reference = calibration(rig, REFERENCE_KIND)
         can_be_checked = reference is not None and reference.picture is not None
-        if can_be_checked and names & THROUGH_THE_FILTER and CHECK not in names:
-            parts.insert(0, {"protocol": CHECK})
+        is_needed = any(each.needs_checked_bench for each in registered)
+        if can_be_checked and is_needed and not any(each.is_bench_check for each in registered):
+            check = next(name for name, each in measurements() if each.is_bench_check)
+            parts.insert(0, {"protocol": check})
         return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).suited_to(rig)
 
     def _rests_on(self, rig: RigFile) -> Literal["shared", "apart"]:
@@ -270,8 +259,9 @@ class Phosphor(Chain):
 
     def units(self) -> Sequence[Unit]:
         """Return the units of all parts in order; on a checked bench, by arrangement."""
-        protocols = {part.protocol.protocol for part in self._links()}
-        is_checked = CHECK in protocols and not BENCH & protocols
+        registered = [part.registered for part in self._links()]
+        calibrates = any(each.of == "bench" and each.calibration for each in registered)
+        is_checked = any(each.is_bench_check for each in registered) and not calibrates
         if self.samples:
             return self._units_of_samples(is_checked=is_checked)
         chain = self.chain()
@@ -335,4 +325,4 @@ def _turn(scene_of: tuple[Part, Scene]) -> int:
         return 1
     if wanted.lvf != "away":
         return 2 if wanted.lvf == "before camera" else 3
-    return 4 if part.protocol.protocol == "excitation" else 5
+    return 4 if part.registered.has_short_charges else 5

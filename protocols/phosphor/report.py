@@ -9,8 +9,6 @@ import numpy as np
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, Spectrum, compare_materials, read_material
-from labrig.protocols.decay.result import DecayResult
-from labrig.protocols.emission_spectrum.report import spectrum_figure
 from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import FrameRecord, FrameRole
 from labrig.report.chain import render_chain
@@ -20,7 +18,8 @@ from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.report_model import GlowPhotograph
 from labrig.report.sections import Picture, Rendered, Section, Source
-from labrig.results import DecayPatch
+from labrig.report.spectrum_figure import spectrum_figure
+from labrig.results import DecayPatch, ResultWithDecays
 
 #: Legend entries of the emission spectrum and its band.
 NAMES = "Emission", "± 1 σ"
@@ -127,7 +126,7 @@ def _decays(result: PhosphorResult) -> dict[str, DecayPatch]:
     decays = {
         name.rpartition("/")[0]: part
         for name, part in result.parts.items()
-        if isinstance(part, DecayResult)
+        if isinstance(part, ResultWithDecays)
     }
     return {
         sample or name: patch

@@ -25,7 +25,6 @@ from labrig.acquire import (
 )
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
-from labrig.protocols.lvf_calibration.protocol import StripUnit
 from labrig.protocols.steps.camera_settings import MARGIN_S, CameraSettings
 from labrig.protocols.steps.patch_names import FilterPatches
 from labrig.protocols.steps.scenes import (
@@ -38,6 +37,7 @@ from labrig.protocols.steps.scenes import (
     SceneUnit,
     StillDarkUnit,
 )
+from labrig.protocols.steps.strip_scenes import StripUnit
 
 
 class ReflectanceFrames(StrEnum):

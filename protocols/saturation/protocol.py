@@ -15,8 +15,8 @@ from labrig.acquire import CameraOffers, ManualStep, ProtocolModel, Unit
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.foundation.region import CENTRE
-from labrig.protocols.decay.protocol import Decay, DecayUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
+from labrig.protocols.steps.decays import DecaySettings, DecayUnit
 from labrig.protocols.steps.glow import DarkUnit, MeterUnit
 from labrig.protocols.steps.patch_names import Patches
 from labrig.protocols.steps.random_spacing import Spacing
@@ -172,10 +172,10 @@ class Saturation(ProtocolModel):
             decays.insert(0, MeterUnit(self._decay(shortest_s), shortest_s, metering))
         return decays
 
-    def _decay(self, charge_s: float) -> Decay:
+    def _decay(self, charge_s: float) -> DecaySettings:
         """Return one of the decays as a protocol of its own."""
         exposure = self.exposure if isinstance(self.exposure, str) else f"{self.exposure!r} s"
-        return Decay.model_validate(
+        return DecaySettings.model_validate(
             {
                 "sample": self.sample,
                 "charge": f"{charge_s!r} s",

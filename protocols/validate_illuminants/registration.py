@@ -6,4 +6,5 @@ VALIDATE_ILLUMINANTS = Measurement(
     package=__package__,
     protocol=".protocol:ValidateIlluminants",
     result=".result:ValidateIlluminantsResult",
+    is_of_fluorescence=True,
 )

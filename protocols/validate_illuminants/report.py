@@ -7,15 +7,10 @@ import numpy as np
 
 from labrig.foundation.number_format import plus_minus, rounded
 from labrig.optics import XYZ_TO_SRGB
-from labrig.protocols.validate_illuminants.result import (
-    LampComparison,
-    LampPatch,
-    SeenColour,
-    ValidateIlluminantsResult,
-)
+from labrig.protocols.validate_illuminants.result import ValidateIlluminantsResult
 from labrig.report.colours import css_colour, into_gamut
 from labrig.report.sections import Rendered, Section, Source, Table
-from labrig.results import Measured
+from labrig.results import LampComparison, LampPatch, Measured, SeenColour
 
 WHITES = {
     "lamp": "Colours with a perfect white under the lamp.",

@@ -6,17 +6,16 @@ may have no such state.
 
 from collections.abc import Callable
 
-from labrig.protocols.decay.result import DecayResult
 from labrig.report.sections import Section
-from labrig.results import DecayPatch
+from labrig.results import DecayPatch, ResultWithDecays
 
 
-def unrecorded_temperature(result: DecayResult) -> tuple[str, ...]:
+def unrecorded_temperature(result: ResultWithDecays) -> tuple[str, ...]:
     """Return a sentence for each patch of which a drift of the temperature would matter."""
     return _of_patches(result, _temperature)
 
 
-def outside_sections(result: DecayResult) -> tuple[Section, ...]:
+def outside_sections(result: ResultWithDecays) -> tuple[Section, ...]:
     """Return the section with all statements of a decay; empty if there are none."""
     unseen = _of_patches(result, lambda patch: patch.fit.outside_sigma if patch.fit else "")
     flicker = _of_patches(result, lambda patch: str((patch.fit and patch.fit.unseen_flicker) or ""))
@@ -27,7 +26,7 @@ def outside_sections(result: DecayResult) -> tuple[Section, ...]:
     return (Section("Not in σ", text),)
 
 
-def _of_patches(result: DecayResult, sentence: Callable[[DecayPatch], str]) -> tuple[str, ...]:
+def _of_patches(result: ResultWithDecays, sentence: Callable[[DecayPatch], str]) -> tuple[str, ...]:
     sentences = ((name, sentence(patch)) for name, patch in result.patches.items())
     return tuple(
         f"{name}: {text}" if len(result.patches) > 1 else text for name, text in sentences if text

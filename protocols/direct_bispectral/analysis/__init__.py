@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 
 from labrig.acquire import LEDS, RigFile
+from labrig.analyse.direct_columns import direct_columns
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import card_reflectance, filter_transmittances
 from labrig.fit.bispectral import (
-    BispectralColumns,
+    BispectralColumns as BispectralColumns,
     LitSpectrum,
     band_weights_nm,
     bispectral_columns,
     light_window_nm,
-    separate_columns,
+    separate_columns as separate_columns,
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -442,29 +443,6 @@ def _card_sigma(card: Transmittance, at_nm: FloatArray) -> FloatArray:
 def _typical_sigma(curve: Spectrum | Transmittance) -> float:
     """Return the median relative σ of a curve, NaN if it is not known."""
     return float("nan") if curve.sigma is None else float(np.median(curve.sigma / curve.value))
-
-
-def direct_columns(
-    lights: Sequence[str], columns: BispectralColumns, drift: Measured
-) -> DirectColumns:
-    """Return columns with reflected and re-radiated light taken apart; `lights` in their order."""
-    separated = separate_columns(columns)
-    return DirectColumns(
-        lights=tuple(lights),
-        input_nm=columns.light_nm,
-        output_nm=columns.output_nm,
-        column=columns.column,
-        column_sigma=columns.column_sigma,
-        share=columns.share,
-        is_mixed=separated.is_mixed,
-        reflectance=separated.reflectance,
-        reflectance_sigma=separated.reflectance_sigma,
-        reradiated=separated.reradiated,
-        reradiated_sigma=separated.reradiated_sigma,
-        common_sigma=columns.common_sigma,
-        light_sigma=columns.power_sigma / columns.power,
-        drift=drift,
-    )
 
 
 def _light_spectrum(name: str, white: _Lit, rig: RigFile) -> LightSpectrum:

@@ -36,7 +36,6 @@ from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import appearance, read_emissions
 from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
-from labrig.protocols.direct_bispectral.result import DirectBispectralResult
 from labrig.protocols.led_fluorescence.analysis.direct import direct_measurement, missing_samples
 from labrig.protocols.led_fluorescence.analysis.methods import (
     method_differences,
@@ -48,6 +47,7 @@ from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.results import (
     ColourUnderLight,
+    DirectMeasurement,
     EstimateMethod,
     FluorescentPatch,
     MatrixOnBands,
@@ -309,7 +309,7 @@ def _patch(
     estimates: _Estimates,
     lit: LitPatch,
     system: FluorescenceSystem,
-    direct: DirectBispectralResult | None,
+    direct: DirectMeasurement | None,
 ) -> FluorescentPatch:
     fit, joint, per_led = estimates.chosen, estimates.joint, estimates.per_led
     excitable, is_extrapolated = _excitable(fit, lit, system), _extrapolated(system)

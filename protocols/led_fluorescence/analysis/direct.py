@@ -5,11 +5,10 @@ from pathlib import Path
 
 from labrig.acquire import RigFile
 from labrig.foundation.errors import UsageError
-from labrig.protocols.direct_bispectral.result import DirectBispectralResult
-from labrig.results import read_result
+from labrig.results import DirectMeasurement, read_result
 
 
-def direct_measurement(rig: RigFile) -> DirectBispectralResult | None:
+def direct_measurement(rig: RigFile) -> DirectMeasurement | None:
     """Read the direct measurement that a rig file names; None if it names none.
 
     Raises
@@ -21,19 +20,20 @@ def direct_measurement(rig: RigFile) -> DirectBispectralResult | None:
     if named is None:
         return None
     result = read_result(Path(named))
-    if not isinstance(result, DirectBispectralResult):
+    direct: DirectMeasurement | None = result.provides().get("direct")
+    if direct is None:
         raise UsageError(
             f"{named}: expected a run of direct_bispectral (optics: direct), got one of "
             f"{result.kind}; name another run, or leave the key out"
         )
-    if len(result.lights) < 2:
+    if len(direct.lights) < 2:
         raise UsageError(
             f"{named}: expected a direct measurement under two lights or more, got one"
         )
-    return result
+    return direct
 
 
-def missing_samples(direct: DirectBispectralResult, names: Iterable[str]) -> list[str]:
+def missing_samples(direct: DirectMeasurement, names: Iterable[str]) -> list[str]:
     """Return a warning if no sample was measured directly under the name of a patch."""
     if any(name in direct.samples for name in names):
         return []

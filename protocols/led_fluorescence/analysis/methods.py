@@ -10,9 +10,9 @@ from labrig.fit.fluorescence import FluorescenceFit
 from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMatrix, compare_colours
 from labrig.optics import Spectrum, edges_from_centres, read_light
-from labrig.protocols.direct_bispectral.result import DirectBispectralResult
 from labrig.results import (
     DirectColumns,
+    DirectMeasurement,
     MeasuringMethod,
     MethodDifference,
     ReradiatedSpectrum,
@@ -27,7 +27,7 @@ def reradiation_under_lights(
     joint: FluorescenceFit,
     per_led: FluorescenceFit,
     leds: Sequence[Spectrum],
-    direct: DirectBispectralResult | None,
+    direct: DirectMeasurement | None,
 ) -> tuple[ReradiationUnderLight, ...]:
     """Return what a sample re-radiates under each light, by each method.
 

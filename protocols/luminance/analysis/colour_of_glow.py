@@ -34,7 +34,6 @@ from labrig.optics import (
     read_spectrum,
     scotopic_efficacy,
 )
-from labrig.protocols.emission_spectrum.result import EmissionSpectrumResult
 from labrig.protocols.luminance.protocol import TABLES
 from labrig.results import Measured, read_result
 
@@ -139,12 +138,12 @@ def emission_of(part: Part, name: str) -> Emission | None:
         return None
     if named is not None and is_path(named) and Path(named).is_dir():
         result = read_result(Path(named))
-        if not isinstance(result, EmissionSpectrumResult):
+        spectra = result.provides().get("spectra")
+        if not spectra:
             raise UsageError(
                 f"emission: {named}: expected a run of emission_spectrum, got one of {result.kind}"
             )
-        patch = result.patches.get(name) or next(iter(result.patches.values()))
-        measured = patch.spectrum
+        measured = spectra.get(name) or next(iter(spectra.values()))
     elif named is not None and Path(named).suffix in TABLES:
         spectrum = read_spectrum(Path(named))
         return Emission(spectrum, Path(named).name, _error(spectrum))

@@ -33,13 +33,13 @@ from labrig.protocols.lvf_calibration.analysis.lines import (
     strip_lines,
     wavelengths_along,
 )
-from labrig.protocols.lvf_calibration.protocol import LvfFrames, filter_unit
 from labrig.protocols.lvf_calibration.result import (
     CameraCurves,
     FilterMisfit,
     LvfCalibrationResult,
     Stripes,
 )
+from labrig.protocols.steps.strip_scenes import LvfFrames, filter_unit
 from labrig.reduce import slice_values, strip_profile_in
 
 #: Misfit of the filters in σ beyond which a warning is given.

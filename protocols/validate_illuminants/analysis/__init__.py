@@ -35,14 +35,8 @@ from labrig.protocols.validate_illuminants.analysis.prediction import (
     with_scales_of_samples,
 )
 from labrig.protocols.validate_illuminants.protocol import SAMPLE, IlluminantFrames
-from labrig.protocols.validate_illuminants.result import (
-    LampComparison,
-    LampPatch,
-    SeenColour,
-    ValidatedSample,
-    ValidateIlluminantsResult,
-)
-from labrig.results import MatrixOnBands
+from labrig.protocols.validate_illuminants.result import ValidateIlluminantsResult
+from labrig.results import LampComparison, LampPatch, MatrixOnBands, SeenColour, ValidatedSample
 
 #: Mean χ² per channel and pull from which photographs differ from their predictions.
 ODD_CHI2, ODD_PULL = 2.0, 4.0

@@ -5,7 +5,6 @@ from typing import Any
 
 from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, read_any_material
-from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from labrig.results import read_result
 
 
@@ -31,14 +30,15 @@ def matrices_of(protocol: Any) -> dict[str, ReradiationMatrix]:
 
 def _of_run(run: str, patches: list[str]) -> dict[str, ReradiationMatrix]:
     result = read_result(Path(run))
-    if not isinstance(result, LedFluorescenceResult):
+    matrices = result.provides().get("matrices")
+    if matrices is None:
         raise UsageError(f"{run}: expected a run of led_fluorescence, got one of {result.kind}")
-    if missing := [name for name in patches if name not in result.patches]:
+    if missing := [name for name in patches if name not in matrices]:
         raise UsageError(
-            f"{run}: expected a patch '{missing[0]}', got {', '.join(result.patches) or 'none'}; "
+            f"{run}: expected a patch '{missing[0]}', got {', '.join(matrices) or 'none'}; "
             "give the patches the names that they had there"
         )
-    return {name: result.patches[name].matrix.named(name) for name in patches}
+    return {name: matrices[name].named(name) for name in patches}
 
 
 def _of_material(named: str) -> ReradiationMatrix:
