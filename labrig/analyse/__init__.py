@@ -1,6 +1,6 @@
 """From the frames of a run to its typed result: one module or package for each protocol."""
 
-from labrig.analyse.calibration import reference_of
+from labrig.analyse.bench_reference import reference_of
 from labrig.analyse.charge_table import ChargeTableOptions, fit_charge_table
 from labrig.analyse.frames import verify_frames
 from labrig.analyse.hyperspectral import CubeList, matrix_from_cubes

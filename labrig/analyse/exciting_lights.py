@@ -22,8 +22,7 @@ from labrig.optics import (
     Transmittance,
     read_spectrometer_reading,
 )
-from labrig.protocols.irradiance import CardSpectra, light_unit
-from labrig.protocols.steps.exciting_lights import ExcitingLights
+from labrig.protocols.steps.exciting_lights import CardSpectra, ExcitingLights, light_unit
 from labrig.record import SpectrumRecord
 
 #: Relative σ of the transmittance in a filter's file, and σ of its wavelengths in nm.

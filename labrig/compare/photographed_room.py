@@ -33,7 +33,7 @@ from labrig.optics import Spectrum
 from labrig.record import FrameRole, RunRecord, read_run
 from labrig.reduce import SensorLayout, SeriesFrame, reduce_patches, sensor_layout
 from labrig.reproduce import CARD_NAME, DarkRoomLamp, DarkRoomPicture, Renderer, Scene, SceneFile
-from labrig.results import DecayResult, PhosphorResult, RunResult, Series, write_csv
+from labrig.results import ChainResult, ResultWithDecays, RunResult, Series, write_csv
 
 #: Height of the frame in the rendering; its light is even on every sample.
 HEIGHT_PX, MOST_PX = 32, 512
@@ -358,14 +358,14 @@ class PhotographedRoom:
         return burning_s
 
 
-def _decay(folder: Path, result: RunResult) -> tuple[RunRecord, DecayResult]:
+def _decay(folder: Path, result: RunResult) -> tuple[RunRecord, ResultWithDecays]:
     """Return the run, or the part of a chain, that photographed a decay, and its result."""
     run = read_run(folder)
-    if isinstance(result, DecayResult):
+    if isinstance(result, ResultWithDecays):
         return run, result
-    if isinstance(result, PhosphorResult):
+    if isinstance(result, ChainResult):
         decays = {
-            name: part for name, part in result.parts.items() if isinstance(part, DecayResult)
+            name: part for name, part in result.parts.items() if isinstance(part, ResultWithDecays)
         }
         samples = sorted({name.rpartition("/")[0] for name in decays})
         if len(samples) > 1:

@@ -19,9 +19,9 @@ from labrig.analyse import (
 from labrig.bench_optics import camera_curves, with_shipped_camera
 from labrig.calibration import LvfFile, keep_calibration
 from labrig.export import write_nexus
-from labrig.foundation import plugins
 from labrig.foundation.errors import DiskError, FitError, UsageError
 from labrig.foundation.output_file import make_folder_in
+from labrig.foundation.plugins import measurement
 from labrig.foundation.yaml_file import write_yaml
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
@@ -211,7 +211,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])
     require_recorded_settings(run, overrides.bench(folder), overrides)
-    analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
+    analyse = measurement(protocol.protocol, str(folder)).load("analysis")
     inputs = Inputs.of(rig)
     part = Part(run, protocol, rig, overrides, inputs)
     result: RunResult = analyse(part)

@@ -13,6 +13,7 @@ from labrig.fit import ChargeFit, OrderState
 from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.output_file import make_folder, write_text
+from labrig.foundation.plugins import measurement
 from labrig.foundation.yaml_file import write_yaml
 from labrig.material import Material, Provenance, State, write_material
 from labrig.process.provenance import library_versions
@@ -26,13 +27,11 @@ from labrig.report import (
     led_study_report,
     mixture_report,
     shared_decay_report,
-    table_sections,
     trap_depth_report,
     write_report,
 )
 from labrig.results import (
     DecayPatch,
-    DecayResult,
     Series,
     SharedDecay,
     StateDepth,
@@ -198,7 +197,8 @@ def report_table(
     >>> processed.report.as_posix()
     'my-decay/result/report.html'
     """
-    result = DecayResult(
+    decay = measurement("decay")
+    result = decay.load("result")(
         patches={
             part.region or table.stem: DecayPatch(
                 region=None,
@@ -224,7 +224,7 @@ def report_table(
     )
     sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted)]
     about = describe_without_run(table.stem, "decay", table.name, sample)
-    sections, methods = table_sections(result, about)
+    sections, methods = decay.load("table_report")(result, about)
     make_folder(folder)
     result_folder = new_result(folder)
     write_yaml(result_folder / "provenance.yaml", provenance)

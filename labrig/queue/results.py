@@ -19,7 +19,7 @@ from labrig.foundation.quantity import duration_text
 from labrig.process import describe_without_run, write_with_report
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
-from labrig.results import MCD_PER_M2, LuminanceResult, Measured, read_fitted_decay, read_result
+from labrig.results import MCD_PER_M2, Measured, read_fitted_decay, read_result
 from labrig.text_table import table_text
 
 
@@ -51,11 +51,10 @@ def found_luminances(run: Path) -> Iterator[FoundLuminance]:
         result = read_result(run)
     except LabrigError:
         return
-    if isinstance(result, LuminanceResult):
-        for name, patch in result.patches.items():
-            for entry in patch.decay.at:
-                if entry.luminance is not None:
-                    yield FoundLuminance(name, entry.t_s, entry.luminance, patch.decay.scale_sigma)
+    for name, decay in result.provides().get("luminances", {}).items():
+        for entry in decay.at:
+            if entry.luminance is not None:
+                yield FoundLuminance(name, entry.t_s, entry.luminance, decay.scale_sigma)
 
 
 #: Name of the figure, what it shows, label of its axis, and the quantity.

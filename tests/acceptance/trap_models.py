@@ -34,7 +34,7 @@ from labrig.material import (
     read_material,
 )
 from labrig.process import process_and_report
-from labrig.results import ExcitationResult
+from labrig.protocols.excitation.result import ExcitationResult
 from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.lamp import BURNING_K, Lamp, filament_spectrum
 from labrig.sim.phosphor import band_cells, phosphor

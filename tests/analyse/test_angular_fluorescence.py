@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Inputs, Part
-from labrig.analyse.angular_fluorescence import analyse
 from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_and_report
-from labrig.protocols.angular_fluorescence import Circle
+from labrig.protocols.angular_fluorescence.analysis import analyse
+from labrig.protocols.angular_fluorescence.protocol import Circle
+from labrig.protocols.angular_fluorescence.result import AngularFluorescenceResult
 from labrig.record import Attempt
-from labrig.results import AngularFluorescenceResult
 from tests.analyse.angular_bench import record_angular, record_sphere, true_camera
 from tests.analyse.recorded import part_of
 from tests.analyse.small_runs import ANGULAR

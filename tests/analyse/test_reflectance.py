@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Inputs
-from labrig.analyse.reflectance import analyse
 from labrig.analyse.surface import with_reflectance, with_reflectances
 from labrig.calibration import LVF_KIND, REFLECTANCE_KIND
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Albedo, read_material, write_material
 from labrig.optics import Strip
+from labrig.protocols.reflectance.analysis import analyse
+from labrig.protocols.reflectance.result import ReflectanceResult
 from labrig.report import describe_phosphor, draw_phosphor
-from labrig.results import ReflectanceResult
 from tests.acceptance.reflectance_pulls import (
     BLUE,
     JUDGED,

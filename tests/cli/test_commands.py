@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from labrig.foundation import plugins
+from labrig.protocols.decay.result import DecayResult
 from labrig.record import RunLock, own_digest, read_run
-from labrig.results import DecayResult, read_result
+from labrig.results import read_result
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 
@@ -319,8 +320,10 @@ def test_a_protocol_of_a_package_is_listed_and_needs_a_file_of_ones_own(
     labrig: Labrig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     registry = plugins._registry()
-    decay = EntryPoint("lamp_drift", registry[plugins.PROTOCOLS]["decay"].value, plugins.PROTOCOLS)
-    extended = {**registry, plugins.PROTOCOLS: {**registry[plugins.PROTOCOLS], "lamp_drift": decay}}
+    decay = registry[plugins.MEASUREMENTS]["decay"]
+    other = EntryPoint("lamp_drift", decay.value, decay.group)
+    registered = {**registry[plugins.MEASUREMENTS], "lamp_drift": other}
+    extended = {**registry, plugins.MEASUREMENTS: registered}
     monkeypatch.setattr(plugins, "_registry", lambda: extended)
     assert "lamp_drift" in labrig("protocol", "list").out
     one_line(labrig("plan", "lamp_drift", "--rig", "sim"), 2, "installed", "lamp_drift.yaml")

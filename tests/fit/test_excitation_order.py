@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Overrides
-from labrig.analyse.excitation.closure import predicted_charging
-from labrig.analyse.excitation.orders import OrderFits
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.material import becquerel_of, read_material
-from labrig.results import (
-    Charge,
-    ChargingSeries,
-    Closure,
-    EarlierCharges,
-    FittedExcitation,
-    PatchCharging,
-    Series,
-)
+from labrig.protocols.excitation.analysis.closure import predicted_charging
+from labrig.protocols.excitation.analysis.orders import OrderFits
+from labrig.protocols.excitation.result import PatchCharging
+from labrig.results import Charge, ChargingSeries, Closure, EarlierCharges, FittedExcitation, Series
 from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.simulation import LampSettings
 from tests.fit.charged_samples import BARE, LVF, Bench, lvf_windows, two_states

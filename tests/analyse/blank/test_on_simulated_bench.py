@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Overrides, decay as decay_analysis
+from labrig.analyse import Overrides
 from labrig.analyse.frames import intact_frames
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import BLANK_KIND
 from labrig.foundation.errors import DataError
 from labrig.process import process_run
+from labrig.protocols.decay import analysis as decay_analysis
 from labrig.record import read_run
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.analyse.small_runs import BLANK

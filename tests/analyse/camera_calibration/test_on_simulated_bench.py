@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from labrig.analyse import decay as decay_analysis
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import CAMERA_KIND, CameraFile
 from labrig.foundation.errors import DataError
 from labrig.process import Processed, process_and_report, process_run
+from labrig.protocols.camera_calibration.result import CameraCalibrationResult
+from labrig.protocols.decay import analysis as decay_analysis
 from labrig.record import read_run
-from labrig.results.camera_calibration import CameraCalibrationResult
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record

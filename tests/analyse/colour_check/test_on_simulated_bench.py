@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Part
-from labrig.analyse.camera_curves import analyse as analyse_curves
-from labrig.analyse.colour_check import analyse
 from labrig.foundation.errors import UsageError
 from labrig.optics import CURVES_FILE
 from labrig.process import process_and_report
-from labrig.results import ColourCheckResult
+from labrig.protocols.camera_curves.analysis import analyse as analyse_curves
+from labrig.protocols.colour_check.analysis import analyse
+from labrig.protocols.colour_check.result import ColourCheckResult
 from tests.analyse.chart_bench import record, with_camera
 from tests.analyse.recorded import part_of
 from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Overrides
-from labrig.analyse.led_fluorescence import analyse
-from labrig.analyse.led_fluorescence.methods import method_differences
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import (
     ReradiationMatrix,
@@ -22,7 +20,10 @@ from labrig.material import (
 )
 from labrig.optics import read_light
 from labrig.process import Processed, process_and_report
-from labrig.results import FluorescentPatch, LedFluorescenceResult
+from labrig.protocols.led_fluorescence.analysis import analyse
+from labrig.protocols.led_fluorescence.analysis.methods import method_differences
+from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
+from labrig.results import FluorescentPatch
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of
 from tests.results.made import assert_read_back

@@ -1,0 +1,11 @@
+"""Registration of the measurement `decay`."""
+
+from labrig.foundation.plugins import Measurement
+
+DECAY = Measurement(
+    package=__package__,
+    protocol=".protocol:Decay",
+    result=".result:DecayResult",
+    table_report=".report:table_sections",
+    is_per_patch=True,
+)

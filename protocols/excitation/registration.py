@@ -1,0 +1,12 @@
+"""Registration of the measurement `excitation`."""
+
+from labrig.foundation.plugins import Measurement
+
+EXCITATION = Measurement(
+    package=__package__,
+    protocol=".protocol:Excitation",
+    result=".result:ExcitationResult",
+    is_per_patch=True,
+    needs_checked_bench=True,
+    has_short_charges=True,
+)

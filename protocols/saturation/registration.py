@@ -1,0 +1,10 @@
+"""Registration of the measurement `saturation`."""
+
+from labrig.foundation.plugins import Measurement
+
+SATURATION = Measurement(
+    package=__package__,
+    protocol=".protocol:Saturation",
+    result=".result:SaturationResult",
+    is_per_patch=True,
+)
