@@ -8,7 +8,7 @@ the colours are taken.
 
 Of the searches by Levenberg and Marquardt: one evaluates a few numbers per step, so that a loop
 over starts would take most of its time for its bookkeeping. All searches go on together, which
-makes them as fast as one; the lowest end is carried to the minimum by `labrig.fit.least_squares`.
+makes them as fast as one; the lowest end is carried to the minimum by the core of all fits.
 """
 
 from collections.abc import Callable, Iterator

@@ -47,7 +47,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from labrig.fit.least_squares import least_squares
+from labrig.fit.nonlinear_least_squares import least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares

@@ -30,7 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri, stdtrit
 
-from labrig.fit.least_squares import LeastSquaresFit, Residuals, least_squares, parameter_covariance
+from labrig.fit.nonlinear_least_squares import (
+    LeastSquaresFit,
+    Residuals,
+    least_squares,
+    parameter_covariance,
+)
 from labrig.foundation.arrays import FloatArray
 from labrig.results import ASYMMETRIC, NORMAL_95, ProfileInterval
 

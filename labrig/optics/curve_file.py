@@ -27,7 +27,7 @@ from labrig.optics.curve_table import (
     is_own_table,
     sorted_columns,
 )
-from labrig.optics.foreign_spectra import foreign_spectra
+from labrig.optics.instrument_spectra import foreign_spectra
 from labrig.optics.spectral_columns import Quantity, read_ordinate
 from labrig.optics.spectrum import Spectrum, Transmittance
 from labrig.text_table import read_table_text

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.special import ndtr, ndtri
 
-from labrig.fit.least_squares import Residuals
+from labrig.fit.nonlinear_least_squares import Residuals
 from labrig.fit.profile_likelihood import (
     Likelihood,
     LowerMinimumError,

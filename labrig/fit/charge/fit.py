@@ -26,7 +26,7 @@ from labrig.fit.charge.model import (
     readings_of,
 )
 from labrig.fit.charge.result import ChargeCandidate, ChargeFit, FittedReadings, OrderState
-from labrig.fit.least_squares import LeastSquaresFit, least_squares
+from labrig.fit.nonlinear_least_squares import LeastSquaresFit, least_squares
 from labrig.fit.profile_likelihood import (
     Likelihood,
     LowerMinimumError,

@@ -28,7 +28,7 @@ from scipy.special import chdtrc
 from labrig.fit.decay.diagnostics import MISFIT_LEVEL, order_p_value
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, WhitenedSeries, whitened
 from labrig.fit.decay.variable_projection import projection
-from labrig.fit.least_squares import EPSILON
+from labrig.fit.nonlinear_least_squares import EPSILON
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares

@@ -38,7 +38,7 @@ from labrig.fit.decay.variable_projection import (
     fit_jointly,
     projection,
 )
-from labrig.fit.least_squares import parameter_covariance
+from labrig.fit.nonlinear_least_squares import parameter_covariance
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.number_format import rounded

@@ -20,7 +20,7 @@ from labrig.fit.decay.noise_correlation import NoiseCorrelation, noise_correlati
 from labrig.fit.decay.series import DecaySeries, WhitenedSeries
 from labrig.fit.decay.states import StatesFit, exponentials
 from labrig.fit.decay.variable_projection import covariance_under_flicker, weight_sigma
-from labrig.fit.least_squares import propagated_covariance
+from labrig.fit.nonlinear_least_squares import propagated_covariance
 from labrig.foundation.arrays import FloatArray
 from labrig.results import (
     DecayReference,

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.fit.least_squares import EPSILON
+from labrig.fit.nonlinear_least_squares import EPSILON
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 

@@ -13,7 +13,7 @@ from labrig.fit.decay.variable_projection import (
     projection,
     search_rates,
 )
-from labrig.fit.least_squares import Ending
+from labrig.fit.nonlinear_least_squares import Ending
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.material import exponential_means_and_slopes

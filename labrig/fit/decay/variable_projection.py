@@ -23,7 +23,7 @@ import nlopt
 import numpy as np
 
 from labrig.fit.decay.series import WhitenedSeries
-from labrig.fit.least_squares import LeastSquaresFit, least_squares
+from labrig.fit.nonlinear_least_squares import LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.material import exponential_means
 

@@ -22,7 +22,12 @@ from labrig.fit.excitation.model_tests import (
 )
 from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.least_squares import Ending, LeastSquaresFit, least_squares, propagated_covariance
+from labrig.fit.nonlinear_least_squares import (
+    Ending,
+    LeastSquaresFit,
+    least_squares,
+    propagated_covariance,
+)
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares

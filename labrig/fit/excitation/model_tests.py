@@ -35,7 +35,7 @@ from scipy.special import chdtrc
 
 from labrig.fit.excitation.parameters import Parameters, Rates, RelativeSigmas, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.least_squares import EPSILON, LeastSquaresFit
+from labrig.fit.nonlinear_least_squares import EPSILON, LeastSquaresFit
 from labrig.foundation.arrays import FloatArray, IntArray
 from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.results import BandQuantity, BandTests, ChargingSeries, Measured

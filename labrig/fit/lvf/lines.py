@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks, peak_widths
 from scipy.special import chdtri
 
-from labrig.fit.least_squares import least_squares
+from labrig.fit.nonlinear_least_squares import least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.optics import NOMINAL_FWHM_NM, WavelengthMap, peak_shape

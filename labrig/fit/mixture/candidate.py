@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.least_squares import Ending
 from labrig.fit.mixture.entries import StokesEntries, masked_mse, with_integral
 from labrig.fit.mixture.gaussians import Gaussians, LikelihoodFit, maximise_likelihood
 from labrig.fit.mixture.refinement import refined, refined_skewed
+from labrig.fit.nonlinear_least_squares import Ending
 from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMixture
 

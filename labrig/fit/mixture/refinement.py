@@ -6,9 +6,9 @@ its peak; the error that is reported, and seen, is the squared one.
 
 import numpy as np
 
-from labrig.fit.least_squares import LeastSquaresFit, least_squares
 from labrig.fit.mixture.entries import StokesEntries
 from labrig.fit.mixture.gaussians import LEAST_WEIGHT, Gaussians
+from labrig.fit.nonlinear_least_squares import LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 
 #: Parameters of a component: log of its height, mean of the input, mean of the output, log of σ of

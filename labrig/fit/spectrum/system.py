@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
 
-from labrig.fit.least_squares import EPSILON
+from labrig.fit.nonlinear_least_squares import EPSILON
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares
