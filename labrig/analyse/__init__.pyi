@@ -20,6 +20,13 @@ from .overrides import (
     Overrides as Overrides,
     read_run_protocol as read_run_protocol,
 )
+from .process_options import (
+    ProcessOptions as ProcessOptions,
+    check_options as check_options,
+    chosen_options as chosen_options,
+    flag as flag,
+    options_of as options_of,
+)
 from .raw_agreement import (
     clock_warnings as clock_warnings,
     require_recorded_settings as require_recorded_settings,

@@ -23,6 +23,7 @@ from labrig.analyse.strip_model import (
     strip_system,
 )
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
+from labrig.calibration import LVF_KIND
 from labrig.fit.spectrum import SpectralSystem
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
@@ -125,7 +126,7 @@ def forward_models(
     DataError
         No patch lies below the filter.
     """
-    calibration = part.inputs.lvf
+    calibration = part.inputs[LVF_KIND]
     if calibration is None or calibration.before_camera is None:
         raise UsageError(
             "a spectrum needs the LVF calibrated before the camera: run the protocol "
@@ -233,7 +234,7 @@ def channel_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
         name = part.overrides.camera or part.rig.optics.camera
         if name is not None:
             return read_monochrome_camera(name)
-    camera = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
+    camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
     if camera.channels != channels:
         raise DataError(
             f"expected frames with the channels {', '.join(camera.channels)} or one alone, got "

@@ -9,6 +9,7 @@ import numpy as np
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
+from labrig.calibration import CAMERA_KIND
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
@@ -139,7 +140,7 @@ def lit_patches(
     DataError
         Frames are missing, damaged, or of another camera than the calibrated one.
     """
-    camera = part.inputs.camera
+    camera = part.inputs[CAMERA_KIND]
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     lit, left = (_series(part, each, patches) for each in (role, f"{role}-off"))
     units = [f"{begin}{light}" for light in lights]
@@ -165,7 +166,7 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
 
 
 def _series(part: Part, role: str, patches: Mapping[str, Region] | None) -> dict[str, Series]:
-    run, camera = part.run, part.inputs.camera
+    run, camera = part.run, part.inputs[CAMERA_KIND]
     frames = steady_frames(run, part.overrides, role)
     if not frames:
         raise DataError(

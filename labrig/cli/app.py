@@ -24,6 +24,7 @@ from labrig.cli import (
     verify,
 )
 from labrig.cli.completion import complete_run
+from labrig.cli.process_command import ProcessCommand
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
@@ -149,7 +150,7 @@ def simulations() -> None:
 app.command("run")(run.run)
 app.command("plan")(run.plan)
 app.command("resume")(run.resume)
-app.command("process")(process.process)
+app.command("process", cls=ProcessCommand)(process.process)
 app.command("figures")(figures)
 app.command("frame")(frame)
 app.command("compare")(compare.compare)

@@ -21,7 +21,7 @@ MEASUREMENTS = "labrig.measurements"
 _KINDS = {DRIVERS: "driver", MEASUREMENTS: "protocol"}
 
 
-Part = Literal["protocol", "result", "analysis", "report", "table_report", "calibration"]
+Part = Literal["protocol", "result", "analysis", "report", "options", "table_report", "calibration"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,14 +43,14 @@ class Measurement:
         Function that analyses an `AnalysisContext` to the result.
     report
         Function that renders the result; None for plain tables of its fields.
+    options
+        Model of its own options of `labrig process`, a `ProcessOptions`; None where it has none.
     table_report
         Function that renders the result of another program's table; None where there is no such.
     calibration
         The `CalibrationKind` that it measures; None for other measurements.
     of
         What is measured: a `bench`, once for all samples, or each `sample`.
-    options
-        Options of `labrig process` that it takes, besides those of every run.
     is_per_patch
         Whether it measures every patch of a chain that names patches.
     needs_checked_bench
@@ -76,10 +76,10 @@ class Measurement:
     result: str
     analysis: str = ".analysis:analyse"
     report: str | None = ".report:render"
+    options: str | None = None
     table_report: str | None = None
     calibration: str | None = None
     of: Literal["bench", "sample"] = "sample"
-    options: tuple[str, ...] = ()
     is_per_patch: bool = False
     needs_checked_bench: bool = False
     is_bench_check: bool = False

@@ -13,7 +13,7 @@ from labrig.analyse.frames import (
     timing_warnings,
 )
 from labrig.analyse.inputs import Part
-from labrig.calibration import BlankFile
+from labrig.calibration import CAMERA_KIND, BlankFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.protocols.blank.protocol import BLANK_FRAMES
@@ -122,7 +122,7 @@ def analyse(part: Part) -> BlankResult:
     DataError
         No sequence is complete, or a frame is missing or was changed.
     """
-    protocol, run, camera = part.protocol, part.run, part.inputs.camera
+    protocol, run, camera = part.protocol, part.run, part.inputs[CAMERA_KIND]
     region = part_region(part, protocol.region)
     frames = intact_frames(run, part.overrides, BLANK_FRAMES)
     require_calibrated_camera(camera, run, part_frames(part, BLANK_FRAMES))

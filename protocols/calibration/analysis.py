@@ -18,7 +18,7 @@ def analyse(part: Part) -> CalibrationResult:
         No part can be analysed.
     """
     analysed = analyse_parts(part)
-    lvf = analysed.inputs[""].lvf
+    lvf = analysed.inputs[""][LVF_KIND]
     pictures = [
         card_picture(_part_of(part, link.name, link.protocol), lvf)
         for link in part.protocol.chain()

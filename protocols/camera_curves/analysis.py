@@ -15,6 +15,7 @@ from labrig.bench_optics import (
     lens_transmittance,
     polariser_transmittance,
 )
+from labrig.calibration import CAMERA_KIND, LVF_KIND
 from labrig.fit.camera_curves import (
     GRID_NM,
     CameraCurvesFit,
@@ -137,7 +138,7 @@ def _left_out(part: Part) -> tuple[str, ...]:
 
 def _through(part: Part) -> FilterReadings:
     """Return the readings of the card through the filter."""
-    calibrated = part.inputs.lvf
+    calibrated = part.inputs[LVF_KIND]
     if calibrated is None or calibrated.before_camera is None:
         raise UsageError(
             f"{part.run.folder}: no LVF is known that is before the camera; run lvf_calibration, "
@@ -145,7 +146,7 @@ def _through(part: Part) -> FilterReadings:
         )
     frames, strip = frames_of(part, CurvesFrames.THROUGH), calibrated.before_camera
     darks = steady_frames(part.run, part.overrides, FrameRole.DARK)
-    (values,) = slice_values(frames, strip, darks, part.inputs.camera).values()
+    (values,) = slice_values(frames, strip, darks, part.inputs[CAMERA_KIND]).values()
     layout = sensor_layout(frames[0])
     places = np.array(strip.positions(layout.width, layout.height))
     inside = np.clip(places, calibrated.position[0], calibrated.position[-1])

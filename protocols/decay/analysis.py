@@ -18,11 +18,13 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.surface import with_layer, with_reflectance
 from labrig.analyse.temperature import drift_an_hour, drift_warnings
+from labrig.calibration import BLANK_KIND, CAMERA_KIND, REFLECTANCE_KIND
 from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.region import Region
 from labrig.material import Material, Provenance, State
+from labrig.protocols.decay.options import DecayOptions
 from labrig.protocols.decay.result import DecayResult
 from labrig.record import FrameRole, charge_durations_s, glow_temperature_c
 from labrig.reduce import (
@@ -99,9 +101,9 @@ def analyse(part: Part) -> DecayResult:
     run, protocol, overrides = part.run, part.protocol, part.overrides
     regions = overrides.patches(protocol)
     background = protocol.background if protocol.dark == "background" else None
-    frames, stray = without_stray_light(intact_frames(run, overrides), part.inputs.blank)
-    require_calibrated_camera(part.inputs.camera, run, run.frames(FrameRole.DECAY))
-    camera = part.inputs.camera
+    frames, stray = without_stray_light(intact_frames(run, overrides), part.inputs[BLANK_KIND])
+    require_calibrated_camera(part.inputs[CAMERA_KIND], run, run.frames(FrameRole.DECAY))
+    camera = part.inputs[CAMERA_KIND]
     # A calibrated glare is subtracted, and a background has the same as the patches.
     unknown_glare = background is None and (camera is None or camera.glare is None)
     series = reduce_patches(
@@ -117,13 +119,14 @@ def analyse(part: Part) -> DecayResult:
         if whole_frame is None
         else glare_warning(series, regions, whole_frame, sensor_layout(frames.decay[0]))
     )
-    states = overrides.states or (None if protocol.states == "auto" else protocol.states)
+    options = part.options(DecayOptions)
+    states = options.states or (None if protocol.states == "auto" else protocol.states)
     fit = partial(
         fit_series,
         states=states,
-        fixed_rates_per_s=overrides.fixed_rates_per_s,
-        law=overrides.law,
-        intervals=overrides.intervals,
+        fixed_rates_per_s=options.rate,
+        law=options.law,
+        intervals=options.intervals,
     )
     fits = fit_patches(series, fit)
     temperature_c = glow_temperature_c(run, part.protocol.rate_frames)
@@ -220,7 +223,7 @@ def _decay_patch(
                 _material(series, fit, name, part.run.name, temperature_c), part.protocol.sample
             ),
             patch,
-            part.inputs.reflectance,
+            part.inputs[REFLECTANCE_KIND],
         ),
         drift_effect=(
             drift_an_hour(part.run, fit.drift_effect_s) if fit.law == EXPONENTIALS else None

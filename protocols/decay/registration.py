@@ -6,6 +6,7 @@ DECAY = Measurement(
     package=__package__,
     protocol=".protocol:Decay",
     result=".result:DecayResult",
+    options=".options:DecayOptions",
     table_report=".report:table_sections",
     is_per_patch=True,
 )

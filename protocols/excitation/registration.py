@@ -6,6 +6,7 @@ EXCITATION = Measurement(
     package=__package__,
     protocol=".protocol:Excitation",
     result=".result:ExcitationResult",
+    options=".options:ExcitationOptions",
     is_per_patch=True,
     needs_checked_bench=True,
     has_short_charges=True,

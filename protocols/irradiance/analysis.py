@@ -11,7 +11,7 @@ from labrig.analyse.exciting_lights import ExcitingLight, exciting_lights
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.calibration import CardLight, IrradianceFile
+from labrig.calibration import CAMERA_KIND, LVF_KIND, CardLight, IrradianceFile
 from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
@@ -67,7 +67,7 @@ def analyse(part: Part) -> IrradianceResult:
     """
     if part.protocol.select is not None:
         return _of_lights(part, part.protocol.select)
-    calibrated = part.inputs.lvf
+    calibrated = part.inputs[LVF_KIND]
     if calibrated is None or calibrated.on_sample is None:
         raise UsageError(
             f"{part.run.folder}: no LVF is known that lies on the sample; run lvf_calibration, "
@@ -104,7 +104,7 @@ def _of_lights(part: Part, select: ExcitingLights) -> IrradianceResult:
     frames, lamp = StripFrames(part), lamp_spectrum(part.rig)
     lit = [*frames.of(CardFrames.DIRECT), *frames.of(CardFrames.THROUGH)]
     regions = {"card": part.protocol.sites}
-    values = region_values(lit, regions, frames.dark, part.inputs.camera)
+    values = region_values(lit, regions, frames.dark, part.inputs[CAMERA_KIND])
     names = select.names()
     ratio = mean_ratio(
         [
@@ -115,7 +115,7 @@ def _of_lights(part: Part, select: ExcitingLights) -> IrradianceResult:
         ]
     )
     lights = exciting_lights(part, select, lamp)
-    camera = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
+    camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
     scale = light_scale(ratio, lights, names, lamp, card_reflectance(part.rig), camera)
     calibration = _file_of_lights(part, names, lights, lamp, ratio, scale)
     return IrradianceResult(
@@ -222,7 +222,7 @@ def _moments(light: Spectrum, edges_nm: FloatArray) -> tuple[float, float]:
 def _card_values(part: Part, frames: StripFrames, strip: Strip) -> Mapping[str, SliceValues]:
     """Return the light of the card along the strip's place, scene by scene."""
     lit = [*frames.of(CardFrames.DIRECT), *frames.of(CardFrames.THROUGH)]
-    return slice_values(lit, strip, frames.dark, part.inputs.camera)
+    return slice_values(lit, strip, frames.dark, part.inputs[CAMERA_KIND])
 
 
 def _card_light(frames: StripFrames, values: Mapping[str, SliceValues]) -> CardLight | None:

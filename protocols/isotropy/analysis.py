@@ -12,6 +12,7 @@ from labrig.analyse.frames import (
 )
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
+from labrig.calibration import BLANK_KIND, CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.number_format import plus_minus
@@ -35,9 +36,9 @@ def analyse(part: Part) -> IsotropyResult:
     DataError
         A straight view or all others are missing, or frames are damaged.
     """
-    protocol, run, camera = part.protocol, part.run, part.inputs.camera
+    protocol, run, camera = part.protocol, part.run, part.inputs[CAMERA_KIND]
     frames, stray = without_stray_light(
-        intact_frames(run, part.overrides, protocol.role), part.inputs.blank
+        intact_frames(run, part.overrides, protocol.role), part.inputs[BLANK_KIND]
     )
     require_calibrated_camera(camera, run, run.frames(protocol.role))
     regions = part.overrides.patches(protocol)

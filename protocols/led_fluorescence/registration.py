@@ -6,5 +6,6 @@ LED_FLUORESCENCE = Measurement(
     package=__package__,
     protocol=".protocol:LedFluorescence",
     result=".result:LedFluorescenceResult",
+    options=".options:LedFluorescenceOptions",
     is_of_fluorescence=True,
 )

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from labrig.analyse.chain import analyse_parts
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.surface import with_reflectances
+from labrig.calibration import REFLECTANCE_KIND
 from labrig.material import Material
 from labrig.protocols.phosphor.result import PhosphorResult
 
@@ -31,5 +32,5 @@ def _materials(inputs: Mapping[str, Inputs]) -> dict[str, Material]:
     return {
         sample or patch: material
         for sample, known in inputs.items()
-        for patch, material in with_reflectances(known.materials, known.reflectance).items()
+        for patch, material in with_reflectances(known.materials, known[REFLECTANCE_KIND]).items()
     }

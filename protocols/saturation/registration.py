@@ -6,5 +6,6 @@ SATURATION = Measurement(
     package=__package__,
     protocol=".protocol:Saturation",
     result=".result:SaturationResult",
+    options=".options:SaturationOptions",
     is_per_patch=True,
 )

@@ -232,7 +232,7 @@ def recorded(case: Case, folder: Path) -> Path:
 def row(case: Case, run: Path, order: str) -> bool:
     """Print one material's deviations; return whether they are right."""
     began = time.monotonic()
-    done = process_and_report(run, Overrides(order=order))
+    done = process_and_report(run, Overrides(options={"order": order}))
     assert isinstance(done.result, ExcitationResult)
     (patch,) = done.result.patches.values()
     fit = json.loads((run / "result" / "excitation.json").read_text())

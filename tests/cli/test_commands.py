@@ -126,9 +126,9 @@ def test_wrong_usage(labrig: Labrig, arguments: list[str], command: str) -> None
     [("x", "expected a whole number, got 'x'"), ("9", "expected a number of at most 3, got '9'")],
 )
 def test_an_option_of_another_kind_is_told_plainly(
-    labrig: Labrig, value: str, expected: str
+    labrig: Labrig, finished: Path, value: str, expected: str
 ) -> None:
-    one_line(labrig("process", "last", "--states", value), 2, "'--states'", expected)
+    one_line(labrig("process", finished, "--states", value), 2, "--states", expected)
 
 
 @pytest.mark.parametrize("command", [["resume"], ["process"]])

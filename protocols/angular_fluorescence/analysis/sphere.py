@@ -7,6 +7,7 @@ import numpy as np
 
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.inputs import Part
+from labrig.calibration import CAMERA_KIND
 from labrig.fit.angular import NearLight, SphereImage, fit_shading
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -82,7 +83,7 @@ def sphere_views(part: Part) -> tuple[tuple[SphereViews, ...], list[str]]:
         The channels cannot be chosen.
     """
     frames = part_frames(part, *AngularFrames)
-    require_calibrated_camera(part.inputs.camera, part.run, frames)
+    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, frames)
     views, warnings = [], []
     for pose in part.protocol.poses():
         own = [frame for frame in frames if frame.unit == pose.unit]
@@ -276,7 +277,7 @@ def _image(
 
 def _flat(part: Part) -> Flat | None:
     """Return the calibrated flat field of the lens; None if there is none."""
-    camera = part.inputs.camera
+    camera = part.inputs[CAMERA_KIND]
     return None if camera is None else camera.flat_at(part.protocol.camera.f_number)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera, untimed
 from labrig.analyse.inputs import Part
+from labrig.calibration import CAMERA_KIND
 from labrig.fit.angular import fit_dependence
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -99,7 +100,7 @@ def _views(part: Part) -> tuple[list[View], list[str]]:
 
 def _series(part: Part, role: AngularFrames) -> Series:
     frames = part_frames(part, role)
-    require_calibrated_camera(part.inputs.camera, part.run, frames)
+    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, frames)
     if not frames:
         raise DataError(
             f"{part.run.folder}: no view is complete; go on with: labrig resume {part.run.folder}"

@@ -19,6 +19,7 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.place_reduction import reduce_places
 from labrig.analyse.strip import StripPatch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
+from labrig.calibration import CAMERA_KIND, LVF_KIND
 from labrig.fit.spectrum import fit_spectrum
 from labrig.foundation.arrays import FloatArray
 from labrig.optics import Spectrum
@@ -77,7 +78,7 @@ def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
     models, _ = forward_models(part, cards[0], [WHOLE])
     bare = models[WHOLE]
     reduction = reduce_places(
-        [*cards, *patches], darks, {WHOLE: bare.slices}, part.inputs.camera, bare.holder
+        [*cards, *patches], darks, {WHOLE: bare.slices}, part.inputs[CAMERA_KIND], bare.holder
     )[WHOLE]
     white = reduction.of_unit(THROUGH_UNIT)
     light = card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
@@ -159,7 +160,7 @@ def _by_errors(
 
 def _shift_nm(part: Part, cards: Sequence[SeriesFrame], darks: Sequence[SeriesFrame]) -> float:
     """Return how far the filter's strip has moved along itself since its calibration, in nm."""
-    calibrated = part.inputs.lvf
+    calibrated = part.inputs[LVF_KIND]
     assert calibrated is not None
     assert calibrated.before_camera is not None
     before = calibrated.before_camera

@@ -25,6 +25,7 @@ from labrig.analyse.frames import (
 from labrig.analyse.inputs import Part
 from labrig.analyse.place_reduction import PatchReduction, reduce_places
 from labrig.analyse.strip import StripPatch, for_each_patch
+from labrig.calibration import BLANK_KIND, CAMERA_KIND
 from labrig.fit.spectrum import DECISIVE, SpectrumFit, fit_spectrum
 from labrig.foundation.errors import DataError
 from labrig.protocols.emission_spectrum.analysis.camera_filters import (
@@ -84,15 +85,17 @@ def analyse(part: Part) -> EmissionSpectrumResult:
         Too many values clip.
     """
     intact = intact_frames(part.run, part.overrides, SpectrumFrames.GLOW)
-    frames, stray = without_stray_light(intact, part.inputs.blank)
-    require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(SpectrumFrames.GLOW))
+    frames, stray = without_stray_light(intact, part.inputs[BLANK_KIND])
+    require_calibrated_camera(
+        part.inputs[CAMERA_KIND], part.run, part.run.frames(SpectrumFrames.GLOW)
+    )
     models, refused = _models(part, frames.decay[0])
     white = steady_frames(part.run, part.overrides, SpectrumFrames.WHITE)
     reductions = reduce_places(
         [*frames.decay, *white],
         frames.dark,
         {patch: model.slices for patch, model in models.items()},
-        part.inputs.camera,
+        part.inputs[CAMERA_KIND],
         next(iter(models.values())).holder,
     )
     patches, warnings = for_each_patch(

@@ -11,7 +11,15 @@ from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectance
 from labrig.analyse.temperature import at_temperature
-from labrig.calibration import IrradianceFile, Warming
+from labrig.calibration import (
+    BLANK_KIND,
+    CAMERA_KIND,
+    FADE_KIND,
+    IRRADIANCE_KIND,
+    REFLECTANCE_KIND,
+    IrradianceFile,
+    Warming,
+)
 from labrig.fit.excitation import RelativeSigmas
 from labrig.foundation.errors import DataError
 from labrig.protocols.excitation.analysis.charge_intervals import GLOWING
@@ -39,6 +47,7 @@ from labrig.protocols.excitation.analysis.selected_light import (
     within_bands,
 )
 from labrig.protocols.excitation.analysis.warmth import remembered_warmth, scatter_by_warmth
+from labrig.protocols.excitation.options import ExcitationOptions
 from labrig.protocols.excitation.result import ExcitationResult, PatchCharging, PatchExcitation
 from labrig.record import FrameRole
 from labrig.results import ChargingSeries, Closure, EmissionSpectrum, FittedDecay, FittedExcitation
@@ -77,7 +86,11 @@ def analyse(part: Part) -> ExcitationResult:
     FitError
         Nothing glows, or the glow cannot be fitted.
     """
-    irradiance, fade, blank = part.inputs.irradiance, part.inputs.fade, part.inputs.blank
+    irradiance, fade, blank = (
+        part.inputs[IRRADIANCE_KIND],
+        part.inputs[FADE_KIND],
+        part.inputs[BLANK_KIND],
+    )
     if irradiance is None:
         raise DataError(
             "expected the light on every place of the sample, got none; run irradiance and name "
@@ -127,8 +140,8 @@ def _patch_excitation(
         largest_factor=LARGEST_FACTOR,
     )
     fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(part) is not None)
-    choice = fits.chosen(part.overrides.order)
-    if part.inputs.camera is None:
+    choice = fits.chosen(part.options(ExcitationOptions).order)
+    if part.inputs[CAMERA_KIND] is None:
         flicker = common_flicker(choice.best, _series(charging), dark)
         relative_sigmas = replace(relative_sigmas, flicker=flicker)
         choice = replace(choice, relative_sigmas=relative_sigmas)
@@ -137,12 +150,14 @@ def _patch_excitation(
     if irradiance.lights:
         by_leds = bool(part.protocol.select.leds)
         charging, even = _within_bands(charging, irradiance, choice, by_leds=by_leds)
-    fit = choice.fitted(_series(charging), "all" if part.overrides.intervals else "auto")
+    fit = choice.fitted(
+        _series(charging), "all" if part.options(ExcitationOptions).intervals else "auto"
+    )
     fit = fit if even is None else with_doubt(fit, even)
     density, basis = largest_density(
         irradiance.bands_nm,
         part.protocol.sample.max_optical_density,
-        patch_reflectance(patch.folder, part.inputs.reflectance),
+        patch_reflectance(patch.folder, part.inputs[REFLECTANCE_KIND]),
     )
     fit = choice.in_a_layer(_series(charging), fit, density, basis)
     closure = predicted_charging(charging, relative_sigmas, _fitting_by_places(choice, even))
@@ -157,7 +172,7 @@ def _patch_excitation(
     )
     if spectrum is not None and (scale := _scale(part, charging, fit, irradiance, spectrum)):
         material = scale.of(material)
-    material = with_reflectance(material, patch.folder, part.inputs.reflectance)
+    material = with_reflectance(material, patch.folder, part.inputs[REFLECTANCE_KIND])
     material = with_layer(material, part.protocol.sample)
     material = at_temperature(material, run, part.protocol.rate_frames)
     return (
@@ -254,7 +269,9 @@ def _closure_warnings(closure: Closure | None) -> Iterator[str]:
 def _asked_states(part: Part) -> int | None:
     """Return the number of states that is asked for; None if the data choose it."""
     protocol_states = part.protocol.states
-    return part.overrides.states or (None if protocol_states == "auto" else protocol_states)
+    return part.options(ExcitationOptions).states or (
+        None if protocol_states == "auto" else protocol_states
+    )
 
 
 def _states(part: Part, patch: StripPatch) -> int | None:
@@ -270,6 +287,6 @@ def _series(charging: PatchCharging) -> list[ChargingSeries]:
 
 
 def _flicker(part: Part, decay: FittedDecay) -> float:
-    if part.inputs.camera is not None:
-        return part.inputs.camera.flicker
+    if (camera := part.inputs[CAMERA_KIND]) is not None:
+        return camera.flicker
     return decay.flicker if decay.flicker > 0 else TYPICAL_FLICKER

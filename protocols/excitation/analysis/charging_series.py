@@ -9,7 +9,7 @@ from numpy.polynomial.legendre import legvander
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions
-from labrig.calibration import IrradianceFile, Warming
+from labrig.calibration import BLANK_KIND, CAMERA_KIND, FADE_KIND, IrradianceFile, Warming
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
@@ -70,8 +70,10 @@ def patch_chargings(
         The irradiance is that of selected lights and the run's charges went through the filter.
     """
     inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
-    frames = charge_frames(part.run, overrides, warming.time_constant_s, inputs.blank, part.beside)
-    require_calibrated_camera(inputs.camera, part.run, list(frames.charge_of))
+    frames = charge_frames(
+        part.run, overrides, warming.time_constant_s, inputs[BLANK_KIND], part.beside
+    )
+    require_calibrated_camera(inputs[CAMERA_KIND], part.run, list(frames.charge_of))
     layout = sensor_layout(next(iter(frames.charge_of)))
     if protocol.select is None:
         strip = irradiance.lvf_strip()
@@ -96,9 +98,9 @@ def patch_chargings(
             for frame in part.run.frames(FrameRole.DARK)
             if not overrides.excludes(frame)
         ],
-        camera=inputs.camera,
+        camera=inputs[CAMERA_KIND],
     )
-    rise, fade = lamp_transients(inputs.fade, np.array(irradiance.bands_nm))
+    rise, fade = lamp_transients(inputs[FADE_KIND], np.array(irradiance.bands_nm))
     longest = max(
         (interval for interval in frames.intervals if interval.is_direct),
         key=lambda interval: interval.off_s - interval.on_s,

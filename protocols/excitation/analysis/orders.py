@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.analyse.overrides import FREE
 from labrig.fit.excitation import (
     IntervalChoice,
     RelativeSigmas,
@@ -19,6 +18,7 @@ from labrig.fit.excitation import (
     layer_effect,
 )
 from labrig.foundation.arrays import FloatArray
+from labrig.protocols.excitation.options import FREE
 from labrig.results import (
     AUTO,
     ChargingSeries,

@@ -13,7 +13,13 @@ import numpy as np
 
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.calibration import CardLight, IrradianceFile, relative_sensitivity
+from labrig.calibration import (
+    CAMERA_KIND,
+    LVF_KIND,
+    CardLight,
+    IrradianceFile,
+    relative_sensitivity,
+)
 from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.foundation.errors import UsageError
 from labrig.material import SEEN_FACTOR, Material, ScaleFactor, State
@@ -114,7 +120,7 @@ def radiometric_scale(
     if optics.grey_card is None:
         return None
     try:
-        camera = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
+        camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
     except UsageError:
         return None
     if channel not in camera.channels:
@@ -231,7 +237,7 @@ def mean_irradiance(
 def _settings(part: Part, card: CardLight, iso: float, f_number: float | None) -> ScaleFactor:
     """Return the card's signal per that at the settings of the glow."""
     value, sigma = relative_sensitivity(
-        part.inputs.camera, (card.iso, card.f_number), (iso, f_number)
+        part.inputs[CAMERA_KIND], (card.iso, card.f_number), (iso, f_number)
     )
     return ScaleFactor(
         name="card's sensitivity and aperture over those of the glow",

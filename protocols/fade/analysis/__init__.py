@@ -7,7 +7,7 @@ import numpy as np
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import camera_curves, lamp_spectrum
-from labrig.calibration import Change, FadeFile, Warming
+from labrig.calibration import CAMERA_KIND, LVF_KIND, Change, FadeFile, Warming
 from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -52,8 +52,8 @@ def analyse(part: Part) -> FadeResult:
     UsageError
         The rig file does not name the curves of lamp and camera.
     """
-    protocol, camera = part.protocol, part.inputs.camera
-    curves = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
+    protocol, camera = part.protocol, part.inputs[CAMERA_KIND]
+    curves = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
     lamp = lamp_spectrum(part.rig)
     frames = part_frames(part, LampFrames.FADE, LampFrames.RISE, LampFrames.STEADY)
     require_calibrated_camera(camera, part.run, frames)
@@ -112,7 +112,7 @@ def _fit_warming(
     if not frames:
         return None, None
     card = part_region(part, part.protocol.card)
-    return warming(part.run, frames, darks, card, part.inputs.camera, flicker)
+    return warming(part.run, frames, darks, card, part.inputs[CAMERA_KIND], flicker)
 
 
 def _places(
@@ -133,7 +133,7 @@ def _places(
         light_errors = np.array([(light * change).T for change in changes])
         card = {"card": part_region(part, part.protocol.card)}
         return card, _normalise(channel_light), _normalised_errors(channel_light, light_errors)
-    lvf = part.inputs.lvf
+    lvf = part.inputs[LVF_KIND]
     if lvf is None or lvf.before_camera is None:
         raise DataError(
             "the fade through the variable filter needs its calibration: name it as optics.lvf in "

@@ -15,6 +15,7 @@ from labrig.analyse.frames import (
 )
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import card_reflectance
+from labrig.calibration import CAMERA_KIND
 from labrig.fit.leds import LedBand, led_band
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
@@ -113,7 +114,7 @@ def camera_values(part: Part, camera: CameraResponse) -> dict[str, CameraValues]
             f"{part.run.folder}: no LED's unit is complete; go on with: labrig resume "
             f"{part.run.folder}"
         )
-    require_calibrated_camera(part.inputs.camera, part.run, lit)
+    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, lit)
     off = part_frames(part, BrightnessFrames.CARD_OFF)
     darks = part_frames(part, FrameRole.DARK)
     series, off_series = (_series(part, frames, darks) for frames in (lit, off))
@@ -136,7 +137,7 @@ def _series(part: Part, frames: Sequence[FrameRecord], darks: Sequence[FrameReco
         [untimed(frame) for frame in frames],
         {"card": region},
         [untimed(frame) for frame in darks],
-        camera=part.inputs.camera,
+        camera=part.inputs[CAMERA_KIND],
     )
     return measured["card"]
 

@@ -24,6 +24,7 @@ from labrig.bench_optics import (
     illuminant_exposures,
     led_exposures,
 )
+from labrig.calibration import LEDS_KIND
 from labrig.fit.fluorescence import (
     EstimatedFluorophore,
     FluorescenceFit,
@@ -42,6 +43,7 @@ from labrig.protocols.led_fluorescence.analysis.methods import (
     reradiation_under_lights,
 )
 from labrig.protocols.led_fluorescence.analysis.mixture import mixture_of
+from labrig.protocols.led_fluorescence.options import LedFluorescenceOptions
 from labrig.protocols.led_fluorescence.protocol import SAMPLE, LedFrames
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from labrig.protocols.steps.led_scenes import CARD
@@ -93,7 +95,7 @@ def analyse(part: Part) -> LedFluorescenceResult:
     named = part.rig.optics.emission_library
     library = () if named is None else read_emissions(named)
     estimator = JointEstimator(system.with_drift(flicker), library)
-    method: EstimateMethod = part.overrides.method or part.protocol.method
+    method: EstimateMethod = part.options(LedFluorescenceOptions).method or part.protocol.method
     direct = direct_measurement(part.rig)
     if direct is not None:
         warnings += missing_samples(direct, lit.samples)
@@ -241,7 +243,7 @@ def _lights(part: Part) -> dict[str, LedExposure]:
         The rig file lacks one of them.
     """
     protocol = part.protocol
-    lights = led_exposures(part.rig, "rig.yaml", part.inputs.leds)
+    lights = led_exposures(part.rig, "rig.yaml", part.inputs[LEDS_KIND])
     if unknown := [led for led in protocol.leds if led not in lights]:
         raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
     if not protocol.lamps:

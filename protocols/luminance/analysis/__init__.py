@@ -29,6 +29,7 @@ from labrig.bench_optics import (
     card_reflectance,
     illuminance_lx,
 )
+from labrig.calibration import BLANK_KIND, CAMERA_KIND, LVF_KIND
 from labrig.fit import fit_luminance
 from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
 from labrig.foundation.errors import DataError
@@ -81,16 +82,16 @@ def analyse(part: Part) -> LuminanceResult:
     """
     run, protocol = part.run, part.protocol
     frames, stray = without_stray_light(
-        intact_frames(run, part.overrides, LuminanceFrames.GLOW), part.inputs.blank
+        intact_frames(run, part.overrides, LuminanceFrames.GLOW), part.inputs[BLANK_KIND]
     )
     card = steady_frames(run, part.overrides, LuminanceFrames.CARD)
     if not card:
         raise DataError(f"{run.folder}: no card was photographed; go on with labrig resume")
-    require_calibrated_camera(part.inputs.camera, run, run.frames(LuminanceFrames.GLOW))
+    require_calibrated_camera(part.inputs[CAMERA_KIND], run, run.frames(LuminanceFrames.GLOW))
     excitation = _excitation(part)
     regions = part.overrides.patches(protocol)
     counts = {
-        name: glow_ratios(name, region, frames.decay, card, frames.dark, part.inputs.camera)
+        name: glow_ratios(name, region, frames.decay, card, frames.dark, part.inputs[CAMERA_KIND])
         for name, region in regions.items()
     }
     patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW), *stray]
@@ -99,7 +100,8 @@ def analyse(part: Part) -> LuminanceResult:
             "without dark frames the level without light is that of the files: its error, in no σ "
             "here, grows towards the dim end"
         )
-    if part.inputs.camera is None or part.inputs.camera.glare is None:
+    camera = part.inputs[CAMERA_KIND]
+    if camera is None or camera.glare is None:
         warnings += _veiled(frames, regions)
     for name, each in counts.items():
         if not _is_seen(each).any():
@@ -127,7 +129,7 @@ def _patch(
 ) -> tuple[PatchLuminance, list[str]]:
     """Return the luminances of a patch, and doubts about them."""
     rig, protocol = part.rig, part.protocol
-    camera = camera_curves(rig, part.overrides.camera, part.inputs.lvf)
+    camera = camera_curves(rig, part.overrides.camera, part.inputs[LVF_KIND])
     known = emission_of(part, name)
     colour, noise = _colour(counts, np.flatnonzero(_is_seen(counts).any(axis=1)))
     # A channel that does not see the glow has a value all the same, of its noise.
@@ -247,7 +249,7 @@ def _one_a_time(t_s: FloatArray) -> IntArray:
 def _factors(counts: GlowRatios, scale: ColourScale, part: Part) -> Iterator[ScaleFactor]:
     """Yield the factors that all luminances have in common."""
     reading = part.rig.optics.luminance
-    camera = part.inputs.camera
+    camera = part.inputs[CAMERA_KIND]
     assert reading is not None
     meter = "luxmeter at the sample" if reading.at == "sample plane" else "meter on the card"
     yield ScaleFactor(f"{meter}, {reading.value}", reading.sigma, "rig file")

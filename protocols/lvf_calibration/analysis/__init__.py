@@ -13,7 +13,7 @@ from labrig.bench_optics import (
     filter_transmittances,
     lamp_spectrum,
 )
-from labrig.calibration import BandColumns, CurveColumns, LvfFile, WavelengthColumns
+from labrig.calibration import CAMERA_KIND, BandColumns, CurveColumns, LvfFile, WavelengthColumns
 from labrig.fit.lvf import LvfCalibration
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -122,7 +122,7 @@ def _scenes(part: Part, frames: StripFrames, strip: Strip) -> FilterScenes:
     completed = part.run.completed()
     names = [name for name in part.protocol.filter_names() if f"filter-{name}" in completed]
     lit = [*frames.of(LvfFrames.CARD), *frames.of(LvfFrames.FILTER)]
-    values = slice_values(lit, strip, frames.dark, part.inputs.camera)
+    values = slice_values(lit, strip, frames.dark, part.inputs[CAMERA_KIND])
     return FilterScenes(
         np.array(strip.positions(*frames.size)),
         [NO_FILTER, *filter_transmittances(part.rig, names)],

@@ -8,7 +8,7 @@ import numpy as np
 from labrig.analyse.inputs import Part
 from labrig.analyse.strip import StripFrames, StripPatch, for_each_patch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
-from labrig.calibration import ReflectanceFile
+from labrig.calibration import LVF_KIND, ReflectanceFile
 from labrig.fit.reflectance import AlbedoFit, Luminescence, fit_albedo, unresolved
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError, UsageError
@@ -55,7 +55,7 @@ def analyse(part: Part) -> ReflectanceResult:
     DataError
         Frames are missing or damaged, no patch lies below the filter, or there is no light.
     """
-    calibrated = part.inputs.lvf
+    calibrated = part.inputs[LVF_KIND]
     if calibrated is None or calibrated.on_sample is None or calibrated.before_camera is None:
         raise UsageError(
             f"{part.run.folder}: no LVF is known before the camera and on the sample; run "

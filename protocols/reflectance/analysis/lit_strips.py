@@ -11,7 +11,7 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.strip import Slices, StripFrames, StripPatch, slice_strip, strip_regions
 from labrig.analyse.strip_model import channel_positions, conditioned_on_white, strip_system
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.calibration import LvfFile
+from labrig.calibration import CAMERA_KIND, LvfFile
 from labrig.fit.reflectance import (
     LitStrip,
     Luminescence,
@@ -266,7 +266,7 @@ class _Scenes:
         each = [replace(frame, unit=f"glow-{n}") for n, frame in enumerate(glow_frames)]
         lit: list[SeriesFrame] = [*frames.of(names.card), *frames.of(names.sample)]
         values = region_values(
-            [*lit, *each], regions, frames.dark, part.inputs.camera, is_evened=True
+            [*lit, *each], regions, frames.dark, part.inputs[CAMERA_KIND], is_evened=True
         )
         cards = [values[f"card-{names.name}-{n}"] for n in (1, 2)
                  if f"card-{names.name}-{n}" in values]  # fmt: skip

@@ -24,12 +24,14 @@ from labrig.analyse.frames import (
 )
 from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import fit_series
+from labrig.calibration import BLANK_KIND, CAMERA_KIND
 from labrig.fit import EPSILON, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.number_format import plus_minus
 from labrig.material import exponential_means, exponential_means_and_slopes
 from labrig.protocols.saturation.analysis.kinetic_order import compare_levels
+from labrig.protocols.saturation.options import SaturationOptions
 from labrig.protocols.saturation.protocol import Light, WeakerLight
 from labrig.protocols.saturation.result import (
     Concentration,
@@ -242,8 +244,8 @@ def analyse(part: Part) -> SaturationResult:
     FitError
         The decays do not allow a fit.
     """
-    protocol, run, camera = part.protocol, part.run, part.inputs.camera
-    frames, stray = without_stray_light(intact_frames(run, part.overrides), part.inputs.blank)
+    protocol, run, camera = part.protocol, part.run, part.inputs[CAMERA_KIND]
+    frames, stray = without_stray_light(intact_frames(run, part.overrides), part.inputs[BLANK_KIND])
     require_calibrated_camera(camera, run, run.frames(FrameRole.DECAY))
     regions = part.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
@@ -291,11 +293,10 @@ def _patch_saturation(
             "expected two or more complete decays under the full light, got "
             f"{len(full)}; go on with labrig resume"
         )
-    states = part.overrides.states or (
-        None if part.protocol.states == "auto" else part.protocol.states
-    )
+    options = part.options(SaturationOptions)
+    states = options.states or (None if part.protocol.states == "auto" else part.protocol.states)
     longest = decays[units[full[-1]]]
-    fit = fit_series(longest, states, fixed_rates_per_s=part.overrides.fixed_rates_per_s)
+    fit = fit_series(longest, states, fixed_rates_per_s=options.rate)
     curves = {unit: curve(decay, fit) for unit, decay in decays.items()}
     start_per_s = [state.k_r_per_s for state in fit.states]
     rates = compare_rates(list(curves.values()), start_per_s, flicker_dof(fit))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from labrig.analyse import Inputs
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IRRADIANCE_KIND
@@ -175,6 +176,6 @@ def test_charges_are_missing(run: Path) -> None:
 
 def test_a_calibration_of_another_camera_is_refused(run: Path) -> None:
     part = part_of(run)
-    other = replace(part, inputs=replace(part.inputs, camera=camera()))
+    other = replace(part, inputs=Inputs({**part.inputs.provided, "camera": camera()}))
     with pytest.raises(DataError, match="calibration of another camera"):
         patch_chargings(other, true_irradiance(), USUAL)
