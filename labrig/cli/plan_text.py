@@ -9,33 +9,13 @@ from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
 from labrig.acquire import CAMERA, Plan, Step, shutter_text
+from labrig.cli.wording import counted, measurement
 from labrig.consent import calls, has_consent, starting
 from labrig.foundation.quantity import duration_text
 from labrig.record import PERSON, size_text
 
 if TYPE_CHECKING:
     from labrig.bench import Recording
-
-#: Name of a sample that a protocol does not name.
-_UNNAMED = "sample"
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, such as `1 unit` or `19 units`."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
-def measurement(protocol: str, sample: str) -> str:
-    """Return what is measured, such as `decay of blue-paint`; without a sample that says nothing.
-
-    Parameters
-    ----------
-    protocol
-        Name of the protocol.
-    sample
-        Name of the sample.
-    """
-    return protocol if sample in (_UNNAMED, protocol) else f"{protocol} of {sample}"
 
 
 #: Waits that are shorter in all are left out, in seconds.

@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from labrig.cli.completion import complete_protocol, complete_run
-from labrig.cli.plan_text import counted, measurement
+from labrig.cli.wording import counted, measurement
 from labrig.foundation.errors import UsageError
 
 if TYPE_CHECKING:
