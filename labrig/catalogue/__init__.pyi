@@ -14,6 +14,8 @@ from .run_summary import (
     RunStatus as RunStatus,
     RunSummary as RunSummary,
     status_of as status_of,
+)
+from .summarising import (
     summarise as summarise,
 )
 from .trap_depths import (

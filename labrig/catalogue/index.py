@@ -36,6 +36,7 @@ FILES = (PROTOCOL, "made.txt", "journal.jsonl", "result", f"result/{SUMMARY}")
 _MODULES = (
     "catalogue/index.py",
     "catalogue/run_summary.py",
+    "catalogue/summarising.py",
     "results/fitted_decay.py",
     "results/fitted_decay_file.py",
     "results/measured.py",
@@ -58,7 +59,7 @@ class _Entry:
 
     @classmethod
     def made_from(cls, run: Path) -> Self:
-        from labrig.catalogue.run_summary import summarise
+        from labrig.catalogue.summarising import summarise
         from labrig.results import fits_by_folder
 
         fits = fits_by_folder(run / "result").values()

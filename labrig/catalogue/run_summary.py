@@ -1,4 +1,4 @@
-"""Summary of a run with its status, made from the files of its folder."""
+"""Summary of a run, and its status."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -6,11 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from labrig.acquire import read_protocol
-from labrig.foundation.errors import DataError, DiskError, LabrigError, UsageError
-from labrig.foundation.yaml_file import read_yaml
-from labrig.record import read_run, time_made
-from labrig.results import fits_by_folder, read_fitted_decay, read_summary
+from labrig.foundation.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.record import RunRecord
@@ -21,12 +17,9 @@ if TYPE_CHECKING:
 #: journal names; `recorded`: all units are complete, without a result; `processed`: with a result;
 #: `damaged`: journal or result cannot be read.
 RunStatus = Literal["running", "interrupted", "failed", "recorded", "processed", "damaged"]
-
 STATUSES: tuple[RunStatus, ...] = get_args(RunStatus)
-
 #: Statuses of a run of which units are missing, in which it may be running at another moment.
 INCOMPLETE: frozenset[RunStatus] = frozenset({"running", "interrupted", "failed"})
-
 #: Time for which a lock has to be held to be that of a run: who only looks holds it for a moment.
 LOOK_S = 0.1
 
@@ -135,82 +128,3 @@ def is_being_written(folder: Path) -> bool:
 def utc(time_s: float) -> datetime:
     """Return a time in seconds since 1970 as a calendar's time in UTC."""
     return datetime.fromtimestamp(time_s, UTC)
-
-
-def summarise(folder: Path) -> RunSummary:
-    """Summarise the run in a folder.
-
-    Parameters
-    ----------
-    folder
-        Run folder; its files may be incomplete or damaged.
-
-    Returns
-    -------
-    RunSummary
-        Sample, protocol, status, number of frames and what decays follow.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.catalogue import summarise
-    >>> summary = summarise(Path("runs/decay"))
-    >>> summary.sample, summary.status, summary.frames
-    ('sample', 'processed', 37)
-    """
-    sample, protocol, units = _protocol_summary(folder)
-    number = None if units is None else len(units)
-    made = time_made(folder)
-    try:
-        record = read_run(folder)
-    except (DataError, DiskError):
-        has_journal = (folder / "journal.jsonl").exists()
-        status: RunStatus = "damaged" if has_journal else "interrupted"
-        return RunSummary(folder, sample, protocol, made, None, status, 0, number, 0, {})
-    completed = record.completed()
-    status = status_of(record, is_complete=units is not None and set(units) <= set(completed))
-    try:
-        parameters = {
-            place: read_fitted_decay(path).parameters
-            for place, path in fits_by_folder(folder / "result").items()
-        }
-    except DataError:
-        status, parameters = "damaged", {}
-    return RunSummary(
-        folder=folder,
-        sample=sample,
-        protocol=protocol,
-        made=made,
-        began=utc(record.attempts[0].start["time"]) if record.attempts else None,
-        status=status,
-        done=len(completed),
-        units=number,
-        frames=sum(len(attempt.frames) for attempt in completed.values()),
-        parameters=parameters,
-        headline=next(iter(read_summary(folder / "result")), ""),
-    )
-
-
-def _protocol_summary(folder: Path) -> tuple[str, str, tuple[str, ...] | None]:
-    """Return sample, protocol and names of the units from the protocol file of a run.
-
-    The names are None if the protocol is not installed.
-    """
-    path = folder / "protocol.yaml"
-    try:
-        protocol = read_protocol(path)
-        units = tuple(unit.name for unit in protocol.units())
-    except LabrigError:
-        return *_names_in(path), None
-    return protocol.sample.name, protocol.protocol, units
-
-
-def _names_in(protocol: Path) -> tuple[str, str]:
-    """Return sample and protocol of a file that no installed protocol reads, `?` if it has none."""
-    try:
-        content = read_yaml(protocol)
-    except LabrigError:
-        return "?", "?"
-    sample = content.get("sample")
-    name = sample.get("name", "?") if isinstance(sample, dict) else "?"
-    return str(name), str(content.get("protocol", "?"))
