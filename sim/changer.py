@@ -24,10 +24,8 @@ from .simulation import SampleChangerSettings, Simulation
 
 #: Largest angle of a sample against the camera's axis.
 MAX_TILT_DEG = 85
-
 #: Largest angle between light and camera.
 MAX_LIGHT_DEG = 150
-
 #: Least distance of a lamp from the sample.
 MIN_LAMP_M = 0.2
 

@@ -21,7 +21,6 @@ from .simulation import Simulation
 
 #: A servo takes over a new pulse with its next frame.
 FRAME_S = 0.02
-
 #: Ringing below this part of a quarter turn is over: 2.5e-8 of the light.
 AT_REST = 1e-4
 

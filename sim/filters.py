@@ -19,7 +19,6 @@ from .lamp import IS_VISIBLE, WAVELENGTH_NM
 
 #: Blaze of the grating and width of its efficiency in nm.
 BLAZE_NM, BLAZE_WIDTH_NM = 480.0, 260.0
-
 #: Equal slits give a triangle; lens errors round it by a normal curve of this part of its width.
 ROUNDED = 0.18
 
@@ -37,9 +36,7 @@ def passed_by(settings: MonochromatorSettings, wavelength_nm: float) -> FloatArr
 
 
 SHIPPED = "config/optics/filters"
-
 SUFFIX = ".csv"
-
 #: Distance of the random knots of what a filter differs from its curve.
 KNOTS_NM: FloatArray = np.arange(360.0, 820.0, 50.0)
 

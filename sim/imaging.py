@@ -15,7 +15,6 @@ from .sensor import read_noise_electrons
 
 #: Grain of surfaces is never darker than this part of them.
 DARKEST = 0.05
-
 #: A blur reaches so far, in its standard deviations.
 REACH = 4.0
 
@@ -92,29 +91,20 @@ def _blurred(picture: Float32Array, sigma_px: float) -> Float32Array:
 
 #: Longest side of a live picture; about that of a 5D Mark II's.
 LIVE_PIXELS = 1056
-
 #: Exposure, sensitivity and aperture of a live picture: the camera opens the lens and turns its
 #: gain up to see anything.
 LIVE_EXPOSURE_S = 1 / 30
-
 LIVE_ISO = 1600
-
 LIVE_F_NUMBER = 4.0
-
 #: Scatter of the live picture's pixels: lines are skipped, so it is noisier than a photograph.
 NOISE_FACTOR = 3.0
-
 #: Electrons that are white on the display, at `LIVE_ISO`.
 WHITE_ELECTRONS = 3_000.0
-
 #: Where the camera's own metering puts the bright part of the picture at most.
 METERED = 0.5
-
 METERED_PERCENTILE = 90
-
 #: Cloth and paint have a grain, without which there would be nothing to focus on.
 GRAIN = 0.08
-
 GRAIN_SEED = 20
 
 

@@ -114,17 +114,14 @@ class KineticsSettings(Part):
 
 #: Boltzmann's constant in eV/K.
 BOLTZMANN_EV_K = 8.617333e-5
-
 #: Temperature in K to which a material's rates belong.
 RATES_K = 294.15
 
 #: Depths of neighbouring traps differ by this at most, in eV: a factor e of their rates, which
 #: leaves a ripple below 0.1 % on their common decay.
 DEPTH_STEP_EV = 0.025
-
 #: How far a distribution of depths is followed, in its widths: 1 in 10⁵ is beyond.
 GAUSSIAN_WIDTHS, EXPONENTIAL_WIDTHS = 4.5, 12.0
-
 #: Layers of a sample: some, and so many more for each unit of its optical density.
 LAYERS, LAYERS_PER_DENSITY = 4, 2
 

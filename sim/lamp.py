@@ -22,25 +22,19 @@ from .simulation import LampSettings
 
 #: Second radiation constant hc/k, nm K (CODATA 2018).
 C2_NM_K = 1.438776877e7
-
 BURNING_K = 3000.0
-
 ROOM_K = 295.0
 
 #: The filament's heat content over its power when burning. With the next two tuned to the fade of
 #: the paper's lamp: 1/e after 31 ms at 419 nm and 51 ms at 650 nm, dark (1e-4) after 320 ms.
 FILAMENT_S = 0.366
-
 #: Part of the power that leaves by conduction, through gas and leads. By radiation alone the red
 #: afterglow would last a second.
 CONDUCTED = 0.57
-
 #: Tungsten's specific heat when cold over that at 3000 K.
 COLD_HEAT_CAPACITY = 0.6
-
 #: Total emissivity of tungsten grows with T, so radiation with the fifth power of it.
 RADIATION_EXPONENT = 5
-
 #: Cold tungsten conducts better and draws an inrush current: P = U²/R, R growing as this power.
 RESISTANCE_EXPONENT = 1.2
 
@@ -49,11 +43,8 @@ SETTLED_S = 3.0
 
 #: Cells of the wavelength grid: 300–780 nm; borders of Table 1's bands are borders of cells.
 CELL_NM = 2.5
-
 CELL_EDGES_NM: FloatArray = np.linspace(300.0, 780.0, 193)
-
 WAVELENGTH_NM: FloatArray = CELL_EDGES_NM[:-1] + CELL_NM / 2
-
 #: Where an amount of light is "that of the lamp", whatever ultraviolet comes with it.
 IS_VISIBLE: NDArray[np.bool_] = WAVELENGTH_NM > 380.0
 
@@ -63,18 +54,14 @@ SETTLING_TIMES = 1001
 #: Gauss and Legendre's nodes and weights for a panel, and how long a panel resolves a fading lamp,
 #: and a burning one.
 PANEL = np.polynomial.legendre.leggauss(8)
-
 PANEL_FADING_S = 0.02
-
 PANEL_SETTLED_S = 300.0
 
 
 #: Tungsten's, which falls linearly over the visible: 0.47 at 400 nm to 0.41 at 700 nm, about what
 #: de Vos measured in 1954.
 _EMISSIVITY: FloatArray = 0.47 - 2e-4 * (WAVELENGTH_NM - 400.0)
-
 _FIFTH_POWER: FloatArray = WAVELENGTH_NM**5
-
 _AT_560_NM = (0.47 - 2e-4 * 160.0) / (560.0**5 * math.expm1(C2_NM_K / (560.0 * BURNING_K)))
 
 
@@ -96,7 +83,6 @@ def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
 
 #: Spectrum of the burning lamp.
 BURNING_SPECTRUM: FloatArray = filament_spectrum(BURNING_K)
-
 #: Its visible light.
 BURNING_LIGHT = float(BURNING_SPECTRUM[IS_VISIBLE].sum())
 
@@ -318,16 +304,13 @@ LINES = (
     (579.0670, 0.09),
     (690.7500, 0.006),
 )
-
 #: Light of the strongest line over the warm halogen lamp's in 1 nm at 560 nm.
 STRONGEST = 40.0
-
 #: Continuum in 1 nm over the strongest line.
 CONTINUUM = 1e-4
 
 #: Light of the cold arc, and the time constant with which it warms.
 COLD = 0.4
-
 WARM_UP_S = 45.0
 
 

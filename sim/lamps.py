@@ -22,13 +22,10 @@ XENON_LINES = (
     (450.1, 0.08, 2.5), (462.4, 0.12, 2.5), (467.1, 0.32, 3.0), (473.4, 0.14, 2.5),
     (480.7, 0.10, 2.5), (492.3, 0.08, 3.0), (617.8, 0.04, 4.0), (647.3, 0.05, 4.0),
 )  # fmt: skip
-
 #: Temperature of its continuum in K, and edges in nm of the projector's filters with their widths.
 XENON_K, XENON_ULTRAVIOLET_NM, XENON_INFRARED_NM = 5600.0, (405.0, 12.0), (682.0, 8.0)
-
 #: A daylight simulator: temperature in K, and the ultraviolet that its glass takes away.
 DAYLIGHT_K, DAYLIGHT_ULTRAVIOLET_NM = 6350.0, (360.0, 15.0)
-
 #: A black light: width at half maximum in nm, and mercury's lines through its glass.
 BLACK_LIGHT_LINES = ((404.7, 0.02, 1.5), (435.8, 0.008, 1.5))
 

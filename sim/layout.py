@@ -26,16 +26,12 @@ PIECES = 400
 
 #: Order of the pass band's exponential; 2 would be a Gaussian.
 ORDER = 2.4
-
 #: Height of the shoulder, its distance and width in widths of the pass band.
 SHOULDER, SHOULDER_AWAY, SHOULDER_WIDE = 0.03, 0.8, 1.2
-
 #: Widths at the ends of the strip, of that in its middle.
 WIDTHS = (0.92, 1.08)
-
 #: Transmission of the pass band at blue end, in the middle and at the red end.
 PEAKS = (0.42, 0.58, 0.52)
-
 #: Fraction of the bend that has one turn more.
 WIGGLE = 0.15
 

@@ -40,24 +40,16 @@ from .temperature import TemperatureSensor
 #: `sim://room/lamps`, with a filter wheel `sim://room/wheel`, with one before the
 #: camera `sim://room/camera-wheel`, with a monochromator `sim://room/monochromator`.
 NAME = "room"
-
 #: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
-
 RELAYS = 8
-
 LCUS_RELAYS = 4
-
 ARDUINO_RELAYS = 4
-
 DC4100_UNITS = 3
-
 #: Analogue input of the Numato board that has the thermometer.
 TEMPERATURE_INPUT = 0
-
 #: Stream of random numbers of the thermometer alone.
 TEMPERATURE_STREAM = 9
-
 #: Streams of random numbers of the spectrometer's pixels, and of its noise.
 PIXEL_STREAM, SPECTRUM_STREAM = 10, 11
 

@@ -22,15 +22,12 @@ from .phosphor import band_cells
 from .simulation import LampSettings
 
 CURVES = "canon_eos_5d_mark_ii"
-
 CHANNELS = ("R", "G", "B")
 
 #: Three published sets of this camera's curves, peak-normalised, differ by 0.02–0.06 RMS.
 DISAGREEMENT_RMS = (0.022, 0.058)
-
 #: Distance of the random knots of that difference: smooth like a wrong reference diode.
 KNOTS_NM: FloatArray = np.arange(340.0, 840.0, 40.0)
-
 #: Fraction of it that is stray light and dark error, added where the curve itself is nearly zero.
 ADDED = 0.05
 
@@ -41,24 +38,20 @@ STRENGTHS = (1.0, 2.0, 4.0, 8.0, 16.0)
 #: sensitivity 1. Chosen: blue paint just after a long charge fills half of the range at ISO 400,
 #: f/4, 1 s.
 ELECTRONS_PER_S_NM = 33_000.0
-
 #: Radiance that a white surface reflects at irradiance 1. Chosen: under the default lamp a grey
 #: card fills half of the range at ISO 100, f/5.6, 1/60 s, about 500 times the glow of blue paint.
 REFLECTED = 12.5
-
 #: Reflectance of the black cloth around the samples.
 CLOTH_REFLECTANCE = 0.03
 
 #: Distance in nm over which a lens's glass absorbs e times less: an exponential edge (Urbach's).
 GLASS_EDGE_NM = 6.0
-
 #: Polariser of iodine in stretched film: part of unpolarised, or depolarised, light that it passes,
 #: wavelength of the half of that, and width of the edge in nm.
 FILM, FILM_EDGE_NM, FILM_WIDTH_NM = 0.4, 395.0, 7.0
 
 #: From the middle to the corner of a full-format frame, and the lens that a camera usually has.
 CORNER_MM = 21.75
-
 FOCAL_MM = 75.0
 
 
@@ -194,13 +187,11 @@ def vignetting(height: int, width: int, focal_mm: float = FOCAL_MM) -> FloatArra
 
 #: Luminous efficacy of light of 540 THz in lm/W (SI, since 2019), and mcd in a cd.
 KM_LM_PER_W = 683.0
-
 MCD = 1000.0
 
 
 #: V(λ) of CIE 1924 from 380 nm to 780 nm in steps of 10 nm.
 STEPS_NM: FloatArray = np.arange(380.0, 781.0, 10.0)
-
 STEPS = (
     3.9e-05, 0.00012, 0.000396, 0.00121, 0.004, 0.0116, 0.023, 0.038,
     0.06, 0.09098, 0.13902, 0.20802, 0.323, 0.503, 0.71, 0.862,
@@ -209,7 +200,6 @@ STEPS = (
     0.004102, 0.002091, 0.001047, 0.00052, 0.0002492, 0.00012, 6e-05, 3e-05,
     1.499e-05,
 )  # fmt: skip
-
 PHOTOPIC: FloatArray = np.nan_to_num(
     PchipInterpolator(STEPS_NM, STEPS, extrapolate=False)(WAVELENGTH_NM)
 )

@@ -56,7 +56,6 @@ class CalibrationRules(FrozenModel):
 
 #: Units of readings, each with the place at which it is taken.
 UNITS = {"lx": "sample plane", "cd/m2": "card"}
-
 _READING = re.compile(
     r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>lx|cd\s*/\s*m(?:2|²))\s*"
 )
@@ -122,7 +121,6 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 #: Difference in degrees between the angles of light and camera, on opposite sides of the surface's
 #: normal, from which a surface's gloss does not reach the camera.
 GLOSS_DEG = 30.0
-
 #: Largest angle of light or camera against the normal.
 LARGEST_DEG = 85
 

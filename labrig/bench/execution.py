@@ -156,15 +156,11 @@ ErrorT = TypeVar("ErrorT", bound=BaseException)
 
 #: Time to wait for a lost device: the user has to notice and walk to the bench.
 COMES_BACK_S = 300.0
-
 LOOK_PERIOD_S = 2.0
-
 #: Number of lost devices in one unit at which the run ends.
 MAX_LOSSES = 3
-
 #: Difference from which a clock counts as set back; times are rounded, and kept exact by NTP.
 CLOCK_STEP_S = 1.0
-
 #: Largest number of files named in a warning.
 MAX_NAMED = 4
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, DiskError, UsageError
 from labrig.foundation.yaml_file import did_you_mean, read_yaml
 from labrig.record import FrameRole, glow_temperature_c, read_run, relative_rate_change
@@ -22,9 +23,6 @@ from labrig.results import (
     read_fitted_decays,
     read_series,
 )
-
-#: Signal over σ that a reference needs.
-SEEN_SIGMA = 5.0
 
 
 def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
@@ -58,10 +56,10 @@ def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
         for run, fit in zip((a, b), fits, strict=True)
     )
     for run, signal in ((a, signal_a), (b, signal_b)):
-        if not signal.value > SEEN_SIGMA * signal.sigma:
+        if not signal.value > DETECTION_SIGMA * signal.sigma:
             raise DataError(
                 f"--reference {name}: expected light in {channel} that stands out by "
-                f"{SEEN_SIGMA:g} σ, got {signal.value:.3g} ± {signal.sigma:.2g} DN/s in {run}"
+                f"{DETECTION_SIGMA:g} σ, got {signal.value:.3g} ± {signal.sigma:.2g} DN/s in {run}"
             )
     return signal_a.over(signal_b)
 
@@ -94,12 +92,9 @@ def _steady(run: Path, name: str, channel: str) -> Measured:
 
 #: Significance level below which rates differ.
 DIFFERENT_P = 0.01
-
 #: Difference of temperatures from which a comparison says so, in K: rates change by 18 %.
 SAME_TEMPERATURE_K = 2.0
-
 NO_GAIN = Measured(1.0, 0.0)
-
 #: Smallest p-value that is reported as a number.
 MIN_P = 1e-9
 

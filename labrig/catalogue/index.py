@@ -26,12 +26,9 @@ from labrig.record import require_plain_folder, time_made
 from labrig.results import SUMMARY
 
 FILE = ".runs-index"
-
 PROTOCOL = "protocol.yaml"
-
 #: Files on which every run's summary depends; the fits in its result are added to them.
 FILES = (PROTOCOL, "made.txt", "journal.jsonl", "result", f"result/{SUMMARY}")
-
 #: Modules whose code decides what a summary says.
 _MODULES = (
     "catalogue/index.py",
@@ -42,7 +39,6 @@ _MODULES = (
     "results/measured.py",
     "results/summary.py",
 )
-
 #: Age from which another change of a file shows in its time: file systems count by up to 2 s.
 SETTLED_S = 3.0
 

@@ -54,10 +54,8 @@ class DetachableStream:
 
 #: Largest number of characters of a file name in a message.
 MAX_SHOWN = 200
-
 #: Surrogates, to which Python decodes bytes of an argument that are not UTF-8.
 _NO_TEXT = re.compile("[\ud800-\udfff]")
-
 _SET_LOCALE = "set a locale with UTF-8, such as LC_ALL=C.UTF-8"
 
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 #: Most wavelengths that an option states, and how far the last may be from a step, in nm.
 _MOST_STEPS, _ROUNDING_NM = 10_000, 1e-6
-
 #: Lights under which colours are described unless others are asked for.
 LIGHTS = ("D65", "A", "450nm")
 
@@ -25,13 +24,10 @@ File = Annotated[
         ".BFC, .csv, ART .ark, spectral .exr, or an excitation-emission matrix (.txt, .csv, .dat)."
     ),
 ]
-
 Entry = Annotated[str | None, typer.Option("--entry", help="Matrix of an archive with several.")]
-
 Pixel = Annotated[
     str | None, typer.Option("--pixel", help="Column and row of an image's pixel, such as 10,20.")
 ]
-
 Rows = Annotated[
     str | None,
     typer.Option(
@@ -40,7 +36,6 @@ Rows = Annotated[
         "it, by names or by the side that has the light.",
     ),
 ]
-
 Excitation = Annotated[
     str | None,
     typer.Option(
@@ -49,7 +44,6 @@ Excitation = Annotated[
         "does not have: first, last and step, such as 230:450:5.",
     ),
 ]
-
 Corrected = Annotated[
     bool,
     typer.Option(
@@ -58,7 +52,6 @@ Corrected = Annotated[
         "anti-Stokes side tells them.",
     ),
 ]
-
 Lights = Annotated[
     list[str] | None,
     typer.Option(

@@ -12,7 +12,6 @@ from labrig.cli.default_rig import RigArgument, rig_path
 PortOption = Annotated[
     int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
 ]
-
 NoBrowserOption = Annotated[
     bool, typer.Option("--no-browser", help="Only print the page's address.")
 ]

@@ -20,13 +20,10 @@ if TYPE_CHECKING:
 
 #: Waits that are shorter in all are left out, in seconds.
 SHORT_S = 60.0
-
 #: A number with its unit, which are not parted by the end of a line.
 _QUANTITY = re.compile(r"(\d) (s|ms|min|h)\b")
-
 #: Column at which units begin, and width of a page where there is no terminal.
 INDENT, WIDTH = 26, 120
-
 #: Number of steps by hand that are written out for units that are folded.
 WRITTEN_OUT = 3
 

@@ -30,7 +30,6 @@ from labrig.watch import Previews, RenderedPreview
 
 #: Answer that undoes the previous step.
 UNDO = "undo"
-
 #: Period in which an interruption is looked for.
 CHECK_INTERVAL_S = 0.05
 

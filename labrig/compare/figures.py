@@ -36,15 +36,10 @@ from labrig.report import (
 
 #: Number of photographs side by side, and exponent of their spacing, dense at early times.
 COLUMNS = 9
-
 SPREAD = 1.6
-
 WRITING_PT = 8.5
-
 LABELS_PT, MEANS_PT, CELL_HEIGHT_PT = 74.0, 34.0, 24.0
-
 TITLE_PT, TIMES_PT, GAP_PT = 20.0, 16.0, 8.0
-
 #: Luminance from which black text has more contrast than white text.
 BRIGHT = 0.18
 
@@ -157,7 +152,6 @@ def _luminance(linear: FloatArray) -> float:
 
 #: Characters of a sample's name that fit below its colours, by their width in points.
 LETTER_PT = 5.0
-
 #: What stands where there is no number.
 NOTHING = "–"
 
@@ -232,16 +226,11 @@ def _on_screen(xyz: FloatArray) -> FloatArray:
 PANEL_COLUMNS = 3
 
 PANEL_HEIGHT_PT, LEGEND_PT, BELOW_PT, LEFT_PT = 112.0, 22.0, 18.0, 16.0
-
 FROM_NM, TO_NM = 395.0, 705.0
-
 TICKS_NM = (400, 500, 600, 700)
-
 #: Alignment of the labels: the outer ones end with their axes, so that panels stay apart.
 _SIDES: tuple[Literal["left", "center", "right"], ...] = ("left", "center", "center", "right")
-
 TICK_PT = 8.5
-
 #: Upper limit of the vertical axes, with space for the colours above 1.
 HIGHEST = 1.4
 

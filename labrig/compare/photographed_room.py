@@ -37,7 +37,6 @@ from labrig.results import ChainResult, ResultWithDecays, RunResult, Series, wri
 
 #: Height of the frame in the rendering; its light is even on every sample.
 HEIGHT_PX, MOST_PX = 32, 512
-
 #: Name of the scene's file.
 SCENE_FILE = "dark-room.yaml"
 
@@ -117,17 +116,13 @@ FileT = TypeVar("FileT", bound=BaseModel)
 
 #: Illuminance where none was read; what is compared does not depend on it.
 ANY_LUX = 1000.0
-
 #: Steps of the lamp's fade, and the light that is left when they end.
 FADE_STEPS, DARK = 12, 1e-3
-
 #: Edges of the steps in which the lamp's housing warms, in its time constants.
 WARMING_STEPS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
-
 #: Scatter of a photograph's light by shutter, aperture and lamp, and error of a shutter in s, where
 #: neither was calibrated (1 σ).
 FLICKER, SHUTTER_S = 0.007, 2e-4
-
 #: Names of what was photographed under the lamp.
 SAMPLE, CARD = "the sample", "the grey card"
 

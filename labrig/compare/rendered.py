@@ -408,7 +408,6 @@ Row = tuple[str | float, ...]
 
 #: Columns of both tables: light over reflected light, or over that of the card.
 LIGHT = ("photographed", "photographed_sigma", "rendered", "rendered_sigma")
-
 OF_GLOW = (
     "patch",
     "t_s",
@@ -420,7 +419,6 @@ OF_GLOW = (
     "delta_e_matched",
     "delta_e_one_exposure",
 )
-
 OF_LAMPS = (
     "lamp",
     "sample",

@@ -29,10 +29,8 @@ from labrig.optics import CIE_1931, Spectrum, band_integrals, band_means, illumi
 
 #: Grid of the primaries' spectra, over which the observer sees.
 PRIMARIES_NM = np.arange(390.0, 721.0, 5.0)
-
 #: Weight of the colour over that of smoothness.
 COLOUR_WEIGHT = 1e4
-
 #: Error of a colour, relative to its luminance, up to which a spectrum is said to have it.
 SAME_COLOUR = 2e-3
 
@@ -96,13 +94,10 @@ def primary_spectra() -> tuple[FloatArray, ...]:
 XYZ_TO_RGB = np.array(
     [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
 )
-
 #: Luminance of linear sRGB.
 RGB_TO_Y = np.array([0.2126, 0.7152, 0.0722])
-
 #: Mean ȳ of a light below which no eye sees it: ȳ is 4e-5 at 380 nm.
 INVISIBLE = 1e-3
-
 #: Negative channel of a light of luminance 1 that is rounding.
 ROUNDED = 1e-3
 
@@ -244,7 +239,6 @@ def _d65_power() -> float:
 
 #: Lights under which a reflectance is to look as its three channels.
 MOST_LIGHTS = 40
-
 #: Weight of a reflectance's second differences over that of its colours.
 SMOOTHNESS = 3e-2
 

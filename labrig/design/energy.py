@@ -40,16 +40,12 @@ def emitted_over_absorbed(
 
 #: Searches for the nearest material that keeps the energy, and evaluations of each.
 SEARCHES, EVALUATIONS = 4, 40
-
 #: Relative gain and step of a search that ends it.
 LEAST_GAIN = 1e-4
-
 #: Powers of the excess by which excitation rates are lowered where a search starts.
 LOWERED = (0.0, 0.5, 1.0)
-
 #: Relative change of a coordinate by which slopes are found.
 DIFFERENCE = 1e-5
-
 #: Part of an albedo that is left at least where it leaves too little light to be absorbed.
 LEAST_PART = 0.01
 

@@ -25,7 +25,6 @@ from labrig.foundation.nonnegative import nonnegative_least_squares
 
 #: Steps of all searches, and the relative gain below which one has ended.
 STEPS, LEAST_GAIN = 25, 1e-5
-
 INITIAL_DAMPING, LEAST_FACTOR = 1e-3, 0.1
 
 
@@ -111,16 +110,12 @@ def _step(
 
 #: Pivot relative to its column below which two columns are the same.
 SINGULAR = 1e-13
-
 #: Part by which diagonals grow where columns may be the same and only a direction is sought.
 ALMOST_SINGULAR = 1e-12
-
 #: Candidates that are solved at the same time; their arrays stay in the cache.
 CHUNK = 512
-
 #: Weight of second differences of Λ and albedo where many spectra have a colour.
 SMOOTHNESS = 1e-3
-
 #: State of an unknown: 0, free, or at its upper bound.
 ZERO, FREE, FULL = 0, 1, 2
 

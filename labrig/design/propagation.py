@@ -33,15 +33,11 @@ from labrig.foundation.models import FrozenModel, Positive, UnitFraction
 
 #: Neighbours of each texel.
 NEIGHBOURS = 10
-
 #: Weight of the texels' own values against edits of weight 1, so that what no edit reaches stays.
 KEPT = 1e-4
-
 #: Clusters of texels on the coarse level of the solution.
 CLUSTERS = 400
-
 GOLDEN_RATIO = (math.sqrt(5) - 1) / 2
-
 #: Relative residual at which the linear equations are solved, and most iterations.
 SOLVED, MOST_ITERATIONS = 1e-5, 2000
 

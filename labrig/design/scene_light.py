@@ -109,13 +109,10 @@ class TexelSurface:
 
 #: Albedo of the material before it is designed.
 PLACEHOLDER = 0.5
-
 #: Places whose light stands for that of all in spectra of a design.
 TYPICAL = 8
-
 #: Times at which the glow of other phosphors is kept.
 MOST_KEPT = 256
-
 #: Half of the diagonal of a pixel.
 HALF_PIXEL = 0.5**0.5
 

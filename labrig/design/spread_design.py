@@ -32,7 +32,6 @@ from labrig.reproduce import ParameterTexture
 
 #: Strength, as a part of the largest, below which light is none.
 FAINTEST = 1e-9
-
 #: Relative difference of albedos that is rounding.
 ROUNDED = 1e-9
 
@@ -125,16 +124,12 @@ Texel: TypeAlias = tuple[int, int]
 
 #: RMS of relative residuals that nobody sees, up to which a material counts as good as another.
 UNSEEN = 2e-3
-
 #: How strongly rates of dots stay as the base's, and rates that do not change at all.
 HELD, FIXED = 1e-3, 1e3
-
 #: What is emitted over what is absorbed from which on it is nearly all.
 NEARLY_ALL = 0.9
-
 #: Materials of dots that are kept from one wish to the next.
 MOST_KEPT = 64
-
 #: Largest albedo of a texel: light has to be lost at every bounce.
 MOST_ALBEDO = 0.99
 

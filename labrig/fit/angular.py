@@ -224,20 +224,15 @@ def _scatter(design: FloatArray, value: FloatArray, noise: FloatArray, dof: int)
 
 #: Angles beyond which texture and penumbra count for more than the law: cosines of incidence, view.
 LEAST_INCIDENCE, LEAST_VIEW = 0.35, 0.4
-
 #: Relative uncertainty of the light's distance.
 DISTANCE_SIGMA = 0.02
-
 #: Uncertainty of the outline's centre and radius that all views share, in radii, beside that of
 #: finding it: of a fabric that is no perfect sphere.
 OUTLINE_SIGMA = 0.003
-
 #: Largest roughness in degrees that is tried.
 MAX_ROUGHNESS_DEG = 60.0
-
 #: Deviation from even light over that from Lambert's law below which a sample is flat.
 EVEN = 0.5
-
 _BINS = 12
 
 

@@ -26,10 +26,8 @@ from labrig.optics import Spectrum, edges_from_centres
 #: Part of its peak down to which a light is followed on both sides, and the part of that distance
 #: by which its window goes on: of a normal curve, 1e-4 of the power is beyond.
 WINDOW_LEVEL, WINDOW_ROOM = 0.02, 0.5
-
 #: Pixels over which noise is averaged when the window is looked for.
 SMOOTHED_PIXELS = 9
-
 #: A light's peak over its σ, below which there is no light.
 LEAST_PEAK = 20.0
 
@@ -318,14 +316,11 @@ def _scale_variance(share: FloatArray, scale_sigma: FloatArray) -> FloatArray:
 
 #: Least part of a light in a band from which its reflectance is read.
 LEAST_SHARE = 0.03
-
 #: Part of a light in a band from which reflected light is more than a correction.
 MIXED_SHARE = 1e-3
-
 #: Mean and σ of a reflectance of which nothing is known, even between 0 and 1; and the part of a
 #: light in a band up to which that is enough to tell re-radiation.
 UNKNOWN_REFLECTANCE = 0.5, 1 / np.sqrt(12)
-
 LITTLE_SHARE = 0.02
 
 

@@ -25,14 +25,11 @@ from labrig.optics import CHANNELS, CameraResponse, Lvf, Spectrum, Transmittance
 
 #: Wavelengths in nm of estimated curves.
 GRID_NM: FloatArray = np.arange(380.0, 781.0, 5.0)
-
 #: Part of the variance between cameras that is a smooth difference of no other camera, and the
 #: distance in nm at which it is independent. Both were chosen by leaving out each shipped camera.
 OWN_SHARE, OWN_NM = 0.08, 12.0
-
 #: Relative prior σ of the scale of each channel, which the chart's own greys tell better.
 SCALE_SIGMA = 0.1
-
 #: Fewest cameras that tell how cameras differ.
 FEWEST = 8
 
@@ -98,10 +95,8 @@ def correlation(distance_nm: float) -> FloatArray:
 #: Relative σ of a patch of one's own chart against the published means: its level and, smooth over
 #: so many nm, its course; and what is added to every reflectance, as by a dusty black.
 LEVEL, COURSE, ADDED, COURSE_NM = 0.02, 0.015, 0.002, 60.0
-
 #: Relative σ of the brightness of a scene against another one.
 BRIGHTNESS = 0.05
-
 #: Relative σ of a filter's transmittance, smooth over so many nm: its calibration rests on other
 #: curves of the camera; and of a single place.
 TRANSMITTANCE, TRANSMITTANCE_NM, ROUGH = 0.1, 60.0, 0.02
@@ -198,22 +193,16 @@ class FilterReadings:
 
 #: Relative σ of a lamp's spectrum whose file has none, and the distance in nm over which it errs.
 LAMP_SIGMA, LAMP_NM = 0.01, 60.0
-
 #: Factors of the family's covariance and of the errors' that are tried, and how firmly both are
 #: expected to be 1: degrees of freedom of an inverse χ².
 UNUSUAL = np.geomspace(0.1, 40.0, 25)
-
 MISFITS = np.geomspace(0.4, 60.0, 18)
-
 UNUSUAL_DOF, MISFIT_DOF = 4.0, 12.0
-
 #: Iterations in which errors relative to the curves follow the curves.
 ROUNDS = 4
-
 #: Reflectances from which a patch tells the scale of the channels, and their largest relative range
 #: over the wavelengths of a grey.
 GREY_REFLECTANCE, GREY_RANGE = 0.15, 0.25
-
 #: Wavelengths in nm between which a reflectance's range is that of a grey.
 GREY_NM = (450.0, 700.0)
 

@@ -56,15 +56,11 @@ from labrig.results import NORMAL_95, ForecastTime, Measured
 
 #: Factors in time of the last readings that lines are laid through, and fewest readings of a line.
 WINDOWS = (1.25, 1.6, 2.5, 5.0)
-
 FEWEST = 5
-
 #: Factors in time before the end between which rates are compared, and the growth of a rate that
 #: is none of the noise's: in σ, and relative.
 PARTS = (1.0, 1.5, 2.5, 5.0, 12.0)
-
 GROWN_SIGMAS, GROWN = 4.0, 0.05
-
 #: Largest relative σ of a rate of which the inverse is nearly normal.
 UNCERTAIN_RATE = 0.3
 
@@ -164,19 +160,14 @@ def _line(
 
 #: Most values, evenly spaced in ln t, and the fewest that a law is fitted to.
 MOST_VALUES, FEWEST_VALUES = 32, 5
-
 #: Rates of the reference: lowest in inverse last times, highest in inverse first times, number.
 LOWEST_RATE, HIGHEST_RATE, N_RATES = 0.02, 8.0, 40
-
 #: Least luminance of the reference, relative to its largest, and least slope −d ln L/d ln t.
 LEAST_REFERENCE, LEAST_SLOPE = 1e-9, 0.05
-
 #: Relative σ that the search for the scatter begins with, the least, and the number of its steps.
 BEGIN_SCATTER, LEAST_SCATTER, SCATTER_STEPS = 0.02, 1e-5, 4
-
 #: Parameters of a reference, which follow the readings.
 REFERENCE_PARAMETERS = 4
-
 #: Degrees of freedom of differences of neighbours per reading, and σ of their mean square from
 #: which given σ are too small.
 DIFFERENCE_FREEDOM, TOO_SMALL_SIGMAS = 0.6, 2.0
@@ -299,24 +290,18 @@ def _sigma_factor(x: FloatArray, light: FloatArray, sigma: FloatArray) -> float:
 
 #: Least and largest shape of a law of a rate and a shape.
 SHAPES = {"becquerel": (0.0, 2.0), "otor": (0.0, 1.0), "stretched": (0.1, 1.0)}
-
 #: Numbers of exponentials.
 N_EXPONENTIALS = (2, 3)
-
 #: Priors, mean and σ: ln of the amplitude above the first reading, ln of the rate times T, and the
 #: logit of the shape.
 AMPLITUDE, RATE, LOGIT = (1.0, 4.0), (1.5, 3.0), (0.0, 1.5)
-
 #: Priors of exponentials: ln of the slowest one's amplitude above the last reading and of its rate
 #: times T; ln of the ratio of amplitudes and of rates from one to the next faster.
 SLOWEST_AMPLITUDE, SLOWEST_RATE = (1.5, 3.0), (0.7, 1.3)
-
 NEXT_AMPLITUDE, NEXT_RATE = (1.3, 1.5), (1.6, 0.8)
-
 #: Priors of an exponential that is added to a law: part of the last time at which its light is
 #: given, and its ln relative to the whole there.
 ADDED_AT, ADDED_LIGHT = 1 / 3, (-1.0, 1.5)
-
 #: Least luminance of a law, of which the logarithm is finite.
 LEAST = 1e-300
 
@@ -412,18 +397,13 @@ def _exponentials(n: int, decay: LogDecay) -> Candidate:
 
 #: Steps δ of the walk of a slope per root of ln t.
 WALKS = (0.03, 0.1, 0.25)
-
 #: Parts of the record, in ln t, whose fits predict the rest.
 FIRST_PARTS = (0.5, 0.75)
-
 #: Steps of the fits, first damping, its factors after a good and a bad step, and its limits.
 N_STEPS, DAMPING, BETTER, WORSE = 24, 1e-2, 0.2, 6.0
-
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e9
-
 #: Change of a parameter, in its prior's σ, for slopes; largest change in a step.
 SLOPE_STEP, LARGEST_STEP = 1e-5, 1.0
-
 #: Degrees of freedom of the distributions of draws and of predictions.
 STUDENT_FREEDOM = 6.0
 
@@ -611,24 +591,17 @@ def _fits(
 
 #: Part of the draws of what the record does not foretell.
 UNFORESEEN = 0.15
-
 #: Number of draws, and least weight of a law that is drawn from.
 N_DRAWS, LEAST_WEIGHT = 2000, 2e-3
-
 #: Probability on each side of the range.
 OUTSIDE = 0.025
-
 #: Ratio of its ends from which a time is not determined.
 NOT_DETERMINED = 10.0
-
 #: ln(t/T) before and after the end T up to which laws are followed, and numbers of times.
 BEFORE, N_BEFORE = 0.7, 8
-
 AFTER, N_AFTER = math.log(300.0), 101
-
 #: Factors of the slope at the end that a law's later slope is taken as, least and largest.
 SLOPES = (0.2, 5.0)
-
 SEED = 20_260
 
 

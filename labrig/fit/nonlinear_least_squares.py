@@ -54,48 +54,33 @@ def propagated_covariance(covariance: FloatArray, transform: FloatArray) -> Floa
 Residuals = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 EPSILON = float(np.finfo(np.float64).eps)
-
 #: Relative step below which the damped search hands over to undamped steps.
 SEARCH_STEP = 1e-7
-
 #: Relative step above which a stopped search has not converged.
 CONVERGED_STEP = 1e-6
-
 #: Gain of the next step, in parts of χ², above which a search has not converged, and the relative
 #: step below which that gain is rounding.
 CONVERGED_GAIN = 1e-8
-
 ROUNDED_STEP = 1e-10
-
 #: Number of evaluations after which a search begins anew, with the scales of the place it reached.
 SEARCH_EVALUATIONS = 500
-
 #: Ratio of χ² at the start to that at the end above which the start was far.
 FAR_START = 4.0
-
 #: Gain, in parts of χ², below which a search gains nothing.
 NO_GAIN = 1e-12
-
 #: Number of evaluations of the search that is made from a far start, too.
 SECOND_EVALUATIONS = 2000
-
 INITIAL_DAMPING = 1e-3
-
 #: Smallest factor of the damping after a step as good as predicted; Nielsen's 1/3 takes 50 % more
 #: steps.
 MIN_DAMPING_FACTOR = 1 / 10
-
 #: Number of entries of the Jacobian from which the search uses the normal equations, and the
 #: covariance a triangle.
 LARGE_JACOBIAN = 100_000
-
 POLISH_STEPS = 60
-
 #: Fall of χ² that matters: it moves no parameter by more than a tenth of its σ.
 GAIN_THAT_MATTERS = 0.01
-
 POLISH_PATIENCE = 3
-
 #: Part of a step by which χ² has to begin to fall.
 BEGUN = 1 / 64
 

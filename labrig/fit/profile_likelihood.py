@@ -114,29 +114,21 @@ Value = Callable[[FloatArray], tuple[float, FloatArray]]
 
 #: Probabilities of the two intervals: within 1 and 1.96 σ of a normal distribution.
 PROBABILITIES = (math.erf(math.sqrt(0.5)), 0.95)
-
 SIGMAS = (1.0, NORMAL_95)
-
 #: Weight of a quantity's distance from its target, in units of 1/σ².
 STIFFNESS = 30.0
-
 #: Steps of a search for a limit, relative precision of √Δχ² at its end, largest ratio of a step to
 #: the way made so far, and part of that way by which a step aims beyond.
 MOST_POINTS, PRECISION, LONGEST_STEP, BEYOND = 25, 3e-3, 2.0, 0.03
-
 #: Relative step and gain in χ² at which a point of the profile is near enough, and its evaluations.
 TOLERANCE, LEAST_GAIN, MAX_ITERATIONS = 1e-4, 1e-4, 200
-
 #: Part of a quantity's σ within which it is at the end of its range, and of a step below which a
 #: parameter's bound has stopped it.
 AT_END, STOPPED = 0.01, 0.1
-
 #: Largest σ that a search goes by, as a part of the range searched.
 PART_OF_RANGE = 0.2
-
 #: Largest number with an exponential.
 LARGEST_LOG = 700.0
-
 #: Gain in χ² over the fit from which it was not at the minimum.
 LOWER_MINIMUM = 0.01
 

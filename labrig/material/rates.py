@@ -18,10 +18,8 @@ from labrig.foundation.arrays import FloatArray
 
 #: Argument below which φ₂ is summed as a series: the difference 1 − φ₁ loses digits.
 _SERIES_BELOW = 0.5
-
 #: Value of k T below which x φ₁′(x), a difference of nearly equal numbers, is summed as a series.
 _SLOPE_SERIES_BELOW = 0.03
-
 #: Σ (−x)ⁿ/(n + 2)!, highest power first; the first omitted term is 2e-17 at 0.5.
 _PHI2_SERIES = [(-1) ** n / math.factorial(n + 2) for n in range(13, -1, -1)]
 

@@ -21,7 +21,6 @@ from labrig.optics.spectrum import check_curve
 
 #: Folder of the files, JSON as rawtoaces writes it.
 FOLDER = "config/optics/cameras"
-
 #: Names of the same model elsewhere in the world.
 OTHER_NAMES = {
     "EOS 100D": ("EOS Rebel SL1", "EOS Kiss X7"),
@@ -32,7 +31,6 @@ OTHER_NAMES = {
     "EOS R6m2": ("EOS R6 Mark II",),
     "Digital Rebel XTi": ("EOS Digital Rebel XTi", "EOS 400D Digital", "EOS Kiss Digital X"),
 }
-
 #: Words of makers' names that are no part of it.
 COMPANY = {"co", "company", "corp", "corporation", "inc", "ltd"}
 
@@ -124,15 +122,11 @@ def _key(words: list[str]) -> str:
 
 
 CHANNELS = ("R", "G", "B")
-
 MONOCHROME = ("L",)
-
 #: File of curves in the result of a run of `camera_curves`.
 CURVES_FILE = "curves.csv"
-
 #: Lowest value of a measured curve, relative to its maximum, that counts as noise.
 _NOISE_BELOW_ZERO = -0.05
-
 #: Suffixes of tables; names of shipped cameras have none.
 _TABLES = (".csv", ".dat", ".txt")
 

@@ -19,15 +19,12 @@ from labrig.foundation.yaml_file import did_you_mean
 from labrig.optics.spectrum import Spectrum
 
 CIE_1931 = "CIE 1931 2 Degree Standard Observer"
-
 CIE_2015 = "CIE 2015 2 Degree Standard Observer"
 
 #: Table of wavelength in nm and x̄, ȳ, z̄ of `CIE_1931`.
 _OBSERVER = Path(__file__).with_name("cie_1931_observer.csv")
-
 #: Table of wavelength in nm and the relative power of the illuminants that its head names.
 _ILLUMINANTS = Path(__file__).with_name("cie_illuminants.csv")
-
 #: Limit of the linear part of CIELAB, and its slope and intercept (CIE 15:2018, equations 8.6).
 _LAB_LIMIT, _LAB_SLOPE, _LAB_INTERCEPT = (6 / 29) ** 3, (29 / 6) ** 2 / 3, 4 / 29
 

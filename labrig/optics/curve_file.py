@@ -124,9 +124,7 @@ _GOT = {
     Quantity.OTHER_DENSITY: "light over wavenumbers, energies or frequencies",
     Quantity.UNKNOWN: "values whose meaning is not stated",
 }
-
 _OTHER = "give another file or column"
-
 _REMEDY = {
     Quantity.LIGHT: _OTHER,
     Quantity.TRANSMITTANCE: _OTHER,
@@ -135,13 +133,10 @@ _REMEDY = {
     Quantity.UNKNOWN: "write above the columns what they are, such as wavelength_nm,absorbance or, "
     "for fractions, wavelength_nm,value",
 }
-
 #: Largest number of names listed in a message.
 LISTED = 8
-
 #: What a curve of a file may be where light, or a fraction of it, is wanted.
 _LIGHT = (None, Quantity.LIGHT, Quantity.UNKNOWN)
-
 _FRACTION = (None, Quantity.TRANSMITTANCE, Quantity.REFLECTANCE)
 
 

@@ -31,25 +31,19 @@ from labrig.text_table.rows import no_measurements
 
 #: Names of a first column that say nothing.
 _NAMELESS = frozenset({"", "x", "x-axis", "x value"})
-
 #: Keys of lines about the axis and about the values, without blanks and signs.
 _AXIS_KEY = re.compile(
     r"x(axis|units?|mode|label|axismode|axisunits?)|abscissa|(scan|spectral)?range"
 )
-
 _VALUE_KEY = re.compile(
     r"y(axis|units?|mode|label|axisunits?)|ordinate|(data|photometric|measur\w+|phot)mode|mode|"
     r"spectrumtype"
 )
-
 _COUNT_KEY = re.compile(r"npoints|numberofpixelsinspectrum|numberof(data)?points")
-
 _KEY = re.compile(
     r"[#\s\"'*]*(?P<key>\S.*?)\s*(?:[=:\t;,]+|\s{2,}|(?<=[A-Z]) )\s*(?P<value>.*?)[\s;,\"']*"
 )
-
 _PACKED = re.compile(r"xydata\W*\(x\+\+\(y\.\.y\)\)", re.IGNORECASE)
-
 #: First cell of a line that names what stands in the columns below.
 _SAMPLES = frozenset(
     {
@@ -58,7 +52,6 @@ _SAMPLES = frozenset(
         "bezeichnung",
     }
 )  # fmt: skip
-
 #: Where the unit of the axis is not stated: relative difference that is a rounding.
 _ROUNDING = 1e-3
 

@@ -18,7 +18,6 @@ from labrig.optics.spectrum import Spectrum
 
 #: Asymmetry below which the limit, a Gaussian, is equally exact.
 _GAUSSIAN = 1e-9
-
 _LN2 = float(np.log(2.0))
 
 

@@ -15,12 +15,9 @@ from labrig.optics.spectrum import Spectrum
 
 #: Luminous efficacies of monochromatic light at their maxima in lm/W (CIE 18:2019).
 PHOTOPIC_LM_PER_W, SCOTOPIC_LM_PER_W = 683.0, 1700.0
-
 #: Scotopic efficiency at 555 nm as CIE 191 takes it, its rule for m, and its first guess.
 _SCOTOPIC_555 = 683.0 / 1699.0
-
 _MESOPIC_START, _MESOPIC_SLOPE, _MESOPIC_CONSTANT = 0.5, 0.3334, 0.767
-
 #: Iterations of that rule, which converges by a factor of about 5 each time.
 _ITERATIONS = 60
 

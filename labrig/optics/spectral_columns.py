@@ -21,7 +21,6 @@ from labrig.optics.spectrum import FRACTION_SLACK
 
 #: Range of wavelengths in nm, which excludes tables in µm or in Hz.
 PLAUSIBLE_NM = (100.0, 20_000.0)
-
 #: Range in nm of an axis without a unit: beyond it are wavenumbers, Å, numbers of pixels.
 UNSTATED_NM = (150.0, 3000.0)
 
@@ -62,25 +61,19 @@ _UNITS = {
     )
     for word in words.split()
 }
-
 _WAVELENGTH = (
     "wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "λ", "wellenlänge",
     "longueur d'onde", "longitud de onda", "lunghezza d'onda",
 )  # fmt: skip
-
 _WAVENUMBER = ("wavenumber", "wavenumbers", "wave number", "wellenzahl", "nombre d'onde")
-
 _ENERGY = ("energy", "photon energy", "energie", "frequency", "frequenz")
-
 #: Axes over which a table is no spectrum of light.
 _OTHER_AXES = (
     "raman shift", "raman", "shift", "pixel", "pixels", "time", "temperature", "delay",
     "2theta", "binding energy", "kinetic energy",
 )  # fmt: skip
-
 #: What follows the name: a unit in brackets, after a slash, a comma, a blank, `_` or `in`.
 _AFTER_NAME = re.compile(r"[\s_.,]*[\s_.,/(\[]\s*(?:in )?(.*?)\s*[)\]]?")
-
 _NAMES = (*_WAVELENGTH, *_WAVENUMBER, *_ENERGY)
 
 
@@ -265,7 +258,6 @@ class Ordinate:
 
 #: Absorbance that no instrument measures.
 _LARGEST_ABSORBANCE = 20.0
-
 UNKNOWN = Ordinate(Quantity.UNKNOWN)
 
 _REFUSED = {
@@ -285,22 +277,18 @@ _REFUSED = {
         (r"\b[µμu]?mol\b|photons? ?(/|per|s-1)|quanta", "counts photons, not energy"),
     )
 }
-
 _ABSORBANCE = re.compile(
     r"abs|absorbance|absorbanz|absorption|extinction|extinktion|od|optical ?density|"
     r"optische dichte|densité optique|m?au|log10 ?\(1/[rt]\)|log ?\(1/[rt]\)"
 )
-
 _TRANSMITTANCE = re.compile(
     r"t|trans|transm|transmittance|transmission|transmissivity|transmissionsgrad|transmisson|"
     r"transmisión|transmissão|trasmissione|trasmittanza|transmitancia|durchlässigkeit|durchlass"
 )
-
 _REFLECTANCE = re.compile(
     r"r|refl|reflectance|reflection|reflectivity|reflexion|reflexionsgrad|remission|réflectance|"
     r"reflectancia|albedo"
 )
-
 _LIGHT_WORDS = frozenset(
     {
         "count", "counts", "intensity", "intensität", "intensité", "intensidad", "int",
@@ -310,13 +298,9 @@ _LIGHT_WORDS = frozenset(
         "s1c/r1", "s1c/r1c", "irr",
     }
 )  # fmt: skip
-
 _WORDS = re.compile(r"[^\W\d_][\w'./]*")
-
 _PER_CENT_WORDS = re.compile(r"%|\b(percent|per cent|prozent|pct|pour cent)\b")
-
 _FRACTION_WORDS = re.compile(r"\b(fraction|frac|anteil|0-1|0\.\.1)\b")
-
 _BRACKETS = re.compile(r"[(\[].*?[)\]]")
 
 
@@ -394,11 +378,8 @@ def _in_brackets(name: str) -> str:
 
 
 _PREFIXES = {"": 1.0, "k": 1e3, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "n": 1e-9, "p": 1e-12}
-
 _AREAS_M2 = {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "sqm": 1.0, "sqcm": 1e-4}
-
 _LENGTHS_NM = {"nm": 1.0, "µm": 1e3, "μm": 1e3, "um": 1e3, "å": 0.1, "a": 0.1, "m": 1e9}
-
 _SYMBOL = re.compile(r"([a-zµμå]+)\^?(-?\d)?")
 
 

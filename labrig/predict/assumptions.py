@@ -23,9 +23,7 @@ from labrig.protocols.steps.decays import DecaySettings
 
 #: Range of the bisection in DN/s, and number of its steps.
 DIMMEST, BRIGHTEST = 1e-3, 1e9
-
 BISECTIONS = 50
-
 #: Half a step of exposure times, in thirds of a stop: middle of brightnesses metered alike.
 HALF_A_THIRD_STOP = 2 ** (1 / 6)
 

@@ -16,13 +16,10 @@ from labrig.predict.variants import Change, changed, changes
 
 #: Largest ratio of σ after over before a change that helps.
 HELPS = 0.95
-
 #: Ratio that counts as half: dark frames are shared, so that 4 decays fall just short of it.
 HALF = 0.52
-
 #: Largest number of combined changes, and fraction of the lab time up to which one is cheap.
 MAX_TOGETHER = 3
-
 CHEAP = 0.1
 
 

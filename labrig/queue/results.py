@@ -62,21 +62,16 @@ SWEPT: tuple[tuple[str, str, str, Callable[["FoundState"], Measured]], ...] = (
     ("rates-{}", "Decay rates", "k_r / s⁻¹", lambda state: state.k_r_per_s),
     ("amplitudes-{}", "Amplitudes at lamp off", "Amplitude", lambda state: state.amplitude),
 )
-
 #: Caption of the figure of luminances.
 LUMINANCES = "Luminances at times after lamp off over {}. Bars are ± 1 σ, with the scale's."
-
 #: Heads of the table of slopes, and what it shows.
 SLOPE_HEAD = ("Quantity", "slope", "p")
-
 SLOPES = (
     "Slopes with both axes logarithmic, d ln(quantity)/d ln(key), with σ in units of the last "
     "places: 1 is proportional. p is the probability of values further from one slope."
 )
-
 #: Probability below which one slope does not describe the values.
 NO_SLOPE = 0.01
-
 #: Status before the run, beside those of runs.
 WAITING = "waiting"
 

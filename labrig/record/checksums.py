@@ -28,7 +28,6 @@ from labrig.foundation.output_file import make_folder_in, write_durably, write_p
 from labrig.record.frames import FileRecord
 
 _FOLDER, _FILE = "labrig", "kept_numbers_key"
-
 _BYTES = 32
 
 
@@ -81,18 +80,14 @@ def _read(file: Path) -> bytes | None:
 
 #: Folder of the frames in a run folder.
 FRAMES = "frames"
-
 #: Folder in a run folder for what can be made again from the frames; it may be deleted.
 CACHE = "cache"
-
 _CHECKED = "checked_frames.txt"
-
 #: Files read at once: hashing takes longer than reading from most disks.
 _READERS = 4
 
 #: Size in bytes, modification time in nanoseconds, and checksum of a file.
 _State = list[int | str]
-
 FileRecordT = TypeVar("FileRecordT", bound=FileRecord)
 
 

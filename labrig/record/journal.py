@@ -25,9 +25,7 @@ from labrig.foundation.output_file import REAL_DISK, Disk, write_durably
 from labrig.record.plain_folder import require_plain_folder
 
 JOURNAL = "journal.jsonl"
-
 _AFTER = "after"
-
 Document = tuple[str, dict[str, Any]]
 
 
@@ -365,17 +363,12 @@ VALUES: Mapping[str, Mapping[str, str]] = {
         "late_s": "number",
     },
 }
-
 #: Keys of a RunStart that are texts, where they are there.
 _TEXTS = ("protocol", "sample", "labrig_version", "guard", "rig")
-
 #: Parts of a descriptor for which labrig has nothing.
 _EMPTY = ("configuration", "object_keys", "object_classes", "hints")
-
 _READS_BACK = "_reads_back"
-
 _STATUSES = ("success", "abort", "fail")
-
 #: Times since 1970 are rounded to less than this, in seconds.
 _ROUNDING_S = 1e-5
 

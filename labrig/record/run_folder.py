@@ -82,7 +82,6 @@ def time_made(run: Path) -> datetime:
 #: Time to wait for a lock: who only looks whether it is held, holds it for a moment.
 #: Lock of the process that records into a run.
 RECORDING_LOCK = ".lock"
-
 LOCK_TIMEOUT_S = 0.5
 
 
@@ -164,7 +163,6 @@ def _holder_text(path: Path) -> str:
 
 #: File by which a run folder is recognised.
 PROTOCOL = "protocol.yaml"
-
 #: File with the calibrations that were found beside the runs, and their ages.
 CALIBRATIONS_FILE = "calibrations.yaml"
 

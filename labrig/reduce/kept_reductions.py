@@ -31,7 +31,6 @@ from labrig.record import CACHE, own_digest
 
 #: Keys of an array.
 _ARRAY = {"dtype", "shape", "base64"}
-
 #: Kinds of numbers in arrays: bool, signed and unsigned integer, float.
 _NUMBERS = "biuf"
 
@@ -93,13 +92,10 @@ def _array_or_object(content: dict[str, Any]) -> Any:
 
 #: Frames after which what is new is written, so that little is lost if the process is killed.
 _WRITE_EVERY = 100
-
 #: Largest file of them that is read, of some 10,000 frames of many patches.
 MAX_CACHE_BYTES = 200_000_000
-
 #: Libraries whose version changes what is reduced from a frame.
 _LIBRARIES = ("labrig", "numpy", "scipy", "rawpy")
-
 #: Modules beside those of `labrig.reduce` whose code reduces frames.
 _MODULES = (
     "labrig.foundation.nonnegative",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import LIT_PIXEL_SIGMA, PRECISE_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
 from labrig.optics import SLICES, CameraModel, Strip
@@ -20,32 +21,21 @@ from labrig.reduce.raw import RawFrame
 from labrig.reduce.series import reduce_patches
 from labrig.results import Series, SliceValues, StripProfile
 
-#: Least brightness of a lit pixel in units of the noise of the dark surroundings,
-SEEN_SIGMA = 6.0
-
 #: as a fraction of the brightest light near by,
 EDGE = 0.4
-
 #: and as a fraction of the brightest of all: less is stray light.
 FAINTEST = 3e-4
-
 #: Neighbourhood as a fraction of the frame's width, within which the strip's light may double.
 NEAR = 0.01
-
 #: Largest tilt: upright regions along the strip would mix too many wavelengths beyond it.
 MAX_TILT_DEGREES = 5.0
-
 #: Least ratio of a strip's length to its height, and least fraction of the frame that it fills.
 MIN_ELONGATION = 2.0
-
 MIN_FRACTION = 0.005
-
 #: Range of the lit fraction of the rectangle; more than 1 is rounding.
 FULL = (0.9, 1.1)
-
 #: Margins at each long side and at each end, as fractions of the strip's height and length.
 LONG_MARGIN, END_MARGIN = 0.12, 0.01
-
 #: Least width of a slice in pixels: a cell of the colour filter.
 _MIN_SLICE = 2
 
@@ -217,7 +207,7 @@ def _largest_lit_patch(light: Image) -> NDArray[np.uint8] | None:
     height, width = light.shape
     neighbourhood = np.ones((height // 2 * 2 + 1, int(NEAR * width) // 2 * 2 + 1), np.uint8)
     local = cv2.dilate(above, neighbourhood)
-    least = max(SEEN_SIGMA * noise, FAINTEST * float(above.max()))
+    least = max(LIT_PIXEL_SIGMA * noise, FAINTEST * float(above.max()))
     lit_mask = ((above > least) & (above > EDGE * local)).astype(np.uint8)
     cell = np.ones((3, 3), np.uint8)
     cleaned = cv2.morphologyEx(
@@ -279,8 +269,6 @@ def _interpolate_means(
 #: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
 FLICKER = 0.005
 
-#: Significance from which a value in a frame tells the frame's brightness.
-SEEN = 20.0
 
 #: Relative independent error of a place: the sensor's pattern, dust.
 PATTERN = 0.002
@@ -540,7 +528,7 @@ def _evened(series: Mapping[str, Series], unit: str) -> Mapping[str, Series]:
     usable = np.array([_usable(region, unit) for region in series.values()])
     value = np.array([region.values for region in series.values()])
     sigma = np.array([region.sigma for region in series.values()])
-    shown = usable[:, :, np.newaxis] & (value > SEEN * sigma)
+    shown = usable[:, :, np.newaxis] & (value > PRECISE_SIGMA * sigma)
     frames = np.flatnonzero(shown.any(axis=(0, 2)))
     if len(frames) < 2:
         return series

@@ -26,16 +26,11 @@ _FILES = (
     "log.txt",
     "notes.md",
 )
-
 _FOLDERS = ("frames", "result")
-
 #: What `labrig figures` draws from a result at any time.
 _DRAWN_LATER = ("result/figures/figures.pdf",)
-
 _TITLE = "# labrig seal"
-
 _LINE = re.compile(r"([0-9a-f]{64})  (\S[^\r\n\\]*)")
-
 _HEAD = re.compile(r"# (sealed|by|run|journal|labrig): (.*)")
 
 
@@ -163,9 +158,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 #: Files of the list and of its signature in a run folder.
 SEAL = "seal.sha256"
-
 SIGNATURE = f"{SEAL}.sig"
-
 _MOST_SIGNATURE_BYTES = 10_000
 
 

@@ -25,18 +25,12 @@ from labrig.foundation.input_file import read_text
 
 #: Purpose of a signature of labrig, `-n` of ssh-keygen.
 NAMESPACE = "labrig-run"
-
 #: Name of the only kind of key.
 ED25519 = "ssh-ed25519"
-
 _MAGIC, _VERSION = b"SSHSIG", struct.pack(">I", 1)
-
 _HASHES = {b"sha256": hashlib.sha256, b"sha512": hashlib.sha512}
-
 _BEGIN, _END = "-----BEGIN SSH SIGNATURE-----", "-----END SSH SIGNATURE-----"
-
 _KEY_BYTES = 32
-
 _LINE = 70
 
 
@@ -214,7 +208,6 @@ def _texts(content: bytes) -> list[bytes]:
 
 
 _MOST_BYTES = 1_000_000
-
 _NAMESPACES = re.compile(r'namespaces="([^"]*)"', re.IGNORECASE)
 
 

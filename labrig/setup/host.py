@@ -84,7 +84,6 @@ _REMEDIES = {
         "EOS Utility": "close EOS Utility",
     },
 }
-
 _ZADIG = "give this camera the WinUSB driver with Zadig (https://zadig.akeo.ie)"
 
 

@@ -133,10 +133,8 @@ class EditableProtocol:
 
 
 MAX_PATCHES = 200
-
 #: Tolerance of the page's rounding, by which a region may exceed the frame.
 ROUNDING = 1e-6
-
 #: Names on one line of YAML, without control characters and line ends.
 _ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
 
@@ -182,7 +180,6 @@ class DrawnPatches(FrozenModel):
 
 #: Longest wait for a picture until the browser has to repeat its request.
 PICTURE_TIMEOUT_S = 10.0
-
 _HERE = Path(__file__).parent
 
 PAGES: Mapping[str, Path] = {
@@ -284,10 +281,8 @@ class _Conversation(LocalConversation):
 
 #: Period of the pictures: enough for focusing by hand, with pauses for the camera.
 PICTURE_PERIOD_S = 0.1
-
 #: Longest real time until Ctrl-C is answered.
 CHECK_INTERVAL_S = 0.1
-
 #: Keys of devices that may have a live view, in order of preference.
 _LIVE_VIEW_KEYS = (VIEWFINDER.key, CAMERA.key)
 

@@ -32,10 +32,8 @@ from labrig.foundation.yaml_file import validate
 
 #: Frames of a programme, and the least of one light in it.
 FRAMES, LEAST = 200, 4
-
 #: Time in s after a change of light up to which frames lie evenly.
 EVEN_S = 0.5
-
 #: Shown time after the last key and after the last change of light: a part of the time that has
 #: passed since that change, and at least so many seconds.
 AFTER, AT_LEAST_S = 0.3, 60.0
@@ -81,10 +79,8 @@ def _delays(duration_s: float, count: int, *, is_last: bool) -> FloatArray:
 
 #: Name of the page in messages about what it sent.
 SOURCE = "the page"
-
 #: Most states and bands of a material that is set by hand.
 MOST_STATES, MOST_BANDS = 2, 100
-
 #: Digits of the numbers that are sent.
 DIGITS = 5
 

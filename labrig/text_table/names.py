@@ -23,18 +23,13 @@ _TIMES = frozenset(
         "stunden", "milliseconds", "millisekunden", "microseconds", "nanoseconds", "picoseconds",
     }
 )  # fmt: skip
-
 #: Units that alone name a column of times; `min` may be a minimum, `d` a distance.
 _TIMES_BY_UNIT = frozenset({"fs", "ps", "ns", "us", "ms", "nsec", "usec", "msec"})
-
 #: Names of the abscissa, if no column is called a time.
 ABSCISSAS = frozenset({"x", "x_value", "x-value", "x value", "lifetime", "timestamp"})
-
 #: Names of a column that counts channels of a memory, or bins of a histogram.
 _CHANNELS = frozenset({"chan", "channel", "channels", "ch", "ch.", "bin", "bins", "kanal", "canal"})
-
 _NUMBER_OF = re.compile(r"\s*(?:#|no\.?|nr\.?|numbers?|nummer)$")
-
 #: Names of other abscissas, and their units, which tell a header that is no table of times.
 _OTHER_ABSCISSAS = frozenset(
     {
@@ -43,9 +38,7 @@ _OTHER_ABSCISSAS = frozenset(
         "wellenzahl", "raman shift", "energy", "photon energy", "frequency",
     }
 )  # fmt: skip
-
 _OTHER_UNITS = frozenset({"nm", "nanometers", "nanometres", "um", "a", "å", "cm-1", "1/cm", "ev"})
-
 #: Units of time in seconds by their names, in lower case.
 _UNITS_S = {
     unit: seconds
@@ -67,42 +60,32 @@ _UNITS_S = {
     )
     for unit in units
 }  # fmt: skip
-
 #: Unit with a power of ten before it: `10^-9 s`, `x10⁻⁶ s`, `1E-3 sec`.
 _POWER_OF_TEN = re.compile(
     r"(?:[x×*·]\s*)?(?:10\s*\^?\s*\(?(?P<power>[+-]?\d+)\)?|1(?:\.0*)?e(?P<e>[+-]?\d+))"
     r"[\s*·x×]*(?P<unit>[^\W\d_]+)"
 )
-
 #: Letters that look alike, and blanks that do not break a line, as units are written with them.
 _TYPOGRAPHY = str.maketrans({"µ": "u", "μ": "u", "\u00a0": " ", "⁻": "-", "−": "-", "¹": "1"})
-
 _POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺", "0123456789+")
-
 #: Names of an uncertainty, in lower case.
 _SIGMA = (
     r"sigma|σ|±|\+/-|\+-|errors?|err|std|std\.? ?dev\.?|stdev|standard deviation|standard error|"
     r"uncertainty|uncert|unc|s\.?d\.?|s\.?e\.?|u|δ|delta|fehler|unsicherheit|abweichung|"
     r"standardabweichung|erreur|incertitude|[dy]?error|y ?err|dy"
 )
-
 _SIGMA_ALONE = re.compile(_SIGMA)
-
 _SIGMA_AFTER = re.compile(rf"(?P<of>.+?)(?:[\s_.\-]+(?:{_SIGMA})|\s*[±σ])")
-
 _SIGMA_BEFORE = re.compile(
     rf"(?:(?:{_SIGMA})[\s_.\-]+(?:(?:of|in|von|de)\s+)?|[±σδ]\s*|d_)(?P<of>.+)"
 )
-
 _SIGMA_OF = re.compile(rf"(?:{_SIGMA})\s*\((?P<of>.+)\)")
-
 _ROW_NUMBERS = frozenset(
     {
         "", "#", "no", "no.", "nr", "nr.", "n", "index", "point", "row", "id", "sample", "frame",
         "record",
     }
 )  # fmt: skip
-
 #: Forms of a name with its unit: `time (s)`, `I [a.u.]`, `t / s`, `Zeit in s`, `time_ms`.
 _WITH_UNIT = tuple(
     re.compile(pattern)
@@ -113,7 +96,6 @@ _WITH_UNIT = tuple(
         r"(?P<name>.*\S)\s*,?\s+in\s+(?P<unit>\S+)",
     )
 )
-
 _TIME_WITH_UNIT = re.compile(
     r"(?P<name>.*[^\s_.,:|{<-])[\s_.,:|{<-]+(?P<unit>[^\s_.,:|{}<>-]+)[}>.]?"
 )
@@ -195,12 +177,9 @@ _DECIBEL = re.compile(
     r"(?:(?P<name>.+?)[\s_/]+)?(?P<unit>d[Bb][\s(]*(?P<to>[mnuµμ]?W|m|c|FS|[muµμ]?V|u|[muµμ]?A)?\)?)"
     r"(?:\s*re\.?\s*(?:1\s*)?(?P<re>\S+))?"
 )
-
 #: References of decibels of a power, with the unit, and of an amplitude.
 _OF_POWER = {"m": "mW", "mW": "mW", "W": "W", "µW": "µW", "uW": "µW", "nW": "nW", "c": ""}
-
 _OF_AMPLITUDE = {"V": "V", "mV": "mV", "µV": "µV", "uV": "µV", "u": "", "FS": ""}
-
 #: Words in names of quantities whose decibels are those of a power, and of an amplitude.
 _UNIT_POWERS = frozenset(
     {
@@ -210,32 +189,24 @@ _UNIT_POWERS = frozenset(
         "optical", "photons",
     }
 )  # fmt: skip
-
 _AMPLITUDES = frozenset(
     {"u", "v", "volt", "volts", "voltage", "spannung", "tension", "amplitude", "current", "strom"}
 )
-
 _BASES = {
     "ln": math.e, "loge": math.e, "log10": 10.0, "lg": 10.0, "log2": 2.0, "ld": 2.0, "lb": 2.0,
 }  # fmt: skip
-
 _LOG = r"(?P<log>ln|lg|ld|lb|log(?:[\s_]?(?:e|10|2))?)"
-
 _LOGARITHM = re.compile(
     rf"(?P<sign>[-+]?)\s*{_LOG}"
     r"(?:\s*[(\[{]\s*(?P<in>.+?)\s*[)\]}]?|[\s_]+(?:of\s+)?(?P<after>[^\W\d].*?)|)"
     r"(?:\s*[(\[](?:a\.?\s?u\.?|arb.*|1|-)?[)\]])?",
     re.IGNORECASE,
 )
-
 #: A light divided into that at the begin: its logarithm grows.
 _INVERSE = re.compile(r"[_\s(]*(?:0|max|t\s*=\s*0)\)?\s*/")
-
 _MAGNITUDE = re.compile(r"(?P<milli>m?)mag(?:\b.*)?")
-
 #: The same without a blank: `lnI`, but not `Login`.
 _GLUED = re.compile(r"(?P<log>ln|lg|log(?:10|2)?)(?P<of>[A-Z].*)")
-
 #: Words for a logarithm: `natural log of I`, `I_log`, `Intensity, ln`, `log-transformed signal`.
 _WORDED = re.compile(
     r"(?P<kind>natural|decadic|common|decimal)[\s_-]*log(?:arithm)?\s*(?:\(?of\b)?\s*\(?(?P<in>.*?)\)?"
@@ -244,16 +215,12 @@ _WORDED = re.compile(
     r"|log[\s_-]*(?:arithm(?:ic|us)?|transformed|scaled?)\b.*",
     re.IGNORECASE,
 )
-
 #: `E (ln(lx))`: a unit that is a logarithm.
 _NESTED = re.compile(
     rf"(?P<name>.+?)\s*[(\[]\s*(?P<unit>{_LOG}\s*[(\[].+[)\]])\s*[)\]]", re.IGNORECASE
 )
-
 _KINDS = {"natural": "ln", "decadic": "log10", "common": "log10", "decimal": "log10"}
-
 _OTHER_FUNCTION = re.compile(r"1\s*/\s*\(?(?P<of>[^\W\d].*)|(?:sqrt|exp)\s*\(.*|√.*", re.IGNORECASE)
-
 _ABSORBANCE = frozenset({"absorbance", "abs", "od", "mod", "extinction", "extinktion", "absorbanz"})
 
 

@@ -24,17 +24,13 @@ from labrig.foundation.arrays import BoolArray, FloatArray
 
 #: Differences to the neighbours, in steps of the last digit, from which equal values are no chance.
 _STEPS = 10.0
-
 #: Fraction of the rows that are copies, and length of a run of equal values, from which they are.
 _FRACTION, _RUN = 0.15, 5
-
 #: Fewest copies, and fewest rows that tell them.
 _FEWEST, _FEWEST_ROWS = 4, 10
-
 #: Rows before and after a run in which the last digit of its values is looked for, and how well
 #: they are multiples of it.
 _NEAR, _MULTIPLE = 10, 1e-3
-
 #: Largest number of steps that neighbouring levels are apart, where all are multiples of one.
 _PARTS = 6
 
@@ -160,7 +156,6 @@ def _last_written(levels: FloatArray, level: float) -> float:
 #: Distance to the values beside, in steps of the last digit, from which equal values are a limit.
 #: Photons that get rare go to zero from some counts at once.
 _STEPS_BELOW_CEILING, _STEPS_ABOVE_FLOOR = 10.0, 50.0
-
 #: Fewest equal values, and fraction of the values from the first to the last of them.
 _FEWEST_AT_CEILING, _FEWEST_AT_FLOOR, _LIMIT_FRACTION = 3, 5, 0.5
 
@@ -244,7 +239,6 @@ def _step(values: FloatArray, first: int, end: int) -> float:
 
 #: Magnitude from which a number is no measurement; SCPI's marks are 9.9e37, others 1e38, 3.4e38.
 _OVERLOAD = 9.8e37
-
 #: Words of meters, loggers, spreadsheets and languages, in upper case.
 _WORDS = re.compile(
     r"[+\-<>]?(?:[O0]\.?\s?L\.?|OV(?:E?R)?(?:LD|L|FL)?|OVERLOAD(?:ED)?|OVERFLOW|OVER[\s\-]?RANGE|OFL"
@@ -253,16 +247,12 @@ _WORDS = re.compile(
     r"|[+\-]?(?:1\.#\w+|S?Q?NAN(?:\(\w*\))?)|NA|N/A|N\.A\.|NV|NULL|NONE|NIL|NO DATA|MISSING|INVALID"
     r"|BAD|ERR|ERROR|FEHLER|#[A-Z/0!?]+[!?]?|-+|\*+|#+|\?+|[.]{2,}|[=_~]+|[–—]+"
 )
-
 #: Nines, perhaps with zeros behind, that mark missing data: 9999, -999.9, 9.99999e9.
 _NINES = re.compile(r"9{3,10}0*")
-
 #: A power of ten, which some meters show for overload: 1e9.
 _POWER = re.compile(r"10*")
-
 #: How far beyond every other value a number of nines, or a power of ten from 1e6 on, is a mark.
 _BEYOND_NINES, _BEYOND_POWERS, _LEAST_NINES, _LEAST_POWER = 10.0, 1e4, 999, 1e6
-
 #: Fewest other values that tell so of either.
 _FEWEST_NINES, _FEWEST_POWERS = 3, 8
 
@@ -338,10 +328,8 @@ def _far_marks(values: dict[int, float]) -> set[int]:
 
 #: Fraction of the rows from which rows whose time goes back are in no order at all.
 _NO_ORDER = 0.1
-
 #: Fraction of the light's fall by which it rises again where a decay is repeated.
 _RISE = 0.2
-
 #: Values of which means are taken, and by how many of their σ the light has to have fallen.
 _VALUES, _SIGMAS = 5, 10.0
 

@@ -28,12 +28,9 @@ from labrig.watch.preview import Preview, glance
 
 #: Largest numbers of past and coming steps, as many as the page shows.
 MAX_DONE = 2
-
 MAX_NEXT = 6
-
 #: Devices of steps that are waits, and of choices of the protocol.
 WAITING, FINDING = "-", "protocol"
-
 #: Key by which a step of the plan is found for a journal line.
 _Key = tuple[str, str]
 
@@ -159,7 +156,6 @@ def _text_of(record: ActionRecord | FrameRecord) -> str:
 
 
 PICTURE_WIDTH = 720
-
 #: Number of earlier decay frames read per look, so that the page does not wait for thousands.
 MAX_EARLIER = 4
 

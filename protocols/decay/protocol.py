@@ -6,12 +6,12 @@ After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appea
 from collections.abc import Sequence
 
 from labrig.acquire import Unit
-from labrig.protocols.steps.decays import WHY, DaylightUnit, DecaySettings, DecayUnit
+from labrig.protocols.steps.decays import WHY, DaylightUnit, DecaySettings
 from labrig.protocols.steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
-from labrig.protocols.steps.scenes import Arrangement, Scene, ScenesProtocol
+from labrig.protocols.steps.scenes import Arrangement, Scene
 
 
-class Decay(DecaySettings, ScenesProtocol):
+class Decay(DecaySettings):
     """Decay protocol; `decay.yaml` is the commented example."""
 
     def scenes(self) -> Sequence[Scene]:
@@ -20,7 +20,7 @@ class Decay(DecaySettings, ScenesProtocol):
         if isinstance(self.exposure, str):
             longest_s = self.charge if isinstance(self.charge, float) else METER_CHARGE_S
             units.append(MeterUnit(self, longest_s))
-        units += [DecayUnit(self, f"decay-{number}") for number in range(1, self.repeats + 1)]
+        units += self.decays()
         if self.daylight:
             units.append(DaylightUnit(self))
         scenes = [Scene(unit, Arrangement(), WHY) for unit in units]

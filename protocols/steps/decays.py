@@ -18,10 +18,10 @@ from labrig.acquire import (
     SHIELD,
     CameraOffers,
     ExposureSettings,
-    ProtocolModel,
     RigFile,
     Session,
     Shoot,
+    Unit,
     at,
     planned_rig,
 )
@@ -58,9 +58,12 @@ from .sample_pose import (
     visible_after_s,
 )
 from .sanity_checks import SanityChecks
+from .scenes import Arrangement, Scene, ScenesProtocol
 
 #: Earliest first photograph after lamp off: a halogen lamp has gone dark by then.
 EARLIEST_S = 0.5
+#: Reason for the sample by itself.
+WHY = "its glow is photographed by itself"
 
 
 class Plateau(FrozenModel):
@@ -83,7 +86,7 @@ class Plateau(FrozenModel):
     at_most: DurationS = Field(7200.0, gt=0)
 
 
-class DecaySettings(ProtocolModel):
+class DecaySettings(ScenesProtocol):
     """Settings of a decay; `decay.yaml` is the commented example.
 
     Attributes
@@ -162,6 +165,14 @@ class DecaySettings(ProtocolModel):
                 f"{duration_text(self.every)} apart; make it longer"
             )
         return self
+
+    def decays(self) -> Sequence[Unit]:
+        """Return a charge with the decay after it, as often as it is repeated."""
+        return [DecayUnit(self, f"decay-{number}") for number in range(1, self.repeats + 1)]
+
+    def scenes(self) -> Sequence[Scene]:
+        """Return the decays alone, without dark frames and metering."""
+        return [Scene(unit, Arrangement(), WHY) for unit in self.decays()]
 
     @property
     def first_s(self) -> float:
@@ -331,8 +342,6 @@ class DecayFrames(StrEnum):
     PLATEAU = "plateau"
 
 
-#: Reason for the sample by itself.
-WHY = "its glow is photographed by itself"
 #: Shutter times of the daylight photograph: one of them is right whatever the lamp.
 DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
 LAMP_SETTLES_S = 5.0

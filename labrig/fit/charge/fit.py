@@ -37,6 +37,7 @@ from labrig.fit.profile_likelihood import (
     parameter,
 )
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.material import MAX_ORDER
 from labrig.results import Measured, OneSided, ProfileInterval
@@ -158,36 +159,23 @@ def _falling(log_rate: float) -> float:
 
 #: Largest number of states.
 MAX_STATES = 2
-
 #: Largest η that is tried; above 1 it conserves no energy.
 MAX_STIMULATED = 10.0
-
 #: Concentration after the charge at the least κ: saturation changes nothing.
 UNSATURATED = 1e-3
-
 #: Start values: orders, κ times the length of the charge, and speeds of the states over the
 #: inverse time in which the light falls by a factor e.
 START_ORDER, START_KAPPA = 1.7, 0.3
-
 START_SPEEDS = {1: ((1.0,),), 2: ((3.0, 0.3), (1.5, 0.7))}
-
-#: Difference in BIC from which a model with more parameters is preferred: odds of e^3 = 20 : 1.
-CLEAR_BIC = 6.0
-
 #: Gain in χ² of a step at which fits that are compared end.
 LEAST_GAIN = 0.1
-
 TOLERANCE = 1e-7
-
 MAX_ITERATIONS = 150
-
 #: Largest σ of log κ with which κ is known from above, and gain in χ² over the least κ from which
 #: it is known from below: 3 σ.
 KNOWN_LOG_KAPPA, KNOWN_GAIN = 0.5, 9.0
-
 #: Distance of an order from 1 in σ from which τ = 1/((b − 1) k r(0)^(b − 1)) has a σ of its own.
 ABOVE_FIRST_SIGMAS = 2.0
-
 #: Chance of noise alone to look like a misfit.
 MISFIT_CHANCE = 1e-3
 
@@ -297,7 +285,7 @@ def _chosen(candidates: Sequence[ChargeCandidate]) -> int:
     """Return the index of the first model that no later one beats clearly."""
     chosen = 0
     for index, candidate in enumerate(candidates):
-        if candidate.bic < candidates[chosen].bic - CLEAR_BIC:
+        if candidate.bic < candidates[chosen].bic - STRONG_EVIDENCE_DELTA_BIC:
             chosen = index
     return chosen
 

@@ -22,7 +22,6 @@ from labrig.material import DECAY_LAWS, becquerel_of, lit_concentration, lit_ste
 
 #: Parameters of a state: log κ, log s, b, log g; and the place of b.
 STATE_PARAMETERS, ORDER = 4, 2
-
 #: Those of all states, which follow: η, the prompt light and the dark level.
 COMMON_PARAMETERS = 3
 
@@ -134,22 +133,16 @@ class _StateLight(NamedTuple):
 
 #: Readings nearer than this to a switching of the lamp, in steps between readings, are left out.
 SWITCHING_STEPS = 1.5
-
 #: Least number of readings under the lamp, and of those after it.
 LEAST_READINGS = 4
-
 #: Neighbours whose median is taken for the mean light where σ is not given.
 NEIGHBOURS = 9
-
 #: Median of the square of a standard normal variable.
 MEDIAN_SQUARE = 0.4549
-
 #: Least counts in the variance of a reading.
 LEAST_COUNTS = 4.0
-
 #: Least light after the lamp, in σ of its mean.
 VISIBLE_SIGMAS = 5.0
-
 #: Stretches of the charge, of equal times, and of the decay, of equal ratios of times, in which
 #: residuals are summed.
 CHARGE_STRETCHES, DECAY_STRETCHES = 15, 25

@@ -20,21 +20,16 @@ from labrig.results import DecayState, UnseenFlicker
 
 #: Values below which neither is looked for, and first values that are looked at.
 FEWEST_VALUES, MOST_VALUES = 12, 1000
-
 #: Frequencies that are looked at, in values a second of the mean spacing, and periods in the record
 #: from which residuals that repeat are no misfit.
 HIGHEST, FEWEST_PERIODS = 2.5, 6.0
-
 #: Frequencies that are computed for each that is independent of the others.
 OVERSAMPLING = 5
-
 #: Coherence |Σ exp(2πi f t)|/n of the times from which frames are evenly spaced, unless few frames
 #: have it by chance.
 EVEN = 0.6
-
 #: First values that tell it, and most frequencies.
 MOST_TIMES, MOST_FREQUENCIES = 300, 4000
-
 #: Part of a flicker below which it does not matter.
 LEAST_SHARE = 0.1
 
@@ -191,30 +186,21 @@ def _even_from(n_values: int) -> float:
 
 #: Significance level of each misfit test.
 MISFIT_LEVEL = 5e-4
-
 #: Number of frames below which the order of residuals is not tested.
 FEWEST_FOR_ORDER = 8
-
 #: Reduced χ² below which σ is doubted: 0.6 of the scatter that it says, if not by chance.
 TOO_SMALL_CHI2 = 0.36
-
 #: σ of log k from which a rate is said to be known badly: errors of such a rate are far from
 #: symmetric, and beyond 3 σ more often than σ says.
 KNOWN_BADLY = 0.2
-
 #: Ratio to the slowest rate searched below which a rate is at that bound.
 NEAR_BOUND = 1.001
-
 BELOW_ZERO_SIGMAS = 5.0
-
 OFFSET_SIGMAS = 4.0
-
 #: Distance of an outlier from the curve in robust standard deviations of the frames.
 OUTLIER_SIGMAS = 7.0
-
 #: Distance of an outlier in σ of its own noise, and the largest number of outliers reported.
 OUTLIER_OWN_SIGMAS = 3.0
-
 MAX_NAMED = 2
 
 

@@ -36,44 +36,31 @@ from labrig.material import exponential_means
 from labrig.results import ScatterSigma
 
 COARSE_RATES = 48
-
 #: Logarithm of the slowest rate, in 1/spans, beside a free offset. Slower ones and a negative
 #: offset cancel, but their light would flicker: ρ came out four times too small.
 SLOWEST_BESIDE_OFFSET = 0.0
-
 #: Number of steps into which each iteration divides the distance of two rates.
 REFINEMENT = 4
-
 #: Iterations: the grid ratio falls from 1.2 to 1.003, the error of the curve below 1e−5; and how
 #: many suffice as long as weights and flicker still change.
 ROUNDS, FIRST_ROUNDS = 3, 1
-
 #: Upper limit of the flicker of shutters, apertures and lamps: a larger scatter is due to a wrong
 #: dark level or model.
 MAX_FLICKER = 0.1
-
 #: Alternations of curve, channel weights and flicker; of curve and weights if flicker is given.
 ALTERNATIONS = 5
-
 ALTERNATIONS_IF_GIVEN = 2
-
 FLICKER_ITERATIONS = 12
-
 #: Signal of all frames in σ below which it is noise.
 MIN_BRIGHTNESS = 4.0
-
 #: Fraction of the bright frames' information that the curve must leave to the flicker.
 MIN_SPARE = 1e-6
-
 #: Scale of the half-Cauchy prior of the flicker (A. Gelman, Bayesian Analysis 1, 2006): shutters,
 #: apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
 USUAL_FLICKER = 0.01
-
 #: Number of values of ρ that propagate its uncertainty, and size of their grid.
 LIKELY_FLICKERS = 16
-
 FLICKER_GRID = 200
-
 #: Degrees of freedom below which the estimated flicker is unreliable.
 FEWEST_NOISE_DOF = 4.0
 
@@ -309,15 +296,12 @@ def _likely_flickers(brightness2: FloatArray, along2: FloatArray, free: FloatArr
 
 #: Iterations in which the weights of the curve follow σ; the third changes σ by less than 1 %.
 ITERATIONS = 3
-
 #: Number of fractions of each kind of noise that are weighed, dense near none and all of it.
 FRACTIONS = 9
-
 #: Prior probability that the noise is the same for all values. Some dozens of values hardly tell,
 #: and a σ that rises with the signal by accident would weigh the first values, which determine the
 #: fastest rate, too little.
 PRIOR_OF_CONSTANT = 0.7
-
 #: Scatter below which data are exact up to rounding, in units of the largest value.
 EXACT = 1e-13
 
@@ -438,9 +422,7 @@ def _mixtures() -> FloatArray:
 
 
 _MIXTURES = _mixtures()
-
 _IS_CONSTANT = _MIXTURES[:, 0] == 1
-
 _PRIOR = np.where(
     _IS_CONSTANT, PRIOR_OF_CONSTANT, (1 - PRIOR_OF_CONSTANT) / np.count_nonzero(~_IS_CONSTANT)
 )
@@ -448,16 +430,12 @@ _PRIOR = np.where(
 
 #: Chance of right σ to scatter so much that they are scaled.
 SCALED_LEVEL = 5e-4
-
 #: Log likelihood by which the factor has to be better than flicker: odds of e² = 7 : 1.
 CLEAR_LOG_LIKELIHOOD = 2.0
-
 #: Least ratio of robust scatter to scatter: below, few values lie far off and the others do not.
 LEAST_ROBUST = 0.6
-
 #: Fewest degrees of freedom that tell it.
 FEWEST_DOF = 5.0
-
 #: Values of a flicker that are tried.
 FLICKERS = np.linspace(0.0, MAX_FLICKER, 100)
 

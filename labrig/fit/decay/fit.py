@@ -26,10 +26,11 @@ from labrig.fit.decay.laws import LawFit, fit_laws, tie_warnings
 from labrig.fit.decay.noise_correlation import NoiseLikelihood
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
 from labrig.fit.decay.result import DecayFit, assemble
-from labrig.fit.decay.selection import CLEAR_BIC, choose_states, is_needed, law_margin
+from labrig.fit.decay.selection import choose_states, is_needed, law_margin
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, WhitenedSeries, decay_series, whitened
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.results import (
     AUTO,
@@ -333,7 +334,7 @@ def _chosen_law(
     if law == AUTO:
         margins = dict.fromkeys(bics, law_margin(n_states))
         # A spectrum contains all exponentials.
-        margins |= {EXPONENTIALS: 0.0, RATE_SPECTRUM: CLEAR_BIC}
+        margins |= {EXPONENTIALS: 0.0, RATE_SPECTRUM: STRONG_EVIDENCE_DELTA_BIC}
         return min(bics, key=lambda name: bics[name] + margins[name])
     if law not in bics:
         raise FitError(f"expected a signal that decays by the law '{law}', got none")

@@ -26,11 +26,11 @@ from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope, SigmaScale
 from labrig.fit.decay.further_state import HiddenState
 from labrig.fit.decay.laws import LawFit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation
-from labrig.fit.decay.selection import CLEAR_BIC
 from labrig.fit.decay.series import WhitenedSeries
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.variable_projection import JointFit
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.foundation.number_format import rounded
 from labrig.results import (
@@ -48,13 +48,10 @@ from labrig.results import (
 
 #: Significance of a bend in σ, a chance of 6 in 100,000 without one.
 BEND_SIGMAS = 4.0
-
 #: Change of a fitted parameter in its σ from which a bend matters.
 MATTERS_SIGMAS = 0.5
-
 #: Part of the bend that weights and offsets must leave over; less is rounding.
 LEAST_OWN = 1e-4
-
 #: Smallest slope of the parameters that counts as dependent.
 RCOND = 1e-10
 
@@ -169,15 +166,12 @@ def _solved(design: FloatArray, target: FloatArray) -> FloatArray:
 
 
 RISING_SIGMAS = 5.0
-
 #: Residuals over the largest value below which they are those of numbers' last digits, which are
 #: finer for small numbers than for large ones.
 ROUNDING = 1e-6
-
 #: Degrees of freedom of an estimated flicker below which its prior makes σ: Student's t then has no
 #: variance. Above, the flicker's own uncertainty is in σ.
 FEWEST_FLICKER_DOF = 2.0
-
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
 AT_BOUND = 1e-3
 
@@ -265,7 +259,7 @@ class Evidence:
     def is_another_better(self) -> bool:
         """Whether a law other than exponentials is clearly better."""
         laws = self.other_laws
-        return bool(laws) and laws[0].bic < self.exponentials_bic - CLEAR_BIC
+        return bool(laws) and laws[0].bic < self.exponentials_bic - STRONG_EVIDENCE_DELTA_BIC
 
 
 def student_factor(dof: float) -> float:

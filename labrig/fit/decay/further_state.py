@@ -26,33 +26,24 @@ from labrig.material import exponential_means
 
 #: Rates tried for a further state of any rate, and for one that is faster than all others.
 ANY_RATES, FASTER_RATES = 24, 12
-
 #: Odds that a fast state is there before the data tell: most samples have none.
 PRIOR_ODDS = 0.2
-
 #: Scale of its amplitude, relative to all others' sum.
 USUAL_SHARE = 0.4
-
 #: Lifetimes before the first frame beyond which a state was all of the light at lamp off: e^300 is
 #: near the largest number.
 LARGEST_PHASE = 300.0
-
 #: Ratio to the fastest rate found from which a further state is a fast one.
 FASTER = 2.0
-
 #: Chance from which a hidden state counts: below, the data do not support it, and a σ that covered
 #: what they say nothing of would have no limit. And the chance from which a warning tells it.
 POSSIBLE, LIKELY = 0.1, 0.5
-
 #: Probability that the amplitude of a state that goes unseen is below its limit.
 LIMIT = 0.95
-
 #: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
 SHOWN_GAIN = 40.0
-
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
 LEAST_OWN = 1e-4
-
 #: Smallest slope of the others' parameters that counts as dependent.
 RCOND = 1e-10
 
@@ -239,7 +230,6 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit, fast: FastStates) -> Hidd
 
 #: Gauss–Legendre nodes and weights on [0, 1].
 _NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)
-
 NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
 
 

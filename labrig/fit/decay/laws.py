@@ -29,7 +29,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter
 
 from labrig.fit.decay.noise_correlation import NoiseLikelihood
-from labrig.fit.decay.selection import CLEAR_BIC
 from labrig.fit.decay.series import DecaySeries, WhitenedSeries
 from labrig.fit.decay.variable_projection import (
     JointFit,
@@ -40,6 +39,7 @@ from labrig.fit.decay.variable_projection import (
 )
 from labrig.fit.nonlinear_least_squares import parameter_covariance
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.foundation.number_format import rounded
 from labrig.material import DECAY_LAWS, DecayLaw
@@ -55,32 +55,23 @@ from labrig.results import (
 #: Largest rate at lamp off in inverse shortest steps between frames, and smallest in spans: laws
 #: other than exponentials fall fast at first, and go on falling.
 FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
-
 #: Sizes of the grid of rates and shapes, smallest shape above 0 on it, and most of its basins from
 #: which a search starts.
 GRID = (36, 16)
-
 LEAST_SHAPE = 1e-5
-
 MOST_BASINS = 4
-
 #: Steps in time, relative to the time since the first frame, within which frames are merged: for
 #: the grid, which only shows where to start, and for the search.
 GRID_MERGED, MERGED = 0.05, 0.01
-
 #: Steps of a search of the rate at each shape, and of both.
 PROFILE_STEPS, MOST_STEPS = 4, 60
-
 #: First damping, and its factors after a step that descends and after another one.
 DAMPING, LESS, MORE = 1e-3, 0.1, 4.0
-
 #: Gain in χ² of a step at which a search ends.
 ENOUGH = 1e-3
-
 #: Difference in χ², absolute and relative, by which a minimum may be above the lowest one and be
 #: that after the joint fit.
 CLOSE, RELATIVELY_CLOSE = 4.0, 0.02
-
 #: Distance in σ below which two places are the same minimum.
 SAME = 0.1
 
@@ -324,9 +315,7 @@ class _Places:
 
 #: Places of the rate and of the shape among the parameters.
 LAW_RATE, LAW_SHAPE = slice(1, 2), 2
-
 MAX_ITERATIONS = 200
-
 TOLERANCE = 1e-8
 
 
@@ -595,14 +584,11 @@ def _own_covariance(fit: JointFit, series: DecaySeries, covariance: FloatArray) 
 #: the limit of every law: odds of e² = 7 : 1. At half of that, one clean decay in a hundred had a
 #: tie.
 SUPPORTED_BIC = 4.0
-
 #: Difference of two laws at the end of a forecast, in their σ, from which it matters which holds.
 #: A law that contains the other one, as one trap does the exponential, differs by less.
 MATTERS_SIGMAS = 3.0
-
 #: Part of the signal where amplitudes hold below which it does not matter whether rates are spread.
 DARKNESS = 1e-4
-
 #: Relative difference of a spectrum's forecast from which it matters: two states that are close
 #: together differ from it by less.
 SPREAD_MATTERS = 1 / 3
@@ -622,7 +608,7 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
     lowest = max(min(signals), np.finfo(float).tiny)
     return [
         f"the data do not tell {_name(fit, taken)} from {_names(fit, ties)} (ΔBIC below "
-        f"{CLEAR_BIC:.0f}): at {at_s:.3g} s they differ by a factor of "
+        f"{STRONG_EVIDENCE_DELTA_BIC:.0f}): at {at_s:.3g} s they differ by a factor of "
         f"{rounded(max(signals) / lowest, 2)}; record longer, or take more light at first"
     ]
 
@@ -630,7 +616,11 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
 def _is_close(fit: FittedDecay, taken: ComparedLaw, other: ComparedLaw) -> bool:
     difference = other.bic_above_best - taken.bic_above_best
     is_limit = fit.law == EXPONENTIALS and fit.n_states == 1
-    return -CLEAR_BIC < difference < (-SUPPORTED_BIC if is_limit else CLEAR_BIC)
+    return (
+        -STRONG_EVIDENCE_DELTA_BIC
+        < difference
+        < (-SUPPORTED_BIC if is_limit else STRONG_EVIDENCE_DELTA_BIC)
+    )
 
 
 def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:

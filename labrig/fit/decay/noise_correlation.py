@@ -36,11 +36,9 @@ from labrig.foundation.arrays import FloatArray
 
 #: Values of ρ that are tried, dense near zero, where a small one already tells.
 FLICKERS = MAX_FLICKER * np.linspace(0, 1, 100) ** 2
-
 #: Variance over that assumed where the flicker assumed is all of it and less is tried: rounding
 #: may else make it negative.
 LEAST_FACTOR = 1e-12
-
 #: Relative error of values and models by rounding: smaller residuals say nothing of a model.
 ROUNDING = 1e-13
 
@@ -116,35 +114,26 @@ class NoiseLikelihood:
 #: Correlations of neighbouring values that are weighed, and the prior probability of none: who
 #: gives the flicker has measured it, and would have seen how a steady light drifts.
 CORRELATIONS = np.array([0.0, 0.4, 0.65, 0.8, 0.92, 0.97])
-
 PRIOR_OF_NONE, PRIOR_OF_NONE_IF_GIVEN = 0.8, 0.95
-
 #: Factor by which the data raise the odds of a correlation from which a warning says so:
 #: substantial evidence on the scale of H. Jeffreys, Theory of Probability, 1961. Of 1200 series
 #: with independent noise five have it.
 TOLD = 5.0
-
 #: Factors c that are weighed: noise that correlates is larger than its scatter about a curve that
 #: follows it. The flicker c ρ has half a Student's t distribution with 3 degrees of freedom before
 #: the data; half a Cauchy distribution, as for the independent flicker, has no mean square.
 FACTORS = np.geomspace(0.5, 4.0, 7)
-
 #: Values below which no correlation is told, and number of first values that tell it.
 FEWEST_VALUES, MOST_VALUES = 12, 100
-
 #: Diagonal of a triangular factor that stands for 0, and variance that is always independent.
 TINY, INDEPENDENT = 1e-300, 1e-6
-
 #: Least estimate: a flicker that drifts with the decay leaves hardly any scatter about a curve.
 LEAST_FLICKER = 0.002
-
 #: Number of σ, the probability beyond which is that of a normal distribution, and steps of a search
 #: by halves.
 TAIL_SIGMAS, BISECTIONS = 3.0, 20
-
 #: Part of a variance, below which what is added to it does not matter.
 LEAST_ADDED = 1e-3
-
 #: Mean part of the variance from which it matters whether it correlates.
 LEAST_FRACTION = 0.1
 

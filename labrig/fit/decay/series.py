@@ -19,7 +19,6 @@ from labrig.foundation.errors import FitError
 
 #: Slowest rate searched: 1 / (this many spans of the data).
 SLOWEST_SPANS = 50.0
-
 #: Fastest rate searched: this many decays within the shortest step between frames.
 FASTEST_DECAYS = 10.0
 

@@ -29,12 +29,9 @@ from labrig.material import exponential_means
 
 #: Largest number of combinations of rates, which limits the grid.
 COMBINATIONS = 2000
-
 FINEST_GRID = 36
-
 #: Precision in log k at which the search ends and the joint fit starts.
 LOG_RATE_TOLERANCE = 0.1
-
 MAX_EVALUATIONS = 200
 
 

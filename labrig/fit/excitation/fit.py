@@ -43,10 +43,8 @@ from labrig.results import (
 
 #: Guesses of the concentration of the brightest site, the least certain start value.
 GUESSED_LEVELS = (0.05, 0.2, 0.5, 0.9)
-
 #: Kinetic order at the start where orders are fitted.
 START_ORDER = 1.5
-
 #: Grid of κ over k_r.
 KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
 
@@ -127,31 +125,22 @@ def channel_weights(problem: ExcitationProblem, reference: int) -> FloatArray:
 
 #: Tolerance of the relative step, for the starting points and for the result.
 ROUGH, FINE = 1e-3, 1e-6
-
 #: Tolerances of the fits with the flicker's covariance by the one before; the third one has hardly
 #: any effect.
 WHITENINGS = (ROUGH, ROUGH, FINE)
-
 MAX_ITERATIONS = 60
-
 #: Number of iterations of a starting point of general order.
 ROUGH_ITERATIONS = 15
-
 #: Relative error of the light on a place, which the starting points take for noise.
 LIGHT_SIGMA = 0.05
-
 #: Factor from its start value within which the starting points leave a k_r.
 ROUGH_K_R_FACTOR = 2.0
-
 #: Gain in χ² of a step at which a starting point of general order is near enough.
 ROUGH_GAIN = 0.1
-
 #: Relative σ of an amplitude above which a warning is given.
 LEVEL_KNOWN = 0.3
-
 #: Missing signal in σ from which a warning is given.
 CLEARLY_MISSING = 3.5
-
 #: Reduced χ² above which a warning is given.
 LARGE_CHI2 = 1.5
 

@@ -42,18 +42,14 @@ from labrig.results import BandQuantity, BandTests, ChargingSeries, Measured
 
 #: Step of the derivatives by logarithms.
 STEP = 1e-4
-
 #: Step of the second derivatives by the light.
 DEPTH_STEP = 1e-2
-
 #: σ of a logarithm above which a band's glow says nothing about a quantity, and of the light's
 #: variance above which the glow says nothing about the layer.
 UNKNOWN, UNKNOWN_VARIANCE = 1.0, 1e3
-
 #: Relative σ of a channel over another on a place: in a colour filter array they lie up to a pixel
 #: apart, and the glow is steep along the filter.
 HUE_SIGMA = 0.02
-
 #: Relative σ of rate and amplitude from band to band: no bench is steadier. 0.03 K change a rate by
 #: so much, and the noise of a bright glow is far less.
 RATE_SIGMA, AMPLITUDE_SIGMA = 0.0025, 0.01
@@ -264,7 +260,6 @@ def order_gain(
 
 #: Probability of all pulls together below which the law does not hold, as of all misfit tests.
 UNLIKELY = 5e-4
-
 #: Significance of a course of the pulls with the length of the charge.
 CLEAR_SIGMAS = 3.5
 
@@ -330,7 +325,6 @@ def _trend(charging: ChargingSeries, pulls: FloatArray) -> float:
 
 #: Sizes of a kind of error that are tried, the denser the smaller they are.
 TRIED = 13
-
 #: Kind of the lamp's scatter, before those of the sites.
 LAMP = 0
 

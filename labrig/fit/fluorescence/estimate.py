@@ -49,31 +49,23 @@ from labrig.material import ReradiationMatrix
 from labrig.optics import Spectrum
 
 DRAWS = 200
-
 #: Log-probability below the best at which a hypothesis is dropped.
 HOPELESS = 9.0
-
 #: Number of hypotheses with each likely number of fluorophores that are drawn from.
 SCATTERED = 60
-
 #: Power of the evidence by which hypotheses with fluorophores are weighed. It rests on shapes that
 #: no dye has exactly, and would choose too surely among those that are about as good.
 TEMPER = 0.5
-
 #: Part of the largest re-radiation that any entry may have beside all shapes: measured emissions
 #: have 1 to 2 % of their maximum far from it.
 UNSHAPED = 0.02
-
 #: What bands of 10 nm leave out: relative error of a value, and relative to the largest.
 RELATIVE_ERROR, ABSOLUTE_ERROR = 1e-3, 2e-4
-
 #: Reduced χ² that correct errors hardly exceed, and how often errors are made larger where it does.
 LARGE_CHI2, ROUNDS = 2.0, 2
-
 #: Relative error of a value under a light of unknown brightness: of camera curves that were not
 #: measured on this body, and of an emission that is only like its shape.
 LOOSE_COLOUR = 0.1
-
 #: Relative error of a value before the errors of lights and curves are known for a surface.
 CRUDE_ERROR = 0.03
 

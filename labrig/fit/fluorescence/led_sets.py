@@ -15,9 +15,7 @@ from labrig.optics import CameraResponse, Spectrum
 
 #: Relative noise of a value, and relative to the largest value under the same LED.
 RELATIVE_NOISE, ABSOLUTE_NOISE = 2e-3, 5e-4
-
 FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))
-
 STEP_NM = 1.0
 
 
@@ -149,16 +147,13 @@ RECOMMENDED_NM: Mapping[int, tuple[float, ...]] = MappingProxyType(
         12: (365, 385, 405, 430, 450, 475, 500, 525, 555, 590, 620, 650),
     }
 )
-
 #: Usual full width at half maximum in nm by the peak in nm, from LEDs' data sheets.
 USUAL_WIDTH_NM = ((365, 460, 520, 560, 590, 660), (12, 22, 33, 38, 18, 20))
-
 #: Ends of an even placement, least and largest peak, and the search's step, in nm.
 EVEN_NM, LIMITS_NM, PLACEMENT_STEP_NM = (380.0, 640.0), (350.0, 700.0), 10.0
 
 #: Least and largest number of LEDs of a set.
 NUMBERS = (3, 24)
-
 #: Quantiles over the surfaces whose mean the search lowers.
 JUDGED = (0.5, 0.9)
 

@@ -244,10 +244,8 @@ def _block_diagonal(blocks: Sequence[FloatArray]) -> FloatArray:
 
 #: Part of the re-radiation excited in bands without light from which that is a fact to know.
 MUCH = 0.1
-
 #: Reduced χ² that is a fact to know: of few degrees of freedom it scatters.
 LARGE_CHI2 = 3.0
-
 #: Fraction of light that may come back, as `labrig.material.physical_warnings` has it.
 LARGEST_FRACTION, SIGMAS = 1.1, 3.0
 

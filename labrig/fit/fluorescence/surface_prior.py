@@ -18,56 +18,41 @@ from labrig.optics import Spectrum, edges_from_centres
 
 #: Mean reflectance, standard deviation of its level and correlation length of its course in nm.
 REFLECTANCE, LEVEL_SIGMA, REFLECTANCE_NM = 0.5, 0.5, 90.0
-
 #: Standard deviations of a reflectance's course that are tried, the usual one first.
 REFLECTANCE_SIGMAS = (0.2, 0.1, 0.4)
-
 #: Standard deviations of the excitation, a fraction of the incident light, that are tried.
 EXCITATION_SIGMAS = (0.03, 0.1, 0.3, 0.7)
-
 #: The excitation ends this far below the emission's peak, within a few times a width, in nm: of
 #: dyes that emit in the blue farther than of others, and with a spread. Of the 47 dyes of the index
 #: of McNamara and Boswell with peaks from 380 nm to 460 nm it falls to one half about 40 nm below
 #: the peak, of the 459 from 490 nm on at 5 nm to 11 nm.
 STOKES_NM, STOKES_WIDTH_NM = 15.0, 8.0
-
 BLUE_STOKES_NM, BLUE_SPREAD_NM = 40.0, 13.0
-
 #: Peaks in nm below which a dye emits in the blue, and above which it does not.
 BLUE_NM = (455.0, 500.0)
-
 #: Points of the spread of a normal density and their weights, by Gauss and Hermite.
 SPREAD, SPREAD_WEIGHT = np.polynomial.hermite_e.hermegauss(5)
-
 #: How far below the peak it begins to fall, and over which distance by e, in nm.
 PLATEAU_NM, DECAY_NM = 60.0, 90.0
-
 #: Where most materials begin to absorb ultraviolet themselves, over which width, and what is left,
 #: in nm and as a fraction.
 ULTRAVIOLET_NM, ULTRAVIOLET_WIDTH_NM, ULTRAVIOLET_LEFT = 342.0, 14.0, 0.15
-
 #: How far below the peak deviations from the usual course end, in nm.
 BEYOND_NM = -5.0
-
 #: Part of the excitation's variance that is its usual course, and correlation length of the rest.
 USUAL_PART, EXCITATION_NM = 0.5, 35.0
-
 #: Standard deviations that are tried of light of all wavelengths that no dye explains (stray light,
 #: a pedestal of the lights' spectra), as re-radiation in 1/nm, independent for each light.
 BACKGROUND_SIGMAS = (5e-6, 5e-5)
-
 #: Error of an emission's peak in nm and of the logarithm of its width by the steps of the shapes.
 SHIFT_NM, LOG_WIDTH = 4.0, 0.1
-
 #: Deviation of an emission from its shape, over the geometric mean of the emission and its maximum;
 #: what is added to the emission for that, over its maximum; and correlation length in equivalent
 #: widths. Of measured dyes it is 4 to 9 % of the maximum from half a width below to two above.
 EMISSION_SIGMA, EMISSION_FLOOR, EMISSION_WIDTHS = 0.15, 1e-3, 0.5
-
 #: Distance in nm above the exciting wavelength over which an emission sets in, in the median, and σ
 #: of its logarithm.
 EDGE_NM, LOG_EDGE_SIGMA = 8.0, 0.7
-
 #: Part of the deviation's variance that is the same whatever light excites (Kasha's rule).
 SAME_EMISSION = 0.9
 
@@ -143,29 +128,20 @@ def _step(x: FloatArray) -> FloatArray:
 
 #: Peaks in nm, full widths at half maximum in nm, and skews of the shapes that are tried.
 PEAKS_NM = np.arange(400.0, 721.0, 10.0)
-
 WIDTHS_NM = (22.0, 32.0, 46.0, 65.0, 92.0)
-
 SKEWS = (0.0, 0.2, 0.4)
-
 #: Dyes' widths and skews, log-normal and normal: median and standard deviation.
 MEDIAN_WIDTH_NM, LOG_WIDTH_SIGMA = 50.0, 0.45
-
 MEAN_SKEW, SKEW_SIGMA = 0.19, 0.2
-
 #: The side of long wavelengths falls as (1 + TAIL x²)^−TAIL_POWER, x in half widths: at 2 and 3
 #: half widths it has 16 and 6 % of the maximum, measured papers and textiles 16 and 3 %, and 516
 #: dyes of the index of McNamara and Boswell 20 and 9 % in the median.
 TAIL_POWER = 1.5
-
 TAIL = 2 ** (1 / TAIL_POWER) - 1
-
 #: Part of the prior probability that a library of measured emissions has.
 LIBRARY_SHARE = 0.5
-
 #: Step in nm on which a shape is averaged in bands.
 STEP_NM = 1.0
-
 #: Least part of an emission of a library that must lie in the output bands.
 LEAST_INSIDE = 0.5
 
@@ -262,10 +238,8 @@ def emission_shapes(output_nm: FloatArray, library: Sequence[Spectrum] = ()) -> 
 
 #: Variance of the excitation, relative to its largest, below which it is 0.
 LEAST_VARIANCE = 1e-3
-
 #: Added to prior covariances, relative to their largest variance.
 JITTER = 1e-6
-
 #: The same of a covariance of 0.
 TINY = 1e-20
 

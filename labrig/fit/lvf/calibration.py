@@ -36,21 +36,15 @@ from labrig.optics import (
 #: Prior mean and σ of a band. Leakage and remainder are in units of the peak, the width is its
 #: logarithm.
 LOG_FWHM = (float(np.log(NOMINAL_FWHM_NM)), 0.3)
-
 SKEW = (0.0, 0.2)
-
 LEAKAGE = (0.002, 0.01)
-
 #: σ of the logarithm of the order of a band's shape, 2 for the skewed Gaussian that is fitted: tops
 #: of interference filters are flatter, and the mean over a piece of strip makes them rounder again.
 LOG_ORDER_SIGMA = 0.1
-
 #: Prior σ of the remainder near a band and, beyond a distance in nm, of the uneven blocking.
 REMAINDER, BLOCKING, SHAPE_NM = 0.01, 0.001, 60.0
-
 #: Prior σ of the logarithm of the peak: all positions have the same order of magnitude.
 ANY_PEAK = 2.0
-
 #: Run of the parameters along a strip: order of a polynomial, and scatter about it.
 ALONG_THE_STRIP = {
     strip_problem.CENTRE: (3, 0.3),
@@ -59,18 +53,13 @@ ALONG_THE_STRIP = {
     strip_problem.LOG_PEAK: (2, 0.04),
     strip_problem.LEAKAGE: (1, 0.0005),
 }
-
 #: σ of the bend with one turn more than the map has, and least σ of its coefficients, in nm.
 THIRD_ORDER_NM, EXACT_NM = 5.0, 0.01
-
 #: Lower limit of the map's σ: strips are not smooth to a tenth of a nanometre.
 CENTRE_FLOOR_NM = 0.5
-
 #: Correlation length of errors of a gel's transmittance, which closer positions share.
 ALIKE_NM = 40.0
-
 FEWEST_FILTERS = 6
-
 #: Number of updates of the prior from the other positions, and steps in between.
 ROUNDS, STEPS = 4, 4
 
@@ -281,15 +270,11 @@ def _lvf(
 
 #: Centres in nm of the bands that are to be found, and full width of each at half maximum.
 CENTRES_NM: FloatArray = np.linspace(400.0, 700.0, 31)
-
 FWHM_NM = 25.0
-
 #: What is known without filters of a band's centre and width in nm, and of its leakage.
 KNOWN = np.array([5.0, 5.0, 0.01])
-
 #: σ of a measured transmittance: a fraction of it, by the filter's table, and noise.
 RELATIVE, NOISE = 0.02, 0.003
-
 #: Steps in nm, and of the leakage, of derivatives.
 DIFFERENCE_STEPS = np.array([1.0, 1.0, 0.001])
 

@@ -16,24 +16,18 @@ from labrig.optics import NOMINAL_FWHM_NM, WavelengthMap, peak_shape
 from labrig.results import LocatedLines
 
 FEWEST_LINES = 3
-
 #: Smallest fraction of the profile's variance that lines and background must explain.
 MIN_EXPLAINED = 0.9
-
 #: Largest deviation, in σ, of a blend's fraction from its prior: an imperfect shape would bias it
 #: otherwise.
 FRACTION_SIGMAS = 2.0
-
 #: Height of a line in σ from which it is significant.
 SIGNIFICANT = 6.0
-
 #: σ of the position, in widths, below which a line is located.
 LOCATED = 0.2
-
 #: Largest distance of a line from its assigned position, in widths: 405 and 436 nm are 1.2 apart,
 #: and must not be exchanged.
 NEAR = 0.6
-
 _STEP = 1e-5
 
 
@@ -236,20 +230,14 @@ class LineModel:
 
 #: Smallest prominence in units of the noise.
 MIN_PROMINENCE = 10.0
-
 #: Smallest prominence as a fraction of the channel's range, and of the largest range.
 MIN_FRACTION, MIN_OF_ALL = 0.03, 0.003
-
 MAX_PEAKS = 8
-
 MAX_SAMPLES = 20_000
-
 #: Distance, in widths, below which peaks of two channels are one.
 SAME = 0.5
-
 #: Width of the smoothing as a fraction of the profile.
 SMOOTHING = 0.002
-
 #: Median absolute third difference over σ, for normal noise; a smooth profile has hardly any, even
 #: if a line is but a few samples wide.
 _MAD = 0.6745 * np.sqrt(20.0)
@@ -320,15 +308,11 @@ def _distinct(peaks: list[Peak]) -> list[Peak]:
 
 #: Largest deviation of peaks from an assignment, in widths.
 TOLERANCE = 0.4
-
 #: Difference of scores below which assignments are ambiguous, and the number of them fitted.
 AMBIGUOUS = 1.0
-
 MAX_CANDIDATES = 4
-
 #: Largest bend of a strip in nm, in its middle against its ends.
 MAX_BEND_NM = 20.0
-
 #: Ratio of the unexplained variances at which the better orientation is accepted.
 CLEARLY = 1.3
 
@@ -470,10 +454,8 @@ def _assignment(centres_nm: list[float], peaks: list[Peak], fwhm_nm: float) -> A
 
 #: Significance level of a bend (F-test with known σ).
 RARE = 0.01
-
 #: Smallest σ of a line in nm: shapes of bands differ slightly.
 FLOOR_NM = 0.1
-
 #: Prior σ of the bend of a strip in nm, between its middle and its ends.
 USUAL_BEND_NM = 5.0
 

@@ -17,10 +17,8 @@ from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMixture
 
 SEED = 2021
-
 #: Widest σ of an added component that is tried, and how often it is halved.
 WIDEST_SD_BANDS, HALVINGS = 4.0, 2
-
 #: Number of entries around which an added component is tried.
 MOST_CENTRES = 48
 
@@ -118,12 +116,9 @@ def with_one_more(
 #: Starts of expectation maximisation by light and by its square, which noise far from the dye
 #: hardly draws, and how many of the best of either are refined.
 STARTS, REFINED_STARTS = 8, 1
-
 MAX_ITERATIONS = 100
-
 #: Gain in mean log-likelihood at which expectation maximisation ends.
 TOLERANCE = 1e-4
-
 #: Least σ of a component in bands: a narrower one could hide between their centres.
 LEAST_SD_BANDS = 0.5
 

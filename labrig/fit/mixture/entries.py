@@ -204,10 +204,8 @@ Scaling = Literal["integral", "least-squares", "colour"]
 
 #: How far from the scale of the integral, as a factor, colours may take it.
 FARTHEST = 2.0
-
 #: Difference in σ between fitted and summed light up to which it is taken for noise.
 NOISE_SIGMAS = 2.0
-
 #: Number of scales of which the best is the start of the search.
 GRID = 29
 

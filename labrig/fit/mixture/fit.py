@@ -33,7 +33,6 @@ from labrig.material import ReradiationMatrix, ReradiationMixture
 from labrig.optics import Spectrum
 
 FOLDS = 5
-
 SEED = 2021
 
 
@@ -131,7 +130,6 @@ Selection = Literal["bic", "cross-validation"]
 
 #: Largest number of components that "auto" tries.
 MOST_COMPONENTS = 6
-
 #: Numbers of components in a row without a lower BIC after which "auto" ends.
 PATIENCE = 2
 

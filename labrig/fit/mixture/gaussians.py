@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 AnyFloatArray = NDArray[Any]
 
 LOG_2PI = float(np.log(2 * np.pi))
-
 #: Weight below which a component is empty; its logarithm is still finite in single precision.
 LEAST_WEIGHT = 1e-12
-
 #: Multiplications of a matrix product up to which OpenBLAS takes one thread.
 ONE_THREAD = 2**18
 

@@ -15,15 +15,12 @@ from labrig.foundation.arrays import FloatArray
 #: the input, rise of the output with the input, log of σ of the output at one input. They are the
 #: Cholesky factor of its covariance, whose positive definiteness they keep.
 PARAMETERS = 6
-
 #: Bounds in units of `StokesEntries.unit_nm`: a mean stays within the measured wavelengths, σ
 #: is no more than this, and the height no less than this times the largest entry.
 LARGEST_SD, LEAST_HEIGHT, STEEPEST = 20.0, 1e-6, 20.0
-
 #: Relative step at which a fit ends; gain, in parts of the squared light, at which one that is only
 #: compared ends.
 TOLERANCE, LEAST_GAIN = 1e-7, 1e-5
-
 MAX_ITERATIONS = 400
 
 

@@ -32,7 +32,6 @@ from labrig.foundation.arrays import FloatArray
 
 #: Full widths at half maximum of lines in nm.
 FWHM_NM = np.geomspace(0.7, 22.0, 9)
-
 #: Distance of the knots of lines, per distance of the knots.
 FINER = 0.1
 
@@ -140,29 +139,22 @@ class Problem:
 #: Weights besides lines. At the least of them, knots 5 nm apart, the smooth spectrum may bend as
 #: much as a band of 40 nm with all the light: what is narrower is a matter of lines.
 WEIGHTS_WITH_LINES = WEIGHTS[26::3]
-
 #: Evidence with one line over that without above which there are lines. 150 is called decisive
 #: (Kass and Raftery, *Bayes factors*, J. Am. Stat. Assoc. 90, 1995); bands that are steep or have a
 #: kink reach that, too, if the system is a little off.
 DECISIVE = 1000.0
-
 #: Weights of spectra rougher than any broad band, and their probability above which there are
 #: lines, too: of many lines one alone explains little.
 ROUGH_WEIGHTS, ROUGH = WEIGHTS[:20], 0.5
-
 #: A line is sought with widths up to this, every so many fine knots, and with these weights.
 SOUGHT_FWHM_NM, SOUGHT_EVERY, SOUGHT_WEIGHTS = 5.0, 5, WEIGHTS[::3]
-
 #: Width of the blocks of wavelengths in nm that have lines or not, and the loss of χ² up to which
 #: all blocks without lines together may have none; width of the lines of that search in nm.
 BLOCK_NM, LOSS, SEARCH_FWHM_NM = 10.0, 6.0, 2.5
-
 #: How far from such a block lines may be, in nm: about a pass band.
 MARGIN_NM = 25.0
-
 #: Bases that are tried, and the mean distance of their lines in nm, even in its logarithm.
 CANDIDATES, DISTANCE_NM = 300, (1.5, 14.0)
-
 #: Power to which the likelihood of a basis is taken: that of finitely many bases comes no nearer.
 TEMPER = 0.5
 

@@ -217,18 +217,13 @@ def measured(
 
 #: Grid of weights of the prior, for a spectrum of about 1.
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
-
 #: Added to the curvature of the fit, for a spectrum of about 1.
 MIN_CURVATURE = 1e-6
-
 #: Distance in nm (1 σ) over which a spectrum is about as rough, rounds in which its roughness is
 #: found, and second differences that the roughness of the whole counts as among those near by.
 ROUGHNESS_NM = 8.0
-
 ROUGHNESS_ROUNDS = 8
-
 ROUGHNESS_OF_ALL = 0.1
-
 #: Gain of log evidence from which a spectrum is rougher in one place than in another.
 UNEVEN = 10.0
 
@@ -359,10 +354,8 @@ def normalised(log_probability: FloatArray) -> FloatArray:
 
 #: Number of exchanges after which block pivoting counts as cycling.
 MAX_EXCHANGES = 25
-
 #: Rounding errors of slopes, and of coordinates relative to the largest.
 ROUNDING = 100 * EPSILON
-
 SMALLEST = 1e-9
 
 

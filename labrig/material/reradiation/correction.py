@@ -30,14 +30,11 @@ from labrig.material.reradiation.noise import (
 
 #: Anti-Stokes entries from which an offset is known well enough.
 FEWEST_ENTRIES = 3
-
 #: Entries' worth of doubt about an offset, which draws that of short columns towards 0.
 DOUBT_ENTRIES = 1.0
-
 #: σ after over σ before. What is left drifts along the column: 0.7 of σ on the anti-Stokes side
 #: itself, 0.75 to 0.82 in blue and red columns, 0.82 to 0.89 at 700 to 780 nm of output.
 LEFT_SIGMA = 0.8
-
 #: Correlation of any two entries of a column after that.
 LEFT_CORRELATION = 0.23
 
@@ -96,21 +93,15 @@ def without_offset(matrix: ReradiationMatrix) -> ReradiationMatrix:
 #: Both parts above the diagonal over those below, on a BFC-450: -0.52 and -0.60 on 196 measurements
 #: of tiles, -0.48 and -0.66 at wavelengths without re-radiation of 97 other samples.
 ABOVE_TO_BELOW = np.array([-0.5, -0.63])
-
 #: Part of the correction that is uncertain: one wavelength's spill differs from the next one's.
 CORRECTION_SCATTER = 0.2
-
 #: The same at the last output band, where the instrument's scan ends: 780 nm has 1.8 times as much.
 END_SCATTER = 0.8
-
 #: Bands beside one another for which two numbers are fitted.
 FEWEST_PAIRS = 8
-
 #: Residuals beyond this many of their σ have less weight in the fit (P. J. Huber, 1964).
 HUBER_SIGMAS = 1.345
-
 TINY = np.finfo(float).tiny
-
 ITERATIONS = 20
 
 

@@ -91,7 +91,6 @@ def _mean_slope(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
-
 #: Truncation, in standard deviations above the mean, from which the tail is taken as exponential
 #: in z²: its relative error there is 1e-8, and the logarithm of the whole tail loses as much.
 FAR_TAIL = 1e4

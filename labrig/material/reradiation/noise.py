@@ -19,35 +19,25 @@ from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Entries nearer to the diagonal than this many bands hold light that passes both monochromators.
 CLEAR_BANDS = 1.5
-
 #: Entries beyond this many times the column's median are no noise; of 10⁹ normal ones, 2 are.
 CLIP_SIGMAS = 6.0
-
 #: Normal σ over the median of the absolute values.
 SIGMA_OF_MEDIAN = 1.4826
-
 #: Weight of what is expected of a column, in entries. With 4, rms pulls of held-out tiles are 0.96
 #: to 1.03 in all regions; with 1 they are up to 1.12, with 16 down to 0.93.
 EXPECTED_ENTRIES = 4.0
-
 #: Entries that are averaged for what is expected of a column, and for a row's factor.
 POOLED_COLUMN_ENTRIES, POOLED_ROW_ENTRIES = 10, 15
-
 #: The parabola of the rows ends where fewer entries than this are known, and goes on level. With 4,
 #: rms pulls of tiles at 700 to 780 nm are 1.08; to the end, a parabola has 0.94 and scatters more.
 LAST_ROW_ENTRIES = 4
-
 #: σ of the columns 300 to 390 nm (rms over them) over that of the nearest columns with an
 #: anti-Stokes side is 1.1 on the tiles; the column of 300 nm alone is 2 times as noisy.
 UNSEEN_COLUMN_RATIO = 1.2
-
 #: Scatter of a tile's reflectance beyond the noise: a part of it, and a wrong wavelength.
 REFLECTANCE_SCATTER = 0.0016
-
 WAVELENGTH_SCATTER_NM = 0.2
-
 ITERATIONS = 10
-
 #: Correlation of any two entries of a column: what makes the scatter of sums over columns.
 COLUMN_CORRELATION = 0.55
 

@@ -27,7 +27,6 @@ from labrig.optics import (
 #: `light`: a perfect white under the light itself. `D65`: that of a screen, on which the reference
 #: has the luminance `REFERENCE_Y`.
 White = Literal["light", "D65"]
-
 #: Luminance of the reference under a narrow light, of a white's.
 REFERENCE_Y = 0.5
 

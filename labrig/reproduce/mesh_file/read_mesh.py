@@ -146,7 +146,6 @@ def _cut(polygons: _Polygons, places: FloatArray, texture: FloatArray) -> Mesh:
 
 
 HEAD_BYTES = 84
-
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 

@@ -110,24 +110,17 @@ Record = Callable[[float, FloatArray], None]
 
 #: First step after a change of light, as a part of the fastest relaxation; later ones grow.
 FIRST_STEP, GROWTH = 0.25, 2.0
-
 #: Change of the logarithm of all light at which steps grow no more; rounds and parts of a step.
 MOST_CHANGE, ROUNDS, PARTS = 0.7, 2, 8
-
 #: Relative change of light within a step that is none.
 UNCHANGED = 1e-5
-
 #: Rounds in which levels of a long charge settle, and their last change.
 CHARGING_ROUNDS, SETTLED = 100, 1e-5
-
 #: Rounds of what is emitted at once.
 PROMPT_ROUNDS = 6
-
 TINY = 1e-300
-
 #: Part of the rays that may leave a closed room between its triangles: none do of a whole mesh.
 MOST_ESCAPED = 1e-4
-
 #: Steps of a scene that moves.
 MOST_STEPS = 100_000
 

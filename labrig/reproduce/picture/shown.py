@@ -20,10 +20,8 @@ from labrig.reproduce.picture.exr import SpectralFrame
 
 #: Luminances in cd/m² below which rods see alone, and above which cones do.
 RODS_ALONE_CD_PER_M2, CONES_ALONE_CD_PER_M2 = 0.01, 10.0
-
 #: The wider Gaussian of a difference of Gaussians over the narrower.
 _WIDER = 1.6
-
 #: Chromaticities x = y of equal energy and of the bluish grey of night.
 _GREY, _BLUE = 1 / 3, 1 / 4
 
@@ -231,7 +229,6 @@ def _by_rods(relative: FloatArray, look: NightLook) -> FloatArray:
 Bytes = NDArray[np.uint8]
 
 EACH, COMMON = "each", "common"
-
 #: Percentage of the pixels that are not brighter than white; lamps and their reflections are.
 UNCLIPPED_PER_CENT = 96.0
 

@@ -9,15 +9,10 @@ from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
 
 #: Lengths in m and times in s that single precision and a person can still tell apart.
 Length = Annotated[float, Field(gt=0, le=1e6)]
-
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-
 Time = Annotated[float, Field(ge=-1e9, le=1e9)]
-
 Vector = tuple[Coordinate, Coordinate, Coordinate]
-
 Name = Annotated[str, Field(min_length=1)]
-
 Count = Annotated[int, Field(ge=1, le=8192)]
 
 
@@ -100,7 +95,6 @@ STRENGTHS = {
     "distant": ("illuminance_lux", "irradiance_w_per_m2"),
     "sky": ("luminance_cd_per_m2", "radiance_w_per_m2_sr"),
 }
-
 _ALL_STRENGTHS = tuple(sorted({name for names in STRENGTHS.values() for name in names}))
 
 
@@ -310,5 +304,4 @@ class ObjectEntry(ScenePart):
 
 #: Parts of a rectangle of which a wave can be seen.
 LEAST_PARTS = 8
-
 SHAPES = ("rectangle", "disk", "box", "sphere", "mesh", "particles")

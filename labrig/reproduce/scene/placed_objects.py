@@ -104,7 +104,6 @@ def _point_in_front(mesh: Mesh) -> FloatArray:
 
 #: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
 TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
-
 MOST_AREA_M2 = 1e12
 
 

@@ -180,10 +180,8 @@ def _sizes(k_r: Float32Array, k_e: Float32Array, reradiation: Float32Array) -> s
 
 
 SIZE = 129
-
 #: Longest step in lifetimes 1/k of a full state that a table describes.
 LONGEST = 30.0
-
 #: Tables that are kept: animations have few lengths of steps.
 KEPT = 32
 
@@ -231,10 +229,8 @@ def order_table(order: float, phase: float) -> OrderTable:
 
 
 IMPROPER = "expected an irradiance that is finite and ≥ 0, got a negative or infinite one, or NaN"
-
 #: Samples below which several threads cost more than they gain.
 FEW_SAMPLES = 65_536
-
 #: Samples up to which a solution for each takes less than a table for all steps of one length.
 FEW_FOR_TABLES = 64
 

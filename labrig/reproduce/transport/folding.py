@@ -141,7 +141,6 @@ def fold(
 
 #: Sequences of coloured materials that are told apart.
 MOST_SEQUENCES = 30_000
-
 #: Relative difference of the albedo of two bands that is no colour.
 GREY = 1e-6
 

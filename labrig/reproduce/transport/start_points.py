@@ -21,10 +21,8 @@ from labrig.reproduce.transport.mesh import Mesh
 #: Points along each edge of a texel at which its place on the surface is looked up, at least; and
 #: along each edge of the texture.
 LEAST_LOOKUPS, LEAST_POINTS = 4, 256
-
 #: Part of the looked-up points that may belong to two triangles: rounding along their edges.
 SHARED_POINTS = 0.02
-
 #: Decimals of texture coordinates, and of places relative to the mesh, at which vertices are one.
 SAME_DECIMALS = 6
 

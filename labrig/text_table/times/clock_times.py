@@ -22,13 +22,10 @@ import numpy.typing as npt
 from labrig.foundation.errors import UsageError
 
 _HOUR_S, _HALF_DAY_S, _DAY_S = 3600, 43200, 86400
-
 #: Rows before and after a jump whose spacing proves it, and the fewest of them.
 _NEIGHBOURS, _FEWEST = 10, 4
-
 #: Longest row spacing from which a jump of an hour stands out.
 _LONGEST_SPACING_S = 3600
-
 #: Largest spacing over the smallest one of regular rows.
 _REGULAR_SHARE = 3.0
 
@@ -38,7 +35,6 @@ _NIGHT_H = range(4)
 _CHANGE_MONTHS = frozenset({2, 3, 4, 9, 10, 11})
 
 _SUNDAY = 6
-
 #: More jumps ahead by an hour than this are the pauses of a schedule.
 _MOST_JUMPS = 2
 
@@ -214,7 +210,6 @@ def _is_night_of_change(clock: Clock, row: int) -> bool:
 
 
 _HOURS_OF_HALF_DAY = 12
-
 #: First of the two-digit years that belong to the last century, as in POSIX.
 _PIVOT_YEAR = 69
 
@@ -230,7 +225,6 @@ _MONTHS = {
     )
     for letters in names.split()
 }  # fmt: skip
-
 #: Hours ahead of UTC by the names that clocks print; where one changes, summer time does.
 _ZONES_H = {
     "Z": 0, "UTC": 0, "UT": 0, "GMT": 0, "WET": 0, "WEST": 1, "BST": 1, "CET": 1, "MEZ": 1,
@@ -239,36 +233,27 @@ _ZONES_H = {
 }  # fmt: skip
 
 _WEEKDAY = re.compile(r"[^\W\d_]{2,10}\.?,?\s+(?=\d)")
-
 #: As C's `ctime` and the shell's `date` print it: `Sat Oct 24 23:59:30 CEST 2026`.
 _YEAR_LAST = re.compile(r"([^\W\d_]{3} \d{1,2}) (\d\d?:\d\d:\d\d\S*(?: [A-Z]{3,4})?) (\d{4})")
-
 _NAMED_MONTH = re.compile(
     r"(?:(?P<d>\d{1,2})\.?[\s\-/]*(?P<m>[^\W\d_]{3,9})\.?[\s,\-/]+"
     r"|(?P<m2>[^\W\d_]{3,9})\.?\s+(?P<d2>\d{1,2}),?\s+)(?P<y>\d{4}|\d\d(?!:))(?!\d)"
 )
-
 _BASIC = re.compile(r"(\d{8})[T_](\d\d)(\d\d)(\d\d)")
-
 #: `20261024235930`, which no count of seconds reaches.
 _DIGITS = re.compile(
     r"((?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01]))([01]\d|2[0-3])([0-5]\d)([0-5]\d)"
 )
-
 _DATE = r"(?P<d1>\d{4}|\d\d?)(?P<mark>[-/.])(?P<d2>\d\d?)(?P=mark)(?P<d3>\d{4}|\d\d?)\.?"
-
 _ANY_DATE = rf"(?:{_DATE}|(?P<compact>\d{{8}}))"
-
 _TIME = (
     r"(?P<a>\d{1,3}):(?P<b>[0-5]\d)"
     r"(?::(?P<c>[0-5]\d)(?:[.,](?P<f>\d*)|:(?P<ms>\d{3}))?|[.,](?P<g>\d+))?"
     r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\.?)?(?:\s*(?:Uhr|h))?"
 )
-
 _ZONE = (
     r"(?:\s*(?P<zone>Z|UTC|UT|GMT|[A-Z]{3,4})?(?P<offset>[+\-]\d\d?(?::?\d\d)?)?(?:\[[\w/]+\])?)?"
 )
-
 _FORMS = (
     re.compile(rf"(?:{_ANY_DATE}(?:T|[\s,;_]+|[-:](?=\d\d?:)))?{_TIME}{_ZONE}"),
     re.compile(rf"{_TIME}{_ZONE}[\s,;]+{_ANY_DATE}"),
@@ -376,37 +361,28 @@ def _seconds(offset: str) -> int:
 
 
 SECONDS_A_DAY = 86400
-
 _HALF_DAY_H, _DAY_H = 12, 24
-
 _TWO_PARTS, _THREE_PARTS = 2, 3
-
 #: Orders of the numbers in a date: indices of year, month and day.
 _ORDERS = {
     "year-month-day": (0, 1, 2),
     "day.month.year": (2, 1, 0),
     "month/day/year": (2, 0, 1),
 }
-
 #: What says an order with the option `--time-unit`.
 _SAID = {
     "year-month-day": "yyyy-mm-dd",
     "day.month.year": "dd/mm/yyyy",
     "month/day/year": "mm/dd/yyyy",
 }
-
 #: Longest row spacing over the median one of rows that are regular. With the wrong order of day
 #: and month the longest one is more by this factor.
 _REGULAR = 10.0
-
 #: Fewest row spacings that tell whether rows are regular.
 _FEWEST_SPACINGS = 3
-
 #: Forms of clocks in headers and in the option `--time-unit`.
 _HOURS_MINUTES = re.compile(r"\bh+:m|uhrzeit|clock|time of day|heure|\blocal|\butc|\bh(ours)?\b")
-
 _MINUTES_SECONDS = re.compile(r"(?<!:)\bm+(in)?:s|\bmin(utes)?\b")
-
 _DATE_FORMS = {
     "year-month-day": re.compile(r"\b(y+|j+|year)\W+m\w*\W+[dt]\w*"),
     "day.month.year": re.compile(r"\b(d+|t+|day)\W+m\w*"),

@@ -32,22 +32,16 @@ from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Shift of light that water scatters, in 1/nm.
 _RAMAN_PER_NM = 3400e-7
-
 #: Half the width in nm of the middle of a line, and the distances at which its surroundings are.
 _MIDDLE_NM, _BESIDE_NM = 6.0, (20.0, 40.0)
-
 #: How far a line rises above both sides, as a ratio and over their noise, to be one.
 _RATIO, _NOISES = 1.8, 5.0
-
 #: Fewest excitations, and part of them, in which a line stands out.
 _FEWEST, _PART = 4, 0.5
-
 #: Ratio of widths of a line and of the one that it follows.
 _WIDER = 1.5
-
 #: A line ends where it is no more than this many times what is beside it.
 _END_RATIO = 1.5
-
 #: Plateau of a detector that is saturated: fewest entries, each beside another one.
 _FEWEST_SATURATED = 3
 

@@ -24,25 +24,20 @@ from labrig.text_table import SEPARATORS, Block, Line, Style, parse_number, read
 from labrig.text_table.rows import no_measurements
 
 Axis: TypeAlias = Literal["emission", "excitation"]
-
 #: Name of the upper left cell of labrig's own tables of curves, which are no matrices.
 _CURVES = "wavelength_nm"
-
 _NAMES: dict[Axis, re.Pattern[str]] = {
     "excitation": re.compile(r"(?<![a-z])(λ?_?ex|exc|excitation|anregung)(?![a-z])"),
     "emission": re.compile(r"(?<![a-z])(λ?_?em|emi|emission|emissions)(?![a-z])"),
 }
-
 _LABEL = re.compile(
     r"(?:.*?(?P<kind>(?<![a-z])(?:ex[a-z]*|em[a-z]*|syn[a-z]*))[\s_:=(\[]*)?"
     r"(?:λ|wl|wavelength)?[\s_:=(\[]*(?P<nm>\d+(?:[.,]\d+)?)\s*_?(?:nm)?[)\]]?"
     r"(?:[\s_]*(?P<after>ex|em)[a-z]*)?",
     re.IGNORECASE,
 )
-
 #: Most lines between the wavelengths above a grid and its rows.
 _BETWEEN = 8
-
 #: Fewest wavelengths of either axis.
 _FEWEST = 2
 
@@ -315,10 +310,8 @@ def _named_spectra(text: str) -> Grid:
 
 #: Distance from a line of scattered light in nm from which light is fluorescence.
 _BESIDE_NM = 15.0
-
 #: Ratio of mean signals on both sides that tells one side from noise and stray light.
 _CLEAR = 3.0
-
 _OPTION = "say --rows emission or --rows excitation"
 
 

@@ -12,10 +12,8 @@ from labrig.material.reradiation.matrix import ReradiationMatrix, are_same_bands
 
 #: Range of wavelengths in nm, which excludes tables in µm or in Hz.
 PLAUSIBLE_NM = (100.0, 20_000.0)
-
 #: Largest magnitude of a fraction that is no fault of the file.
 LARGEST_FRACTION = 2.0
-
 #: Characters of a line that a message repeats.
 _SHOWN = 30
 
