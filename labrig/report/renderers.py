@@ -1,4 +1,4 @@
-"""Rendering of a result: by its protocol's renderer, as plain tables, or part by part of a chain."""
+"""Rendering of a result: by its protocol's renderer, as plain tables, or part by part."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

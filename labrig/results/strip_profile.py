@@ -1,4 +1,4 @@
-"""Profile of a filter's strip with its lines, and change of the card's picture since calibration."""
+"""Profile of a filter's strip with its lines, and change of the card's picture."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Times of the rows of a table: their column and unit, or a channel's width, or as the user says."""
+"""Times of the rows of a table: their column and unit, a channel's width, or as a user says."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Vignetting of a lens at one aperture, from frames of an evenly lit card, and its veiling glare."""
+"""Vignetting of a lens at one aperture, from frames of an evenly lit card, and veiling glare."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
