@@ -246,9 +246,9 @@ class Phosphor(Chain):
         """Return why rests are shared or not, and the time in the lab with the other way."""
         if not self.samples:
             return super().notes(rig)
-        driver, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
+        _, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
         apart = self._lab_time("apart", rig)
-        if driver.declared_keeps_dark(settings):
+        if settings.keeps_dark:
             shared = self._lab_time("shared", rig)
             if self._rests_on(rig) == "shared":
                 return (

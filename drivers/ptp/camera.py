@@ -57,11 +57,6 @@ class PtpCamera:
             self._leaving = leaving.pop_all()
 
     @classmethod
-    def declared_offers(cls, settings: PtpCameraSettings) -> CameraOffers:
-        """Return the offers that planning without the camera assumes."""
-        return settings.declared_offers()
-
-    @classmethod
     def recorded_exposures_s(cls, label_s: float, identity: str) -> tuple[float, ...]:
         """Return the exposure times that a run may hold for a frame with a time in its EXIF.
 

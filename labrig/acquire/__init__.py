@@ -3,12 +3,20 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.calibration_rules import CalibrationRules
+from labrig.acquire.channels import (
+    Board,
+    Channel,
+    Positions,
+    Servo,
+    Switch,
+    TemperatureSensor,
+    switch_off,
+)
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.loading import (
+    bank_lights,
     changes_with_absolute_paths,
     driver_and_settings,
-    illuminant_lights,
-    led_lights,
     load_driver,
     read_protocol,
 )
@@ -46,8 +54,10 @@ __all__ = [
     "SERVICES",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
+    "Board",
     "CalibrationRules",
     "CameraOffers",
+    "Channel",
     "Connections",
     "DeviceEntry",
     "ExposureSettings",
@@ -61,6 +71,7 @@ __all__ = [
     "Optics",
     "PartUnit",
     "Plan",
+    "Positions",
     "Program",
     "ProtocolModel",
     "Rig",
@@ -68,20 +79,22 @@ __all__ = [
     "RunObserver",
     "Sample",
     "SerialPort",
+    "Servo",
     "Session",
     "Severity",
     "Step",
+    "Switch",
+    "TemperatureSensor",
     "TimedAction",
     "UndoManualStep",
     "Unit",
     "at",
+    "bank_lights",
     "changes_with_absolute_paths",
     "driver_and_settings",
     "frame_bytes",
     "gone",
-    "illuminant_lights",
     "in_safe_order",
-    "led_lights",
     "lights_that_read_back",
     "linux_programs",
     "load_driver",
@@ -93,5 +106,6 @@ __all__ = [
     "run_units",
     "running_programs",
     "shutter_text",
+    "switch_off",
 ]
 __all__ += roles.__all__

@@ -6,15 +6,16 @@ import pytest
 from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
-from labrig.acquire import FilterWheel, TurnWheel
-from labrig.drivers.maestro import MaestroFilterWheel
-from labrig.drivers.serial_relay import SerialFilterWheel
-from labrig.drivers.thorlabs_fw102c import ThorlabsFilterWheel
+from labrig.acquire import FilterWheel, TurnWheel, load_driver
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, ProtocolError, UnclearAnswerError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import Fw102cBoard, MaestroBoard
 from tests.drivers.serial_wire import BoardPort, Script, ScriptedPort, Wired
+
+MaestroFilterWheel: Any = load_driver("filter_wheel", "maestro", "rig.yaml")
+SerialFilterWheel: Any = load_driver("filter_wheel", "serial_relay", "rig.yaml")
+ThorlabsFilterWheel: Any = load_driver("filter_wheel", "thorlabs_fw102c", "rig.yaml")
 
 OPENED: Script = [
     (b"\r", b"\rCommand error CMD_NOT_DEFINED\r> "),
@@ -25,12 +26,12 @@ FILTERS = {"bandpass-450": 2, "bandpass-500": 4}
 COMMANDS = {
     "filters": {"blue": {"send": "turn 2", "answer": "there"}, "red": "turn 3"},
     "open": {"send": "turn 1", "answer": "there"},
-    "turn": "2 s",
+    "travel": "2 s",
     "answers_within": "5 s",
 }
 
 
-def thorlabs(script: Script) -> tuple[ThorlabsFilterWheel, ScriptedPort]:
+def thorlabs(script: Script) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, [*OPENED, *script])
     settings = ThorlabsFilterWheel.Settings(filters=FILTERS)

@@ -1,10 +1,12 @@
 """The LCUS driver against wire transcripts and against the emulated board."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Checkable, Lamp
-from labrig.drivers.lcus import LcusRelay, command, relay_states
+from labrig.acquire import Checkable, Lamp, load_driver
+from labrig.drivers.lcus import command, relay_states
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.sim.boards import LcusBoard
@@ -17,16 +19,18 @@ from tests.drivers.serial_wire import (
     Wired,
 )
 
+LcusLamp: Any = load_driver("lamp", "lcus", "rig.yaml")
+
 ON_1, OFF_1 = bytes.fromhex("A00101A2"), bytes.fromhex("A00100A1")
 ON_2, OFF_2 = bytes.fromhex("A00201A3"), bytes.fromhex("A00200A2")
 QUERY = b"\xff"
 ANSWERS: tuple[Answers, ...] = ("nothing", "text", "bytes")
 
 
-def lamp(script: Script, relay: int = 1) -> tuple[LcusRelay, ScriptedPort]:
+def lamp(script: Script, relay: int = 1) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, script)
-    return LcusRelay("COM5", LcusRelay.Settings(relay=relay), Wired(clock, port)), port
+    return LcusLamp("COM5", LcusLamp.Settings(relay=relay), Wired(clock, port)), port
 
 
 def asked(first: bytes, second: bytes) -> Script:
@@ -118,7 +122,7 @@ def test_a_board_that_fell_silent_is_reported() -> None:
 def test_the_command_has_left_when_it_returns_and_no_sooner() -> None:
     clock = VirtualClock()
     board = LcusBoard(1, lambda relay, on: None)
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
     before_s = clock.now()
     driver.on()
     assert clock.now() - before_s == pytest.approx(4 * 10 / 9600)
@@ -130,7 +134,7 @@ def test_the_driver_and_the_emulated_board(answers: Answers) -> None:
     moved: list[tuple[int, bool]] = []
     board = LcusBoard(4, lambda relay, on: moved.append((relay, on)), answers)
     board.states[2] = True
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=3), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=3), Wired(clock, BoardPort(clock, board)))
     assert moved == [(3, False)], "off at connect"
     for on in (True, False, True):
         (driver.on if on else driver.off)()
@@ -144,7 +148,7 @@ def test_the_driver_and_the_emulated_board(answers: Answers) -> None:
 def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, answers: Answers) -> None:
     clock = InterruptingClock()
     board = LcusBoard(2, lambda relay, on: None, answers)
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
     with clock.interrupted_after(waits):
         driver.on()
         driver.is_on()
@@ -159,7 +163,7 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, answers: Answe
 def test_half_a_command_of_another_program_does_not_keep_the_lamp_on(torn: bytes) -> None:
     clock = VirtualClock()
     board = LcusBoard(2, lambda relay, on: None)
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
     driver.on()
     board.receive(torn)
     driver.make_safe()

@@ -5,14 +5,16 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Guarded, LampShield, TrapDoor
-from labrig.drivers.maestro import MaestroDoor, MaestroShield
-from labrig.drivers.maestro.servo import ERRORS, Wire, error_text, quarters, seven_bits
+from labrig.acquire import Guarded, LampShield, TrapDoor, load_driver
+from labrig.drivers.maestro import ERRORS, Wire, error_text, quarters, seven_bits
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import MaestroBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
+
+MaestroDoor: Any = load_driver("door", "maestro", "rig.yaml")
+MaestroShield: Any = load_driver("shield", "maestro", "rig.yaml")
 
 KEYS = {"channel": 2, "closed": "1000 us", "open": "1500 us", "travel": "280 ms"}
 FINE = (b"\xa1", b"\0\0")
@@ -23,11 +25,11 @@ WHERE = bytes.fromhex("9002")
 NO_LIMITS: Script = [(bytes.fromhex("87020000"), b""), (bytes.fromhex("89020000"), b"")]
 
 
-def settings(**keys: Any) -> MaestroDoor.Settings:
+def settings(**keys: Any) -> Any:
     return validate({**KEYS, **keys}, MaestroDoor.Settings, "rig.yaml")
 
 
-def door(script: Script, **keys: Any) -> tuple[MaestroDoor, ScriptedPort]:
+def door(script: Script, **keys: Any) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, [FINE, FINE, *script])
     return MaestroDoor("COM6", settings(**keys), Wired(clock, port)), port
@@ -145,7 +147,7 @@ def test_what_does_not_answer_or_obey(script: Script, error: type[DeviceError], 
 
 
 def test_two_equal_pulses_are_refused() -> None:
-    with pytest.raises(Exception, match="two different pulses for 'closed' and 'open'"):
+    with pytest.raises(Exception, match="two different positions for 'closed' and 'open'"):
         settings(open="1000 us")
 
 

@@ -16,8 +16,8 @@ from tests.terminal import idle_guard, on_a_terminal
 RIG = """
 name: two boards
 devices:
-  lamp: {{driver: lcus_relay, address: "{lcus}", relay: 2}}
-  door: {{driver: maestro_door, address: "{maestro}", channel: 3, closed: 1000 us, open: 1877.5 us,
+  lamp: {{driver: lcus, address: "{lcus}", relay: 2}}
+  door: {{driver: maestro, address: "{maestro}", channel: 3, closed: 1000 us, open: 1877.5 us,
           travel: 20 ms}}
 """
 

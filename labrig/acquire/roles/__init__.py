@@ -8,6 +8,7 @@ need in `__all__`.
 
 from typing import Any
 
+from labrig.acquire.roles.board_device import BoardDevice
 from labrig.acquire.roles.camera import CAMERA, Camera, Shoot
 from labrig.acquire.roles.changer import CHANGER, Changer
 from labrig.acquire.roles.door_and_shield import (
@@ -29,16 +30,17 @@ from labrig.acquire.roles.filter_wheel import (
     TurnCameraWheel,
     TurnWheel,
 )
-from labrig.acquire.roles.illuminants import (
+from labrig.acquire.roles.known_light import Illuminant, LedLight
+from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, LampSwitch
+from labrig.acquire.roles.light_bank import (
     ILLUMINANTS,
     ILLUMINANTS_OFF,
-    Illuminant,
+    LEDS,
+    LEDS_OFF,
     IlluminantSwitch,
-    LampBank,
+    LedSwitch,
+    LightBank,
 )
-from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
-from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedLight, LedSwitch
-from labrig.acquire.roles.light_bank import LightBank
 from labrig.acquire.roles.monochromator import (
     MONOCHROMATOR,
     Monochromator,
@@ -122,6 +124,7 @@ __all__ = [
     "SPECTROMETER",
     "THERMOMETER",
     "VIEWFINDER",
+    "BoardDevice",
     "BringSample",
     "Camera",
     "Changer",
@@ -138,9 +141,8 @@ __all__ = [
     "IlluminantSwitch",
     "KeptAwake",
     "Lamp",
-    "LampBank",
     "LampShield",
-    "LedBank",
+    "LampSwitch",
     "LedLight",
     "LedSwitch",
     "Light",
@@ -157,7 +159,6 @@ __all__ = [
     "Shoot",
     "Spectrometer",
     "Suggestion",
-    "Switch",
     "Thermometer",
     "TrapDoor",
     "Tune",

@@ -2,8 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from pydantic import BaseModel, Field
+
+from labrig.acquire.channels import Board, Servo
+from labrig.acquire.connections import Connections
+from labrig.acquire.roles.board_device import BoardDevice, keys_model, require_distinct
 from labrig.acquire.roles.role import (
     Device,
     ExerciseContext,
@@ -67,6 +72,93 @@ class PlannedSwing(PlannedDevice):
 
     def uncover(self) -> None:
         """Do nothing."""
+
+
+class ServoSwing(BoardDevice):
+    """A part of the bench that a servo swings between two ends.
+
+    The read-back is the command that the board sends, not the place of the part: one that is
+    stuck, or a servo without power, is seen by the camera alone.
+    """
+
+    kind = Servo
+    #: Keys of the safe end and of the other one in a rig file, and their descriptions.
+    ends: ClassVar[Mapping[str, str]]
+
+    def __init__(self, address: str, settings: Any, connections: Connections) -> None:
+        super().__init__(address, settings, connections)
+        self._servo: Servo = self.channel_class(self.board, settings)
+        self._safe, self._other = (getattr(settings, key) for key in self.ends)
+
+    @classmethod
+    def keys(cls, board: type[Board], channel: type[Servo]) -> type[BaseModel]:
+        """Return the model of the device's keys: a position for each end, and those of a servo."""
+        first, second = cls.ends
+        expected = f"two different positions for '{first}' and '{second}'"
+
+        def differ(settings: Any) -> None:
+            ends = [channel.distinct(getattr(settings, key)) for key in cls.ends]
+            require_distinct(ends, expected)
+
+        return keys_model(
+            cls,
+            (channel.Settings, board.Settings),
+            differ,
+            **{
+                key: (channel.Position, Field(description=description))
+                for key, description in cls.ends.items()
+            },
+        )
+
+    def identity(self) -> str:
+        """Return the board's identity, the channel and the position that is commanded."""
+        return f"{self.board.identity()}, {self.noun} on {self._servo.place()}"
+
+    def travel_s(self) -> float:
+        """Return the time in seconds from the command until it has stopped, from the rig file."""
+        travel_s: float = self.settings.travel
+        return travel_s
+
+    def make_safe(self) -> None:
+        """Swing to the safe end, whatever was interrupted; return when it has had the time."""
+        self._servo.make_safe(self._safe)
+
+
+class ServoDoor(ServoSwing):
+    """A trap door that a servo swings."""
+
+    noun = "trap door"
+    ends: ClassVar[Mapping[str, str]] = {
+        "closed": "Position of the servo with the door closed, for example `1000 us`.",
+        "open": "Position of the servo with the door open, for example `2000 us`.",
+    }
+
+    def open(self) -> None:
+        """Begin to open the door."""
+        self._servo.go(self._other)
+
+    def close(self) -> None:
+        """Begin to close the door."""
+        self._servo.go(self._safe)
+
+
+class ServoShield(ServoSwing):
+    """A shield that a servo swings before the lamp."""
+
+    noun = "lamp shield"
+    ends: ClassVar[Mapping[str, str]] = {
+        "uncovering": "Position of the servo with the shield away from the lamp, its safe end, for "
+        "example `2000 us`.",
+        "covering": "Position of the servo with the shield before the lamp, for example `1000 us`.",
+    }
+
+    def cover(self) -> None:
+        """Begin to cover the lamp."""
+        self._servo.go(self._other)
+
+    def uncover(self) -> None:
+        """Begin to uncover the lamp."""
+        self._servo.go(self._safe)
 
 
 @dataclass(frozen=True)
@@ -140,7 +232,8 @@ DOOR: Role[TrapDoor] = Role(
     key="door",
     protocol_class=TrapDoor,
     name="door",
-    planned=lambda driver, settings, clock: PlannedSwing(driver.declared_travel_s(settings)),
+    planned=lambda settings, clock: PlannedSwing(settings.travel),
+    on_board=ServoDoor,
     exercise=_exercise_door,
     safe_first=True,
 )
@@ -149,7 +242,8 @@ SHIELD: Role[LampShield] = Role(
     key="shield",
     protocol_class=LampShield,
     name="shield",
-    planned=lambda driver, settings, clock: PlannedSwing(driver.declared_travel_s(settings)),
+    planned=lambda settings, clock: PlannedSwing(settings.travel),
+    on_board=ServoShield,
     exercise=_exercise_shield,
     safe_first=True,
 )

@@ -1,19 +1,11 @@
 """Filter wheels, which put one of their filters before the lamp, or before the camera."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar, Protocol, runtime_checkable
 
-from labrig.acquire.roles.role import (
-    Device,
-    ExerciseContext,
-    Exercised,
-    Measured,
-    PlannedDevice,
-    Role,
-)
-from labrig.foundation.clock import VirtualClock
+from labrig.acquire.roles.places import BoardPlaces, PlannedPlaces, timed
+from labrig.acquire.roles.role import Device, ExerciseContext, Exercised, Measured, Role
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
@@ -39,24 +31,29 @@ class FilterWheel(Device, Protocol):
         """
 
 
-class PlannedFilterWheel(PlannedDevice):
-    """Stand-in of a filter wheel in a plan, for which every turn takes the longest time."""
-
-    def __init__(self, clock: VirtualClock, filters: Sequence[str], turn_s: float) -> None:
-        self._clock = clock
-        self._filters = tuple(filters)
-        self._turn_s = turn_s
-        self._name: str | None = None
+class PlannedFilterWheel(PlannedPlaces):
+    """Stand-in of a filter wheel in a plan."""
 
     def filters(self) -> tuple[str, ...]:
-        """Return the filters that the driver declares."""
-        return self._filters
+        """Return the filters in the rig file."""
+        return self._names
 
-    def put(self, name: str | None, /) -> None:
-        """Let the time of a turn pass, unless the filter is in place."""
-        if name != self._name:
-            self._clock.spend(self._turn_s)
-        self._name = name
+
+class BoardFilterWheel(BoardPlaces):
+    """Filters on an arm, a slide or a wheel that a channel of a board moves."""
+
+    noun = "filter wheel"
+    things = (
+        "filters",
+        "Position with each filter in place, by the filter's name, for example "
+        "`{bandpass-450: 1100 us, bandpass-500: 1300 us}` on a servo, "
+        "`{bandpass-450: 2, bandpass-500: 3}` for the slots of a wheel.",
+    )
+    empty = ("open", "Position with no filter in place.")
+
+    def filters(self) -> tuple[str, ...]:
+        """Return the names of the filters in the wheel."""
+        return tuple(self._positions)
 
 
 @dataclass(frozen=True)
@@ -96,10 +93,7 @@ class TurnCameraWheel(TurnWheel):
 
 def _exercise(wheel: FilterWheel, context: ExerciseContext) -> Exercised:
     """Turn to every filter once, and back to the open slot."""
-    measured = [
-        Measured(f"to {name}", duration_text(context.timed_s(partial(wheel.put, name))))
-        for name in wheel.filters()
-    ]
+    measured = timed(wheel, wheel.filters(), context)
     back_s = context.timed_s(partial(wheel.put, None))
     return Exercised((*measured, Measured("to the open slot", duration_text(back_s))))
 
@@ -109,9 +103,10 @@ def _role(key: str, name: str) -> Role[FilterWheel]:
         key=key,
         protocol_class=FilterWheel,
         name=name,
-        planned=lambda driver, settings, clock: PlannedFilterWheel(
-            clock, driver.declared_filters(settings), driver.declared_turn_s(settings)
+        planned=lambda settings, clock: PlannedFilterWheel(
+            clock, settings.filters, settings.travel
         ),
+        on_board=BoardFilterWheel,
         exercise=_exercise,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from labrig.acquire import led_lights
+from labrig.acquire import LEDS, bank_lights
 from labrig.analyse.inputs import Part
 from labrig.analyse.led_brightness.checks import Bank, Checked, check_leds, unseen_channels
 from labrig.analyse.led_brightness.readings import (
@@ -89,7 +89,7 @@ def _bank(part: Part) -> Bank:
     exposures = led_exposures(part.rig, source)
     camera = camera_curves(part.rig, part.overrides.camera)
     nominal = {name: exposure.light for name, exposure in exposures.items()}
-    lights = led_lights(part.rig, source)
+    lights = bank_lights(part.rig, LEDS.key, source)
     sketched = frozenset(name for name, light in lights.items() if light.spectrum is None)
     sigma_nm = {name: exposure.wavelength_sigma_nm for name, exposure in exposures.items()}
     return Bank(nominal, sketched, sigma_nm, camera, card_reflectance(part.rig))
