@@ -210,6 +210,32 @@ def test_a_bank_over_two_units_lights_the_room(make_rig: Make) -> None:
     assert peaks_nm == pytest.approx([400, 450, 500, 550, 600], abs=2.5)
 
 
+@pytest.mark.parametrize("answers", ["nothing", "text", "bytes"])
+def test_eight_relays_of_an_lcus_board_light_the_room(make_rig: Make, answers: str) -> None:
+    path = make_rig(
+        leds=[{"relay": 1 + n, "centre": 400 + 30 * n, "fwhm": 20} for n in range(8)],
+        led_board="lcus",
+        lcus=answers,
+    )
+    content = read_quickly(path.read_text())
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"leds": [5]}}
+    channels = {f"{400 + 30 * n} nm": n + 1 for n in range(8)}
+    content["devices"]["leds"] = {
+        "driver": "lcus", "address": "sim://room/lcus", "channels": channels,
+    }  # fmt: skip
+    path.write_text(write_quickly(content))
+    with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+        assert bench.room is not None
+        assert lights_that_read_back(devices)["leds"] == (answers != "nothing")
+        for name in channels:
+            devices[LEDS].light(name)
+            assert devices[LEDS].channel_on() == name
+        devices[LEDS].dark()
+        states = [lit for _, lit in bench.room.room.leds.states]
+    lit_in_turn = [lit for number in range(1, 9) for lit in ({number}, set())]
+    assert states == [set(), {5}, set(), *lit_in_turn]
+
+
 def test_the_rig_check_lists_heads_and_settling(
     make_rig: Make, labrig: Callable[..., Ended]
 ) -> None:
