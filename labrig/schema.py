@@ -59,8 +59,8 @@ def _describe_in_markdown(node: Any) -> None:
 
 def _protocol() -> Any:
     """Return the union of the registered protocols, discriminated by the key `protocol`."""
-    names = plugins.names(plugins.PROTOCOLS)
-    return _one_of("protocol", [plugins.load(plugins.PROTOCOLS, name, "schema") for name in names])
+    models = [registered.load("protocol") for _, registered in plugins.measurements()]
+    return _one_of("protocol", models)
 
 
 def _rig() -> Any:
@@ -70,7 +70,7 @@ def _rig() -> Any:
     roles: dict[str, Any] = {}
     for key, role in ROLES.items():
         fitting = [
-            _entry(name, fitted)
+            _entry(name, fitted)  # type: ignore[arg-type]
             for name, driver in drivers.items()
             if (fitted := role.driver(driver)) is not None
         ]

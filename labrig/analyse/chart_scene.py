@@ -6,6 +6,7 @@ import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
+from labrig.calibration import CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
@@ -62,7 +63,7 @@ def frames_of(part: Part, role: str) -> list[SeriesFrame]:
             f"{part.run.folder}: there are no complete '{role}' frames; go on with: labrig resume "
             f"{part.run.folder}"
         )
-    require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(role))
+    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, part.run.frames(role))
     return frames
 
 
@@ -127,6 +128,6 @@ def _evened(scene: ChartScene, card: SliceValues) -> ChartScene:
 def _measured(part: Part, frames: list[SeriesFrame], patches: list[Region]) -> SliceValues:
     darks = steady_frames(part.run, part.overrides, FrameRole.DARK)
     regions = {f"{number:02d}": region for number, region in enumerate(patches)}
-    values = region_values(frames, regions, darks, part.inputs.camera)
+    values = region_values(frames, regions, darks, part.inputs[CAMERA_KIND])
     (unit,) = {frame.unit for frame in frames}
     return values[unit]

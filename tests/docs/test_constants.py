@@ -5,7 +5,6 @@ import math
 import pytest
 
 from labrig.acquire.roles import camera
-from labrig.analyse.excitation import lamp_light
 from labrig.bench import execution, guard
 from labrig.fit import luminance
 from labrig.fit.decay import (
@@ -20,6 +19,7 @@ from labrig.fit.decay import (
     states,
 )
 from labrig.material.reradiation import evidence
+from labrig.protocols.excitation.analysis import lamp_light
 from labrig.setup import check
 from tests.acceptance.campaigns import ROOT
 

@@ -248,16 +248,13 @@ def test_eight_relays_drive_a_bank_of_lights(role: str) -> None:
     assert port.script == []
 
 
-def test_a_light_of_a_bank_that_stays_on_is_reported() -> None:
+def test_a_light_of_a_bank_that_stays_on_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = VirtualClock()
     board = LcusBoard(8, lambda relay, on: None, "bytes")
     driver = eight("leds", Wired(clock, BoardPort(clock, board)))
 
-    def switch_nothing_off(data: bytes) -> None:
-        del data
-
     board.states[4] = True
-    board._obey = switch_nothing_off  # type: ignore[method-assign]
+    monkeypatch.setattr(board, "_obey", lambda command: None)
     with pytest.raises(DeviceError, match="relay 5 .* was switched off but reads on"):
         driver.make_safe()
 

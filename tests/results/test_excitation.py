@@ -8,15 +8,13 @@ from typing import cast
 import numpy as np
 import pytest
 
-from labrig.analyse.excitation.material import excited_material
 from labrig.foundation.errors import DiskError
 from labrig.material import read_material
+from labrig.protocols.excitation.analysis.material import excited_material
+from labrig.protocols.excitation.report import render
+from labrig.protocols.excitation.result import ExcitationResult
 from labrig.report import Source
-from labrig.report.excitation import render
 from labrig.results import ExcitationModel
-from labrig.results.excitation import (
-    ExcitationResult,
-)
 from tests.results.made import assert_read_back
 from tests.results.made_excitation import excitation_result
 

@@ -1,9 +1,10 @@
 """Driver of a relay board that understands `relay on N` and `relay off N`, one line a command."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Board, Connections, Switch
 from labrig.drivers import SerialLine
+from labrig.foundation.models import FrozenModel
 
 BAUDRATE = 19200
 ANSWER_S = 1.0
@@ -12,7 +13,7 @@ ANSWER_S = 1.0
 class PlainRelay(Switch):
     """One relay of the board."""
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a relay in a rig file.
 
         Attributes
@@ -20,8 +21,6 @@ class PlainRelay(Switch):
         relay
             Number of the relay on the board, 0 to 9.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         relay: int = Field(ge=0, le=9)
 

@@ -4,10 +4,11 @@ Replace what the board is told and what it answers. A board that only reads and 
 no Python: see the driver `serial_relay` in labrig's guide "Use boards of your own".
 """
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Board, Connections, Switch
 from labrig.drivers import SerialLine
+from labrig.foundation.models import FrozenModel
 
 BAUDRATE = 19200
 ANSWER_S = 1.0
@@ -19,7 +20,7 @@ class Relay(Switch):
     Other kinds of channels are `Servo`, `Positions` and `TemperatureSensor` in `labrig.acquire`.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of a relay in a rig file; editors show what stands here.
 
         Attributes
@@ -27,8 +28,6 @@ class Relay(Switch):
         relay
             Number of the relay on the board, 0 to 9.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         relay: int = Field(ge=0, le=9)
 
