@@ -255,7 +255,7 @@ def test_a_light_of_a_bank_that_stays_on_is_reported(monkeypatch: pytest.MonkeyP
 
     board.states[4] = True
     monkeypatch.setattr(board, "_obey", lambda command: None)
-    with pytest.raises(DeviceError, match="relay 5 .* was switched off but reads on"):
+    with pytest.raises(DeviceError, match=r"relay 5 .* was switched off but reads on"):
         driver.make_safe()
 
 
@@ -263,7 +263,7 @@ def test_a_relay_that_the_board_has_not_is_refused_before_anything_is_lit() -> N
     clock = VirtualClock()
     board = LcusBoard(4, lambda relay, on: None, "text")
     driver = eight("leds", Wired(clock, BoardPort(clock, board)))
-    with pytest.raises(DeviceError, match="was asked for relay 8: .* has it that many relays"):
+    with pytest.raises(DeviceError, match=r"was asked for relay 8: .* has it that many relays"):
         driver.make_safe()
 
 
