@@ -12,7 +12,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import Board, Connections, Switch, switch_off
+from labrig.acquire import Board, Connections, Switch
 from labrig.foundation.errors import DeviceError, UnclearAnswerError, UsageError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import Fraction
@@ -249,7 +249,7 @@ class ThorlabsDc4100(Board):
         self._darken({switch.settings.output: switch for switch in switches})
 
     def _darken(self, named: Mapping[int, Switch]) -> None:
-        switch_off(
+        self.switch_off(
             named.get(output) or Dc4100Output(self, Dc4100Output.Settings(output=output))
             for output in range(1, OUTPUTS + 1)
         )

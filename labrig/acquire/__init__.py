@@ -10,7 +10,6 @@ from labrig.acquire.channels import (
     Servo,
     Switch,
     TemperatureSensor,
-    switch_off,
 )
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.loading import (
@@ -106,6 +105,5 @@ __all__ = [
     "run_units",
     "running_programs",
     "shutter_text",
-    "switch_off",
 ]
 __all__ += roles.__all__

@@ -238,7 +238,7 @@ class Board(ABC):
             A channel could not be confirmed as off.
         """
         self.resynchronise()
-        switch_off(switches)
+        self.switch_off(switches)
 
     def heartbeat(self) -> None:  # noqa: B027, most boards have none
         """Restart the board's watchdog, if it has one; takes milliseconds.
@@ -259,22 +259,22 @@ class Board(ABC):
             They do.
         """
 
+    @staticmethod
+    def switch_off(switches: Iterable[Switch]) -> None:
+        """Switch channels off, each even if another one fails.
 
-def switch_off(switches: Iterable[Switch]) -> None:
-    """Switch channels off, each even if another one fails.
-
-    Raises
-    ------
-    DeviceError
-        A channel could not be confirmed as off: the first failure.
-    """
-    failure: DeviceError | None = None
-    for switch in switches:
-        try:
-            switch.switch(on=False)
-        except DeviceError as error:
-            failure = failure or error
-            with suppress(DeviceError):  # so that the next one is understood
-                switch.board.resynchronise()
-    if failure:
-        raise failure
+        Raises
+        ------
+        DeviceError
+            A channel could not be confirmed as off: the first failure.
+        """
+        failure: DeviceError | None = None
+        for switch in switches:
+            try:
+                switch.switch(on=False)
+            except DeviceError as error:
+                failure = failure or error
+                with suppress(DeviceError):  # so that the next one is understood
+                    switch.board.resynchronise()
+        if failure:
+            raise failure

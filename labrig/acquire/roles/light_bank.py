@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
 from pydantic import BaseModel, BeforeValidator, Field, create_model
 
-from labrig.acquire.channels import Board, Switch, switch_off
+from labrig.acquire.channels import Board, Switch
 from labrig.acquire.connections import Connections
 from labrig.acquire.roles.board_device import (
     BoardDevice,
@@ -212,7 +212,7 @@ class SwitchedLights(BoardDevice):
 
     def dark(self) -> None:
         """Switch off all lights that may be lit, each even if another one fails."""
-        switch_off([each for each in self._switches.values() if each.state is not False])
+        Board.switch_off([each for each in self._switches.values() if each.state is not False])
 
     def channel_on(self) -> str | None:
         """Return the light that is on, as reported by the board, else as commanded last.
