@@ -1,4 +1,4 @@
-"""A PTP camera on USB or in the network as labrig's camera."""
+"""A PTP camera on USB as labrig's camera."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
@@ -23,12 +23,11 @@ class PtpCamera:
     Parameters
     ----------
     address
-        Address of the camera, `usb://vid:pid[/serial]`, `ptpip://host[:port]` or
-        `sim://room/device`.
+        Address of the camera, `usb://vid:pid[/serial]` or `sim://room/device`.
     settings
         The rig file's keys for this camera.
     connections
-        Connections that open the USB device or the network connection, and have the clock.
+        Connections that open the USB device, and have the clock.
 
     Raises
     ------
