@@ -69,7 +69,7 @@ def test_a_servo_board_that_answers_late_is_usable() -> None:
     settings = validate(DOOR, MaestroDoor.Settings, "rig.yaml")
     door = MaestroDoor("COM6", settings, Wired(clock, BoardPort(clock, board, LATE_S)))
     door.make_safe()
-    door.open()
+    door.swing(safe=False)
     door.make_safe()
     assert [round(pulse.width_s * 1e6) for pulse in board.pulses(0)] == [1000, 1500, 1000]
 
