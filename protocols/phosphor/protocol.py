@@ -219,10 +219,10 @@ class Phosphor(Chain):
             )
         changer = planned_rig(rig, source, (SAMPLE_CHANGER.key,))[SAMPLE_CHANGER]
         for sample in self.samples:
-            if sample.name not in changer.samples():
+            if sample.name not in changer.names():
                 raise ProtocolError(
                     f"samples: the sample changer of the {source} has no '{sample.name}'; "
-                    f"{did_you_mean(sample.name, changer.samples())}"
+                    f"{did_you_mean(sample.name, changer.names())}"
                 )
         if self.rests == "shared" and not changer.keeps_dark():
             raise ProtocolError(f"rests: shared is not possible: {NOT_DARK}")

@@ -34,7 +34,7 @@ def test_a_changer_on_a_servo() -> None:
     settings = validate(SERVO, MaestroSampleChanger.Settings, "rig.yaml")
     changer = MaestroSampleChanger("COM2", settings, Wired(clock, BoardPort(clock, board)))
     assert isinstance(changer, SampleChanger)
-    assert changer.samples() == tuple(settings.samples)
+    assert changer.names() == tuple(settings.samples)
     changer.put("green paint")
     assert "sample changer on channel 3, pulse 1600.00 µs" in changer.identity()
     changer.make_safe()

@@ -24,7 +24,6 @@ from labrig.acquire.roles.door_and_shield import (
 from labrig.acquire.roles.filter_wheel import (
     CAMERA_FILTER_WHEEL,
     FILTER_WHEEL,
-    FilterWheel,
     TurnCameraWheel,
     TurnWheel,
 )
@@ -45,6 +44,7 @@ from labrig.acquire.roles.monochromator import (
     MonochromatorBand,
     Tune,
 )
+from labrig.acquire.roles.places import Places
 from labrig.acquire.roles.role import (
     DARK,
     Checkable,
@@ -131,7 +131,6 @@ __all__ = [
     "DeviceAction",
     "ExerciseContext",
     "Exercised",
-    "FilterWheel",
     "FrameReader",
     "Guarded",
     "Illuminant",
@@ -147,6 +146,7 @@ __all__ = [
     "Measured",
     "Monochromator",
     "MonochromatorBand",
+    "Places",
     "PlannedDevice",
     "ReadSpectrum",
     "Role",

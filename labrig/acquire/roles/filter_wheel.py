@@ -1,42 +1,12 @@
 """Filter wheels, which put one of their filters before the lamp, or before the camera."""
 
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar
 
-from labrig.acquire.roles.places import BoardPlaces, PlannedPlaces, timed
-from labrig.acquire.roles.role import Device, ExerciseContext, Exercised, Measured, Role
+from labrig.acquire.roles.places import BoardPlaces, Places, PlannedPlaces, timed
+from labrig.acquire.roles.role import ExerciseContext, Exercised, Role
 from labrig.foundation.errors import ProtocolError
-from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
-
-
-@runtime_checkable
-class FilterWheel(Device, Protocol):
-    """A wheel, or a slide, with filters and an open slot. Safe state: at rest.
-
-    A filter that is in the wheel is put in place by it; all others, by hand.
-    """
-
-    def filters(self) -> tuple[str, ...]:
-        """Return the names of the filters in the wheel."""
-
-    def put(self, name: str | None, /) -> None:
-        """Turn to a filter, or to the open slot for None; return when it is in place.
-
-        Raises
-        ------
-        DeviceError
-            The wheel does not confirm that it is there.
-        """
-
-
-class PlannedFilterWheel(PlannedPlaces):
-    """Stand-in of a filter wheel in a plan."""
-
-    def filters(self) -> tuple[str, ...]:
-        """Return the filters in the rig file."""
-        return self._names
 
 
 class BoardFilterWheel(BoardPlaces):
@@ -51,10 +21,6 @@ class BoardFilterWheel(BoardPlaces):
     )
     empty = ("open", "Position with no filter in place.")
 
-    def filters(self) -> tuple[str, ...]:
-        """Return the names of the filters in the wheel."""
-        return tuple(self._positions)
-
 
 @dataclass(frozen=True)
 class TurnWheel:
@@ -67,7 +33,7 @@ class TurnWheel:
     def __str__(self) -> str:
         return f"filter {self.filter}" if self.filter else "no filter"
 
-    def begin(self, wheel: FilterWheel) -> None:
+    def begin(self, wheel: Places) -> None:
         """Turn the wheel, and wait until the filter is in place.
 
         Raises
@@ -75,10 +41,10 @@ class TurnWheel:
         ProtocolError
             The wheel has no such filter.
         """
-        if self.filter is not None and self.filter not in wheel.filters():
+        if self.filter is not None and self.filter not in wheel.names():
             raise ProtocolError(
                 f"the protocol puts the filter '{self.filter}' before the {self.before}, which the "
-                f"wheel has not; {did_you_mean(self.filter, wheel.filters())}"
+                f"wheel has not; {did_you_mean(self.filter, wheel.names())}"
             )
         wheel.put(self.filter)
 
@@ -91,21 +57,17 @@ class TurnCameraWheel(TurnWheel):
     before: ClassVar[str] = "camera"
 
 
-def _exercise(wheel: FilterWheel, context: ExerciseContext) -> Exercised:
+def _exercise(wheel: Places, context: ExerciseContext) -> Exercised:
     """Turn to every filter once, and back to the open slot."""
-    measured = timed(wheel, wheel.filters(), context)
-    back_s = context.timed_s(partial(wheel.put, None))
-    return Exercised((*measured, Measured("to the open slot", duration_text(back_s))))
+    return Exercised(tuple(timed(wheel, context, "to the open slot")))
 
 
-def _role(key: str, name: str) -> Role[FilterWheel]:
+def _role(key: str, name: str) -> Role[Places]:
     return Role(
         key=key,
-        protocol_class=FilterWheel,
+        protocol_class=Places,
         name=name,
-        planned=lambda settings, clock: PlannedFilterWheel(
-            clock, settings.filters, settings.travel
-        ),
+        planned=lambda settings, clock: PlannedPlaces(clock, settings.filters, settings.travel),
         on_board=BoardFilterWheel,
         exercise=_exercise,
     )

@@ -2,16 +2,37 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
 from pydantic import BaseModel, Field
 
 from labrig.acquire.channels import Board, Positions
 from labrig.acquire.connections import Connections
 from labrig.acquire.roles.board_device import BoardDevice, keys_model, require_distinct
-from labrig.acquire.roles.role import ExerciseContext, Measured, PlannedDevice
+from labrig.acquire.roles.role import Device, ExerciseContext, Measured, PlannedDevice
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.quantity import duration_text
+
+
+@runtime_checkable
+class Places(Device, Protocol):
+    """A device that brings one of several named things, or none of them, into place.
+
+    A filter wheel, or a slide with filters, is at rest when it is safe. A filter that is in it is
+    put in place by it; all others, by hand.
+    """
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the things."""
+
+    def put(self, name: str | None, /) -> None:
+        """Bring a thing into place, or none for None; return when it is there.
+
+        Raises
+        ------
+        DeviceError
+            The device does not confirm it.
+        """
 
 
 class PlannedPlaces(PlannedDevice):
@@ -22,6 +43,10 @@ class PlannedPlaces(PlannedDevice):
         self._names = tuple(names)
         self._travel_s = travel_s
         self._name: str | None = None
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names in the rig file."""
+        return self._names
 
     def put(self, name: str | None, /) -> None:
         """Let the time of a move pass, unless it is in place."""
@@ -83,6 +108,10 @@ class BoardPlaces(BoardDevice):
         place = self._channel.place()
         return f"{self.board.identity()}, {self.noun}{f' on {place}' if place else ''}"
 
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the things, in the rig file's order."""
+        return tuple(self._positions)
+
     def put(self, name: str | None, /) -> None:
         """Bring a thing, or for None nothing, into place; return when it is there.
 
@@ -98,9 +127,10 @@ class BoardPlaces(BoardDevice):
         self._channel.make_safe(self._empty)
 
 
-def timed(device: Any, names: Sequence[str], context: ExerciseContext) -> list[Measured]:
-    """Return the time of a move to each of the things, in turn."""
+def timed(places: Places, context: ExerciseContext, to_none: str) -> list[Measured]:
+    """Return the time of a move to each of the things in turn, and at last to none of them."""
+    moves = {**{f"to {name}": name for name in places.names()}, to_none: None}
     return [
-        Measured(f"to {name}", duration_text(context.timed_s(partial(device.put, name))))
-        for name in names
+        Measured(move, duration_text(context.timed_s(partial(places.put, name))))
+        for move, name in moves.items()
     ]

@@ -2,37 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from pydantic import Field
 
-from labrig.acquire.roles.places import BoardPlaces, PlannedPlaces, timed
-from labrig.acquire.roles.role import Device, ExerciseContext, Exercised, Finding, Measured, Role
+from labrig.acquire.roles.places import BoardPlaces, Places, PlannedPlaces, timed
+from labrig.acquire.roles.role import ExerciseContext, Exercised, Finding, Role
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import ProtocolError
-from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
 
 
 @runtime_checkable
-class SampleChanger(Device, Protocol):
-    """A disk or a slide with samples. Safe state: all of them in the dark."""
-
-    def samples(self) -> tuple[str, ...]:
-        """Return the names of the samples on it."""
+class SampleChanger(Places, Protocol):
+    """A disk or a slide with samples. Safe state: all of them in the dark, none in place."""
 
     def keeps_dark(self) -> bool:
         """Whether samples that are not in place lie in the dark while another one is lit."""
-
-    def put(self, name: str | None, /) -> None:
-        """Bring a sample into place, or all of them into the dark for None; return when done.
-
-        Raises
-        ------
-        DeviceError
-            The changer does not confirm it.
-        """
 
 
 class PlannedSampleChanger(PlannedPlaces):
@@ -43,10 +29,6 @@ class PlannedSampleChanger(PlannedPlaces):
     ) -> None:
         super().__init__(clock, samples, travel_s)
         self._keeps_dark = keeps_dark
-
-    def samples(self) -> tuple[str, ...]:
-        """Return the samples in the rig file."""
-        return self._names
 
     def keeps_dark(self) -> bool:
         """Whether the rig file says that samples that are not in place lie in the dark."""
@@ -75,10 +57,6 @@ class BoardSampleChanger(BoardPlaces):
         )
     }
 
-    def samples(self) -> tuple[str, ...]:
-        """Return the names of the samples on the changer."""
-        return tuple(self._positions)
-
     def keeps_dark(self) -> bool:
         """Whether samples that are not in place lie in the dark while another one is lit."""
         keeps_dark: bool = self.settings.keeps_dark
@@ -103,18 +81,17 @@ class BringSample:
         ProtocolError
             The changer has no such sample.
         """
-        if self.sample is not None and self.sample not in changer.samples():
+        if self.sample is not None and self.sample not in changer.names():
             raise ProtocolError(
                 f"the protocol measures the sample '{self.sample}', which the sample changer has "
-                f"not; {did_you_mean(self.sample, changer.samples())}"
+                f"not; {did_you_mean(self.sample, changer.names())}"
             )
         changer.put(self.sample)
 
 
 def _exercise(changer: SampleChanger, context: ExerciseContext) -> Exercised:
     """Bring every sample into place once, and all into the dark."""
-    measured = timed(changer, changer.samples(), context)
-    away_s = context.timed_s(partial(changer.put, None))
+    measured = timed(changer, context, "into the dark")
     finding = (
         Finding("fine", "samples rest in the dark while another one is lit (keeps_dark)")
         if changer.keeps_dark()
@@ -125,7 +102,7 @@ def _exercise(changer: SampleChanger, context: ExerciseContext) -> Exercised:
             "if they do, write 'keeps_dark: true'",
         )
     )
-    return Exercised((*measured, Measured("into the dark", duration_text(away_s))), (finding,))
+    return Exercised(tuple(measured), (finding,))
 
 
 SAMPLE_CHANGER: Role[SampleChanger] = Role(
