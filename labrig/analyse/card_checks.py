@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.analyse.lit_patches import SEEN_SIGMA, LightKind, LitPatch, mean_of
+from labrig.analyse.lit_patches import LightKind, LitPatch, mean_of
 from labrig.analyse.lit_warnings import exchanged_warnings, one_of
 from labrig.fit.leds import ChannelMatch, match_channels
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 
 #: Part of the brightest LED's signal from which the camera is expected to see an LED.
@@ -191,7 +192,7 @@ def _unlit(
 def _goes_off(patch: LitPatch, row: int) -> bool:
     light = patch.without_rest()
     part = light.value[row] > GOES_OFF * patch.value[row]
-    return bool((part & (light.value[row] > SEEN_SIGMA * np.sqrt(light.variance[row]))).any())
+    return bool((part & (light.value[row] > DETECTION_SIGMA * np.sqrt(light.variance[row]))).any())
 
 
 def _is_rather(match: ChannelMatch, led: str, named: str) -> bool:

@@ -11,13 +11,12 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.results import FilterFrames, SpectralComparison
 
 #: Iterations of brightness and mean; each gains a digit or more.
 COMBINING_ROUNDS = 20
-#: Least significance in σ of the sum of all light.
-SEEN_SIGMA = 5.0
 #: Significance level, over all comparisons of a kind, of a difference of spectra.
 LEVEL = 1e-3
 #: Fraction of the highest value above which a place counts in the centroid.
@@ -46,7 +45,7 @@ class CombinedFrame:
     @property
     def shows_light(self) -> bool:
         """Whether the sum of all values is significant."""
-        return bool(np.nansum(self.value) > SEEN_SIGMA * np.sqrt(np.nansum(self.sigma**2)))
+        return bool(np.nansum(self.value) > DETECTION_SIGMA * np.sqrt(np.nansum(self.sigma**2)))
 
 
 def combined(frames: FilterFrames) -> CombinedFrame:

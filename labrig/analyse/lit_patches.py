@@ -11,6 +11,7 @@ from labrig.analyse.inputs import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.calibration import CAMERA_KIND
 from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
 from labrig.protocols.steps.led_scenes import AGAIN
@@ -21,8 +22,6 @@ from labrig.results import Measured, Series
 #: What lights are called in messages; both kinds together are lights.
 LightKind = Literal["LED", "lamp", "light"]
 
-#: Significance in σ from which a light is seen.
-SEEN_SIGMA = 5.0
 #: Least part of a variance that channels do not have in common: each frame weighs a little
 #: differently in them.
 LEAST_OWN = 0.01
@@ -73,12 +72,12 @@ class LitPatch:
     @property
     def is_left(self) -> BoolArray:
         """Whether light is left when the light is off, shape (m, k)."""
-        return np.asarray(self.off > SEEN_SIGMA * self.off_sigma)
+        return np.asarray(self.off > DETECTION_SIGMA * self.off_sigma)
 
     @property
     def is_seen(self) -> BoolArray:
         """Whether some channel sees light, shape (m,)."""
-        return np.asarray((self.value > SEEN_SIGMA * np.sqrt(self.variance)).any(axis=1))
+        return np.asarray((self.value > DETECTION_SIGMA * np.sqrt(self.variance)).any(axis=1))
 
     def without_rest(self) -> "LitPatch":
         """Return the values without what is left when the light is off, if there is any."""

@@ -57,7 +57,6 @@ from .fitted_decay_file import (
     write_fitted_decay as write_fitted_decay,
 )
 from .fitted_excitation import (
-    SEEN_SIGMAS as SEEN_SIGMAS,
     UPPER_SIGMAS as UPPER_SIGMAS,
     BandQuantity as BandQuantity,
     BandTests as BandTests,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.number_format import plus_minus
 from labrig.material import ReradiationMatrix
 from labrig.protocols.direct_bispectral.result import DirectBispectralResult
@@ -50,9 +51,8 @@ HEAT_HEIGHT_PT, HEIGHT_PT = 330.0, 220.0
 BAR_ROOM_PT, BAR_PT = 74.0, 11.0
 #: Part of a light in a band below which what comes back there counts as beyond the light.
 LITTLE_SHARE = 0.02
-#: Significance in σ from which re-radiation is seen, and the largest σ of a number in the picture,
-#: of the strongest one.
-SEEN_SIGMA, WORST_SHOWN = 5.0, 0.1
+#: Largest σ of a number in the picture, of the strongest one.
+WORST_SHOWN = 0.1
 INCIDENT, RETURNING = "Incident wavelength / nm", "Returning wavelength / nm"
 
 
@@ -69,7 +69,7 @@ def _line(name: str, columns: DirectColumns) -> str:
     fraction, sigma = _reradiated(columns)
     most = int(np.argmax(fraction))
     lights = f"{len(columns.lights)} lights, σ of a band {_median_sigma(columns):.1g}"
-    if fraction[most] <= SEEN_SIGMA * sigma[most]:
+    if fraction[most] <= DETECTION_SIGMA * sigma[most]:
         return f"{name}: no re-radiation above the noise ({lights})"
     share = plus_minus(100 * fraction[most], 100 * sigma[most])
     return f"{name}: re-radiates up to {share} % of {columns.lights[most]} ({lights})"
@@ -201,7 +201,7 @@ def _row(
     band = int(np.argmin(np.abs(columns.output_nm - columns.input_nm[number])))
     is_known = bool(np.isfinite(columns.reflectance[band]))
     beyond = np.where(_is_beyond(columns)[:, number], columns.reradiated[:, number], np.nan)
-    is_seen = fraction[number] > SEEN_SIGMA * sigma[number]
+    is_seen = fraction[number] > DETECTION_SIGMA * sigma[number]
     return (
         columns.lights[number],
         plus_minus(columns.reflectance[band], columns.reflectance_sigma[band]) if is_known else "",
@@ -234,7 +234,7 @@ def _certain_values(matrix: ReradiationMatrix) -> tuple[FloatArray, float]:
     """Return the re-radiation without numbers that are hardly known, and the strongest."""
     values, sigma = shown_values(matrix), matrix.reradiation_sigma
     assert sigma is not None
-    top = largest(np.where(values > SEEN_SIGMA * BAND_NM * sigma, values, np.nan))
+    top = largest(np.where(values > DETECTION_SIGMA * BAND_NM * sigma, values, np.nan))
     is_certain = BAND_NM * sigma <= WORST_SHOWN * max(top, 1e-12)
     return np.where(is_certain, values, np.nan), top
 

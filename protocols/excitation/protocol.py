@@ -33,6 +33,7 @@ from labrig.acquire import (
 )
 from labrig.calibration import IRRADIANCE_KIND
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import Count, DurationS, Fraction, duration_text
 from labrig.foundation.region import Region
@@ -48,7 +49,6 @@ from labrig.protocols.steps.darkness import levels
 from labrig.protocols.steps.exciting_lights import ExcitingLights
 from labrig.protocols.steps.exposure_metering import (
     SEEN_DN,
-    SEEN_SIGMA,
     DecayMeter,
     MeteringFrame,
     Schedule,
@@ -373,7 +373,9 @@ class ExcitationUnit:
         channels = [
             channel for place in self.measure(frame).patches for channel in place.channels.values()
         ]
-        return any(channel.mean > max(SEEN_SIGMA * channel.sigma, SEEN_DN) for channel in channels)
+        return any(
+            channel.mean > max(DETECTION_SIGMA * channel.sigma, SEEN_DN) for channel in channels
+        )
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ from labrig.acquire import (
     Session,
     Shoot,
 )
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DeviceError
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import Region
 from labrig.record import FrameRole
 
 from .darkness import range_dn
-from .exposure_metering import SEEN_SIGMA, MeteringFrame, measure_frame
+from .exposure_metering import MeteringFrame, measure_frame
 from .sample_pose import face_lamp
 from .sanity_checks import SanityChecks
 
@@ -159,7 +160,9 @@ def _per_s(frames: Sequence[MeteringFrame]) -> float:
             "the aperture"
         )
     brightest, frame = max(unclipped, key=lambda pair: pair[0].mean)
-    if brightest.mean < SEEN_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(frame):
+    if brightest.mean < DETECTION_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(
+        frame
+    ):
         raise DeviceError(
             "the card is not lit: look whether the lamp burns, the card lies in its place and "
             "'card:' is its region in the frame"

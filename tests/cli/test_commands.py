@@ -432,7 +432,7 @@ def test_a_table_has_page_figures_and_result_as_a_run_has(
     again = labrig("fit", "decay", table, "--out", tmp_path / "out")
     assert "the same result as before" in again.out
     other = labrig("fit", "decay", table, "--out", tmp_path / "out", "--from", "6 s")
-    assert "options start" in other.out
+    assert "start: none → 6 s" in other.out
     assert (tmp_path / "out" / "result-1" / "fit.json").is_file()
 
 

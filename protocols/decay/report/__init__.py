@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.protocols.decay.report.law_figure import law_figure
 from labrig.protocols.decay.report.outside_sigma import outside_sections, unrecorded_temperature
 from labrig.protocols.decay.report.periodogram_figure import (
@@ -42,9 +43,6 @@ from labrig.report.timing import (
     frame_timings,
 )
 from labrig.results import DecayPatch, FittedDecay, Series
-
-#: Signal-to-noise ratio of the mean signal below which a patch without a fit counts as dark.
-SEEN_SIGMA = 5.0
 
 
 @dataclass(frozen=True)
@@ -132,7 +130,7 @@ def steady(series: Series) -> SteadySource | None:
     residual = value - level - slope * centred_s
     scatter = float(np.sqrt(residual @ residual / (len(value) - 2)))
     level_sigma = scatter / np.sqrt(len(value))
-    if not level > SEEN_SIGMA * level_sigma:
+    if not level > DETECTION_SIGMA * level_sigma:
         return None
     slope_sigma = scatter / np.sqrt(centred_s @ centred_s)
     return SteadySource(

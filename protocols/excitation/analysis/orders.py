@@ -18,6 +18,7 @@ from labrig.fit.excitation import (
     layer_effect,
 )
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import RATE_LIMIT_SIGMA, STRONG_EVIDENCE_DELTA_BIC
 from labrig.protocols.excitation.options import FREE
 from labrig.results import (
     AUTO,
@@ -28,14 +29,10 @@ from labrig.results import (
     FittedExcitation,
 )
 
-#: Difference in BIC from which a model with more parameters is preferred: odds of e^3 = 20 : 1.
-CLEAR_BIC = 6.0
 #: Part of the veil by which it may differ along the filter, in each of some smooth courses.
 VEIL_SHAPE = 0.3
 #: Largest number of states that are fitted with orders.
 MAX_STATES = 2
-#: Amplitude over its σ from which a state is there.
-SEEN = 2.0
 #: Least part of the glow of a state at the start.
 LEAST_FRACTION = 1e-3
 
@@ -85,17 +82,20 @@ class OrderFits:
         models = tuple(_model(fit, orders, enlarged) for fit, orders in tried)
         chosen = 0
         for index, model in enumerate(models):
-            if model.bic < models[chosen].bic - CLEAR_BIC:
+            if model.bic < models[chosen].bic - STRONG_EVIDENCE_DELTA_BIC:
                 chosen = index
         return replace(tried[chosen][0], models=models)
 
     def _is_worth_while(self, first: FittedExcitation) -> bool:
         """Whether general order may be preferred to first order."""
-        penalty = CLEAR_BIC + len(first.states) * np.log(first.dof)
+        penalty = STRONG_EVIDENCE_DELTA_BIC + len(first.states) * np.log(first.dof)
         if first.order_gain > penalty * max(1.0, first.reduced_chi2):
             return True
         becquerel = [law.bic for law in self.decay.laws if law.name == "becquerel"]
-        return len(first.states) > 1 and min(becquerel, default=np.inf) < self.decay.bic - CLEAR_BIC
+        return (
+            len(first.states) > 1
+            and min(becquerel, default=np.inf) < self.decay.bic - STRONG_EVIDENCE_DELTA_BIC
+        )
 
     def _of_general_order(self, first: FittedExcitation) -> Iterator[FittedExcitation]:
         """Yield fits with an order of each state."""
@@ -107,7 +107,7 @@ class OrderFits:
             slow = [
                 number
                 for number, state in enumerate(self.decay.states)
-                if number == 1 or state.amplitude > SEEN * state.amplitude_sigma
+                if number == 1 or state.amplitude > RATE_LIMIT_SIGMA * state.amplitude_sigma
             ]
             ends = [0, slow[-1]]
             yield self._fit((k_r[ends], fractions[ends]), None)
@@ -194,7 +194,7 @@ def _model(fit: FittedExcitation, order: float | None, enlarged: float = 1.0) ->
 
 def _doubt(fit: FittedExcitation) -> Iterator[str]:
     """Yield a warning if orders that are held at 1 contradict the data."""
-    penalty = CLEAR_BIC + len(fit.states) * np.log(fit.dof)
+    penalty = STRONG_EVIDENCE_DELTA_BIC + len(fit.states) * np.log(fit.dof)
     if fit.order_gain > penalty * max(1.0, fit.reduced_chi2):
         yield (
             f"charges and decays contradict the first order (χ² {fit.chi2:.0f} would fall by "

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import RATE_LIMIT_SIGMA
 from labrig.foundation.number_format import plus_minus, rounded
 from labrig.protocols.excitation.report.exciting_bands import band_lines, band_picture
 from labrig.protocols.excitation.result import ExcitationResult, LightScatter, PatchExcitation
@@ -31,7 +32,6 @@ from labrig.report.figure_style import (
 from labrig.report.interval_table import interval_tables
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
-    SEEN_SIGMAS,
     UPPER_SIGMAS,
     ChargingSeries,
     Closure,
@@ -139,7 +139,7 @@ def _rates(fit: FittedExcitation, number: int) -> list[str]:
     columns = (state.k_e_per_s, state.k_e_sigma_per_s, state.seen, state.k_e_upper_per_s)
     if not state.is_apart:
         value, sigma = fit.relative_k_e(number)
-        columns = value, sigma, value > SEEN_SIGMAS * sigma, value + UPPER_SIGMAS * sigma
+        columns = value, sigma, value > RATE_LIMIT_SIGMA * sigma, value + UPPER_SIGMAS * sigma
         ends = np.stack([value, value])
     else:
         ends = fit.k_e_range(number)

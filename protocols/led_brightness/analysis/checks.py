@@ -7,8 +7,9 @@ import numpy as np
 
 from labrig.calibration import UV_NM
 from labrig.fit.leds import ChannelMatch, LedBand, light_within, match_channels
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.optics import CameraResponse, Spectrum, Transmittance
-from labrig.protocols.led_brightness.analysis.readings import SEEN_SIGMA, CameraValues, Spectrometry
+from labrig.protocols.led_brightness.analysis.readings import CameraValues, Spectrometry
 from labrig.protocols.led_brightness.result import LedFault, LedFinding
 
 #: Difference in nm from the rig file's peak that bins of makers and warmth do not explain.
@@ -250,7 +251,7 @@ def _beside(band: LedBand) -> tuple[float, float, float] | None:
     low_nm, high_nm = float(band.wavelength_nm[0]), float(band.wavelength_nm[-1])
     edges = np.arange(low_nm, high_nm, BIN_NM)
     parts = [light_within(band, edge, edge + BIN_NM) for edge in edges]
-    lit = np.array([part > SEEN_SIGMA * sigma and part > BESIDE / 20 for part, sigma in parts])
+    lit = np.array([part > DETECTION_SIGMA * sigma and part > BESIDE / 20 for part, sigma in parts])
     # The flanks of a band are under the noise one by one, and make it wide.
     flanks = np.convolve(lit, np.ones(3), mode="same") > 0
     light = np.maximum([part for part, _ in parts], 0.0) * flanks
@@ -348,7 +349,7 @@ def unseen_channels(bank: Bank, values: Mapping[str, CameraValues]) -> list[str]
     unseen = []
     for number, channel in enumerate(bank.camera.channels):
         seen = [
-            card.value[number] > SEEN_SIGMA * card.sigma[number]
+            card.value[number] > DETECTION_SIGMA * card.sigma[number]
             for card in values.values()
             if not card.is_clipped
         ]

@@ -18,6 +18,7 @@ from labrig.bench_optics import card_reflectance
 from labrig.calibration import CAMERA_KIND
 from labrig.fit.leds import LedBand, led_band
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import CameraResponse, read_spectrometer_reading
 from labrig.protocols.led_brightness.protocol import BrightnessFrames
@@ -27,8 +28,6 @@ from labrig.results import Series
 
 #: Relative independent error of a channel's value: the sensor's pattern, the shutter.
 PATTERN = 0.002
-#: Limit of detection in standard uncertainties.
-SEEN_SIGMA = 5.0
 #: Part of an LED's light that counts as ambient light beside it.
 AMBIENT = 1e-3
 #: Relative σ of a standard lamp's calibration whose file has none.
@@ -65,13 +64,13 @@ class CameraValues:
     @property
     def is_seen(self) -> bool:
         """Whether some channel sees the LED."""
-        return bool((self.value > SEEN_SIGMA * self.sigma).any())
+        return bool((self.value > DETECTION_SIGMA * self.sigma).any())
 
     @property
     def is_ambient(self) -> bool:
         """Whether light is there with the LED off, enough to matter."""
         total = np.nanmax(np.append(self.value, 0.0))
-        seen = self.off > np.maximum(SEEN_SIGMA * self.off_sigma, AMBIENT * total)
+        seen = self.off > np.maximum(DETECTION_SIGMA * self.off_sigma, AMBIENT * total)
         return bool(seen.any())
 
 

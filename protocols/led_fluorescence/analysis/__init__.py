@@ -9,7 +9,7 @@ import numpy as np
 
 from labrig.analyse.card_checks import UsableLights, usable_lights
 from labrig.analyse.inputs import Part
-from labrig.analyse.lit_patches import SEEN_SIGMA, LightKind, LitPatch, lit_patches, mean_of
+from labrig.analyse.lit_patches import LightKind, LitPatch, lit_patches, mean_of
 from labrig.analyse.lit_system import lit_system
 from labrig.analyse.lit_warnings import (
     bleaching_warnings,
@@ -34,6 +34,7 @@ from labrig.fit.fluorescence import (
     predicted_colour,
 )
 from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import appearance, read_emissions
 from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
@@ -394,7 +395,7 @@ def _excitable(fit: FluorescenceFit, lit: LitPatch, system: FluorescenceSystem) 
     known = np.maximum(system.response.absorbed[~system.is_loose].sum(axis=0), 0.0)
     dark = np.zeros_like(fit.matrix.reradiation)
     reflected = system.values(fit.matrix.reflectance, dark) * system.brightness[:, np.newaxis]
-    more = fit.predicted - reflected > SEEN_SIGMA * np.sqrt(lit.variance)
+    more = fit.predicted - reflected > DETECTION_SIGMA * np.sqrt(lit.variance)
     unknown = system.response.absorbed[[row for row in loose if more[row].any()]].sum(axis=0)
     return np.asarray(unknown > known)
 
