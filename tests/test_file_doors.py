@@ -120,7 +120,6 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
         "labrig/bench/device_lock.py",
         "labrig/record/run_folder.py",  # the name of this PC
         "labrig/acquire/connections.py",  # the type
-        "drivers/ptp/ip/link.py",
         "sim/camera/ptpip/server.py",
         "sim/camera/ptpip/connection.py",
     },

@@ -68,11 +68,6 @@ class Gphoto2Camera:
             self._leaving = leaving.pop_all()
 
     @classmethod
-    def declared_offers(cls, settings: Gphoto2CameraSettings) -> CameraOffers:
-        """Return the offers that planning without the camera assumes."""
-        return settings.declared_offers()
-
-    @classmethod
     def recorded_exposures_s(cls, label_s: float, identity: str) -> tuple[float, ...]:
         """Return the exposure times that a run may hold for a frame with a time in its EXIF.
 

@@ -1,4 +1,4 @@
-"""A PTP camera on USB or in the network as labrig's camera."""
+"""A PTP camera on USB as labrig's camera."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
@@ -23,12 +23,11 @@ class PtpCamera:
     Parameters
     ----------
     address
-        Address of the camera, `usb://vid:pid[/serial]`, `ptpip://host[:port]` or
-        `sim://room/device`.
+        Address of the camera, `usb://vid:pid[/serial]` or `sim://room/device`.
     settings
         The rig file's keys for this camera.
     connections
-        Connections that open the USB device or the network connection, and have the clock.
+        Connections that open the USB device, and have the clock.
 
     Raises
     ------
@@ -55,11 +54,6 @@ class PtpCamera:
                 self._body.take_control()
             self._in_control = True
             self._leaving = leaving.pop_all()
-
-    @classmethod
-    def declared_offers(cls, settings: PtpCameraSettings) -> CameraOffers:
-        """Return the offers that planning without the camera assumes."""
-        return settings.declared_offers()
 
     @classmethod
     def recorded_exposures_s(cls, label_s: float, identity: str) -> tuple[float, ...]:

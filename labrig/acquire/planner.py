@@ -237,9 +237,9 @@ def planned_rig(rig: RigFile, source: str, keys: Collection[str] | None = None) 
     for key in rig.devices:
         if keys is not None and key not in keys:
             continue
-        driver, settings = driver_and_settings(rig, key, source)
+        _, settings = driver_and_settings(rig, key, source)
         if stand_in := ROLES[key].planned:
-            devices[key] = stand_in(driver, settings, clock)
+            devices[key] = stand_in(settings, clock)
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
     return Rig(rig.name, clock, devices, warm_up_s)
 

@@ -132,7 +132,7 @@ class DeviceEntry(BaseModel):
     ----------
     driver
         Name of the device's driver, which decides what the other keys are, for example
-        `numato_relay`.
+        `numato`.
     address
         Address of the device: a serial port (`COM3`, `/dev/ttyACM0`, `/dev/cu.usbmodem…`), a USB
         device (`usb://04a9:3199`, with `/SERIAL` behind it if there are two alike), a network
@@ -391,14 +391,14 @@ def read_rig_file(path: str | Path) -> RigFile:
     >>> rig.name
     'simulated dark room with LVF'
     >>> rig.devices["lamp"].driver, rig.optics.camera
-    ('numato_relay', 'canon_eos_5d_mark_ii')
+    ('numato', 'canon_eos_5d_mark_ii')
     """
     path = Path(path)
     folder = path.resolve().parent
     content = with_absolute_paths(read_yaml(path), RigFile, folder)
     if isinstance(devices := content.get("devices"), dict):
         content["devices"] = {
-            key: _device_with_absolute_paths(entry, folder) for key, entry in devices.items()
+            key: _device_with_absolute_paths(key, entry, folder) for key, entry in devices.items()
         }
     rig = validate(content, RigFile, str(path))
     for key in rig.devices:
@@ -409,16 +409,18 @@ def read_rig_file(path: str | Path) -> RigFile:
     return rig
 
 
-def _device_with_absolute_paths(entry: Any, folder: Path) -> Any:
+def _device_with_absolute_paths(key: str, entry: Any, folder: Path) -> Any:
     """Return a device's keys with absolute paths where its driver's settings name files."""
     if not isinstance(entry, dict) or not isinstance(name := entry.get("driver"), str):
         return entry
-    keys = {key: value for key, value in entry.items() if key not in DeviceEntry.model_fields}
-    if not _has_path(keys):
+    keys = {each: value for each, value in entry.items() if each not in DeviceEntry.model_fields}
+    if not _has_path(keys) or key not in ROLES:
         return entry  # nor is its driver needed yet
     try:
-        driver = load(DRIVERS, name, "")
+        driver = ROLES[key].driver(load(DRIVERS, name, ""))
     except UsageError:  # told where it is needed
+        return entry
+    if driver is None:
         return entry
     return entry | with_absolute_paths(keys, driver.Settings, folder)
 

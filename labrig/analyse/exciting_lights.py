@@ -98,8 +98,7 @@ def exciting_lights(part: Part, lights: ExcitingLights, lamp: Spectrum) -> list[
             f"rig '{part.rig.name}': expected 'monochromator' under 'devices', which has the width "
             "of its band, found none"
         )
-    driver, settings = driver_and_settings(part.rig, MONOCHROMATOR.key, part.rig.name)
-    band = driver.declared_band(settings)
+    _, band = driver_and_settings(part.rig, MONOCHROMATOR.key, part.rig.name)
     return [
         ExcitingLight(_through(lamp, band.transmittance(nm)), math.inf, band.wavelength_sigma)
         for nm in lights.monochromator

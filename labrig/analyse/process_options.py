@@ -14,7 +14,24 @@ OptionsT = TypeVar("OptionsT", bound="ProcessOptions")
 
 
 def flag(name: str) -> str:
-    """Return the option of a field on the command line, such as `--per-led` of `per_led`."""
+    """Return the option of a field on the command line.
+
+    Parameters
+    ----------
+    name
+        Name of the field.
+
+    Returns
+    -------
+    str
+        The option.
+
+    Examples
+    --------
+    >>> from labrig.analyse import flag
+    >>> flag("per_led")
+    '--per-led'
+    """
     return f"--{name.replace('_', '-')}"
 
 
@@ -80,10 +97,27 @@ def options_of(protocol: Any) -> list[type[ProcessOptions]]:
 def check_options(given: Mapping[str, Any], protocol: Any) -> None:
     """Refuse options that a protocol does not have, and values that they cannot have.
 
+    Parameters
+    ----------
+    given
+        Values of options by their fields' names.
+    protocol
+        Model of the protocol.
+
     Raises
     ------
     UsageError
         The message names the option.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.analyse import check_options, read_run_protocol
+    >>> decay = read_run_protocol(Path("runs/decay"))
+    >>> check_options({"states": 2}, decay)
+    >>> check_options({"order": 2}, decay)
+    Traceback (most recent call last):
+    labrig.foundation.errors.UsageError: --order: expected an option of decay, ...
     """
     models = options_of(protocol)
     fields = {name for model in models for name in model.model_fields}
@@ -99,10 +133,30 @@ def check_options(given: Mapping[str, Any], protocol: Any) -> None:
 def chosen_options(model: type[OptionsT], given: Mapping[str, Any]) -> OptionsT:
     """Return the options of one measurement among those given.
 
+    Parameters
+    ----------
+    model
+        Model of the measurement's options.
+    given
+        Values of options by their fields' names, also of other measurements.
+
+    Returns
+    -------
+    ProcessOptions
+        Its own options, with defaults for those that were not given.
+
     Raises
     ------
     UsageError
         A value is one that the option cannot have.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.analyse import chosen_options, options_of, read_run_protocol
+    >>> (options,) = options_of(read_run_protocol(Path("runs/decay")))
+    >>> chosen_options(options, {"states": 2, "order": "free"}).states
+    2
     """
     own = {flag(name): value for name, value in given.items() if name in model.model_fields}
     return validate(own, model, "options")

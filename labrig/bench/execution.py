@@ -369,7 +369,7 @@ def _place_sample(name: str | None, rig: Rig, observer: RunObserver) -> None:
     if SAMPLE_CHANGER not in rig or name is None:  # the safe state is that all are in the dark
         return
     changer = rig[SAMPLE_CHANGER]
-    samples = changer.samples()
+    samples = changer.names()
     if name not in samples:
         observer.warn(
             f"the sample changer has no sample '{name}' (it has {', '.join(samples)}): all of them "

@@ -161,12 +161,6 @@ class PredictedUnderLamps(RunResult):
         Mean ΔE2000 of the chart's patches, and the largest; None without one.
     lamps
         Lamps that were used, by name.
-
-    Examples
-    --------
-    >>> result = labrig.read_result(run)  # doctest: +SKIP
-    >>> for name, lamp in result.lamps.items():
-    ...     print(name, lamp.verdict, lamp.reduced_chi2)
     """
 
     channels: tuple[str, ...]

@@ -22,12 +22,12 @@ from labrig.acquire import (
     LEDS,
     CameraOffers,
     ExposureSettings,
+    LampSwitch,
     LedSwitch,
     ManualStep,
     ProtocolModel,
     Session,
     Shoot,
-    Switch,
     Unit,
     at,
 )
@@ -310,12 +310,12 @@ class ExcitationUnit:
     protocol: ExcitationSettings
 
     @property
-    def light_on(self) -> Switch | LedSwitch:
+    def light_on(self) -> LampSwitch | LedSwitch:
         """Action that switches the light on which charges."""
         return LAMP_ON
 
     @property
-    def light_off(self) -> Switch | LedSwitch:
+    def light_off(self) -> LampSwitch | LedSwitch:
         """Action that switches that light off."""
         return LAMP_OFF
 
@@ -453,12 +453,12 @@ class BandMeter(_MeterUnit):
         return UnitKind.of_light(self.light, "meter")
 
     @property
-    def light_on(self) -> Switch | LedSwitch:
+    def light_on(self) -> LampSwitch | LedSwitch:
         """Action that switches the light on."""
         return _selected(self.protocol).on(self.light)
 
     @property
-    def light_off(self) -> Switch | LedSwitch:
+    def light_off(self) -> LampSwitch | LedSwitch:
         """Action that switches it off."""
         return _selected(self.protocol).off
 
@@ -651,12 +651,12 @@ class BandUnit(_ChargeUnit):
         return UnitKind.of_light(self.light, self.number)
 
     @property
-    def light_on(self) -> Switch | LedSwitch:
+    def light_on(self) -> LampSwitch | LedSwitch:
         """Action that switches the light on."""
         return _selected(self.protocol).on(self.light)
 
     @property
-    def light_off(self) -> Switch | LedSwitch:
+    def light_off(self) -> LampSwitch | LedSwitch:
         """Action that switches it off."""
         return _selected(self.protocol).off
 

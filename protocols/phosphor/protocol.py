@@ -219,10 +219,10 @@ class Phosphor(Chain):
             )
         changer = planned_rig(rig, source, (SAMPLE_CHANGER.key,))[SAMPLE_CHANGER]
         for sample in self.samples:
-            if sample.name not in changer.samples():
+            if sample.name not in changer.names():
                 raise ProtocolError(
                     f"samples: the sample changer of the {source} has no '{sample.name}'; "
-                    f"{did_you_mean(sample.name, changer.samples())}"
+                    f"{did_you_mean(sample.name, changer.names())}"
                 )
         if self.rests == "shared" and not changer.keeps_dark():
             raise ProtocolError(f"rests: shared is not possible: {NOT_DARK}")
@@ -234,9 +234,9 @@ class Phosphor(Chain):
         """Return why rests are shared or not, and the time in the lab with the other way."""
         if not self.samples:
             return super().notes(rig)
-        driver, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
+        _, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
         apart = self._lab_time("apart", rig)
-        if driver.declared_keeps_dark(settings):
+        if settings.keeps_dark:
             shared = self._lab_time("shared", rig)
             if self._rests_on(rig) == "shared":
                 return (

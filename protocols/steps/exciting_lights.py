@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import LAMP_OFF, LAMP_ON, LEDS_OFF, LedSwitch, Switch
+from labrig.acquire import LAMP_OFF, LAMP_ON, LEDS_OFF, LampSwitch, LedSwitch
 from labrig.foundation.models import FrozenModel
 
 from .scenes import Arrangement, Stage
@@ -70,12 +70,12 @@ class ExcitingLights(FrozenModel):
             return Arrangement(stage, monochromator_nm=wavelength_nm)
         return Arrangement(stage)
 
-    def on(self, name: str) -> Switch | LedSwitch:
+    def on(self, name: str) -> LampSwitch | LedSwitch:
         """Return the action that switches the light on."""
         return LedSwitch(name) if self.leds else LAMP_ON
 
     @property
-    def off(self) -> Switch | LedSwitch:
+    def off(self) -> LampSwitch | LedSwitch:
         """Action that switches any of the lights off."""
         return LEDS_OFF if self.leds else LAMP_OFF
 

@@ -121,10 +121,10 @@ class Arrangement:
                 instruction, task = now._step(name)
                 session.ask(ManualStep(instruction, why, task))
         if FILTER_WHEEL in session.rig:
-            in_wheel = self.filter in session.rig[FILTER_WHEEL].filters()
+            in_wheel = self.filter in session.rig[FILTER_WHEEL].names()
             session.perform(TurnWheel(self.filter if in_wheel else None))
         if CAMERA_FILTER_WHEEL in session.rig:
-            in_wheel = self.camera_filter in session.rig[CAMERA_FILTER_WHEEL].filters()
+            in_wheel = self.camera_filter in session.rig[CAMERA_FILTER_WHEEL].names()
             session.perform(TurnCameraWheel(self.camera_filter if in_wheel else None))
         if self.monochromator_nm is not None:
             session.perform(Tune(self.monochromator_nm))
@@ -132,9 +132,9 @@ class Arrangement:
     def _by_hand(self, rig: Rig) -> "Arrangement":
         """Return the part of the arrangement that is made by hand."""
         filter_name, camera_filter = self.filter, self.camera_filter
-        if FILTER_WHEEL in rig and filter_name in rig[FILTER_WHEEL].filters():
+        if FILTER_WHEEL in rig and filter_name in rig[FILTER_WHEEL].names():
             filter_name = None
-        if CAMERA_FILTER_WHEEL in rig and camera_filter in rig[CAMERA_FILTER_WHEEL].filters():
+        if CAMERA_FILTER_WHEEL in rig and camera_filter in rig[CAMERA_FILTER_WHEEL].names():
             camera_filter = None
         tuned_nm = None if self.monochromator_nm is None else 0.0
         return replace(

@@ -60,7 +60,7 @@ def test_unknown_protocols_and_rigs(
         (lambda rig: rig["devices"].update(lmap=rig["devices"].pop("lamp")), "did you mean 'lamp'"),
         (lambda rig: rig["devices"].pop("lamp"), "needs a lamp"),
         (lambda rig: rig["devices"].pop("camera"), "needs a camera"),
-        (lambda rig: rig["devices"]["lamp"].update(driver="numato"), "did you mean 'numato_relay'"),
+        (lambda rig: rig["devices"]["lamp"].update(driver="numato"), "did you mean 'numato'"),
         (lambda rig: rig["devices"]["lamp"].update(relya=1), "did you mean 'relay'"),
         (lambda rig: rig["devices"]["lamp"].update(relay=99), "relay"),
         (lambda rig: rig["devices"]["lamp"].update(warm_up=15), "unit"),
@@ -432,7 +432,7 @@ def test_a_table_has_page_figures_and_result_as_a_run_has(
     again = labrig("fit", "decay", table, "--out", tmp_path / "out")
     assert "the same result as before" in again.out
     other = labrig("fit", "decay", table, "--out", tmp_path / "out", "--from", "6 s")
-    assert "options start" in other.out
+    assert "start: none → 6 s" in other.out
     assert (tmp_path / "out" / "result-1" / "fit.json").is_file()
 
 

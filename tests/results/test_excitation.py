@@ -38,9 +38,9 @@ def test_files_lie_in_folders_of_the_patches(result: ExcitationResult, tmp_path:
         np.testing.assert_array_equal(covariance, np.where(known, patch.fit.covariance, np.nan))
         assert len(fit["covariance_parameters"]) == len(fit["covariance"])
         assert fit["covariance_parameters"][0] == "k_r_per_s 1"
-    assert result.provides() == {
-        "materials": {name: patch.material for name, patch in result.patches.items()}
-    }
+    provided = result.provides()
+    assert provided["materials"] == {name: each.material for name, each in result.patches.items()}
+    assert provided["excitations"] == {name: each.fit for name, each in result.patches.items()}
 
 
 def test_one_patch_alone_has_no_folder(result: ExcitationResult, tmp_path: Path) -> None:

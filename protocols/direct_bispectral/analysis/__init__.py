@@ -7,11 +7,10 @@ pixels of a repetition share is the noise of the dark pixels, which are subtract
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from labrig.acquire import LEDS, RigFile
+from labrig.acquire import LEDS, RigFile, bank_lights
 from labrig.analyse.frames import require_intact
 from labrig.analyse.hyperspectral import direct_columns
 from labrig.analyse.inputs import Part
@@ -401,17 +400,10 @@ def _filter_window_nm(rig: RigFile, name: str) -> tuple[float, float]:
     return float(curve.wavelength_nm[low]), float(curve.wavelength_nm[high])
 
 
-def _declared_leds(rig: RigFile) -> dict[str, Any]:
-    """Return what the rig file says of each LED by its name, whatever the driver calls the list."""
-    entry = rig.devices.get(LEDS.key)
-    groups = [] if entry is None else entry.settings().values()
-    return {name: led for group in groups if isinstance(group, dict) for name, led in group.items()}
-
-
 def named_peak_nm(rig: RigFile, name: str) -> float:
     """Return the peak in nm that the rig file says of an LED; NaN where it says nothing."""
-    led = _declared_leds(rig).get(name)
-    return float(led.get("centre", np.nan)) if isinstance(led, dict) else float("nan")
+    led = bank_lights(rig, LEDS.key, rig.name).get(name)
+    return float("nan") if led is None or led.centre is None else float(led.centre)
 
 
 def _drift(first: _Lit | None, again: _Lit | None) -> Measured:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from labrig.acquire import led_lights
+from labrig.acquire import LEDS, bank_lights
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import DATA_SHEET_NM, camera_curves, card_reflectance, led_exposures
 from labrig.calibration import UV_NM, CalibratedLed, LedsFile, LedSource, UvScale
@@ -100,7 +100,7 @@ def _bank(part: Part) -> Bank:
     exposures = led_exposures(part.rig, source)
     camera = camera_curves(part.rig, part.overrides.camera)
     nominal = {name: exposure.light for name, exposure in exposures.items()}
-    lights = led_lights(part.rig, source)
+    lights = bank_lights(part.rig, LEDS.key, source)
     sketched = frozenset(name for name, light in lights.items() if light.spectrum is None)
     sigma_nm = {name: exposure.wavelength_sigma_nm for name, exposure in exposures.items()}
     return Bank(nominal, sketched, sigma_nm, camera, card_reflectance(part.rig))

@@ -1,19 +1,16 @@
-"""The bank of LEDs, narrow bands of light that charge the sample, one at a time."""
+"""The light of an LED or a lamp as far as a rig file describes it."""
 
 import math
-from collections.abc import Mapping
-from functools import partial
-from typing import Annotated, Any, Protocol, Self, runtime_checkable
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from labrig.acquire.roles.light_bank import BankSwitch, LightBank, PlannedLightBank, exercise
-from labrig.acquire.roles.role import Role
+from labrig.foundation import resources
 from labrig.foundation.models import FrozenModel
-from labrig.foundation.named_files import FilePath
+from labrig.foundation.named_files import FilePath, ShippedOrFile
 from labrig.foundation.quantity import DurationS
-from labrig.optics import Spectrum, read_spectrum
+from labrig.optics import Spectrum, read_light, read_spectrum
 
 FWHM_OVER_SIGMA = 2 * math.sqrt(2 * math.log(2))
 #: Half width of the grid of a spectrum that is given by its centre and width, in widths.
@@ -96,30 +93,43 @@ class LedLight(FrozenModel):
         return float(spectrum.wavelength_nm[spectrum.value.argmax()])
 
 
-@runtime_checkable
-class LedBank(LightBank, Protocol):
-    """Narrow-band LEDs of which at most one is on. Safe state: all off."""
+class Illuminant(LedLight):
+    """The light of a lamp as far as it is known: keys of each lamp of a bank.
 
-    @classmethod
-    def declared_leds(cls, settings: Any, /) -> Mapping[str, LedLight]:
-        """Return what the rig file says of the LEDs' light by their names, for plans."""
+    Attributes
+    ----------
+    spectrum
+        Spectrum of the lamp in relative units per nm: a CIE illuminant such as `D65`, the name of a
+        shipped file such as `halogen_3000k`, or the path of a file; given instead of `centre` and
+        `fwhm`.
+    settling
+        Time from switching on until the lamp is warm and its light steady, for example `10 min`;
+        protocols wait for it.
+    filter
+        Colour filter that is fixed before the lamp, by its name in the rig's folder of filters.
+        Default: none.
 
+    Examples
+    --------
+    >>> from labrig.acquire import Illuminant
+    >>> lamp = Illuminant.model_validate({"spectrum": "halogen_3000k", "settling": "10 min"})
+    >>> lamp.settling, lamp.relative_spectrum().at([450.0, 650.0]).round(2).tolist()
+    (600.0, [0.39, 1.49])
+    """
 
-class LedSwitch(BankSwitch):
-    """The action that switches one LED on and all others off, or all off for None."""
+    spectrum: ShippedOrFile | None = None
+    settling: Annotated[DurationS, Field(ge=0, le=7200)] = 0.0
+    filter: Annotated[str, Field(min_length=1)] | None = None
 
-    device = "leds"
-    noun = "an LED"
+    def relative_spectrum(self) -> Spectrum | None:
+        """Return the spectrum per nm without the filter, None if the rig file says nothing of it.
 
-
-LEDS_OFF = LedSwitch(None)
-
-LEDS: Role[LightBank] = Role(
-    key="leds",
-    protocol_class=LedBank,
-    name="bank of LEDs",
-    planned=lambda driver, settings, clock: PlannedLightBank(driver.declared_leds(settings)),
-    exercise=partial(exercise, nouns="LEDs"),
-    state=lambda leds: str(LedSwitch(leds.channel_on())),
-    safe_first=True,
-)
+        Raises
+        ------
+        UsageError
+            There is no such illuminant and no such file, or the file is malformed.
+        """
+        if self.spectrum is None:
+            return super().relative_spectrum()
+        shipped = resources.curve_path(self.spectrum)
+        return read_light(shipped if shipped.exists() else self.spectrum)
