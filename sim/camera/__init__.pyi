@@ -1,7 +1,5 @@
-from .body_settings import BodySettings as BodySettings
+from .body_settings import BodySettings as BodySettings, CameraFaults as CameraFaults
 from .camera import SimulatedCamera as SimulatedCamera
-from .faults import CameraFaults as CameraFaults
-from .pace import Pace as Pace
-from .photograph import Sensor as Sensor
+from .photograph import Pace as Pace, Sensor as Sensor
 from .ptpip.server import PtpIpServer as PtpIpServer
-from .standard.body import StandardHabits as StandardHabits
+from .standard import StandardHabits as StandardHabits

@@ -2,18 +2,15 @@
 
 from labrig.foundation.clock import VirtualClock
 
-from .body_settings import BodySettings
+from .body_settings import BodySettings, CameraFaults
 from .eos.body import EosBody
 from .eos.operations import EosOperations
-from .faults import CameraFaults
 from .objects import StoredObject
-from .operations import Operations
 from .photograph import Sensor
 from .power import AutoPowerOff
-from .responder import Responder
+from .responder import Operations, Responder
 from .shutter import Shutter
-from .standard.body import StandardBody, StandardHabits
-from .standard.operations import StandardOperations
+from .standard import StandardBody, StandardHabits, StandardOperations
 from .usb.backend import CameraBackend
 from .usb.cable import Cable
 from .usb.descriptors import UsbIdentity

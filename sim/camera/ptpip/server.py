@@ -6,18 +6,233 @@ transactions; on the second, which names the first, the camera reports events.
 
 import select
 import socket
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NoReturn
 
 from labrig.foundation.clock import CHECK_INTERVAL_S, Clock
 from labrig.foundation.errors import UsageError
 
 from ..responder import Responder
+from ..vocabulary import ResponseCode
 from . import packets as ptpip
-from .connection import Connection
-from .packets import FailReason, MalformedPacketError, Packet, PacketType
-from .transactions import Transactions
+from .packets import (
+    FailReason,
+    MalformedPacketError,
+    Packet,
+    PacketReader,
+    PacketType,
+    data_phase,
+    parameters,
+    response,
+)
+
+_MAX_AT_ONCE = 65536
+
+
+class Connection:
+    """A connection that a host made to the server.
+
+    Parameters
+    ----------
+    accepted
+        Accepted socket, which this object owns.
+    """
+
+    def __init__(self, accepted: socket.socket) -> None:
+        accepted.setblocking(False)
+        # a response is one small packet that somebody waits for
+        accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket = accepted
+        self._reader = PacketReader()
+        self._outgoing: deque[memoryview] = deque()
+        self._head_is_cut = False
+
+    def fileno(self) -> int:
+        """Return the socket's file descriptor, for `select`."""
+        return self._socket.fileno()
+
+    @property
+    def is_sending(self) -> bool:
+        """Whether packets still wait to be sent."""
+        return bool(self._outgoing)
+
+    def receive(self) -> bool:
+        """Take in the bytes that have come; return False if the other side is gone."""
+        try:
+            received = self._socket.recv(_MAX_AT_ONCE)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        self._reader.feed(received)
+        return bool(received)
+
+    def next_packet(self) -> Packet | None:
+        """Return the next complete packet.
+
+        Raises
+        ------
+        MalformedPacketError
+            The bytes are no packet.
+        """
+        return self._reader.next_packet()
+
+    def put(self, packets: list[bytes]) -> None:
+        """Queue these packets after those that still wait."""
+        self._outgoing.extend(memoryview(packet) for packet in packets)
+
+    def put_instead(self, packets: list[bytes]) -> None:
+        """Queue these packets in place of waiting ones; one that is half sent is completed."""
+        half_sent = [self._outgoing[0]] if self._head_is_cut else []
+        self._outgoing = deque(half_sent)
+        self.put(packets)
+
+    def send(self) -> bool:
+        """Send as much as the other side takes now; return False if it is gone."""
+        try:
+            while self._outgoing:
+                head = self._outgoing[0]
+                sent_bytes = self._socket.send(head)
+                self._head_is_cut = sent_bytes < len(head)
+                if self._head_is_cut:
+                    self._outgoing[0] = head[sent_bytes:]
+                else:
+                    self._outgoing.popleft()
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        return True
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+
+_DATA_TO_CAMERA = 2
+_NO_DATA_OR_TO_HOST = 1
+#: Announced size of data whose size the host does not know.
+_UNKNOWN_SIZE = 0xFFFFFFFFFFFFFFFF
+_MAX_DATA = 65536
+
+
+@dataclass
+class _Request:
+    """An operation request whose data phase has not ended."""
+
+    opcode: int
+    transaction_id: int
+    params: tuple[int, ...]
+    announced_bytes: int | None = None
+    data: bytearray = field(default_factory=bytearray)
+
+
+class Transactions:
+    """One host's transactions, a packet at a time, independent of sockets.
+
+    Parameters
+    ----------
+    responder
+        Responder of the camera.
+    """
+
+    def __init__(self, responder: Responder) -> None:
+        self._responder = responder
+        self._request: _Request | None = None
+        self._answering: int | None = None
+
+    def take(self, packet: Packet) -> list[bytes]:
+        """Process one packet from the command connection; return the packets that answer it.
+
+        Raises
+        ------
+        MalformedPacketError
+            The packet is invalid at this point: the connection cannot go on.
+        """
+        match packet.kind:
+            case PacketType.OPERATION_REQUEST:
+                return self._begin(packet)
+            case PacketType.START_DATA:
+                return self._announce(packet)
+            case PacketType.DATA:
+                self._receive(packet)
+                return []
+            case PacketType.END_DATA:
+                return self._finish(self._receive(packet))
+            case _:
+                raise MalformedPacketError
+
+    def cancel(self, packet: Packet) -> list[bytes]:
+        """Cancel a transaction; return the packets to send instead of its remaining ones.
+
+        Nothing is cancelled if that transaction is over.
+        """
+        (transaction_id,) = packet.fields("I")
+        if self._request is not None and self._request.transaction_id == transaction_id:
+            self._request = None
+            self._responder.abandon(transaction_id)
+        elif self._answering != transaction_id:
+            return []
+        self._answering = None
+        return [response(ResponseCode.TRANSACTION_CANCELLED, transaction_id)]
+
+    def answered(self) -> None:
+        """Note that all of the last answer is sent, so that it cannot be cancelled any more."""
+        self._answering = None
+
+    def _begin(self, packet: Packet) -> list[bytes]:
+        (direction, opcode, transaction_id), remainder = packet.split("IHI")
+        params = parameters(remainder)
+        if self._request is not None:
+            raise MalformedPacketError
+        if direction == _DATA_TO_CAMERA:
+            self._request = _Request(opcode, transaction_id, params)
+            return []
+        if direction != _NO_DATA_OR_TO_HOST:
+            raise MalformedPacketError
+        return self._execute(opcode, transaction_id, params, b"")
+
+    def _announce(self, packet: Packet) -> list[bytes]:
+        transaction_id, size = packet.fields("IQ")
+        request = self._awaiting_data(transaction_id)
+        if request.announced_bytes is not None or not (size <= _MAX_DATA or size == _UNKNOWN_SIZE):
+            raise MalformedPacketError
+        request.announced_bytes = size
+        return []
+
+    def _receive(self, packet: Packet) -> _Request:
+        (transaction_id,), piece = packet.split("I")
+        request = self._awaiting_data(transaction_id)
+        if request.announced_bytes is None:
+            raise MalformedPacketError
+        request.data += piece
+        if len(request.data) > min(request.announced_bytes, _MAX_DATA):
+            raise MalformedPacketError
+        return request
+
+    def _finish(self, request: _Request) -> list[bytes]:
+        if request.announced_bytes not in (len(request.data), _UNKNOWN_SIZE):
+            raise MalformedPacketError
+        self._request = None
+        data = bytes(request.data)
+        return self._execute(request.opcode, request.transaction_id, request.params, data)
+
+    def _awaiting_data(self, transaction_id: int) -> _Request:
+        if self._request is None or self._request.transaction_id != transaction_id:
+            raise MalformedPacketError
+        return self._request
+
+    def _execute(
+        self, opcode: int, transaction_id: int, params: tuple[int, ...], data: bytes
+    ) -> list[bytes]:
+        answer = self._responder.transaction(opcode, transaction_id, params, data)
+        packets = [] if answer.data is None else list(data_phase(transaction_id, answer.data))
+        packets.append(response(answer.code, transaction_id, answer.params))
+        self._answering = transaction_id
+        return packets
+
 
 #: Address of the server, which no other PC can reach.
 LOOPBACK = "127.0.0.1"

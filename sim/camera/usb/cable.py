@@ -5,7 +5,7 @@ import math
 from labrig.foundation.clock import VirtualClock
 
 from ... import usb_errors
-from ..faults import CameraFaults
+from ..body_settings import CameraFaults
 from ..power import AutoPowerOff
 
 #: Time of host controller and scheduler for every transfer (one high-speed microframe).

@@ -1,1 +1,0 @@
-"""The simulated camera as one that implements nothing but the PTP standard."""
