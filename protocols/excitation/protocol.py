@@ -21,11 +21,9 @@ from labrig.acquire import (
     LAMP_ON,
     LEDS,
     CameraOffers,
-    ExposureSettings,
     LampSwitch,
     LedSwitch,
     ManualStep,
-    ProtocolModel,
     Session,
     Shoot,
     Unit,
@@ -39,8 +37,6 @@ from labrig.foundation.quantity import Count, DurationS, Fraction, duration_text
 from labrig.foundation.region import Region
 from labrig.protocols.steps.afterglow import dark_level
 from labrig.protocols.steps.camera_settings import (
-    MARGIN_S,
-    CameraSettings,
     dark_exposures_s,
     longest_exposure_s,
 )
@@ -54,7 +50,7 @@ from labrig.protocols.steps.exposure_metering import (
     Schedule,
     measure_frame,
 )
-from labrig.protocols.steps.glow import dark_frames
+from labrig.protocols.steps.glow import DarkUnit, MeteredSettings, ladder
 from labrig.protocols.steps.patch_names import FilterPatches
 from labrig.protocols.steps.sample_pose import (
     charge,
@@ -142,7 +138,7 @@ class Rest(FrozenModel):
         return self
 
 
-class ExcitationSettings(ProtocolModel):
+class ExcitationSettings(MeteredSettings):
     """Settings of excitation rates; `excitation.yaml` is the commented example.
 
     Attributes
@@ -185,8 +181,6 @@ class ExcitationSettings(ProtocolModel):
     samples
         Number of samples at hand. With more than one, a fresh sample is put in for every charge,
         instead of a rest.
-    camera
-        Sensitivity and aperture of the camera.
     sites
         Place of the filter on the sample in the frame: `[x, y, width, height]` in pixels, or all
         four as fractions of the frame. Only exposures and charge times depend on it; the fit uses
@@ -219,7 +213,6 @@ class ExcitationSettings(ProtocolModel):
     last_decay: DurationS = Field(180.0, gt=0)
     rest: Rest = Rest()
     samples: Count = Field(1, ge=1)
-    camera: CameraSettings = CameraSettings()
     sites: Region = Field((0.1, 0.4, 0.8, 0.2))
     patches: FilterPatches = Field(default_factory=dict)
     states: Literal["auto", 1, 2, 3] = "auto"
@@ -258,23 +251,18 @@ class ExcitationSettings(ProtocolModel):
         pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
         return [longest_exposure_s(pause_s, offers) for pause_s in (*pauses_s, pauses_s[-1])]
 
-    def settings(self, exposure_s: float) -> ExposureSettings:
-        """Return the camera settings with that shutter time."""
-        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
-
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
         return dark_exposures_s(max(self.longest_exposures_s(offers, self.last_decay)), offers)
 
-    def ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Return begin after lamp off and shutter time of each metering frame."""
         longest_s = max(self.longest_exposures_s(offers, self.duration))
-        at_s, ladder = self.first, []
-        for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
-            exposure_s = offers.exposure_at_most(longest_s * fraction)
-            ladder.append((at_s, exposure_s))
-            at_s += exposure_s + offers.overhead_s + MARGIN_S
-        return ladder
+        return ladder(self.first, longest_s, offers)
+
+    def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
+        """Return the sanity checks of a unit's frames."""
+        return SanityChecks(session, unit, self.regions(), None, metering=metering)
 
     def regions(self) -> list[Region]:
         """Return the regions of the glow: every patch, or the strip on the sample."""
@@ -379,29 +367,12 @@ class ExcitationUnit:
 
 
 @dataclass(frozen=True)
-class DarkUnit(ExcitationUnit):
-    """Dark frames at the later exposures, before anything glows."""
-
-    name: str = "dark"
-
-    def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph in the dark."""
-        session.wait_until_warm("camera")
-        offers, regions = session.rig[CAMERA].offers(), self.protocol.regions()
-        exposures_s = self.protocol.dark_exposures_s(offers)
-        exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
-        dark_frames(session, self.name, regions, exposures)
-        shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
-        SanityChecks(session, self.name, regions, None).require_darkness(shorter)
-
-
-@dataclass(frozen=True)
 class _MeterUnit(ExcitationUnit):
     """A charge whose glow determines the exposures."""
 
     def _meter(self, session: Session, charge_s: float) -> None:
         session.wait_until_warm("camera")
-        ladder = self.protocol.ladder(session.rig[CAMERA].offers())
+        ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
         check_visible(session, ladder[0][0])
         charge(session, charge_s, self.light_on)
         session.run_sequence(
@@ -415,9 +386,8 @@ class _MeterUnit(ExcitationUnit):
         )
 
     def _require_glow(self, session: Session, unit: str) -> None:
-        ladder = self.protocol.ladder(session.rig[CAMERA].offers())
-        shorter = [self.protocol.settings(exposure_s) for _, exposure_s in ladder[:3]]
-        SanityChecks(session, unit, self.protocol.regions(), None).require_glow(shorter)
+        checks = self.protocol.checks(session, unit)
+        checks.require_glow(self.protocol.short_settings(session))
 
 
 @dataclass(frozen=True)
