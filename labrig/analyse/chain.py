@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from labrig.analyse.inputs import Inputs, Part
+from labrig.analyse.inputs import AnalysisContext, Inputs
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.plugins import measurement
 from labrig.results import RunResult
@@ -32,7 +32,7 @@ class AnalysedParts:
     warnings: tuple[str, ...]
 
 
-def analyse_parts(part: Part) -> AnalysedParts:
+def analyse_parts(context: AnalysisContext) -> AnalysedParts:
     """Analyse every part of a chain; each may use the results of earlier ones.
 
     Those of one sample do not use the results of another.
@@ -47,18 +47,18 @@ def analyse_parts(part: Part) -> AnalysedParts:
     results: dict[str, RunResult] = {}
     failures: dict[str, DataError | FitError] = {}
     warnings: list[str] = []
-    inputs = {"": part.inputs}
-    for link in part.protocol.chain():
+    inputs = {"": context.inputs}
+    for link in context.protocol.chain():
         kind = link.protocol.protocol
-        analyse_link = measurement(kind, str(part.run.folder)).load("analysis")
+        analyse_link = measurement(kind, str(context.run.folder)).load("analysis")
         known = inputs.get(link.sample, inputs[""])
-        link_part = Part(
-            part.run.part(link.name),
+        link_part = AnalysisContext(
+            context.run.part(link.name),
             link.protocol,
-            part.rig,
-            part.overrides,
+            context.rig,
+            context.overrides,
             known,
-            part.run.beside(link.name) if link.sample else None,
+            context.run.without_part(link.name) if link.sample else None,
         )
         try:
             result: RunResult = analyse_link(link_part)

@@ -83,7 +83,7 @@ class Inputs:
 
 
 @dataclass(frozen=True)
-class Part:
+class AnalysisContext:
     """One protocol's part of a run, or all of a run that is not a chain.
 
     Attributes
@@ -98,7 +98,7 @@ class Part:
         The user's settings.
     inputs
         Calibrations that the rig file names, and results of earlier parts of a chain.
-    beside
+    other_parts
         Record of the other parts' units, where samples took turns: the lamp burned for them, too.
     """
 
@@ -107,7 +107,7 @@ class Part:
     rig: RigFile
     overrides: Overrides
     inputs: Inputs
-    beside: RunRecord | None = None
+    other_parts: RunRecord | None = None
 
     def options(self, model: type[OptionsT]) -> OptionsT:
         """Return the measurement's own options, of those that the user gave.

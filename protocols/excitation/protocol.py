@@ -36,6 +36,11 @@ from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import Count, DurationS, Fraction, duration_text
 from labrig.foundation.region import Region
 from labrig.protocols.steps.afterglow import dark_level
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
 from labrig.protocols.steps.camera_settings import (
     dark_exposures_s,
     longest_exposure_s,
@@ -60,7 +65,6 @@ from labrig.protocols.steps.sample_pose import (
     lights_out,
 )
 from labrig.protocols.steps.sanity_checks import SanityChecks
-from labrig.protocols.steps.scenes import Arrangement, Scene, ScenesProtocol
 from labrig.record import FrameRecord, FrameRole
 
 
@@ -197,7 +201,7 @@ class ExcitationSettings(MeteredSettings):
         is fitted to the data.
     """
 
-    rests_on = (IRRADIANCE_KIND,)
+    requires = (IRRADIANCE_KIND,)
 
     protocol: Literal["excitation"] = "excitation"
     first_charge: DurationS = Field(8.0, gt=0)
@@ -278,8 +282,8 @@ class ExcitationSettings(MeteredSettings):
 
 
 #: Arrangements for the charges through the filter and by the lamp itself, and their reasons.
-LVF_ON = Arrangement(lvf="on sample")
-LVF_AWAY = Arrangement()
+LVF_ON = BenchConfiguration(lvf="on sample")
+LVF_AWAY = BenchConfiguration()
 THROUGH_IT = "every place is then charged by light of another wavelength"
 BY_ONE = "light of some wavelengths charges the sample"
 BY_ITSELF = "the lamp by itself charges the sample now"
@@ -328,7 +332,7 @@ class ExcitationUnit:
         if self.protocol.samples > 1:
             session.ask(FRESH)
             return
-        rest_s = session.choose("rest", lambda: self._rest_s(session), worst=rule.at_most)
+        rest_s = session.decide("rest", lambda: self._rest_s(session), when_planned=rule.at_most)
         session.rest(rest_s)
         exposure_s = max(
             self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
@@ -498,7 +502,7 @@ class _ChargeUnit(ExcitationUnit):
             ]
             return Schedule(schedule.times_s, tuple(exposures_s))
 
-        return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
+        return session.decide("exposure", decide, Schedule.constant(times_s, longest_s))
 
     def _reference_charge(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
         """Return charge time and frames of the longest charge of the kind."""
@@ -574,7 +578,7 @@ class DoublingUnit(_ChargeUnit):
                 self._glow_by_charge(session, charges)[1], self.protocol.growth
             )
 
-        if self.number > 2 and not session.choose("the glow still grows", grows, worst=True):
+        if self.number > 2 and not session.decide("the glow still grows", grows, when_planned=True):
             return
         session.wait_until_warm("camera")
         charge_s = self.protocol.doubled_s(self.number)
@@ -604,7 +608,7 @@ class RefiningUnit(_ChargeUnit):
             )
 
         worst_s = self.protocol.doubled_s(self.protocol.at_most)
-        charge_s = session.choose("charge for so many seconds", decide, worst_s)
+        charge_s = session.decide("charge for so many seconds", decide, worst_s)
         self._charge(session, ExcitationFrames.STRIP, charge_s, self.protocol.duration)
 
 
@@ -666,7 +670,7 @@ class DirectUnit(_ChargeUnit):
         self._charge(session, ExcitationFrames.DIRECT, protocol.direct[self.number - 1], lasting_s)
 
 
-class Excitation(ExcitationSettings, ScenesProtocol):
+class Excitation(ExcitationSettings, ConfiguredProtocol):
     """Excitation protocol; `excitation.yaml` is the commented example."""
 
     @property
@@ -674,17 +678,17 @@ class Excitation(ExcitationSettings, ScenesProtocol):
         """Roles of the frames to which rates are fitted."""
         return tuple(ExcitationFrames)
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, then metering and charges by bands, then the same by the lamp itself."""
         direct: list[Unit] = [
             DirectMeter(self),
             *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
         ]
         rests = self.samples == 1
-        by_itself = [Scene(unit, LVF_AWAY, BY_ITSELF, rests=rests) for unit in direct]
+        by_itself = [ConfiguredUnit(unit, LVF_AWAY, BY_ITSELF, rests=rests) for unit in direct]
         if self.select is not None:
             return [
-                Scene(DarkUnit(self), LVF_AWAY, BY_ITSELF, is_dark=True),
+                ConfiguredUnit(DarkUnit(self), LVF_AWAY, BY_ITSELF, is_dark=True),
                 *self._by_lights(self.select),
                 *by_itself,
             ]
@@ -694,17 +698,19 @@ class Excitation(ExcitationSettings, ScenesProtocol):
             *(RefiningUnit(self, number) for number in range(1, self.refine + 1)),
         ]
         return [
-            Scene(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
-            *(Scene(unit, LVF_ON, THROUGH_IT, rests=rests) for unit in through),
+            ConfiguredUnit(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
+            *(ConfiguredUnit(unit, LVF_ON, THROUGH_IT, rests=rests) for unit in through),
             *by_itself,
         ]
 
-    def _by_lights(self, lights: ExcitingLights) -> Iterator[Scene]:
+    def _by_lights(self, lights: ExcitingLights) -> Iterator[ConfiguredUnit]:
         """Yield metering and charges by one light after another."""
         rests = self.samples == 1
         for place, light in enumerate(lights.names()):
-            arrangement = lights.arrangement(light)
-            yield Scene(BandMeter(self, light, place == 0), arrangement, BY_ONE, rests=rests)
+            configuration = lights.configuration(light)
+            yield ConfiguredUnit(
+                BandMeter(self, light, place == 0), configuration, BY_ONE, rests=rests
+            )
             for number in range(1, len(self.charges) + 1):
                 unit = BandUnit(self, light, number)
-                yield Scene(unit, arrangement, BY_ONE, rests=rests)
+                yield ConfiguredUnit(unit, configuration, BY_ONE, rests=rests)

@@ -30,6 +30,7 @@ from labrig.foundation.region import CENTRE, Region
 from labrig.record import FrameRole
 from labrig.reduce import FrameMeasurement
 
+from .bench_configuration import BenchConfiguration, ConfiguredProtocol, ConfiguredUnit
 from .camera_settings import (
     DARKS_PER_EXPOSURE,
     MARGIN_S,
@@ -55,7 +56,6 @@ from .sample_pose import (
     visible_after_s,
 )
 from .sanity_checks import SanityChecks
-from .scenes import Arrangement, Scene, ScenesProtocol
 
 #: Earliest first photograph after lamp off: a halogen lamp has gone dark by then.
 EARLIEST_S = 0.5
@@ -83,7 +83,7 @@ class Plateau(FrozenModel):
     at_most: DurationS = Field(7200.0, gt=0)
 
 
-class DecaySettings(MeteredChargeSettings, ScenesProtocol):
+class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
     """Settings of a decay; `decay.yaml` is the commented example.
 
     Attributes
@@ -159,16 +159,16 @@ class DecaySettings(MeteredChargeSettings, ScenesProtocol):
         """Return a charge with the decay after it, as often as it is repeated."""
         return [DecayUnit(self, f"decay-{number}") for number in range(1, self.repeats + 1)]
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return the decays alone, without dark frames and metering."""
-        return [Scene(unit, Arrangement(), WHY) for unit in self.decays()]
+        return [ConfiguredUnit(unit, BenchConfiguration(), WHY) for unit in self.decays()]
 
     @property
     def first_s(self) -> float:
-        """Time from lamp off to the first photograph in seconds; `suited_to` knows the door."""
+        """Time from lamp off to the first photograph in seconds; `resolved_for` knows the door."""
         return EARLIEST_S if self.first == "auto" else self.first
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the protocol with the first photograph after the rig's trap door is open."""
         if self.first != "auto":
             return self
@@ -351,7 +351,7 @@ class DecayUnit:
 
         if isinstance(protocol.exposure, float):
             return protocol.schedule(offers, [], session.warn, seed)
-        return session.choose("exposure", decide, protocol.assumed_schedule(offers, seed))
+        return session.decide("exposure", decide, protocol.assumed_schedule(offers, seed))
 
     def _charge(self, session: Session, exposure_s: float) -> None:
         if isinstance(self.protocol.charge, float):
@@ -365,8 +365,8 @@ class DecayUnit:
             session.run_sequence([*lights_out(session), at(self.protocol.first_s, shoot)])
             face_lamp(session)
             session.perform(LAMP_ON)
-            if session.choose(
-                "plateau reached", lambda: self._reached_plateau(session), worst=False
+            if session.decide(
+                "plateau reached", lambda: self._reached_plateau(session), when_planned=False
             ):
                 session.wait(LAMP_SETTLES_S, "lamp settles, charge topped up")
                 return

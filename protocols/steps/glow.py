@@ -17,12 +17,10 @@ from labrig.record import FrameRole
 from .afterglow import glow
 from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s, longest_exposure_s
 from .darkness import levels, range_dn
-from .exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
+from .exposure_metering import LADDER, DecayMeter, MeteringFrame, Schedule, measure_frame
 from .sample_pose import charge, check_visible, face_camera, face_lamp, has_door, lights_out
 from .sanity_checks import SanityChecks
 
-#: Shutter times of a metering's first frames, as fractions of the longest.
-LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
 #: Shutter times of the further frames, along the decay, as fractions of the longest.
 LATER = (1 / 16, 1)
 
@@ -190,7 +188,7 @@ def metered_schedule(session: Session, protocol: GlowSettings, metering: str) ->
         measured = [measure_frame(frame, protocol.regions()) for frame in frames]
         return protocol.schedule(offers, measured, session.warn)
 
-    return session.choose("exposure", decide, protocol.brightest_schedule(offers))
+    return session.decide("exposure", decide, protocol.brightest_schedule(offers))
 
 
 #: Interval of checks of the sample, and longest rest.
@@ -267,7 +265,9 @@ def _look(
     for fraction in LADDER[::-1]:
         exposure_s = offers.exposure_at_most(longest.exposure_s * fraction)
         session.perform(Shoot(FrameRole.REST, replace(longest, exposure_s=exposure_s)))
-        light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
+        light = session.decide(
+            "light before", lambda: _light(session, unit, regions), when_planned=0.0
+        )
         if np.isfinite(light):
             return light
         least = longest.exposure_s / exposure_s

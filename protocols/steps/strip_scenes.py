@@ -5,7 +5,7 @@ from enum import StrEnum
 
 from labrig.acquire import Session
 
-from .scenes import SceneUnit
+from .bracketing import SceneUnit
 
 
 class LvfFrames(StrEnum):
@@ -34,7 +34,7 @@ class StripUnit(SceneUnit):
 
     def check(self, session: Session) -> None:
         """Check that the strip is visible, whole and straight."""
-        session.choose("strip", lambda: self._strip(session), worst="found")
+        session.decide("strip", lambda: self._strip(session), when_planned="found")
 
     def _strip(self, session: Session) -> str:
         # Takes a while to load, and plans do without.

@@ -6,7 +6,7 @@ import numpy as np
 
 from labrig.analyse.chart_scene import chart_scene
 from labrig.analyse.colours import camera_matrix
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.optics import CHART_PATCHES, read_colour_chart
 from labrig.protocols.colour_check.analysis.colours import GRID_NM, PublishedChart, checked
@@ -20,7 +20,7 @@ from labrig.protocols.colour_check.result import CheckedPatch, ColourCheckResult
 ODD_BALANCE, ODD_MISFIT, MOVED_NM = 3.5, 2.5, 2.0
 
 
-def analyse(part: Part) -> ColourCheckResult:
+def analyse(context: AnalysisContext) -> ColourCheckResult:
     """Compare a chart's colours, in a plain photograph and through the LVF, with published ones.
 
     Raises
@@ -30,16 +30,16 @@ def analyse(part: Part) -> ColourCheckResult:
     DataError
         Frames are missing or damaged, or no chart is to be seen in them.
     """
-    rig, protocol = part.rig, part.protocol
-    lamp, camera = lamp_spectrum(rig), camera_curves(rig, part.overrides.camera)
+    rig, protocol = context.rig, context.protocol
+    lamp, camera = lamp_spectrum(rig), camera_curves(rig, context.overrides.camera)
     chart = PublishedChart.under(read_colour_chart(protocol.chart), lamp)
-    scene = chart_scene(part, CheckFrames.CHART, CheckFrames.CARD)
+    scene = chart_scene(context, CheckFrames.CHART, CheckFrames.CARD)
     matrix = camera_matrix(camera, lamp)
     # On the grid of the sums, and on the scale on which a white has Y = 1.
     values_of_white = chart.light @ camera.at(GRID_NM)
     matrix = matrix * chart.white[1] / (matrix @ values_of_white)[1]
     plain = plain_colours(scene, chart, camera, card_reflectance(rig), matrix)
-    through = through_colours(part, chart)
+    through = through_colours(context, chart)
     every = tuple(range(len(CHART_PATCHES)))
     plainly, of_plain = checked(chart, every, plain.xyz, plain.drawn)
     filtered, of_through = (

@@ -15,7 +15,7 @@ from labrig.analyse.forward_model import (
     with_white_reference,
 )
 from labrig.analyse.frames import steady_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.place_reduction import reduce_places
 from labrig.analyse.strip import StripPatch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
@@ -60,7 +60,7 @@ class ThroughColours:
     shift_nm: float
 
 
-def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
+def through_colours(context: AnalysisContext, chart: PublishedChart) -> ThroughColours | None:
     """Return the colours of the patches that were seen through the filter; None if none were.
 
     Raises
@@ -70,19 +70,22 @@ def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
     DataError
         Frames are missing or damaged.
     """
-    numbers = [n for n in part.protocol.numbers if patch_unit(n) in part.run.completed()]
+    numbers = [n for n in context.protocol.numbers if patch_unit(n) in context.run.completed()]
     if not numbers:
         return None
-    cards, patches = frames_of(part, CheckFrames.CARD_THROUGH), frames_of(part, CheckFrames.PATCH)
-    darks = steady_frames(part.run, part.overrides, FrameRole.DARK)
-    models, _ = forward_models(part, cards[0], [WHOLE])
+    cards, patches = (
+        frames_of(context, CheckFrames.CARD_THROUGH),
+        frames_of(context, CheckFrames.PATCH),
+    )
+    darks = steady_frames(context.run, context.overrides, FrameRole.DARK)
+    models, _ = forward_models(context, cards[0], [WHOLE])
     bare = models[WHOLE]
     reduction = reduce_places(
-        [*cards, *patches], darks, {WHOLE: bare.slices}, part.inputs[CAMERA_KIND], bare.holder
+        [*cards, *patches], darks, {WHOLE: bare.slices}, context.inputs[CAMERA_KIND], bare.holder
     )[WHOLE]
     white = reduction.of_unit(THROUGH_UNIT)
-    light = card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
-    model, _ = with_white_reference(bare, part, white)
+    light = card_light(lamp_spectrum(context.rig), card_reflectance(context.rig))
+    model, _ = with_white_reference(bare, context, white)
     card_fit = _fitted(model, combined(white), seed=0)
     scale = _luminance(chart, light) / _xyz(chart, card_fit.knots_nm, card_fit.value)[1]
     xyz, drawn = [], []
@@ -98,7 +101,7 @@ def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
         np.array(xyz),
         np.stack(drawn, axis=1),
         card_misfit(bare, combined(white), light),
-        _shift_nm(part, cards, darks),
+        _shift_nm(context, cards, darks),
     )
 
 
@@ -158,9 +161,11 @@ def _by_errors(
     return np.asarray(level * (own @ chart.seen + errors))
 
 
-def _shift_nm(part: Part, cards: Sequence[SeriesFrame], darks: Sequence[SeriesFrame]) -> float:
+def _shift_nm(
+    context: AnalysisContext, cards: Sequence[SeriesFrame], darks: Sequence[SeriesFrame]
+) -> float:
     """Return how far the filter's strip has moved along itself since its calibration, in nm."""
-    calibrated = part.inputs[LVF_KIND]
+    calibrated = context.inputs[LVF_KIND]
     assert calibrated is not None
     assert calibrated.before_camera is not None
     before = calibrated.before_camera

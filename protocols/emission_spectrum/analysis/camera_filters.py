@@ -13,7 +13,7 @@ import numpy as np
 from labrig.analyse.combined_frames import combined
 from labrig.analyse.exciting_lights import FILTER_NM, FILTER_SIGMA
 from labrig.analyse.forward_model import KNOTS_NM, ForwardModel, channel_curves
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.place_reduction import PatchReduction
 from labrig.analyse.strip import StripPatch, strip_regions
 from labrig.bench_optics import filter_transmittances
@@ -72,7 +72,7 @@ class CameraFilterModel(ForwardModel):
 
 
 def filter_models(
-    part: Part, select: CameraFilters, frame: SeriesFrame
+    context: AnalysisContext, select: CameraFilters, frame: SeriesFrame
 ) -> dict[StripPatch, ForwardModel]:
     """Return the model of every patch of a part.
 
@@ -90,8 +90,8 @@ def filter_models(
     UsageError
         There is no file of a filter, or there are no camera curves.
     """
-    camera = channel_curves(part, sensor_layout(frame).channels)
-    filters = (None, *filter_transmittances(part.rig, select.filters))
+    camera = channel_curves(context, sensor_layout(frame).channels)
+    filters = (None, *filter_transmittances(context.rig, select.filters))
     knots = [one.wavelength_nm for one in filters if one is not None]
     nodes, weights = quadrature(
         float(KNOTS_NM[0]), float(KNOTS_NM[-1]), camera.wavelength_nm, KNOTS_NM, *knots
@@ -114,13 +114,13 @@ def filter_models(
     system = SpectralSystem(KNOTS_NM, design(passed, sensitivity), np.array(modes))
     return {
         patch: CameraFilterModel(
-            slices={PLACE: patch.region or part.protocol.region},
+            slices={PLACE: patch.region or context.protocol.region},
             holder={},
             camera=camera,
             system=system,
             filters=filters,
         )
-        for patch in strip_regions(part)
+        for patch in strip_regions(context)
     }
 
 

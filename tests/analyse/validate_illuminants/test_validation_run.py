@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part
+from labrig.analyse import AnalysisContext
 from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_and_report
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
@@ -98,9 +98,9 @@ def _with_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:
     return change
 
 
-def asked_anew(part: Part, change: dict[str, Any]) -> Part:
+def asked_anew(context: AnalysisContext, change: dict[str, Any]) -> AnalysisContext:
     """The run as if its protocol had said something else of what is compared."""
-    return replace(part, protocol=part.protocol.model_copy(update=change))
+    return replace(context, protocol=context.protocol.model_copy(update=change))
 
 
 def test_another_matrix_differs_and_is_named(run: Path) -> None:
