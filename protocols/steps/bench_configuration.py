@@ -288,7 +288,7 @@ class ConfiguredProtocol(ProtocolModel):
 
     @abstractmethod
     def configured_units(self) -> Sequence[ConfiguredUnit]:
-        """Return all units with their configurations, in the order in which they build on another."""
+        """Return all units with their configurations, in the order in which they build."""
 
     def units(self) -> Sequence[Unit]:
         """Return the units of all scenes in order, and the bench put back."""
