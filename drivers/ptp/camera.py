@@ -13,7 +13,7 @@ from .eos.protocol import lacking_operations
 from .opening import identify, open_link, open_session
 from .session import Session
 from .settings import PtpCameraSettings
-from .standard.camera import NEEDED, StandardCamera
+from .standard.camera import StandardCamera, missing_operations
 from .standard.exposure import labelled_times_s as standard_times_s
 
 
@@ -222,13 +222,12 @@ class PtpCamera:
         operations = self._info.operations
         if not (lacking := lacking_operations(operations)):
             return EosCamera(self._session, self._clock, self._info, settings)
-        if operations >= NEEDED:
+        if not (missing := missing_operations(operations)):
             return StandardCamera(self._session, self._clock, self._info, settings)
         raise DeviceError(
             f"camera {address}: expected a Canon EOS with remote release or a camera with "
             f"InitiateCapture, got {self._info} without {', '.join(lacking)}, and without "
-            f"{', '.join(f'0x{op:X}' for op in sorted(NEEDED - operations))}: set its USB mode to "
-            "PC remote, or use a camera that has them"
+            f"{', '.join(missing)}: set its USB mode to PC remote, or use a camera that has them"
         )
 
     def _give_back(self) -> None:
