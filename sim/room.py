@@ -30,8 +30,7 @@ from .illuminants import Illuminants
 from .imaging import Imaging
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
-from .led_circuit import LedCircuit
-from .leds import Leds
+from .leds import LedCircuit, Leds
 from .lights import Lights, VisibleLight, leak, room_light_spectrum
 from .luminance import luminance_mcd_per_m2
 from .optics import (
