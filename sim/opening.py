@@ -27,9 +27,8 @@ from .boards import (
 from .boards.dc4100 import OUTPUTS
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
-from .clock import RoomClock
-from .disk import SimulatedDisk
 from .faults import Fault, FaultTime, given
+from .pc import RoomClock, SimulatedDisk
 from .room import Room
 from .simulation import Simulation
 from .spectrometer import Detector, SpectrometerBackend, UsbSpectrometer

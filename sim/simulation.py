@@ -32,7 +32,7 @@ from .bench_settings import (
 from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
-from .kinetics_settings import KineticsSettings
+from .kinetics import KineticsSettings
 
 #: Largest number of a relay of the Numato board.
 RELAYS = 7

@@ -2,7 +2,6 @@
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
-from labrig.acquire.calibration_rules import CalibrationRules
 from labrig.acquire.channels import (
     Board,
     Channel,
@@ -19,15 +18,16 @@ from labrig.acquire.loading import (
     load_driver,
     read_protocol,
 )
-from labrig.acquire.luminance_reading import LampType, LuminanceReading
-from labrig.acquire.plan import Plan, Step
-from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
+from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.rig import Rig, in_safe_order
 from labrig.acquire.rig_file import (
+    CalibrationRules,
     DeviceEntry,
+    LampType,
+    LuminanceReading,
     Optics,
     RigFile,
     read_rig_file,

@@ -9,8 +9,7 @@ import usb.core
 import usb.util
 
 from labrig.acquire import SERVICES
-from labrig.setup.host import Host, Port
-from labrig.setup.port_users import port_users, unreachable
+from labrig.setup.host import Host, Port, port_users, unreachable
 
 NO_LIBUSB = (
     "libusb is not installed, so USB cameras cannot be seen: install libusb-1.0 (Linux: "
