@@ -123,7 +123,6 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
         "labrig/record/run_folder.py",  # the name of this PC
         "labrig/acquire/connections.py",  # the type
         "sim/camera/ptpip/server.py",
-        "sim/camera/ptpip/connection.py",
     },
     (
         "urllib.request",
