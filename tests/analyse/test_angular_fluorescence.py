@@ -16,7 +16,7 @@ from labrig.protocols.angular_fluorescence import Circle
 from labrig.record import Attempt
 from labrig.results import AngularFluorescenceResult
 from tests.analyse.angular_bench import record_angular, record_sphere, true_camera
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import ANGULAR
 from tests.results.made import assert_read_back
 
@@ -272,7 +272,7 @@ def test_a_flat_sample_is_no_sphere(tmp_path: Path) -> None:
 
 
 def test_the_page_answers_with_p_and_power(planted: Path) -> None:
-    done = process_and_report(planted)
+    done = processed_once(planted)
     assert isinstance(done.result, AngularFluorescenceResult)
     line, *budgets = done.lines
     assert all(each.startswith("budget") for each in budgets)

@@ -12,10 +12,9 @@ from labrig.analyse.camera_curves import analyse as analyse_curves
 from labrig.analyse.colour_check import analyse
 from labrig.foundation.errors import UsageError
 from labrig.optics import CURVES_FILE
-from labrig.process import process_and_report
 from labrig.results import ColourCheckResult
 from tests.analyse.chart_bench import record, with_camera
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera
 from tests.results.made import assert_read_back
 
@@ -32,7 +31,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_colours_are_right_end_to_end(run: Path) -> None:
-    done = process_and_report(run)
+    done = processed_once(run)
     result = done.result
     assert isinstance(result, ColourCheckResult)
     assert result.plain.mean < 2

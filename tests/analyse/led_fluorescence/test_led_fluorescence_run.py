@@ -24,7 +24,7 @@ from labrig.optics import read_light
 from labrig.process import Processed, process_and_report
 from labrig.results import FluorescentPatch, LedFluorescenceResult
 from tests.analyse.led_bench import QUICK, SAMPLES, record
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.results.made import assert_read_back
 
 
@@ -41,7 +41,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def processed(run: Path) -> Processed:
-    return process_and_report(run)
+    return processed_once(run)
 
 
 @pytest.fixture(scope="module")
