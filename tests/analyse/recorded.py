@@ -114,7 +114,8 @@ def processed_once(run: Path) -> Processed:
     """
     if SHARED is None:
         return process_and_report(run)
-    files = sorted(path for path in run.rglob("*") if path.is_file())
+    own = [path for path in run.iterdir() if path.name != "cache"]
+    files = sorted(path for top in own for path in (top, *top.rglob("*")) if path.is_file())
     contents = [str(path.relative_to(run)).encode() + path.read_bytes() for path in files]
     digest = sha256(b"\0".join(contents)).hexdigest()
     place = SHARED / f"{digest}-processed"

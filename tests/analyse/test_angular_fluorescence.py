@@ -175,7 +175,6 @@ def changed(part: Part, **keys: Any) -> Part:
     ("region", "sides"),
     [
         ((94, 22, 184, 196), {"left": 4}),
-        ((82, 45, 196, 173), {"above": 14}),
         ((82, 50, 196, 140), {"above": 20, "below": 20}),
         ((98, 38, 180, 180), {"left": 8, "above": 8}),
     ],
@@ -202,11 +201,8 @@ def test_an_outline_of_which_too_little_is_left_is_refused(sphere: Part) -> None
         analyse(changed(sphere, region=(120, 22, 158, 196)))
 
 
-@pytest.mark.parametrize("off_px", [(0, 0, 2), (-2, 0, -2)])
-def test_a_given_circle_that_is_off_is_named_and_refined(
-    sphere: Part, off_px: tuple[int, int, int]
-) -> None:
-    across, down, wider = off_px
+def test_a_given_circle_that_is_off_is_named_and_refined(sphere: Part) -> None:
+    across, down, wider = -2, 0, -2
     circle = Circle(
         centre=((180 + across) / 360, (120 + down) / 240), radius=(90 + wider) / 360
     )  # fmt: skip
