@@ -36,6 +36,9 @@ from .optics import (
     read_camera as read_camera,
 )
 from .process import process_run as process_run
+from .protocols.blank.result import BlankResult as BlankResult
+from .protocols.decay.result import DecayResult as DecayResult
+from .protocols.phosphor.result import PhosphorResult as PhosphorResult
 from .record import (
     RunRecord as RunRecord,
     read_run as read_run,
@@ -52,6 +55,3 @@ from .results import (
     read_result as read_result,
     read_series as read_series,
 )
-from .results.blank import BlankResult as BlankResult
-from .results.decay import DecayResult as DecayResult
-from .results.phosphor import PhosphorResult as PhosphorResult

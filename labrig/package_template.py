@@ -18,7 +18,7 @@ Kind = Literal["driver", "protocol"]
 #: Name of each template's module, and the entry points that must not have the new name yet.
 _TEMPLATES = {
     "driver": ("my_relay", plugins.DRIVERS),
-    "protocol": ("my_protocol", plugins.PROTOCOLS),
+    "protocol": ("my_protocol", plugins.MEASUREMENTS),
 }
 _SUFFIXES = (".py", ".toml", ".yaml")
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")

@@ -59,8 +59,8 @@ def _describe_in_markdown(node: Any) -> None:
 
 def _protocol() -> Any:
     """Return the union of the registered protocols, discriminated by the key `protocol`."""
-    names = plugins.names(plugins.PROTOCOLS)
-    return _one_of("protocol", [plugins.load(plugins.PROTOCOLS, name, "schema") for name in names])
+    models = [registered.load("protocol") for _, registered in plugins.measurements()]
+    return _one_of("protocol", models)
 
 
 def _rig() -> Any:

@@ -30,8 +30,8 @@ ROOT = Path(__file__).parent.parent
 RELAY = 3
 PATIENCE_S = 60.0
 ENTRY_POINTS = """
-[labrig.protocols]
-hold = tests.lit_bench:Hold
+[labrig.measurements]
+hold = tests.hold_registration:HOLD
 [labrig.drivers]
 listed_relay = tests.lit_bench:ListedRelay
 """

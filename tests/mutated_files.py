@@ -119,7 +119,7 @@ _MUTATIONS = [
 
 def victims(run: Path) -> list[Victim]:
     """All that is shipped, and a run folder of a short decay with its result."""
-    protocols = sorted(resources.folder("protocols").glob("*.yaml"))
+    protocols = list(resources.names("protocols").values())
     optics = resources.folder("config/optics")
     curves = [path for kind in ("csv", "json") for path in sorted(optics.rglob(f"*.{kind}"))]
     rigs = sorted(resources.folder("config").glob("sim*.yaml"))

@@ -90,10 +90,15 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
     "run code": (
         {
             "eval", "exec", "__import__", "*.exec_module", "*.import_module", "import_module",
+            "resolve_name", "*.resolve_name",
             "runpy.run_path", "os.system", "os.popen", "os.execv", "os.startfile", "*.loads_pickle",
         },
         # By names that are written there.
-        {"labrig/reproduce/compiled.py", "labrig/reduce/kept_reductions.py"},
+        {
+            "labrig/foundation/plugins.py",
+            "labrig/reproduce/compiled.py",
+            "labrig/reduce/kept_reductions.py",
+        },
     ),
 }  # fmt: skip
 #: Calls of that name on what is no file.
@@ -277,6 +282,7 @@ def test_every_door_is_needed(sources: dict[str, str]) -> None:
         "open('x')", "path.open()", "(folder / name).read_text()", "path.write_bytes(b'')",
         "io.open('x')", "np.load('x.npy')", "cv2.imwrite('x.png', picture)", "figure.savefig('x')",
         "yaml.safe_load(text)", "FileLock('x')", "exec(text)", "importlib.import_module(name)",
+        "resolve_name(name)",
         "shutil.copytree(a, b)", "path.mkdir()", "os.system('x')", "import subprocess",
         "from urllib.request import urlopen", "import pickle", "draft.replace(path)",
         "import h5py", "from PIL import Image", "from os import open as look", "import rawpy",

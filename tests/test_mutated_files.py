@@ -20,7 +20,7 @@ from tests.mutated_files import mutated
 
 TIMES = 60
 READERS: dict[str, Callable[[Path], object]] = {
-    "protocols/decay.yaml": read_protocol,
+    "protocols/decay/decay.yaml": read_protocol,
     "config/sim.yaml": read_rig_file,
     "config/materials/blue-paint.yaml": read_material,
     "config/optics/grey_card_18.csv": read_curve_file,

@@ -9,7 +9,9 @@ import pytest
 from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.process import process_run
-from labrig.results import CalibrationCheckResult, CalibrationResult, PhosphorResult
+from labrig.protocols.calibration.result import CalibrationResult
+from labrig.protocols.calibration_check.result import CalibrationCheckResult
+from labrig.protocols.phosphor.result import PhosphorResult
 from tests.acceptance.whole_phosphor import errors
 from tests.analyse.recorded import record
 from tests.analyse.small_runs import IRRADIANCE, LVF_CALIBRATION, calibration, small_bench
@@ -46,10 +48,9 @@ def test_two_paints_with_one_calibration_are_as_good_as_with_their_own(tmp_path:
     def wide(rig: dict[str, Any]) -> None:
         rig["simulation"]["sensor"] = {"width": 384, "height": 64}
 
-    shipped = resources.folder("protocols")
-    calibration = read_quickly((shipped / "calibration.yaml").read_text())
+    calibration = read_quickly(resources.find("protocols", "protocol", "calibration").read_text())
     process_run(record(tmp_path, calibration, wide))
-    chain = read_quickly((shipped / "phosphor.yaml").read_text())
+    chain = read_quickly(resources.find("protocols", "protocol", "phosphor").read_text())
     for name in ("blue-paint", "green-paint"):
 
         def painted(rig: dict[str, Any], name: str = name) -> None:

@@ -12,7 +12,7 @@ from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import ILLUMINANTS, LEDS, ROLES, Illuminant, LedLight
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import with_absolute_paths
-from labrig.foundation.plugins import DRIVERS, PROTOCOLS, load, names
+from labrig.foundation.plugins import DRIVERS, MEASUREMENTS, load, measurement, names
 from labrig.foundation.yaml_file import read_yaml, validate
 
 
@@ -215,9 +215,9 @@ def _model(content: Mapping[str, Any], source: str) -> type[ProtocolModel]:
     kind = content.get("protocol")
     if not isinstance(kind, str):
         raise UsageError(
-            f"{source}: the key 'protocol' must name one of: {', '.join(names(PROTOCOLS))}"
+            f"{source}: the key 'protocol' must name one of: {', '.join(names(MEASUREMENTS))}"
         )
-    model: type[ProtocolModel] = load(PROTOCOLS, kind, source)
+    model: type[ProtocolModel] = measurement(kind, source).load("protocol")
     return model
 
 
@@ -244,7 +244,7 @@ def changes_with_absolute_paths(
     --------
     >>> from pathlib import Path
     >>> from labrig.acquire import changes_with_absolute_paths
-    >>> from labrig.protocols.luminance import Luminance
+    >>> from labrig.protocols.luminance.protocol import Luminance
     >>> typed = {"emission": "green.csv", "sample.name": "batch.a"}
     >>> changes_with_absolute_paths(typed, Luminance, Path("/lab"))
     {'emission': '/lab/green.csv', 'sample.name': 'batch.a'}

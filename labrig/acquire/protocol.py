@@ -76,8 +76,6 @@ class ProtocolModel(FrozenModel):
         Description of the sample, for the record.
     """
 
-    #: Roles of the frames to which rates are fitted; the rates belong to their temperature.
-    rate_frames: ClassVar[Collection[str]] = (FrameRole.DECAY,)
     #: Kinds of calibrations on which the results depend.
     rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
     #: Whether calibrations that are kept beside the runs are used; not by what measures them anew.
@@ -93,6 +91,11 @@ class ProtocolModel(FrozenModel):
             received = ", got a list" if isinstance(sample, list) else ""
             raise ValueError(f"expected keys, such as 'sample: {{name: blue-paint}}'{received}")
         return sample
+
+    @property
+    def rate_frames(self) -> Collection[str]:
+        """Roles of the frames to which rates are fitted; the rates belong to their temperature."""
+        return (FrameRole.DECAY,)
 
     @property
     def sample_in_place(self) -> str | None:

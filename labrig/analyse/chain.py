@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from labrig.analyse.inputs import Inputs, Part
-from labrig.foundation import plugins
 from labrig.foundation.errors import DataError, FitError
+from labrig.foundation.plugins import measurement
 from labrig.results import RunResult
 
 
@@ -50,7 +50,7 @@ def analyse_parts(part: Part) -> AnalysedParts:
     inputs = {"": part.inputs}
     for link in part.protocol.chain():
         kind = link.protocol.protocol
-        analyse_link = plugins.load(plugins.ANALYSES, kind, str(part.run.folder))
+        analyse_link = measurement(kind, str(part.run.folder)).load("analysis")
         known = inputs.get(link.sample, inputs[""])
         link_part = Part(
             part.run.part(link.name),

@@ -6,7 +6,9 @@ import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
+from labrig.calibration import CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import PRECISE_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
 from labrig.optics import CHART_PATCHES
@@ -14,9 +16,8 @@ from labrig.record import FrameRole
 from labrig.reduce import SeriesFrame, find_colour_chart, region_values
 from labrig.results import SliceValues
 
-#: Significance in σ below which a patch is too dark, and the patches that must not be: those that
-#: are not nearly black in some channel.
-SEEN_SIGMA, BRIGHT = 20.0, (18, 19, 20, 21)
+#: Patches that must not be too dark: those that are not nearly black in some channel.
+BRIGHT = (18, 19, 20, 21)
 #: Relative σ of the light at the chart's edge against its middle, with and without a card.
 EVENED, UNEVEN = 0.005, 0.1
 
@@ -62,7 +63,7 @@ def frames_of(part: Part, role: str) -> list[SeriesFrame]:
             f"{part.run.folder}: there are no complete '{role}' frames; go on with: labrig resume "
             f"{part.run.folder}"
         )
-    require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(role))
+    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, part.run.frames(role))
     return frames
 
 
@@ -94,10 +95,10 @@ def chart_scene(part: Part, chart_role: str, card_role: str | None) -> ChartScen
             f"{metered.path}: expected patches that do not clip, clipped are {', '.join(clipped)}; "
             "lower camera.iso or close the aperture"
         )
-    if (chart.value[list(BRIGHT)] < SEEN_SIGMA * chart.sigma[list(BRIGHT)]).any():
+    if (chart.value[list(BRIGHT)] < PRECISE_SIGMA * chart.sigma[list(BRIGHT)]).any():
         raise DataError(
-            f"{metered.path}: the chart is too dark: expected grey patches {SEEN_SIGMA:g} σ above "
-            "the dark in every channel; expose for longer, or look whether the lamp burns"
+            f"{metered.path}: the chart is too dark: expected grey patches {PRECISE_SIGMA:g} σ "
+            "above the dark in every channel; expose for longer, or look whether the lamp burns"
         )
     middles = np.array([(x + wide / 2, y + high / 2) for x, y, wide, high in patches])
     place = middles - middles.mean(axis=0)
@@ -106,7 +107,7 @@ def chart_scene(part: Part, chart_role: str, card_role: str | None) -> ChartScen
     if card_role is None:
         return scene
     card = _measured(part, frames_of(part, card_role), patches)
-    if not (card.value > SEEN_SIGMA * card.sigma).all():
+    if not (card.value > PRECISE_SIGMA * card.sigma).all():
         raise DataError(
             f"{part.run.folder}: expected a grey card lit at every place of the chart, got one "
             "that is too dark or clips; lay it where the chart lies, all of it"
@@ -127,6 +128,6 @@ def _evened(scene: ChartScene, card: SliceValues) -> ChartScene:
 def _measured(part: Part, frames: list[SeriesFrame], patches: list[Region]) -> SliceValues:
     darks = steady_frames(part.run, part.overrides, FrameRole.DARK)
     regions = {f"{number:02d}": region for number, region in enumerate(patches)}
-    values = region_values(frames, regions, darks, part.inputs.camera)
+    values = region_values(frames, regions, darks, part.inputs[CAMERA_KIND])
     (unit,) = {frame.unit for frame in frames}
     return values[unit]

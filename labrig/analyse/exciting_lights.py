@@ -14,6 +14,7 @@ import numpy as np
 from labrig.acquire import MONOCHROMATOR, driver_and_settings
 from labrig.analyse.inputs import Part
 from labrig.bench_optics import filter_transmittances, led_exposures
+from labrig.calibration import LEDS_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import (
@@ -22,8 +23,7 @@ from labrig.optics import (
     Transmittance,
     read_spectrometer_reading,
 )
-from labrig.protocols.irradiance import CardSpectra, light_unit
-from labrig.protocols.steps.exciting_lights import ExcitingLights
+from labrig.protocols.steps.exciting_lights import CardSpectra, ExcitingLights, light_unit
 from labrig.record import SpectrumRecord
 
 #: Relative σ of the transmittance in a filter's file, and σ of its wavelengths in nm.
@@ -83,7 +83,7 @@ def exciting_lights(part: Part, lights: ExcitingLights, lamp: Spectrum) -> list[
     if part.run.spectra(CardSpectra.DIRECT):
         return [_measured(part, name, lamp) for name in lights.names()]
     if lights.leds:
-        known = led_exposures(part.rig, part.rig.name, part.inputs.leds)
+        known = led_exposures(part.rig, part.rig.name, part.inputs[LEDS_KIND])
         if missing := [name for name in lights.leds if name not in known]:
             raise UsageError(
                 f"rig '{part.rig.name}': expected an LED '{missing[0]}', got {', '.join(known)}"

@@ -11,7 +11,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from labrig.analyse.direct_bispectral.analysis import direct_columns
+from labrig.analyse.direct_columns import direct_columns
 from labrig.fit import LitSpectrum, bispectral_columns
 from labrig.fit.bispectral import light_window_nm
 from labrig.foundation import resources

@@ -1,26 +1,16 @@
 """Input of the analysis of one protocol."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from typing import Any, Self, TypeVar
 
 from pydantic import BaseModel
 
 from labrig.acquire import RigFile
 from labrig.analyse.overrides import Overrides
+from labrig.analyse.process_options import OptionsT, chosen_options
 from labrig.bench_optics import calibration
-from labrig.calibration import (
-    BlankFile,
-    CalibrationKind,
-    CameraFile,
-    FadeFile,
-    IrradianceFile,
-    LedsFile,
-    LvfFile,
-    ReferenceFile,
-    ReflectanceFile,
-    kinds,
-)
+from labrig.calibration import CalibrationKind, kinds
 from labrig.material import Material
 from labrig.record import RunRecord
 from labrig.results import EmissionSpectrum, FittedDecay, RunResult
@@ -30,36 +20,23 @@ FileT = TypeVar("FileT", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Inputs:
-    """Calibrations and earlier results; None or empty where there are none.
+    """Calibrations and earlier results, whatever measured them.
 
     Attributes
     ----------
-    camera, blank, fade, lvf, irradiance, leds, reference, reflectance
-        Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
-        in the same run.
-    others
-        Calibrations of kinds that packages add, by the names of their kinds.
-    spectra
-        Emission spectrum of each patch; that of the only one under "".
-    decays
-        Fitted decay of each patch.
-    materials
-        Material of each patch by excitation, decay and spectrum together; that of the only one
-        under "".
+    provided
+        Values by name: a calibration by that of its kind, from a rig file's `optics:` or measured
+        earlier in the same run, and what results provide.
+
+    Examples
+    --------
+    >>> from labrig.analyse import Inputs
+    >>> from labrig.calibration import LVF_KIND
+    >>> Inputs()[LVF_KIND] is None
+    True
     """
 
-    camera: CameraFile | None = None
-    blank: BlankFile | None = None
-    fade: FadeFile | None = None
-    lvf: LvfFile | None = None
-    irradiance: IrradianceFile | None = None
-    leds: LedsFile | None = None
-    reference: ReferenceFile | None = None
-    reflectance: ReflectanceFile | None = None
-    others: Mapping[str, Any] = field(default_factory=dict)
-    spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
-    decays: Mapping[str, FittedDecay] = field(default_factory=dict)
-    materials: Mapping[str, Material] = field(default_factory=dict)
+    provided: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, rig: RigFile) -> Self:
@@ -70,31 +47,39 @@ class Inputs:
         UsageError
             A file is missing or malformed.
         """
-        named = {kind.name: calibration(rig, kind) for kind in kinds()}
-        return cls()._with(named)
+        return cls({kind.name: calibration(rig, kind) for kind in kinds()})
 
-    def calibration(self, kind: CalibrationKind[FileT]) -> FileT | None:
+    def __getitem__(self, kind: CalibrationKind[FileT]) -> FileT | None:
         """Return the calibration of a kind; None if none is named or measured."""
-        found: FileT | None = getattr(self, kind.name, None) or self.others.get(kind.name)
-        return found
+        calibrated: FileT | None = self.provided.get(kind.name)
+        return calibrated
+
+    @property
+    def spectra(self) -> Mapping[str, EmissionSpectrum]:
+        """Emission spectrum of each patch; that of the only one under ""."""
+        return self._by_patch("spectra")
+
+    @property
+    def decays(self) -> Mapping[str, FittedDecay]:
+        """Fitted decay of each patch."""
+        return self._by_patch("decays")
+
+    @property
+    def materials(self) -> Mapping[str, Material]:
+        """Material of each patch by all that was measured; that of the only one under ""."""
+        return self._by_patch("materials")
 
     def updated_by(self, result: RunResult) -> Self:
         """Return these inputs updated by a result; mappings by patch keep the other patches."""
-        provided: dict[str, Any] = {
-            name: {**getattr(self, name, {}), **value} if isinstance(value, Mapping) else value
+        provided = {
+            name: {**self._by_patch(name), **value} if isinstance(value, Mapping) else value
             for name, value in result.provides().items()
         }
-        return self._with(provided)
+        return type(self)({**self.provided, **provided})
 
-    def _with(self, values: Mapping[str, Any]) -> Self:
-        """Return these inputs with values by the names of fields or of further kinds."""
-        own = {item.name for item in fields(self)}
-        others = {name: value for name, value in values.items() if name not in own}
-        return replace(
-            self,
-            **{name: value for name, value in values.items() if name in own},
-            others={**self.others, **others},
-        )
+    def _by_patch(self, name: str) -> Mapping[str, Any]:
+        by_patch: Mapping[str, Any] = self.provided.get(name, {})
+        return by_patch
 
 
 @dataclass(frozen=True)
@@ -123,3 +108,13 @@ class Part:
     overrides: Overrides
     inputs: Inputs
     beside: RunRecord | None = None
+
+    def options(self, model: type[OptionsT]) -> OptionsT:
+        """Return the measurement's own options, of those that the user gave.
+
+        Raises
+        ------
+        UsageError
+            A value is one that the option cannot have.
+        """
+        return chosen_options(model, self.overrides.options)

@@ -9,15 +9,13 @@ from numpy.typing import ArrayLike
 
 from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DECAY_DETECTION_SIGMA
 from labrig.foundation.errors import FitError
 from labrig.results import AUTO, DecayReference, Series, TableClock
 
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
 TYPICAL_FLICKER = 0.007
-#: Significance in σ of some amplitude, or of the first frame's signal, from which a decay is
-#: detected.
-SEEN_SIGMA = 3.0
 
 
 def fit_series(
@@ -110,8 +108,8 @@ def fit_series(
     if not _is_seen(fit, float(usable.t_s.min())):
         raise FitError(
             "expected a decay, got nothing that stands out of the noise by "
-            f"{SEEN_SIGMA:g} σ; was the sample charged, is it its light that was measured, and for "
-            "long enough?"
+            f"{DECAY_DETECTION_SIGMA:g} σ; was the sample charged, is it its light that was "
+            "measured, and for long enough?"
         )
     return replace(
         fit,
@@ -138,6 +136,8 @@ def _is_seen(fit: DecayFit, first_s: float) -> bool:
     """
     first = np.array([first_s]), np.zeros(1)
     signals = [fit.signal(*first), *(law.signal(*first) for law in fit.laws)]
-    return any(value[0] >= SEEN_SIGMA * np.sqrt(variance[0]) for value, variance in signals) or any(
-        state.amplitude >= SEEN_SIGMA * state.amplitude_sigma for state in fit.states
+    return any(
+        value[0] >= DECAY_DETECTION_SIGMA * np.sqrt(variance[0]) for value, variance in signals
+    ) or any(
+        state.amplitude >= DECAY_DETECTION_SIGMA * state.amplitude_sigma for state in fit.states
     )

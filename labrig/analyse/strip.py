@@ -13,6 +13,7 @@ import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import Part
+from labrig.calibration import CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region, region_pixels
@@ -44,7 +45,9 @@ class StripFrames:
     def __init__(self, part: Part) -> None:
         self._part = part
         self.dark = self.of(FrameRole.DARK)
-        require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(FrameRole.DARK))
+        require_calibrated_camera(
+            part.inputs[CAMERA_KIND], part.run, part.run.frames(FrameRole.DARK)
+        )
 
     def of(self, role: str, unit: str | None = None) -> list[SeriesFrame]:
         """Return the frames of a role, and of one unit if it is given."""

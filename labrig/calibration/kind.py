@@ -7,8 +7,8 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel
 
-from labrig.foundation import plugins
 from labrig.foundation.errors import UsageError
+from labrig.foundation.plugins import measurements
 from labrig.foundation.yaml_file import read_model, write_yaml
 
 FileT = TypeVar("FileT", bound=BaseModel)
@@ -94,5 +94,5 @@ def kinds() -> tuple[CalibrationKind[Any], ...]:
     >>> [kind.name for kind in kinds()]
     ['blank', 'camera', 'fade', 'irradiance', 'leds', 'lvf', 'reference', 'reflectance']
     """
-    names = plugins.names(plugins.CALIBRATIONS)
-    return tuple(plugins.load(plugins.CALIBRATIONS, name, "calibrations") for name in names)
+    loaded = (registered.load("calibration") for _, registered in measurements())
+    return tuple(sorted((kind for kind in loaded if kind is not None), key=lambda kind: kind.name))

@@ -5,12 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.results import FittedDecay, Measured, read_fitted_decays, read_series
-
-#: Signal over σ that a reference needs.
-SEEN_SIGMA = 5.0
 
 
 def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
@@ -44,10 +42,10 @@ def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
         for run, fit in zip((a, b), fits, strict=True)
     )
     for run, signal in ((a, signal_a), (b, signal_b)):
-        if not signal.value > SEEN_SIGMA * signal.sigma:
+        if not signal.value > DETECTION_SIGMA * signal.sigma:
             raise DataError(
                 f"--reference {name}: expected light in {channel} that stands out by "
-                f"{SEEN_SIGMA:g} σ, got {signal.value:.3g} ± {signal.sigma:.2g} DN/s in {run}"
+                f"{DETECTION_SIGMA:g} σ, got {signal.value:.3g} ± {signal.sigma:.2g} DN/s in {run}"
             )
     return signal_a.over(signal_b)
 

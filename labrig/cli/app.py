@@ -28,6 +28,7 @@ from labrig.cli import (
     verify,
     watch,
 )
+from labrig.cli.process_command import ProcessCommand
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
@@ -38,7 +39,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("plan")(run.plan)
 app.command("resume")(run.resume)
-app.command("process")(process.process)
+app.command("process", cls=ProcessCommand)(process.process)
 app.command("figures")(figures.figures)
 app.command("frame")(frame.frame)
 app.command("compare")(compare.compare)

@@ -13,7 +13,7 @@ _PACKAGE = Path(__file__).parents[1]
 
 def complete_protocol(incomplete: str) -> list[str]:
     """Return the shipped protocols that begin so."""
-    return [name for name in _shipped("protocols") if name.startswith(incomplete)]
+    return [name for name in _shipped("protocols", "*/*.yaml") if name.startswith(incomplete)]
 
 
 def complete_rig(incomplete: str) -> list[str]:
@@ -38,12 +38,11 @@ def complete_run(ctx: Any, incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-def _shipped(place: str) -> list[str]:
+def _shipped(place: str, pattern: str = "*.yaml") -> list[str]:
     try:
-        files = [path for path in (_PACKAGE / place).iterdir() if path.suffix in (".yaml", ".yml")]
+        return sorted(path.stem for path in (_PACKAGE / place).glob(pattern))
     except OSError:
         return []
-    return sorted(path.stem for path in files)
 
 
 def _folders(runs: Path) -> Iterator[str]:

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_run
+from labrig.cli.process_command import GIVEN
 
 if TYPE_CHECKING:
     from labrig.analyse import Overrides
 
 
 def process(
+    context: typer.Context,
     run: Annotated[
         Path,
         typer.Argument(
@@ -26,32 +28,6 @@ def process(
         list[str] | None,
         typer.Option("--exclude", help="Frame to leave out, by number or name. Repeatable."),
     ] = None,
-    states: Annotated[
-        int | None, typer.Option("--states", min=1, max=3, help="Number of states to fit.")
-    ] = None,
-    rate: Annotated[
-        list[float] | None,
-        typer.Option("--rate", help="Rate in 1/s that is held fixed. Repeatable."),
-    ] = None,
-    law: Annotated[
-        str, typer.Option("--law", help="Law of decay, as of 'labrig fit decay'.")
-    ] = "auto",
-    order: Annotated[
-        str,
-        typer.Option(
-            "--order",
-            help="Kinetic order of excitation: 'auto' chooses, 1 is the rate equation, 'free' fits "
-            "one of each state, a number holds it.",
-        ),
-    ] = "auto",
-    intervals: Annotated[
-        bool,
-        typer.Option(
-            "--intervals",
-            help="Limits of every rate and order of a decay or an excitation at 68 and 95 % by "
-            "profile likelihood, not only where σ misleads.",
-        ),
-    ] = False,
     camera: Annotated[
         str | None,
         typer.Option("--camera", help="Camera curves to use instead, for the report's colours."),
@@ -62,14 +38,6 @@ def process(
             "--optics",
             help="KEY=PATH: what a key of the rig file's 'optics:' is to name instead, a file or a "
             "run, such as lvf=PATH. Repeatable.",
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            help="How led_fluorescence estimates re-radiation: 'joint', all LEDs together, or "
-            "'per-led', one LED by itself as in McEvoy's thesis.",
         ),
     ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
@@ -85,17 +53,16 @@ def process(
 ) -> None:
     """Reduce, fit and report a run again, and say what changed.
 
-    An earlier result that differs is kept as result-1, result-2, … What was reduced from the frames
+    Measurements have options of their own: 'labrig process RUN --help' shows those of a run. An
+    earlier result that differs is kept as result-1, result-2, … What was reduced from the frames
     before is used again, unless a region or a calibration that it depends on is another one.
     """
     from labrig.analyse import Overrides, verify_frames
     from labrig.catalogue import find_run
     from labrig.record import discard_cache, read_run
 
-    overrides = Overrides.parse(
-        roi or [], exclude or [], states, rate or [], camera, optics or [], law, method, order,
-        intervals=intervals,
-    )  # fmt: skip
+    options = context.meta.get(GIVEN, {})
+    overrides = Overrides.parse(roi or [], exclude or [], camera, optics or [], options)
     folder = find_run(run, runs)
     if verify:
         discard_cache(folder)

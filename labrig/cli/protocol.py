@@ -26,7 +26,7 @@ def protocol_path(protocol: str) -> Path:
     try:
         return resources.find("protocols", "protocol", protocol)
     except UsageError:
-        if protocol in plugins.names(plugins.PROTOCOLS):
+        if protocol in plugins.names(plugins.MEASUREMENTS):
             raise UsageError(
                 f"the protocol '{protocol}' is of an installed package, which ships no file of it; "
                 f"expected a file of yours with 'protocol: {protocol}' in it, such as "
@@ -55,9 +55,9 @@ def list_protocols() -> None:
         model = read_protocol(path)
         shipped.add(model.protocol)
         table.add_row(path.stem, model.protocol, _summary(read_text(path)))
-    for name in plugins.names(plugins.PROTOCOLS):
+    for name in plugins.names(plugins.MEASUREMENTS):
         if name not in shipped:
-            described = plugins.load(plugins.PROTOCOLS, name, "protocol list").__doc__ or ""
+            described = plugins.measurement(name).load("protocol").__doc__ or ""
             table.add_row("–", name, described.strip().partition("\n")[0])
     Console().print(table)
 

@@ -39,7 +39,7 @@ from labrig.reproduce import (
     tristimulus,
     under_lamps,
 )
-from labrig.results import LampPatch, ValidateIlluminantsResult
+from labrig.results import LampPatch, PredictedUnderLamps
 
 #: What the card shows of a lamp that is hardly seen: the tails of its spectrum, whose shape is not
 #: known, as a light of the scene.
@@ -87,7 +87,7 @@ class LampBench:
     """
 
     def __init__(
-        self, folder: Path, result: ValidateIlluminantsResult, camera: CameraResponse, place: Path
+        self, folder: Path, result: PredictedUnderLamps, camera: CameraResponse, place: Path
     ) -> None:
         run = read_run(folder)
         rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), run.camera_identity)
@@ -262,7 +262,7 @@ class LampBench:
 
 
 def _that_lose_light(
-    result: ValidateIlluminantsResult, entry: BandsEntry
+    result: PredictedUnderLamps, entry: BandsEntry
 ) -> tuple[dict[str, ReradiationMatrix], tuple[str, ...]]:
     """Return the matrices that a renderer takes, and a reason for each one that it does not.
 

@@ -31,7 +31,7 @@ from labrig.material import Material
 from labrig.record import FrameRole, RunRecord, read_run
 from labrig.reduce import SensorLayout, SeriesFrame, reduce_patches, sensor_layout
 from labrig.reproduce import DarkRoomLamp
-from labrig.results import DecayResult, PhosphorResult, RunResult, Series
+from labrig.results import ChainResult, ResultWithDecays, RunResult, Series
 
 FileT = TypeVar("FileT", bound=BaseModel)
 
@@ -274,14 +274,14 @@ class PhotographedRoom:
         return burning_s
 
 
-def _decay(folder: Path, result: RunResult) -> tuple[RunRecord, DecayResult]:
+def _decay(folder: Path, result: RunResult) -> tuple[RunRecord, ResultWithDecays]:
     """Return the run, or the part of a chain, that photographed a decay, and its result."""
     run = read_run(folder)
-    if isinstance(result, DecayResult):
+    if isinstance(result, ResultWithDecays):
         return run, result
-    if isinstance(result, PhosphorResult):
+    if isinstance(result, ChainResult):
         decays = {
-            name: part for name, part in result.parts.items() if isinstance(part, DecayResult)
+            name: part for name, part in result.parts.items() if isinstance(part, ResultWithDecays)
         }
         samples = sorted({name.rpartition("/")[0] for name in decays})
         if len(samples) > 1:

@@ -28,7 +28,7 @@ from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Material
 from labrig.record import read_run
 from labrig.reproduce import Assumptions
-from labrig.results import ExcitationResult, PhosphorResult, RunResult, read_result
+from labrig.results import ChainResult, RunResult, read_result
 
 NOTHING_ASSUMED = Assumptions()
 
@@ -173,14 +173,12 @@ def charging_doubts(result: RunResult, patches: Sequence[str]) -> Iterator[str]:
     patches
         Names of the patches whose own materials are rendered.
     """
-    parts = result.parts.values() if isinstance(result, PhosphorResult) else (result,)
+    parts = result.parts.values() if isinstance(result, ChainResult) else (result,)
     for part in parts:
-        if not isinstance(part, ExcitationResult):
-            continue
-        for name, patch in part.patches.items():
+        for name, fit in part.provides().get("excitations", {}).items():
             if name in patches or (not name and patches):
                 of = f"{name}, excitation" if name else "excitation"
-                yield from (f"{of}: {warning}" for warning in patch.fit.warnings)
+                yield from (f"{of}: {warning}" for warning in fit.warnings)
 
 
 def _completed(material: Material) -> Material:

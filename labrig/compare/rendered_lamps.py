@@ -19,22 +19,11 @@ from labrig.compare.run import measured_camera
 from labrig.compare.viewing import DEFAULT_WHITE, Viewing, viewing
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
+from labrig.foundation.plugins import measurement
 from labrig.foundation.yaml_file import read_yaml
 from labrig.optics import CIE_1931, delta_e, lab, observer, white_xyz
-from labrig.results import (
-    AngularFluorescenceResult,
-    DirectBispectralResult,
-    LampPatch,
-    LedFluorescenceResult,
-    ValidateIlluminantsResult,
-    read_result,
-)
+from labrig.results import LampPatch, PredictedUnderLamps, read_result
 
-#: Protocols that measure fluorescence, and photograph nothing under lamps of daily life.
-WITHOUT_LAMPS = tuple(
-    result.kind
-    for result in (LedFluorescenceResult, DirectBispectralResult, AngularFluorescenceResult)
-)
 #: Light of a sample that is shown: as photographed, all that is rendered, and its two parts.
 LOOKS = PHOTOGRAPH, RENDERED, REFLECTED, RERADIATED = (
     "photograph", "rendered", "reflected", "re-radiated"
@@ -162,13 +151,17 @@ def is_of_fluorescence(folder: Path) -> bool:
     """
     path = folder / "protocol.yaml"
     protocol = read_yaml(path).get("protocol") if path.is_file() else None
-    if protocol in WITHOUT_LAMPS:
+    if not isinstance(protocol, str):
+        return False
+    registered = measurement(protocol, str(path))
+    is_under_lamps = issubclass(registered.load("result"), PredictedUnderLamps)
+    if registered.is_of_fluorescence and not is_under_lamps:
         raise UsageError(
             f"{folder}: expected photographs under lamps, got a run of {protocol}; take them with "
             "labrig run validate_illuminants, whose 'fluorescence:' names this run or its "
             "materials, then compare that run"
         )
-    return bool(protocol == ValidateIlluminantsResult.kind)
+    return is_under_lamps
 
 
 def compare_lamps(
@@ -212,7 +205,7 @@ def compare_lamps(
     True
     """
     result = read_result(folder)
-    if not isinstance(result, ValidateIlluminantsResult):
+    if not isinstance(result, PredictedUnderLamps):
         raise UsageError(f"{folder}: expected a run of validate_illuminants, got {result.kind}")
     curves, reasons = measured_camera(folder, camera)
     if curves is None:
@@ -331,7 +324,7 @@ def _over(part: FloatArray, whole: FloatArray) -> FloatArray:
     return np.asarray(np.divide(part, whole, out=np.full(len(whole), np.nan), where=whole > 0))
 
 
-def _description(result: ValidateIlluminantsResult, conversion: Viewing) -> tuple[str, ...]:
+def _description(result: PredictedUnderLamps, conversion: Viewing) -> tuple[str, ...]:
     return (
         f"The dark room is rendered under each lamp with the matrices of {result.fluorescence}, in "
         "bands of 10 nm. Light of a sample is divided by that of the grey card in its place, which "
@@ -345,7 +338,7 @@ def _description(result: ValidateIlluminantsResult, conversion: Viewing) -> tupl
     )
 
 
-def _notes(result: ValidateIlluminantsResult, *, is_same_camera: bool) -> Iterator[str]:
+def _notes(result: PredictedUnderLamps, *, is_same_camera: bool) -> Iterator[str]:
     if result.without_matrix_sigma:
         yield (
             f"the matrices of {', '.join(result.without_matrix_sigma)} have no σ, which is missing "

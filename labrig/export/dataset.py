@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from labrig.foundation.errors import UsageError
 from labrig.record import read_run
 from labrig.results import (
-    DecayResult,
+    ChainResult,
     FittedDecay,
     Measured,
-    PhosphorResult,
+    ResultWithDecays,
     RunResult,
     Series,
     field_unit,
@@ -81,7 +81,7 @@ def read_dataset(run: Path | str) -> "Dataset | DataTree":
     folder = Path(run)
     result = read_result(folder)
     attributes = _attributes(folder)
-    if isinstance(result, DecayResult):
+    if isinstance(result, ResultWithDecays):
         return _decay(result, attributes)
     return tree_of(result, attributes)
 
@@ -122,7 +122,7 @@ def _nodes(result: RunResult) -> "dict[str, Dataset]":
     """Return the nodes of a result's tree by path."""
     import xarray
 
-    if isinstance(result, DecayResult):
+    if isinstance(result, ResultWithDecays):
         return {"/": _decay(result, {})}
     variables: dict[str, dict[str, Column]] = {"/": {}}
     for path, value in iter_values(result):
@@ -132,7 +132,7 @@ def _nodes(result: RunResult) -> "dict[str, Dataset]":
             variables.setdefault(place, {}).update(_columns(".".join((*inner, name)), name, value))
     nodes = {place: xarray.Dataset(columns) for place, columns in variables.items()}
     nodes["/"].attrs["warnings"] = "\n".join(result.warnings)
-    if isinstance(result, PhosphorResult):
+    if isinstance(result, ChainResult):
         for name, part in result.parts.items():
             nodes |= {f"/{name}{path}".rstrip("/"): node for path, node in _nodes(part).items()}
     return nodes
@@ -154,7 +154,7 @@ def _columns(dimension: str, name: str, value: Any) -> dict[str, Column]:
     return {name: (dimensions, array, {"units": units} if units else {})}
 
 
-def _decay(result: DecayResult, attributes: Mapping[str, str]) -> "Dataset":
+def _decay(result: ResultWithDecays, attributes: Mapping[str, str]) -> "Dataset":
     import xarray
 
     patches = [patch.series for patch in result.patches.values()]

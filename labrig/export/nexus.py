@@ -20,11 +20,11 @@ from labrig.acquire import CAMERA, DARK, LIGHTS
 from labrig.foundation.output_file import write_durably
 from labrig.record import DeviceLine, RunDescription, RunRecord
 from labrig.results import (
+    ChainResult,
     DecayPatch,
-    DecayResult,
     FittedDecay,
     Measured,
-    PhosphorResult,
+    ResultWithDecays,
     RunResult,
     Series,
     field_unit,
@@ -380,16 +380,18 @@ def _add_entry(file: h5py.File, run: RunRecord, about: RunDescription, result: R
 
 def _subject(result: RunResult) -> str:
     return (
-        "phosphorescent decay" if isinstance(result, DecayResult) else result.kind.replace("_", " ")
+        "phosphorescent decay"
+        if isinstance(result, ResultWithDecays)
+        else result.kind.replace("_", " ")
     )
 
 
 def _add_results(entry: h5py.Group, result: RunResult, version: str, part: str = "") -> None:
     """Add decays with their fits, other results field by field, and every part of a chain."""
-    if isinstance(result, PhosphorResult):
+    if isinstance(result, ChainResult):
         for name, part_result in result.parts.items():
             _add_results(entry, part_result, version, name)
-    if isinstance(result, DecayResult):
+    if isinstance(result, ResultWithDecays):
         names = valid_names([" ".join(filter(None, (part, name))) for name in result.patches])
         for valid, (name, patch) in zip(names, result.patches.items(), strict=True):
             add_decays(entry, valid, name, patch)

@@ -1,32 +1,145 @@
-"""Registry of drivers, protocols, analyses, results and reports by name, shipped or from packages.
+"""Registry of drivers and measurements by name, shipped or from packages.
 
-A package adds its own by entry points: a driver in `labrig.drivers`; a protocol in
-`labrig.protocols`, and under the same name its analysis in `labrig.analyses`, the type of its
-result in `labrig.results` and, unless plain tables suffice, its part of a report in
-`labrig.reports`; a kind of calibration, which a protocol measures, in `labrig.calibrations`.
+A package adds its own by entry points: a driver's class in `labrig.drivers`, the `Measurement` that
+registers a measurement in `labrig.measurements`.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from importlib.util import find_spec
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any, Literal
 
 from labrig.foundation.errors import UsageError
 from labrig.foundation.yaml_file import did_you_mean
 
 DRIVERS = "labrig.drivers"
-PROTOCOLS = "labrig.protocols"
-ANALYSES = "labrig.analyses"
-RESULTS = "labrig.results"
-REPORTS = "labrig.reports"
-CALIBRATIONS = "labrig.calibrations"
-_KINDS = {
-    DRIVERS: "driver",
-    PROTOCOLS: "protocol",
-    ANALYSES: "analysis of protocol",
-    RESULTS: "result of protocol",
-    REPORTS: "report of protocol",
-    CALIBRATIONS: "kind of calibration",
-}
+MEASUREMENTS = "labrig.measurements"
+_KINDS = {DRIVERS: "driver", MEASUREMENTS: "protocol"}
+
+
+Part = Literal["protocol", "result", "analysis", "report", "options", "table_report", "calibration"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """Registration of a measurement: where its parts are, and how it takes part in chains.
+
+    Parts are import strings `module:name`; a module that begins with a dot is one of `package`. No
+    part is imported before it is asked for, so that a plan loads no fit and a fit no report.
+
+    Attributes
+    ----------
+    package
+        Package with the measurement's parts and its commented example, `<name>.yaml`.
+    protocol
+        Model of the protocol file, a `ProtocolModel`.
+    result
+        Type of the result, a `RunResult`.
+    analysis
+        Function that analyses an `AnalysisContext` to the result.
+    report
+        Function that renders the result; None for plain tables of its fields.
+    options
+        Model of its own options of `labrig process`, a `ProcessOptions`; None where it has none.
+    table_report
+        Function that renders the result of another program's table; None where there is no such.
+    calibration
+        The `CalibrationKind` that it measures; None for other measurements.
+    of
+        What is measured: a `bench`, once for all samples, or each `sample`.
+    is_per_patch
+        Whether it measures every patch of a chain that names patches.
+    needs_checked_bench
+        Whether a chain on a bench that was calibrated before first checks that nothing moved.
+    is_bench_check
+        Whether it is that check.
+    is_of_fluorescence
+        Whether it measures fluorescence, of samples that need no charge.
+    has_short_charges
+        Whether its charges are short: in a chain it comes before those that charge for long, so
+        that nothing waits for their glow to fade.
+
+    Examples
+    --------
+    >>> from labrig.foundation.plugins import measurement
+    >>> decay = measurement("decay")
+    >>> decay.of, decay.load("protocol").__name__, decay.example.name
+    ('sample', 'Decay', 'decay.yaml')
+    """
+
+    package: str
+    protocol: str
+    result: str
+    analysis: str = ".analysis:analyse"
+    report: str | None = ".report:render"
+    options: str | None = None
+    table_report: str | None = None
+    calibration: str | None = None
+    of: Literal["bench", "sample"] = "sample"
+    is_per_patch: bool = False
+    needs_checked_bench: bool = False
+    is_bench_check: bool = False
+    has_short_charges: bool = False
+    is_of_fluorescence: bool = False
+
+    def load(self, part: Part) -> Any:
+        """Import a part; None if there is none.
+
+        Raises
+        ------
+        UsageError
+            It cannot be imported.
+        """
+        named: str | None = getattr(self, part)
+        if named is None:
+            return None
+        try:
+            return resolve_name(self.package + named if named.startswith(".") else named)
+        except (ImportError, AttributeError) as error:
+            raise UsageError(
+                f"{self.package}: the {part} ({named}) cannot be imported ({error})"
+            ) from None
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the package, with its protocol files."""
+        spec = find_spec(self.package)
+        if spec is None or not spec.submodule_search_locations:
+            raise UsageError(f"{self.package}: expected a package, a folder with an __init__.py")
+        return Path(next(iter(spec.submodule_search_locations))).resolve()
+
+    @property
+    def example(self) -> Path:
+        """Path of the commented example, whether it exists or not."""
+        return self.folder / f"{self.package.rpartition('.')[2]}.yaml"
+
+
+def measurement(name: str, source: str = "protocols") -> Measurement:
+    """Return the measurement of a protocol's name; `source` names the requester in messages.
+
+    Raises
+    ------
+    UsageError
+        There is none of that name, or its registration cannot be imported.
+    """
+    registered: Measurement = load(MEASUREMENTS, name, source)
+    return registered
+
+
+def measurements() -> Iterator[tuple[str, Measurement]]:
+    """Yield all measurements with their names, sorted.
+
+    Raises
+    ------
+    UsageError
+        A registration cannot be imported.
+    """
+    for name in names(MEASUREMENTS):
+        yield name, measurement(name)
 
 
 def names(group: str) -> list[str]:
@@ -35,7 +148,7 @@ def names(group: str) -> list[str]:
 
 
 def load(group: str, name: str, source: str) -> Any:
-    """Load the class or function registered as `name`; `source` names the requester in messages.
+    """Load the class or registration of a name; `source` names the requester in messages.
 
     Raises
     ------

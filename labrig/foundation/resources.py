@@ -5,9 +5,12 @@ from pathlib import Path
 
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import is_path
+from labrig.foundation.plugins import measurements
 from labrig.foundation.yaml_file import did_you_mean
 
 _PACKAGE = Path(__file__).parents[1]
+#: Place of the protocol files.
+PROTOCOLS = "protocols"
 #: Suffixes of shipped files: YAML, or measured curves in JSON.
 SUFFIXES = (".yaml", ".yml", ".json")
 
@@ -66,6 +69,12 @@ def curve_path(named: str) -> Path:
 
 
 def names(place: str) -> dict[str, Path]:
-    """Return the files that are shipped in a folder by name, sorted."""
-    files = (path for path in folder(place).iterdir() if path.suffix in SUFFIXES)
-    return {path.stem: path for path in sorted(files)}
+    """Return the files that are shipped in a folder by name, sorted.
+
+    Those of protocols lie in the folders of the measurements, of packages too.
+    """
+    folders = [folder(place)]
+    if place == PROTOCOLS:
+        folders = [registered.folder for _, registered in measurements()]
+    files = (path for each in folders for path in each.iterdir() if path.suffix in SUFFIXES)
+    return {path.stem: path for path in sorted(files, key=lambda path: path.stem)}

@@ -18,7 +18,7 @@ from labrig.predict.expectation import Bench, predictable
 from labrig.predict.glow import Glow, check_states
 from labrig.predict.reference import Reference, read_reference, result_places, run_of
 from labrig.predict.variants import changed
-from labrig.protocols.decay import Decay
+from labrig.protocols.steps.decays import DecaySettings
 
 #: Assumed first exposure as a fraction of the longest, so that it may grow.
 FIRST_EXPOSURE_FRACTION = 1 / 8
@@ -156,7 +156,7 @@ def collect_assumptions(
     )
 
 
-def _by_patch(protocol: Decay, materials: Mapping[str, str]) -> dict[str, str]:
+def _by_patch(protocol: DecaySettings, materials: Mapping[str, str]) -> dict[str, str]:
     """Return the materials by the protocol's own patches."""
     patches = list(protocol.patches)
     by_patch = {}

@@ -12,7 +12,7 @@ from labrig.predict.camera import CameraFigures
 from labrig.predict.expectation import Bench, expected_schedule
 from labrig.predict.glow import Glow, laws, measured_amplitudes, radiated
 from labrig.predict.reference import Reference
-from labrig.protocols.decay import Decay
+from labrig.protocols.steps.decays import DecaySettings
 
 #: Range of the bisection in DN/s, and number of its steps.
 DIMMEST, BRIGHTEST = 1e-3, 1e9
@@ -21,7 +21,9 @@ BISECTIONS = 50
 HALF_A_THIRD_STOP = 2 ** (1 / 6)
 
 
-def measured_glow(material: Material, protocol: Decay, reference: Reference | None) -> Glow | None:
+def measured_glow(
+    material: Material, protocol: DecaySettings, reference: Reference | None
+) -> Glow | None:
     """Return the glow of a material that the reference run measured; None for others."""
     amplitude = measured_amplitudes(material)
     if reference is None or amplitude is None:
@@ -37,7 +39,7 @@ def measured_glow(material: Material, protocol: Decay, reference: Reference | No
 
 def relative_glow(
     material: Material,
-    protocol: Decay,
+    protocol: DecaySettings,
     camera: CameraFigures,
     response: CameraResponse | None,
 ) -> Glow:
@@ -75,13 +77,13 @@ def relative_glow(
     )
 
 
-def _charge_s(protocol: Decay) -> float:
+def _charge_s(protocol: DecaySettings) -> float:
     """Return the length of the charge in seconds, infinite up to the plateau."""
     return protocol.charge if isinstance(protocol.charge, float) else np.inf
 
 
 def brightness_metered_as(
-    metered: Decay, offers: CameraOffers, bench: Bench, exposure_s: float
+    metered: DecaySettings, offers: CameraOffers, bench: Bench, exposure_s: float
 ) -> float:
     """Return the factor for the glows with which metering chooses a given first exposure.
 

@@ -12,13 +12,13 @@ from labrig.predict.frames import dark_frames, glow_frames
 from labrig.predict.glow import Glow
 from labrig.predict.information import Information, information
 from labrig.predict.series import ExpectedSeries, expected_series, repeated
-from labrig.protocols.decay import Decay
 from labrig.protocols.steps.camera_settings import CameraSettings
+from labrig.protocols.steps.decays import DecaySettings
 from labrig.protocols.steps.exposure_metering import Schedule
 from labrig.reduce import FrameMeasurement, is_clipped
 
 
-def predictable(protocol: ProtocolModel) -> Decay:
+def predictable(protocol: ProtocolModel) -> DecaySettings:
     """Return the protocol if its fit can be predicted.
 
     Raises
@@ -26,7 +26,7 @@ def predictable(protocol: ProtocolModel) -> Decay:
     UsageError
         If it records no decay.
     """
-    if not isinstance(protocol, Decay):
+    if not isinstance(protocol, DecaySettings):
         raise UsageError(
             f"--predict: expected a protocol that records a decay, got '{protocol.protocol}', of "
             "which no rates are fitted"
@@ -89,7 +89,7 @@ class Expectation:
     warnings: tuple[str, ...]
 
 
-def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
+def expect(protocol: DecaySettings, offers: CameraOffers, bench: Bench) -> Expectation:
     """Predict every patch of a bench.
 
     Raises
@@ -119,7 +119,7 @@ def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
 
 
 def expected_schedule(
-    protocol: Decay,
+    protocol: DecaySettings,
     offers: CameraOffers,
     bench: Bench,
     warn: Callable[[str], None],
@@ -137,7 +137,7 @@ def expected_schedule(
 
 
 def _series(
-    protocol: Decay,
+    protocol: DecaySettings,
     offers: CameraOffers,
     bench: Bench,
     patch: str,

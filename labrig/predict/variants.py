@@ -8,7 +8,7 @@ from typing import Any
 from labrig.acquire import CameraOffers, ProtocolModel
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import Region
-from labrig.protocols.decay import Decay
+from labrig.protocols.steps.decays import DecaySettings
 
 #: Factor of the number of decays that halves uncorrelated noise.
 REPEATS = 4
@@ -51,7 +51,9 @@ def changed(protocol: ProtocolModel, keys: Keys) -> ProtocolModel:
     return type(protocol).model_validate(content)
 
 
-def changes(protocol: Decay, offers: CameraOffers, patches: Iterable[str]) -> Iterator[Change]:
+def changes(
+    protocol: DecaySettings, offers: CameraOffers, patches: Iterable[str]
+) -> Iterator[Change]:
     """Yield changes that may determine the rates of `patches` better, one key at a time."""
     if isinstance(protocol.exposure, float):
         yield Change("exposure: auto", {"exposure": "auto"})

@@ -6,7 +6,7 @@ from importlib.metadata import version
 from typing import Any
 
 from labrig.acquire import ProtocolModel, RigFile
-from labrig.analyse import Overrides
+from labrig.analyse import Overrides, chosen_options, options_of
 from labrig.foundation.input_file import read_text
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.region import Region
@@ -34,16 +34,8 @@ class Provenance(FrozenModel):
         Versions of the libraries by name.
     regions
         Regions of the patches by name, as they were used.
-    states
-        Number of states that was fitted, or `auto`.
-    method
-        Method of estimating re-radiation; null for protocols that have none.
-    fixed_rates_per_s
-        Rates in 1/s that the user held fixed.
-    law
-        Law of decay that the user asked for, or `auto`.
-    order
-        Kinetic order of excitation that the user asked for, `free` or `auto`.
+    options
+        The measurement's own options as they were used, by name.
     camera
         Name of the camera curves with which the report's pictures were coloured.
     frames
@@ -59,11 +51,7 @@ class Provenance(FrozenModel):
     labrig: str
     libraries: dict[str, str]
     regions: dict[str, Region]
-    states: str | int
-    method: str | None
-    fixed_rates_per_s: tuple[float, ...]
-    law: str
-    order: str
+    options: dict[str, Any]
     camera: str | None
     frames: dict[str, int]
     excluded: tuple[str, ...]
@@ -93,17 +81,26 @@ def provenance(
         labrig=version("labrig"),
         libraries=library_versions(),
         regions=overrides.patches(protocol) if patches else dict(overrides.regions),
-        states=overrides.states or getattr(protocol, "states", "auto"),
-        method=overrides.method or getattr(protocol, "method", None),
-        fixed_rates_per_s=overrides.fixed_rates_per_s,
-        law=overrides.law,
-        order=overrides.order,
+        options=_options(protocol, overrides),
         camera=camera,
         frames=dict(Counter(frame.role for frame in frames if not overrides.excludes(frame))),
         excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),
         optics=dict(overrides.optics),
         journal=run.seal,
     )
+
+
+def _options(protocol: Any, overrides: Overrides) -> dict[str, Any]:
+    """Return what was given, else what the protocol says, else the default of each option."""
+    options: dict[str, Any] = {}
+    for model in options_of(protocol):
+        by_protocol = {
+            name: getattr(protocol, name) for name in model.model_fields if hasattr(protocol, name)
+        }
+        used = chosen_options(model, overrides.options).model_dump(mode="json")
+        for name, value in used.items():
+            options[name] = by_protocol.get(name) if value is None else value
+    return options
 
 
 @cache

@@ -97,7 +97,7 @@ def other_settings(before: Path, after: Path) -> tuple[str, ...]:
     >>> from labrig.analyse import Overrides
     >>> from labrig.process import other_settings, process_run
     >>> _ = shutil.copytree("runs/decay", "trials/one-state")
-    >>> _ = process_run("trials/one-state", Overrides(states=1))
+    >>> _ = process_run("trials/one-state", Overrides(options={"states": 1}))
     >>> other_settings(Path("runs/decay/result"), Path("trials/one-state/result"))
     ('states: auto → 1',)
     """
@@ -158,6 +158,7 @@ def _settings(result: Path) -> dict[str, str]:
     try:
         content = read_yaml(result / PROVENANCE)
         content.pop("journal", None)  # of the run, not of its processing
+        content |= content.pop("options", None) or {}
         return dict(_flattened(content, ""))
     except UsageError:
         return {}

@@ -10,6 +10,7 @@ from labrig.analyse import (
     Inputs,
     Overrides,
     Part,
+    check_options,
     clock_warnings,
     read_run_protocol,
     reference_of,
@@ -17,11 +18,11 @@ from labrig.analyse import (
     temperature_warnings,
 )
 from labrig.bench_optics import camera_curves, with_shipped_camera
-from labrig.calibration import LvfFile, keep_calibration
+from labrig.calibration import LVF_KIND, LvfFile, keep_calibration
 from labrig.export import write_nexus
-from labrig.foundation import plugins
 from labrig.foundation.errors import DiskError, FitError, UsageError
 from labrig.foundation.output_file import make_folder_in
+from labrig.foundation.plugins import measurement
 from labrig.foundation.yaml_file import write_yaml
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
@@ -204,18 +205,18 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 
 def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Processed:
     """Process a run that no other process processes meanwhile."""
-    overrides.check_method(protocol)
+    check_options(overrides.options, protocol)
     require_as_sealed(folder)
     run = read_run(folder)
     rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])
     require_recorded_settings(run, overrides.bench(folder), overrides)
-    analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
+    analyse = measurement(protocol.protocol, str(folder)).load("analysis")
     inputs = Inputs.of(rig)
     part = Part(run, protocol, rig, overrides, inputs)
     result: RunResult = analyse(part)
-    lvf = inputs.updated_by(result).lvf
+    lvf = inputs.updated_by(result)[LVF_KIND]
     camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
     warnings = (
         *result.warnings,

@@ -10,12 +10,13 @@ from labrig.analyse import ChargeTableOptions, FittedTable, TableFitOptions
 from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.output_file import make_folder
+from labrig.foundation.plugins import measurement
 from labrig.foundation.yaml_file import write_yaml
 from labrig.process.provenance import library_versions
 from labrig.process.run import Processed, new_result, put_in_place
 from labrig.process.without_run import describe_without_run
-from labrig.report import Report, table_sections, write_report
-from labrig.results import DecayPatch, DecayResult, TableLayout, write_result
+from labrig.report import Report, write_report
+from labrig.results import DecayPatch, TableLayout, write_result
 
 
 class TableProvenance(FrozenModel):
@@ -92,7 +93,8 @@ def report_table(
     >>> processed.report.as_posix()
     'my-decay/result/report.html'
     """
-    result = DecayResult(
+    decay = measurement("decay")
+    result = decay.load("result")(
         patches={
             part.region or table.stem: DecayPatch(
                 region=None,
@@ -118,7 +120,7 @@ def report_table(
     )
     sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted)]
     about = describe_without_run(table.stem, "decay", table.name, sample)
-    sections, methods = table_sections(result, about)
+    sections, methods = decay.load("table_report")(result, about)
     make_folder(folder)
     result_folder = new_result(folder)
     write_yaml(result_folder / "provenance.yaml", provenance)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.foundation.errors import LabrigError
-from labrig.results import LuminanceResult, Measured, read_result
+from labrig.results import Measured, read_result
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,7 @@ def found_luminances(run: Path) -> Iterator[FoundLuminance]:
         result = read_result(run)
     except LabrigError:
         return
-    if isinstance(result, LuminanceResult):
-        for name, patch in result.patches.items():
-            for entry in patch.decay.at:
-                if entry.luminance is not None:
-                    yield FoundLuminance(name, entry.t_s, entry.luminance, patch.decay.scale_sigma)
+    for name, decay in result.provides().get("luminances", {}).items():
+        for entry in decay.at:
+            if entry.luminance is not None:
+                yield FoundLuminance(name, entry.t_s, entry.luminance, decay.scale_sigma)

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import LIT_PIXEL_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.optics import SLICES, Strip
 from labrig.reduce.hdr import HdrFrame, Image
 from labrig.results import StripProfile
 
-#: Least brightness of a lit pixel in units of the noise of the dark surroundings,
-SEEN_SIGMA = 6.0
 #: as a fraction of the brightest light near by,
 EDGE = 0.4
 #: and as a fraction of the brightest of all: less is stray light.
@@ -201,7 +200,7 @@ def _largest_lit_patch(light: Image) -> NDArray[np.uint8] | None:
     height, width = light.shape
     neighbourhood = np.ones((height // 2 * 2 + 1, int(NEAR * width) // 2 * 2 + 1), np.uint8)
     local = cv2.dilate(above, neighbourhood)
-    least = max(SEEN_SIGMA * noise, FAINTEST * float(above.max()))
+    least = max(LIT_PIXEL_SIGMA * noise, FAINTEST * float(above.max()))
     lit_mask = ((above > least) & (above > EDGE * local)).astype(np.uint8)
     cell = np.ones((3, 3), np.uint8)
     cleaned = cv2.morphologyEx(

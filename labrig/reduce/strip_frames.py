@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import PRECISE_SIGMA
 from labrig.foundation.region import Region
 from labrig.optics import CameraModel, Strip
 from labrig.reduce.frame_reduction import Exposure, reduce_groups
@@ -20,8 +21,6 @@ from labrig.results import Series, SliceValues, StripProfile
 
 #: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
 FLICKER = 0.005
-#: Significance from which a value in a frame tells the frame's brightness.
-SEEN = 20.0
 #: Relative independent error of a place: the sensor's pattern, dust.
 PATTERN = 0.002
 
@@ -280,7 +279,7 @@ def _evened(series: Mapping[str, Series], unit: str) -> Mapping[str, Series]:
     usable = np.array([_usable(region, unit) for region in series.values()])
     value = np.array([region.values for region in series.values()])
     sigma = np.array([region.sigma for region in series.values()])
-    shown = usable[:, :, np.newaxis] & (value > SEEN * sigma)
+    shown = usable[:, :, np.newaxis] & (value > PRECISE_SIGMA * sigma)
     frames = np.flatnonzero(shown.any(axis=(0, 2)))
     if len(frames) < 2:
         return series

@@ -17,9 +17,6 @@ from .curve_sketch import (
     describe_shipped_curves as describe_shipped_curves,
     draw_curves as draw_curves,
 )
-from .decay import (
-    table_sections as table_sections,
-)
 from .decay_figures import (
     exposure_middles_s as exposure_middles_s,
 )
@@ -105,7 +102,9 @@ from .sections import (
     Source as Source,
     Table as Table,
 )
-from .shared_decay import shared_decay_report as shared_decay_report
+from .shared_decay import (
+    shared_decay_report as shared_decay_report,
+)
 from .sweep import (
     SweptPoint as SweptPoint,
     sweep_chart as sweep_chart,

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from labrig.foundation.plugins import REPORTS, load, names
+from labrig.foundation.plugins import measurement
 from labrig.report import any_result
 from labrig.report.budgets import budget_lines, budget_sections
 from labrig.report.sections import Rendered, Renderer, Source
@@ -50,9 +50,8 @@ def render(result: RunResult, source: Source) -> Rendered:
     ['Results', 'Sample', 'Patch sample', 'Timing and stability', 'Not in σ',
      'How far each number may be trusted']
     """
-    show: Renderer = any_result.render
-    if result.kind in names(REPORTS):
-        show = load(REPORTS, result.kind, str(source.run.folder))
+    registered = measurement(result.kind, str(source.run.folder))
+    show: Renderer = registered.load("report") or any_result.render
     rendered = show(result, source)
     return replace(
         rendered,

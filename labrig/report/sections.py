@@ -148,7 +148,7 @@ class Rendered:
 
 
 class Renderer(Protocol):
-    """Function that renders a result, registered in `labrig.reports` under the protocol's name."""
+    """Function that renders a result, named by the measurement's registration."""
 
     def __call__(self, result: Any, source: Source, /) -> Rendered:
         """Render a result of the type that belongs to the protocol."""

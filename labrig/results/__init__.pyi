@@ -1,34 +1,18 @@
-from .angular_fluorescence import (
+from .angular_dependence import (
     LEVEL as LEVEL,
     POWER as POWER,
     AngleMeans as AngleMeans,
-    AngularFluorescenceResult as AngularFluorescenceResult,
     DependenceTest as DependenceTest,
     ShadingFit as ShadingFit,
-    SphereViews as SphereViews,
-    YarnViews as YarnViews,
-)
-from .blank import (
-    BlankResult as BlankResult,
-    StrayLight as StrayLight,
 )
 from .budget import (
     UNDIVIDED as UNDIVIDED,
     Budget as Budget,
 )
-from .calibration import CalibrationResult as CalibrationResult
-from .calibration_check import (
-    CalibrationCheckResult as CalibrationCheckResult,
-    PictureChange as PictureChange,
-)
-from .camera_calibration import (
-    CameraCalibrationResult as CameraCalibrationResult,
-    FittedFlat as FittedFlat,
-    PairScatter as PairScatter,
-    PhotonTransfer as PhotonTransfer,
-)
-from .camera_curves import (
-    CameraCurvesResult as CameraCurvesResult,
+from .chain_result import ChainResult as ChainResult
+from .charge_closure import (
+    Closure as Closure,
+    spans_decades as spans_decades,
 )
 from .charging_series import (
     Charge as Charge,
@@ -36,45 +20,24 @@ from .charging_series import (
     EarlierCharges as EarlierCharges,
     Transient as Transient,
 )
-from .colour_check import (
-    CheckedColour as CheckedColour,
-    CheckedPatch as CheckedPatch,
-    ColourCheckResult as ColourCheckResult,
-    ColourSummary as ColourSummary,
-)
-from .decay import (
+from .decay_patch import (
     DecayPatch as DecayPatch,
-    DecayResult as DecayResult,
     NoiseBudget as NoiseBudget,
+    ResultWithDecays as ResultWithDecays,
 )
-from .decay_reference import DecayReference as DecayReference, first_row_at as first_row_at
-from .direct_bispectral import (
-    DirectBispectralResult as DirectBispectralResult,
+from .decay_reference import (
+    DecayReference as DecayReference,
+    first_row_at as first_row_at,
+)
+from .direct_columns import (
     DirectColumns as DirectColumns,
+    DirectMeasurement as DirectMeasurement,
     LightSpectrum as LightSpectrum,
 )
 from .emission_spectrum import (
-    ChargeSpectrum as ChargeSpectrum,
     EmissionSpectrum as EmissionSpectrum,
-    EmissionSpectrumResult as EmissionSpectrumResult,
     FilterFrames as FilterFrames,
-    PatchSpectrum as PatchSpectrum,
     SpectralComparison as SpectralComparison,
-)
-from .excitation import (
-    Closure as Closure,
-    ExcitationResult as ExcitationResult,
-    LightScatter as LightScatter,
-    PatchCharging as PatchCharging,
-    PatchExcitation as PatchExcitation,
-    spans_decades as spans_decades,
-)
-from .fade import (
-    FadeResult as FadeResult,
-    FittedShape as FittedShape,
-    LampChange as LampChange,
-    SwitchedFrames as SwitchedFrames,
-    WarmingLight as WarmingLight,
 )
 from .fitted_decay import (
     FORECAST_SPANS as FORECAST_SPANS,
@@ -94,7 +57,6 @@ from .fitted_decay_file import (
     write_fitted_decay as write_fitted_decay,
 )
 from .fitted_excitation import (
-    SEEN_SIGMAS as SEEN_SIGMAS,
     UPPER_SIGMAS as UPPER_SIGMAS,
     BandQuantity as BandQuantity,
     BandTests as BandTests,
@@ -118,6 +80,12 @@ from .fitted_law import (
     parameter_text as parameter_text,
     require_law as require_law,
 )
+from .fluorescent_patch import (
+    ColourUnderLight as ColourUnderLight,
+    FluorescentPatch as FluorescentPatch,
+    MatrixOnBands as MatrixOnBands,
+    MeasuredDye as MeasuredDye,
+)
 from .interval import (
     ASYMMETRIC as ASYMMETRIC,
     NORMAL_95 as NORMAL_95,
@@ -126,35 +94,11 @@ from .interval import (
     interval_rows as interval_rows,
     read_intervals as read_intervals,
 )
-from .irradiance import (
-    CardRatio as CardRatio,
-    IrradianceResult as IrradianceResult,
-    StripScale as StripScale,
-)
-from .isotropy import (
-    PAPER_FLUCTUATION as PAPER_FLUCTUATION,
-    AngularGlow as AngularGlow,
-    IsotropyResult as IsotropyResult,
-    is_within_paper as is_within_paper,
-)
 from .layer_effect import (
     PRIOR_DENSITY as PRIOR_DENSITY,
     THICKNESS as THICKNESS,
     DensityBasis as DensityBasis,
     LayerEffect as LayerEffect,
-)
-from .led_brightness import (
-    LedBrightnessResult as LedBrightnessResult,
-    LedFault as LedFault,
-    LedFinding as LedFinding,
-    LedMeasured as LedMeasured,
-)
-from .led_fluorescence import (
-    ColourUnderLight as ColourUnderLight,
-    FluorescentPatch as FluorescentPatch,
-    LedFluorescenceResult as LedFluorescenceResult,
-    MatrixOnBands as MatrixOnBands,
-    MeasuredDye as MeasuredDye,
 )
 from .luminance import (
     MARKING_S as MARKING_S,
@@ -169,23 +113,6 @@ from .luminance import (
     luminance_requirement as luminance_requirement,
     luminance_unit as luminance_unit,
 )
-from .luminance_run import (
-    ExcitationState as ExcitationState,
-    LuminanceResult as LuminanceResult,
-    PatchLuminance as PatchLuminance,
-    ScaleFactor as ScaleFactor,
-)
-from .lvf_calibration import (
-    CameraCurves as CameraCurves,
-    FilterMisfit as FilterMisfit,
-    LocatedLines as LocatedLines,
-    LvfCalibrationResult as LvfCalibrationResult,
-    PlacedStrip as PlacedStrip,
-    SliceValues as SliceValues,
-    Stripes as Stripes,
-    StripLines as StripLines,
-    StripProfile as StripProfile,
-)
 from .measured import (
     Measured as Measured,
     OneSided as OneSided,
@@ -194,12 +121,8 @@ from .measured import (
     measured_number as measured_number,
     with_uncertainty as with_uncertainty,
 )
-from .phosphor import (
-    PhosphorResult as PhosphorResult,
-)
-from .reflectance import (
-    MeasuredReflectance as MeasuredReflectance,
-    ReflectanceResult as ReflectanceResult,
+from .picture_change import (
+    PictureChange as PictureChange,
 )
 from .reradiation_methods import (
     EstimateMethod as EstimateMethod,
@@ -215,16 +138,6 @@ from .run_result import (
     read_result as read_result,
     write_result as write_result,
 )
-from .saturation import (
-    FULL_LIGHT as FULL_LIGHT,
-    LIGHTS as LIGHTS,
-    Concentration as Concentration,
-    Curve as Curve,
-    OrderTest as OrderTest,
-    PatchSaturation as PatchSaturation,
-    RatesTest as RatesTest,
-    SaturationResult as SaturationResult,
-)
 from .series import (
     Series as Series,
     add_flag as add_flag,
@@ -237,13 +150,23 @@ from .series_table import (
     read_described_series as read_described_series,
     read_series as read_series,
 )
-from .shared_decay import SharedDecay as SharedDecay, TableDecay as TableDecay
+from .shared_decay import (
+    SharedDecay as SharedDecay,
+    TableDecay as TableDecay,
+)
+from .strip_profile import (
+    LocatedLines as LocatedLines,
+    SliceValues as SliceValues,
+    StripProfile as StripProfile,
+)
 from .summary import (
     SUMMARY as SUMMARY,
     read_summary as read_summary,
     write_summary as write_summary,
 )
-from .table_clock import TableClock as TableClock
+from .table_clock import (
+    TableClock as TableClock,
+)
 from .table_layout import (
     TableLayout as TableLayout,
 )
@@ -256,11 +179,13 @@ from .trap_depth import (
     state_name as state_name,
     trap_depths_json as trap_depths_json,
 )
-from .unseen_flicker import UnseenFlicker as UnseenFlicker
-from .validate_illuminants import (
+from .under_lamps import (
     LampComparison as LampComparison,
     LampPatch as LampPatch,
+    PredictedUnderLamps as PredictedUnderLamps,
     SeenColour as SeenColour,
     ValidatedSample as ValidatedSample,
-    ValidateIlluminantsResult as ValidateIlluminantsResult,
+)
+from .unseen_flicker import (
+    UnseenFlicker as UnseenFlicker,
 )

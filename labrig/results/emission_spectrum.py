@@ -1,9 +1,9 @@
-"""The emission spectrum Λ* of a sample, whether it changes, and its file `emission.yaml`."""
+"""Emission spectrum with its covariance, and its file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,19 +12,84 @@ from scipy.interpolate import CubicSpline
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.models import Finite, FrozenModel, NotNegative
-from labrig.foundation.output_file import make_folder_in
 from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.material import Spectrum
 from labrig.optics import band_means, edges_from_centres
-from labrig.results.budget import Budget, named
 from labrig.results.measured import Measured
-from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 
 #: Grid of wavelengths in nm, from section 4.7 of the paper (Nalbach et al.).
 WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)
 #: Probability of the credible band between `low` and `high` at a wavelength.
 CREDIBLE = 0.6827
+
+
+@dataclass(frozen=True, eq=False)
+class FilterFrames:
+    """f frames of one scene through the filter, of constant colours but variable brightness.
+
+    Attributes
+    ----------
+    t_s
+        Middles of the exposures in seconds after lamp off, shape (f,).
+    value_dn_per_s
+        Signal of every position and channel in DN/s, shape (f, m); NaN where it clips.
+    sigma_dn_per_s
+        Independent standard uncertainty of the signal in DN/s, shape (f, m).
+    dark_sigma_dn_per_s
+        Common-mode standard uncertainty of a frame's values by the dark level in DN/s, shape (f,
+        m).
+    """
+
+    t_s: FloatArray
+    value_dn_per_s: FloatArray
+    sigma_dn_per_s: FloatArray
+    dark_sigma_dn_per_s: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def take(self, rows: Sequence[int]) -> "FilterFrames":
+        """Return the given frames."""
+        indices = list(rows)
+        return FilterFrames(
+            self.t_s[indices],
+            self.value_dn_per_s[indices],
+            self.sigma_dn_per_s[indices],
+            self.dark_sigma_dn_per_s[indices],
+        )
+
+
+@dataclass(frozen=True)
+class SpectralComparison:
+    """Test whether two scenes through the filter differ in more than their brightness.
+
+    Attributes
+    ----------
+    what
+        Names of the two scenes, for people.
+    brightness
+        Brightness of the first scene relative to the second.
+    chi2, dof
+        χ² of the difference, brightness and an offset of the dark level fitted, and its degrees of
+        freedom.
+    p_value
+        Probability of such a χ² by noise alone.
+    beyond_noise
+        Relative root mean square difference in excess of noise, weighted towards bright places; 0
+        if noise explains all.
+    shift_nm, shift_sigma_nm
+        Shift of the centroid of light along the filter and its standard uncertainty in nm.
+    """
+
+    what: str
+    brightness: float
+    chi2: float
+    dof: int
+    p_value: float
+    beyond_noise: float
+    shift_nm: float
+    shift_sigma_nm: float
 
 
 class EmissionSpectrum(FrozenModel):
@@ -173,175 +238,3 @@ def read_emission_spectrum(path: Path) -> EmissionSpectrum:
 def write_emission_spectrum(path: Path, spectrum: EmissionSpectrum) -> None:
     """Write an emission spectrum; `read_emission_spectrum` reads it back."""
     write_yaml(path, spectrum)
-
-
-@dataclass(frozen=True, eq=False)
-class FilterFrames:
-    """f frames of one scene through the filter, of constant colours but variable brightness.
-
-    Attributes
-    ----------
-    t_s
-        Middles of the exposures in seconds after lamp off, shape (f,).
-    value_dn_per_s
-        Signal of every position and channel in DN/s, shape (f, m); NaN where it clips.
-    sigma_dn_per_s
-        Independent standard uncertainty of the signal in DN/s, shape (f, m).
-    dark_sigma_dn_per_s
-        Common-mode standard uncertainty of a frame's values by the dark level in DN/s, shape (f,
-        m).
-    """
-
-    t_s: FloatArray
-    value_dn_per_s: FloatArray
-    sigma_dn_per_s: FloatArray
-    dark_sigma_dn_per_s: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.t_s)
-
-    def take(self, rows: Sequence[int]) -> "FilterFrames":
-        """Return the given frames."""
-        indices = list(rows)
-        return FilterFrames(
-            self.t_s[indices],
-            self.value_dn_per_s[indices],
-            self.sigma_dn_per_s[indices],
-            self.dark_sigma_dn_per_s[indices],
-        )
-
-
-@dataclass(frozen=True)
-class SpectralComparison:
-    """Test whether two scenes through the filter differ in more than their brightness.
-
-    Attributes
-    ----------
-    what
-        Names of the two scenes, for people.
-    brightness
-        Brightness of the first scene relative to the second.
-    chi2, dof
-        χ² of the difference, brightness and an offset of the dark level fitted, and its degrees of
-        freedom.
-    p_value
-        Probability of such a χ² by noise alone.
-    beyond_noise
-        Relative root mean square difference in excess of noise, weighted towards bright places; 0
-        if noise explains all.
-    shift_nm, shift_sigma_nm
-        Shift of the centroid of light along the filter and its standard uncertainty in nm.
-    """
-
-    what: str
-    brightness: float
-    chi2: float
-    dof: int
-    p_value: float
-    beyond_noise: float
-    shift_nm: float
-    shift_sigma_nm: float
-
-
-@dataclass(frozen=True, eq=False)
-class ChargeSpectrum:
-    """The glow after one charge.
-
-    Attributes
-    ----------
-    lamp
-        Name of the lamp that charged the sample.
-    frames
-        Frames in which light is detected.
-    spectrum
-        Spectrum of all frames together, its credible band from few draws.
-    """
-
-    lamp: str
-    frames: FilterFrames
-    spectrum: EmissionSpectrum
-
-
-@dataclass(frozen=True, eq=False)
-class PatchSpectrum:
-    """The emission spectrum of one patch.
-
-    Attributes
-    ----------
-    spectrum
-        Spectrum after the first charge, all times together; the file `emission.yaml`.
-    channels
-        Channels of the camera.
-    centre_nm
-        Centre of the filter's band in nm for every value of a frame, position by position, or
-        filter by filter, and within it channel by channel, shape (m,).
-    filters
-        Names of the colour filters before the camera; empty of the variable filter. With them the
-        first values of a frame are those without a filter.
-    white_reference
-        Whether the camera's curves were corrected by a grey card under the known lamp.
-    charges
-        Glow after the charge by each lamp that lit, in order of time.
-    times
-        Comparisons of every frame after the first charge with all others together; empty if it is
-        the only one.
-    at_times
-        Spectrum of each of these frames, from few draws.
-    lamps
-        Comparisons of every later charge with the first.
-    changes_with_time, depends_on_lamp
-        Whether any of `times`, of `lamps` is significant.
-    """
-
-    spectrum: EmissionSpectrum
-    channels: tuple[str, ...]
-    centre_nm: FloatArray
-    filters: tuple[str, ...]
-    white_reference: bool
-    charges: tuple[ChargeSpectrum, ...]
-    times: tuple[SpectralComparison, ...]
-    at_times: tuple[EmissionSpectrum, ...]
-    lamps: tuple[SpectralComparison, ...]
-    changes_with_time: bool
-    depends_on_lamp: bool
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class EmissionSpectrumResult(RunResult):
-    """Emission spectra through the variable filter.
-
-    Attributes
-    ----------
-    patches
-        Emission spectrum of each patch by its name; that of the only one under "".
-
-    Examples
-    --------
-    >>> result = labrig.read_result(run)  # doctest: +SKIP
-    >>> for patch in result.patches.values():
-    ...     print(patch.spectrum.peak_nm, patch.spectrum.centroid)
-    """
-
-    kind: ClassVar[str] = "emission_spectrum"
-
-    patches: Mapping[str, PatchSpectrum]
-
-    def provides(self) -> Mapping[str, Any]:
-        """Return the spectrum of every patch."""
-        return {"spectra": {name: patch.spectrum for name, patch in self.patches.items()}}
-
-    def budgets(self) -> dict[str, Budget]:
-        """Return the budgets of the centroids, whose σ has filter and camera in it."""
-        return {
-            named(name, "centroid"): Budget(
-                patch.spectrum.centroid.value, "nm", undivided=patch.spectrum.centroid.sigma
-            )
-            for name, patch in self.patches.items()
-        }
-
-    def write_files(self, folder: Path) -> None:
-        """Write `emission.yaml` and `spectrum.csv`; of several patches in a folder each."""
-        for name, patch in self.patches.items():
-            place = make_folder_in(folder, name)
-            write_emission_spectrum(place / "emission.yaml", patch.spectrum)
-            patch.spectrum.write_csv(place / "spectrum.csv")

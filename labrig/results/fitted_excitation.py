@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
+from labrig.foundation.detection import RATE_LIMIT_SIGMA
 from labrig.material import MAX_ORDER
 from labrig.results.interval import ProfileInterval
 from labrig.results.layer_effect import LayerEffect
@@ -13,8 +14,6 @@ from labrig.results.measured import Measured, OneSided
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
-#: Significance in σ below which an excitation rate is an upper limit.
-SEEN_SIGMAS = 2.0
 #: Significance level of differences between exciting bands, as of all misfit tests.
 DIFFERENT = 5e-4
 #: Significance in σ from which a layer is optically thick.
@@ -80,7 +79,7 @@ class ExcitedState:
     @property
     def seen(self) -> BoolArray:
         """Whether excitation by each band is detected, shape (B,); else k_e is an upper limit."""
-        return self.k_e_per_s > SEEN_SIGMAS * self.k_e_sigma_per_s
+        return self.k_e_per_s > RATE_LIMIT_SIGMA * self.k_e_sigma_per_s
 
     @property
     def k_e_upper_per_s(self) -> FloatArray:

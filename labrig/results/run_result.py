@@ -12,7 +12,7 @@ from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, V
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.foundation.output_file import write_text
-from labrig.foundation.plugins import RESULTS, load
+from labrig.foundation.plugins import measurement
 from labrig.results.text_files import finite
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class RunResult:
     A result holds numbers, with units in the names of its fields or in a `Measured`; arrays are
     `FloatArray`, `BoolArray` or `IntArray`. It contains everything that a report shows, an export
     writes or a notebook computes with. A protocol's own type is a frozen dataclass derived from
-    this one, registered by an entry point in `labrig.results` under the protocol's name.
+    this one, named by the measurement's registration.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ def _to_own_type(content: Any) -> RunResult:
         return content
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
         raise ValueError("a result must say which protocol's it is")
-    result_type: type[RunResult] = load(RESULTS, content["kind"], FILE)
+    result_type: type[RunResult] = measurement(content["kind"], FILE).load("result")
     return result_type.from_dict(content)
 
 

@@ -11,13 +11,12 @@ from enum import Enum
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DeviceError
 
 from .darkness import clips, levels
 from .exposure_metering import MeteringFrame
 
-#: Limits of detection of a glow above darkness, in standard uncertainties and in counts.
-SEEN_SIGMA = 5.0
 SEEN_DN = 1.0
 #: Time in which every phosphor that was just charged fades by more than two per cent.
 MIN_S = 10.0
@@ -121,7 +120,7 @@ class Glow:
     @property
     def seen(self) -> bool:
         """Whether any light is detected."""
-        limit = np.maximum(SEEN_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
+        limit = np.maximum(DETECTION_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
         return self.clips or bool(np.any(self.rate > limit))
 
 

@@ -1,17 +1,19 @@
 """A chain of protocols in one run, whose parts are written as in files of their own."""
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from typing import Any, Self
 
 from pydantic import Field, model_validator
 
 from labrig.acquire import CameraOffers, PartUnit, ProtocolModel, RigFile, Sample
-from labrig.foundation import plugins
+from labrig.foundation.plugins import Measurement, measurement
 from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import validate
 from labrig.record import unit_in, unit_within
 
 from .scenes import Arrangement, Scene, ScenesProtocol
+
+ANOTHER = "expected 'protocol: NAME' in every part, the name of another one that is no chain"
 
 
 class Chain(ProtocolModel):
@@ -48,6 +50,11 @@ class Chain(ProtocolModel):
         """Return the keys of a part with those that it takes from the chain."""
         sample = self.sample.model_dump(exclude_none=True)
         return {"sample": sample} | dict(content)
+
+    @property
+    def rate_frames(self) -> Collection[str]:
+        """Roles of the frames to which rates are fitted in any part."""
+        return tuple({role: None for part in self._links() for role in part.protocol.rate_frames})
 
     def patches_of(self, unit: str) -> Mapping[str, Region]:
         """Return the patches of the part to which the unit belongs."""
@@ -108,19 +115,24 @@ class Part:
         Name of the part in the chain, which its units begin with.
     protocol
         Model of the protocol.
+    registered
+        Registration of its measurement.
     sample
         Name of the sample that alone it measures; empty for the only one, and for the bench.
     """
 
-    def __init__(self, name: str, protocol: ProtocolModel, sample: str = "") -> None:
+    def __init__(
+        self, name: str, protocol: ProtocolModel, registered: Measurement, sample: str = ""
+    ) -> None:
         self.name = name
         self.protocol = protocol
+        self.registered = registered
         self.sample = sample
 
     def of_sample(self, sample: Sample) -> "Part":
         """Return the part for one of several samples, which its name begins with."""
         protocol = self.protocol.model_copy(update={"sample": sample})
-        return Part(unit_in(sample.name, self.name), protocol, sample.name)
+        return Part(unit_in(sample.name, self.name), protocol, self.registered, sample.name)
 
     @classmethod
     def read(cls, content: Mapping[str, Any], chain: str) -> Self:
@@ -133,11 +145,14 @@ class Part:
         """
         keys = dict(content)
         kind = keys.get("protocol")
-        if not isinstance(kind, str) or kind in (chain, "phosphor", "calibration"):
-            raise ValueError("expected 'protocol: NAME' in every part, the name of another one")
+        if not isinstance(kind, str) or kind == chain:
+            raise ValueError(ANOTHER)
         name = str(keys.pop("part", kind))
-        model = plugins.load(plugins.PROTOCOLS, kind, f"part {name}")
-        return cls(name, validate(keys, model, f"part {name}"))
+        registered = measurement(kind, f"part {name}")
+        model = registered.load("protocol")
+        if issubclass(model, Chain):
+            raise ValueError(ANOTHER)
+        return cls(name, validate(keys, model, f"part {name}"), registered)
 
     def scenes(self) -> list[Scene]:
         """Return the part's scenes, with the names that its units have in the chain.

@@ -1,5 +1,6 @@
 """Lights that excite a sample one after another: filters, a monochromator, narrow LEDs."""
 
+from enum import StrEnum
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -10,6 +11,14 @@ from labrig.foundation.models import FrozenModel
 from .scenes import Arrangement, Stage
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class CardSpectra(StrEnum):
+    """Roles of a spectrometer's readings of the card under the same lights."""
+
+    DIRECT = "spectrum-direct"
+    LIGHT = "spectrum-light"
+    DARK = "spectrum-dark"
 
 
 class ExcitingLights(FrozenModel):
@@ -69,3 +78,8 @@ class ExcitingLights(FrozenModel):
     def off(self) -> Switch | LedSwitch:
         """Action that switches any of the lights off."""
         return LEDS_OFF if self.leds else LAMP_OFF
+
+
+def light_unit(name: str, number: int) -> str:
+    """Return the name of the unit that photographs the card under a selected light."""
+    return f"light-{name}-{number}"

@@ -11,6 +11,7 @@ import numpy as np
 
 from labrig.acquire import CameraOffers
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import Region
 from labrig.record import FrameRecord
@@ -19,8 +20,6 @@ from labrig.reduce import ChannelStats, FrameMeasurement, measure, measure_regio
 #: Fraction of the range between black and white that the brightest frame may fill. The rest is room
 #: for a longer charge, the lamp's drift and the shutter's flicker.
 TARGET = 0.4
-#: Limits of detection of a glow's mean, in standard uncertainties and in counts.
-SEEN_SIGMA = 5.0
 SEEN_DN = 2.0
 #: Fraction of the range below which the longest exposure is dominated by noise.
 DIM = 0.002
@@ -107,7 +106,7 @@ class DecayMeter:
             self._shortest_clipped |= not self._readings
             return
         brightest = max(channels, key=lambda channel: channel.mean)
-        if brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN):
+        if brightest.mean > max(DETECTION_SIGMA * brightest.sigma, SEEN_DN):
             rate = brightest.mean / exposure_s
             self._readings.append(_Reading(time_s, rate, brightest.mean, brightest.peak))
 

@@ -1,7 +1,7 @@
 """A grey card under the steady lamp: placing, lighting and metering it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from labrig.acquire import (
     CAMERA,
@@ -12,14 +12,16 @@ from labrig.acquire import (
     Session,
     Shoot,
 )
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DeviceError
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import Region
 from labrig.record import FrameRole
 
 from .darkness import range_dn
-from .exposure_metering import SEEN_SIGMA, MeteringFrame, measure_frame
+from .exposure_metering import MeteringFrame, measure_frame
 from .sample_pose import face_lamp
+from .sanity_checks import SanityChecks
 
 #: Reason for laying the card.
 CARD_REASON = (
@@ -33,6 +35,39 @@ METERED_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1.0)
 SETTLES_S = 5.0
 #: Brightness of the card that a plan assumes: so dim that exposures are long.
 DIM_PER_S = 0.5
+
+
+#: Fractions of the range that the lit card fills: the reference exposure of brackets, flats,
+#: repeats.
+HALF = 0.4
+DARKS_EACH = 4
+
+
+@dataclass(frozen=True)
+class CardDarkUnit:
+    """Dark frames at one ISO, with the card in its place."""
+
+    reference: ExposureSettings
+    card: Region
+    iso: int
+    longest_s: float
+
+    @property
+    def name(self) -> str:
+        """Name of the unit, for example `dark-iso-100`."""
+        return f"dark-iso-{self.iso}"
+
+    def run(self, session: Session) -> None:
+        """Photograph at the shortest and the longest exposure, and check that it is dark."""
+        session.wait_until_warm("camera")
+        offers = session.rig[CAMERA].offers()
+        longest_s = offers.exposure_at_most(self.longest_s)
+        for exposure_s in (offers.exposures_s[0], longest_s):
+            shot = ExposureSettings(exposure_s, self.iso, self.reference.f_number)
+            for _ in range(DARKS_EACH):
+                session.perform(Shoot(FrameRole.DARK, shot))
+        shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
+        SanityChecks(session, self.name, [self.card], None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)
@@ -125,7 +160,9 @@ def _per_s(frames: Sequence[MeteringFrame]) -> float:
             "the aperture"
         )
     brightest, frame = max(unclipped, key=lambda pair: pair[0].mean)
-    if brightest.mean < SEEN_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(frame):
+    if brightest.mean < DETECTION_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(
+        frame
+    ):
         raise DeviceError(
             "the card is not lit: look whether the lamp burns, the card lies in its place and "
             "'card:' is its region in the frame"

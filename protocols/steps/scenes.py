@@ -27,6 +27,7 @@ from labrig.acquire import (
     TurnWheel,
     Unit,
 )
+from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DeviceError
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import CENTRE
@@ -35,7 +36,7 @@ from labrig.record import PERSON, FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw
 
 from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
-from .exposure_metering import SEEN_DN, SEEN_SIGMA, TARGET
+from .exposure_metering import SEEN_DN, TARGET
 from .sample_pose import face_lamp
 from .sanity_checks import SanityChecks
 
@@ -481,11 +482,11 @@ def _measure_brightness(frame: FrameRecord) -> _Brightness:
     measured = measure(read_raw(frame.path))
     channels = list(measured.channels.values())
     brightest = max(channels, key=lambda channel: channel.peak)
-    noise_dn = SEEN_SIGMA * brightest.sigma * np.sqrt(brightest.n)
+    noise_dn = DETECTION_SIGMA * brightest.sigma * np.sqrt(brightest.n)
     return _Brightness(
         exposure_s=frame.exposure_s,
         fraction=brightest.peak / measured.range_dn,
-        visible=brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN)
+        visible=brightest.mean > max(DETECTION_SIGMA * brightest.sigma, SEEN_DN)
         or brightest.peak > max(noise_dn, SEEN_DN),
         clips=measured.clipped,
     )

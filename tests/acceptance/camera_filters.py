@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.process import process_run
-from labrig.results import EmissionSpectrumResult
+from labrig.protocols.emission_spectrum.result import EmissionSpectrumResult
 from tests.analyse.camera_filters_bench import recorded
 from tests.analyse.spectral_bench import emitted
 

@@ -121,7 +121,7 @@ def _protocol_file(place: Path, case: Case) -> Path:
         decay = {"protocol": "decay", "charge": "10 min", "daylight": True}
         path.write_text(write_quickly(decay | {"sample": {"name": case.name}}))
         return path
-    chain = read_quickly((resources.folder("protocols") / "phosphor.yaml").read_text())
+    chain = read_quickly(resources.find("protocols", "protocol", "phosphor").read_text())
     chain["parts"].append({"protocol": "reflectance"})
     path.write_text(write_quickly(chain | {"sample": {"name": case.name}}))
     return path

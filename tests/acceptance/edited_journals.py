@@ -264,7 +264,7 @@ def main() -> None:
         place = Path(scratch)
         key = create_key(place / "key", "Example lab")
         decay = recorded(place / "decay", DECAY, "sim-phosphor")
-        shipped = read_yaml(resources.folder("protocols") / "led_brightness.yaml")
+        shipped = read_yaml(resources.find("protocols", "protocol", "led_brightness"))
         readings = recorded(place / "readings", shipped | READINGS, "sim-fluorescent")
         silent = 0
         for run, process in ((decay, True), (readings, False)):

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from labrig.analyse import Overrides
-from labrig.analyse.emission_spectrum import analyse
 from labrig.foundation.arrays import FloatArray
+from labrig.protocols.emission_spectrum.analysis import analyse
 from labrig.record import read_run
 from labrig.results.emission_spectrum import EmissionSpectrum
 from tests.analyse.recorded import part_of

@@ -18,8 +18,14 @@ from typing import NamedTuple
 import numpy as np
 import yaml
 
-from labrig.analyse.excitation.closure import predicted_charging
-from labrig.analyse.excitation.lamp_light import (
+from labrig.calibration import IrradianceFile
+from labrig.fit.excitation import RelativeSigmas, fit_excitation
+from labrig.foundation import resources
+from labrig.foundation.arrays import FloatArray
+from labrig.material import read_material
+from labrig.optics import SLICES, Strip
+from labrig.protocols.excitation.analysis.closure import predicted_charging
+from labrig.protocols.excitation.analysis.lamp_light import (
     LAMP_SIGMA,
     LARGEST_FACTOR,
     light_scatter,
@@ -27,20 +33,8 @@ from labrig.analyse.excitation.lamp_light import (
     scale_sigma,
     site_modes,
 )
-from labrig.calibration import IrradianceFile
-from labrig.fit.excitation import RelativeSigmas, fit_excitation
-from labrig.foundation import resources
-from labrig.foundation.arrays import FloatArray
-from labrig.material import read_material
-from labrig.optics import SLICES, Strip
-from labrig.results import (
-    BandTests,
-    ChargingSeries,
-    FittedExcitation,
-    LightScatter,
-    PatchCharging,
-    Series,
-)
+from labrig.protocols.excitation.result import LightScatter, PatchCharging
+from labrig.results import BandTests, ChargingSeries, FittedExcitation, Series
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.lvf import Lvf

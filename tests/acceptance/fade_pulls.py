@@ -26,7 +26,7 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.process import process_run
-from labrig.results import SwitchedFrames
+from labrig.protocols.fade.result import SwitchedFrames
 from labrig.sim import lamp as room_lamp
 from labrig.sim.optics import bent_curves
 from labrig.sim.room import CURVES_STREAM

@@ -32,7 +32,6 @@ from typing import Any
 import numpy as np
 import yaml
 
-from labrig.analyse.led_fluorescence import analyse
 from labrig.bench import Recording
 from labrig.foundation import resources
 from labrig.material import (
@@ -44,7 +43,8 @@ from labrig.material import (
 )
 from labrig.optics import read_light
 from labrig.process import process_run
-from labrig.results import LedFluorescenceResult
+from labrig.protocols.led_fluorescence.analysis import analyse
+from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from tests.acceptance.mixture_colours import FOLDER, LEAST_FRACTION
 from tests.analyse.recorded import part_of, quietly
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.process import process_run
-from labrig.results import IrradianceResult
+from labrig.protocols.irradiance.result import IrradianceResult
 from tests.analyse.lvf_calibration.room_truth import simulation_of
 from tests.analyse.recorded import record
 from tests.analyse.selected_lights import BANDS_NM, LED_NAMES, SITES, bench, true_light

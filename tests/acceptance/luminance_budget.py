@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from labrig.acquire import read_rig_file
-from labrig.analyse.luminance import analyse
 from labrig.process import process_run
+from labrig.protocols.luminance.analysis import analyse
 from tests.acceptance.luminance_pulls import AT_60_MIN, EVERYWHERE, HOUR_S
 from tests.acceptance.printed import span
 from tests.analyse.camera_filters_bench import PLACE, recorded as through_filters

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from labrig.acquire import read_rig_file
-from labrig.analyse.luminance import analyse
+from labrig.protocols.luminance.analysis import analyse
 from labrig.results import VISIBLE_MCD_PER_M2
 from tests.analyse.luminance_bench import (
     QUICK,

@@ -61,7 +61,7 @@ class Labrig:
 
     def shipped(self, kind: str) -> Path:
         """Return the folder of its shipped files of a kind."""
-        code = f"from labrig import resources; print(resources.folder({kind!r}))"
+        code = f"from labrig.foundation import resources; print(resources.folder({kind!r}))"
         return Path(self._timed([self.python, "-c", code])[1])
 
     def fit(self, series: Path) -> Times:

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from labrig.analyse.reflectance import analyse
 from labrig.calibration import LVF_KIND, LvfFile
 from labrig.foundation.arrays import FloatArray
 from labrig.material import Albedo, Material, read_material, write_material
 from labrig.optics import Strip
 from labrig.optics.piecewise import band_means, edges_from_centres
-from labrig.results import MeasuredReflectance, ReflectanceResult
+from labrig.protocols.reflectance.analysis import analyse
+from labrig.protocols.reflectance.result import MeasuredReflectance, ReflectanceResult
 from labrig.sim.cards import GREY, GREY_NM
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from tests.analyse.recorded import part_of, record

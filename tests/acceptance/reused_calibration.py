@@ -43,7 +43,7 @@ def labrig(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 def protocol_file(folder: Path, material: str, part: str, keys: dict[str, Any]) -> Path:
     """The shipped chain for another sample, with other keys of one part."""
-    content = yaml.safe_load((resources.folder("protocols") / "phosphor.yaml").read_text())
+    content = yaml.safe_load(resources.find("protocols", "protocol", "phosphor").read_text())
     parts = [one | keys if one["protocol"] == part else one for one in content["parts"]]
     path = folder / f"{material}.yaml"
     path.write_text(yaml.safe_dump(content | {"sample": {"name": material}, "parts": parts}))

@@ -55,7 +55,7 @@ def rig_file(folder: Path, materials: Sequence[str], seed: int, width: int) -> P
 
 def protocol_file(folder: Path, materials: Sequence[str], **keys: Any) -> Path:
     """The shipped chain for these samples; `rest` are keys of the excitation's rests."""
-    content = yaml.safe_load((resources.folder("protocols") / "phosphor.yaml").read_text())
+    content = yaml.safe_load(resources.find("protocols", "protocol", "phosphor").read_text())
     del content["sample"]
     rest = keys.pop("rest", {})
     for part in content["parts"]:

@@ -20,7 +20,8 @@ import numpy as np
 from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
 from labrig.process import process_run
-from labrig.results import ExcitationResult, IrradianceResult
+from labrig.protocols.excitation.result import ExcitationResult
+from labrig.protocols.irradiance.result import IrradianceResult
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import BURNING_K, filament_spectrum
 from labrig.sim.phosphor import band_cells, phosphor

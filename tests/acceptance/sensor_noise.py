@@ -24,11 +24,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from labrig.analyse.camera_calibration.bend import Bend, fit_bend
-from labrig.analyse.camera_calibration.photon_transfer import Pair, measure_pair, photon_transfer
 from labrig.foundation.arrays import FloatArray
+from labrig.protocols.camera_calibration.analysis.bend import Bend, fit_bend
+from labrig.protocols.camera_calibration.analysis.photon_transfer import (
+    Pair,
+    measure_pair,
+    photon_transfer,
+)
+from labrig.protocols.camera_calibration.result import PhotonTransfer
 from labrig.reduce import RawFrame
-from labrig.results import PhotonTransfer
 
 SHAPE = 120, 160
 WHOLE = (0.0, 0.0, 1.0, 1.0)

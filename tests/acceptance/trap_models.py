@@ -34,7 +34,7 @@ from labrig.material import (
     read_material,
 )
 from labrig.process import process_and_report
-from labrig.results import ExcitationResult
+from labrig.protocols.excitation.result import ExcitationResult
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.lamp import BURNING_K, Lamp, filament_spectrum
 from labrig.sim.phosphor import band_cells, phosphor
@@ -232,7 +232,7 @@ def recorded(case: Case, folder: Path) -> Path:
 def row(case: Case, run: Path, order: str) -> bool:
     """Print one material's deviations; return whether they are right."""
     began = time.monotonic()
-    done = process_and_report(run, Overrides(order=order))
+    done = process_and_report(run, Overrides(options={"order": order}))
     assert isinstance(done.result, ExcitationResult)
     (patch,) = done.result.patches.values()
     fit = json.loads((run / "result" / "excitation.json").read_text())

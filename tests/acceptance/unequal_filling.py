@@ -30,7 +30,7 @@ import yaml
 
 from labrig.cli.exit_codes import guarded
 from labrig.process import process_run
-from labrig.results import PatchSaturation, SaturationResult
+from labrig.protocols.saturation.result import PatchSaturation, SaturationResult
 from labrig.sim.lamp import BURNING_K, filament_spectrum
 from labrig.sim.phosphor import band_cells
 from tests.acceptance.decays_of_all_materials import shipped_rig

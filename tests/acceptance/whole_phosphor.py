@@ -58,7 +58,7 @@ def rig_file(folder: Path, material: str, seed: int, width: int) -> Path:
 
 def protocol_file(folder: Path, material: str) -> Path:
     """The shipped chain for another sample."""
-    protocol = yaml.safe_load((resources.folder("protocols") / "phosphor.yaml").read_text())
+    protocol = yaml.safe_load(resources.find("protocols", "protocol", "phosphor").read_text())
     path = folder / "phosphor.yaml"
     path.write_text(yaml.safe_dump(protocol | {"sample": {"name": material}}))
     return path

@@ -44,14 +44,8 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import LabrigError
 from labrig.foundation.region import region_pixels
 from labrig.process import process_run
-from labrig.results import (
-    EXPONENTIALS,
-    DecayPatch,
-    DecayResult,
-    DecayState,
-    FittedDecay,
-    RunResult,
-)
+from labrig.protocols.decay.result import DecayResult
+from labrig.results import EXPONENTIALS, DecayPatch, DecayState, FittedDecay, RunResult
 from labrig.sim.optics import CHANNELS, vignetting
 from labrig.sim.truth import TrueState, Truth
 from tests.acceptance.wrong_charging import CHARGES, Charging

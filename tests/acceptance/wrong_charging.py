@@ -15,7 +15,8 @@ import yaml
 
 from labrig.calibration import FADE_KIND, IRRADIANCE_KIND, Change, FadeFile, Warming
 from labrig.material import read_material
-from labrig.results import ExcitationResult, RunResult
+from labrig.protocols.excitation.result import ExcitationResult
+from labrig.results import RunResult
 from labrig.sim.lamp import BURNING_K, Lamp, filament_spectrum
 from labrig.sim.phosphor import band_cells
 from labrig.sim.simulation import LampSettings

@@ -10,7 +10,7 @@ from labrig.acquire import RigFile, read_rig_file
 from labrig.bench import open_bench
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
-from labrig.protocols.luminance import LuminanceFrames
+from labrig.protocols.luminance.protocol import LuminanceFrames
 from labrig.record import PERSON, read_run
 from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly

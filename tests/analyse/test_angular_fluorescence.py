@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Inputs, Part
-from labrig.analyse.angular_fluorescence import analyse
 from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_and_report
-from labrig.protocols.angular_fluorescence import Circle
+from labrig.protocols.angular_fluorescence.analysis import analyse
+from labrig.protocols.angular_fluorescence.protocol import Circle
+from labrig.protocols.angular_fluorescence.result import AngularFluorescenceResult
 from labrig.record import Attempt
-from labrig.results import AngularFluorescenceResult
 from tests.analyse.angular_bench import record_angular, record_sphere, true_camera
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import ANGULAR
@@ -163,7 +163,7 @@ def sphere(tmp_path_factory: pytest.TempPathFactory) -> Part:
     """A run with a sphere of 90 px about (180, 120) in a frame of 360 × 240."""
     folder = tmp_path_factory.mktemp("sphere")
     run = record_sphere(folder, {"reflected_led": "625 nm"}, repositioning=0.01)
-    return part_of(run, Inputs(camera=true_camera(run)))
+    return part_of(run, Inputs({"camera": true_camera(run)}))
 
 
 def changed(part: Part, **keys: Any) -> Part:
@@ -239,14 +239,16 @@ def test_a_sphere_is_lambertian_in_re_radiation_and_not_in_reflection(sphere: Pa
 @pytest.mark.campaign
 def test_what_a_sphere_loses_to_the_side_is_found(tmp_path: Path) -> None:
     run = record_sphere(tmp_path, {}, repositioning=0.01, reradiation_anisotropy=0.06)
-    known = analyse(part_of(run, Inputs(camera=true_camera(run))))
+    known = analyse(part_of(run, Inputs({"camera": true_camera(run)})))
     (views,) = known.spheres
     amplitude = views.shading.by_view.amplitude
     assert known.finds_dependence
     assert abs(amplitude.value + 0.06) < 3 * amplitude.sigma
     assert amplitude.sigma < 0.015
     assert not views.shading.by_incidence.finds_dependence
-    cut = analyse(changed(part_of(run, Inputs(camera=true_camera(run))), region=(82, 50, 196, 140)))
+    cut = analyse(
+        changed(part_of(run, Inputs({"camera": true_camera(run)})), region=(82, 50, 196, 140))
+    )
     assert cut.finds_dependence
     assert cut.warnings
     # Without the lens it could be the lens.

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from labrig.acquire import RigFile, read_rig_file
-from labrig.analyse.colour_of_glow import ColourScale, Emission, colour_scale
 from labrig.bench_optics import (
     bare_lamp_spectrum,
     camera_curves,
@@ -18,6 +17,7 @@ from labrig.bench_optics import (
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
 from labrig.optics import Spectrum, photopic_efficacy, scotopic_efficacy
+from labrig.protocols.luminance.analysis.colour_of_glow import ColourScale, Emission, colour_scale
 from labrig.sim.cards import reflectances
 from labrig.sim.lamp import BURNING_SPECTRUM, CELL_NM, WAVELENGTH_NM
 from labrig.sim.optics import CameraCurves, bent_curves, measured_curves

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Part
-from labrig.analyse.direct_bispectral import analyse
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.material import read_reradiation
 from labrig.optics import SpectrometerReading, read_spectrometer_reading
-from labrig.protocols.direct_bispectral import DirectSpectra
+from labrig.protocols.direct_bispectral.analysis import analyse
+from labrig.protocols.direct_bispectral.protocol import DirectSpectra
+from labrig.protocols.direct_bispectral.result import DirectBispectralResult
 from labrig.record import Attempt, SpectrumRecord
-from labrig.results import DirectBispectralResult, DirectColumns
+from labrig.results import DirectColumns
 from tests.analyse.direct_bench import (
     MATERIALS,
     record,

@@ -13,31 +13,25 @@ import pytest
 import tifffile
 
 from labrig.analyse import Overrides
-from labrig.analyse.emission_spectrum import analyse
-from labrig.analyse.emission_spectrum.comparison import (
-    combined,
-    compared,
-    differ,
-    over_time,
-    visible,
-)
-from labrig.analyse.emission_spectrum.forward_model import forward_models
-from labrig.analyse.emission_spectrum.reduction import reduce_places
+from labrig.analyse.combined_frames import combined, compared, differ, over_time, visible
+from labrig.analyse.forward_model import forward_models
 from labrig.analyse.inputs import Inputs
+from labrig.analyse.place_reduction import reduce_places
 from labrig.fit.spectrum import SpectrumFit, fit_spectrum, system_through_lvf
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.region import region_pixels
 from labrig.optics import Spectrum
+from labrig.protocols.emission_spectrum.analysis import analyse
+from labrig.protocols.emission_spectrum.report import render
+from labrig.protocols.emission_spectrum.result import EmissionSpectrumResult
 from labrig.record import read_run
 from labrig.reduce import SeriesFrame
 from labrig.report import figure_style
-from labrig.report.emission_spectrum import render
+from labrig.results import FilterFrames
 from labrig.results.emission_spectrum import (
     WAVELENGTH_NM,
     EmissionSpectrum,
-    EmissionSpectrumResult,
-    FilterFrames,
     read_emission_spectrum,
     write_emission_spectrum,
 )

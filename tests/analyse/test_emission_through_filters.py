@@ -9,7 +9,9 @@ import pytest
 from labrig.bench import Recording
 from labrig.foundation.errors import UsageError
 from labrig.process import process_run
-from labrig.results import EmissionSpectrumResult, ExcitationResult, PhosphorResult
+from labrig.protocols.emission_spectrum.result import EmissionSpectrumResult
+from labrig.protocols.excitation.result import ExcitationResult
+from labrig.protocols.phosphor.result import PhosphorResult
 from tests.analyse.camera_filters_bench import FILTERS, IN_WHEEL, PLACE, QUICK, recorded
 from tests.analyse.selected_lights import FILTERS as LAMP_FILTERS, QUICK as EXCITATION, true_rates
 from tests.analyse.spectral_bench import emitted

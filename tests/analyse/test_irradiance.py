@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.analyse.irradiance import in_bands, mean_ratio, strip_scale
 from labrig.calibration import IRRADIANCE_KIND
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
@@ -14,8 +13,9 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
-from labrig.results.irradiance import CardRatio, IrradianceResult
-from labrig.results.lvf_calibration import SliceValues
+from labrig.protocols.irradiance.analysis import in_bands, mean_ratio, strip_scale
+from labrig.protocols.irradiance.result import CardRatio, IrradianceResult
+from labrig.results.strip_profile import SliceValues
 from tests.analyse.lvf_calibration.room_truth import simulation_of, true_irradiance
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 from tests.analyse.recorded import processed_once

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.analyse.isotropy import analyse
 from labrig.foundation.errors import DataError
 from labrig.process import process_and_report
-from labrig.results.isotropy import IsotropyResult
+from labrig.protocols.isotropy.analysis import analyse
+from labrig.protocols.isotropy.result import IsotropyResult
 from tests.analyse.recorded import part_of
 from tests.analyse.small_runs import ISOTROPY
 from tests.analyse.spectral_bench import record

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from labrig.analyse.kinetic_order import compare_levels
 from labrig.material import dark_concentration
-from labrig.results import Curve, OrderTest
+from labrig.protocols.saturation.analysis.kinetic_order import compare_levels
+from labrig.protocols.saturation.result import Curve, OrderTest
 from tests.pulls import assert_sigma_is_right
 
 T_S = np.arange(1.0, 120.0, 4.0)

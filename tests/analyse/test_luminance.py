@@ -9,16 +9,11 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Part, evaluate_luminance_table
-from labrig.analyse.luminance import analyse
 from labrig.bench_optics import card_radiance, luminance
 from labrig.process import process_and_report
-from labrig.results import (
-    TABLE_S,
-    VISIBLE_MCD_PER_M2,
-    LuminanceResult,
-    ScaleFactor,
-    Verdict,
-)
+from labrig.protocols.luminance.analysis import analyse
+from labrig.protocols.luminance.result import LuminanceResult, ScaleFactor
+from labrig.results import TABLE_S, VISIBLE_MCD_PER_M2, Verdict
 from tests.analyse.luminance_bench import QUICK, record, true_luminance, write_glow
 from tests.analyse.recorded import part_of
 from tests.results.made import assert_read_back

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.analyse.decay import noise_budget, noise_parts
 from labrig.fit import DecayFit
+from labrig.protocols.decay.analysis import noise_budget, noise_parts
 from labrig.report.chart_figure import chart_figure
 from labrig.report.decay_figures import noise_figure, visible_parts
 from labrig.report.figure_style import figure_style

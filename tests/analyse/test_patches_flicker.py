@@ -3,9 +3,9 @@
 from dataclasses import replace
 from functools import partial
 
-from labrig.analyse.decay import fit_patches
 from labrig.analyse.series_fit import fit_series
 from labrig.fit import DecayFit
+from labrig.protocols.decay.analysis import fit_patches
 from tests.report.made import decay_series
 
 

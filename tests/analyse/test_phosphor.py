@@ -16,8 +16,8 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.number_format import plus_minus
 from labrig.material import read_material
 from labrig.process import process_and_report
+from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import read_run
-from labrig.results.phosphor import PhosphorResult
 from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, record
 from tests.quick_yaml import write_quickly

@@ -10,7 +10,6 @@ from hypothesis import given, strategies as st
 
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Overrides
-from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.inputs import Inputs, Part
 from labrig.analyse.strip import StripPatch, for_each_patch, slice_strip, tilt_offset
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
@@ -20,6 +19,7 @@ from labrig.foundation.region import Region
 from labrig.material import read_material
 from labrig.optics import Strip
 from labrig.process import Processed, process_and_report
+from labrig.protocols.emission_spectrum.analysis import analyse as analyse_spectra
 from labrig.record import read_run
 from labrig.reduce import SensorLayout
 from labrig.results import read_fitted_decays

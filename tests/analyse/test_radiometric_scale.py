@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse.irradiance import analyse
-from labrig.analyse.radiometric_scale import RadiometricScale, mean_irradiance, scale_of
 from labrig.bench_optics import card_reflectance, lamp_spectrum
 from labrig.calibration import LVF_KIND, IrradianceFile
 from labrig.fit.spectrum import CurveError, curve_modes
@@ -22,6 +20,12 @@ from labrig.optics import (
     read_camera,
 )
 from labrig.predict.glow import measured_amplitudes
+from labrig.protocols.excitation.analysis.radiometric_scale import (
+    RadiometricScale,
+    mean_irradiance,
+    scale_of,
+)
+from labrig.protocols.irradiance.analysis import analyse
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.optics import REFLECTED, vignetting
 from tests.analyse.recorded import part_of, record

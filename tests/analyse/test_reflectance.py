@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Inputs
-from labrig.analyse.reflectance import analyse
 from labrig.analyse.surface import with_reflectance, with_reflectances
 from labrig.calibration import LVF_KIND, REFLECTANCE_KIND
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Albedo, read_material, write_material
 from labrig.optics import Strip
+from labrig.protocols.reflectance.analysis import analyse
+from labrig.protocols.reflectance.result import ReflectanceResult
 from labrig.report import describe_phosphor, draw_phosphor
-from labrig.results import ReflectanceResult
 from tests.acceptance.reflectance_pulls import (
     BLUE,
     JUDGED,
@@ -102,7 +102,7 @@ def test_the_result_is_read_back_and_makes_a_material(
     assert first.startswith("plain,400,")
     paint = read_material("blue-paint")
     both = with_reflectances(
-        {"plain": paint, "other": paint}, Inputs().updated_by(result).reflectance
+        {"plain": paint, "other": paint}, Inputs().updated_by(result)[REFLECTANCE_KIND]
     )
     material = both["plain"]
     assert both["other"].albedo is None
@@ -121,10 +121,11 @@ def test_the_result_is_read_back_and_makes_a_material(
 
 def test_what_is_missing_is_one_clear_line(run: Path) -> None:
     part = part_of(run)
-    assert part.inputs.lvf is not None
-    without = part.inputs.lvf.model_copy(update={"on_sample": None})
+    lvf = part.inputs[LVF_KIND]
+    assert lvf is not None
+    without = lvf.model_copy(update={"on_sample": None})
     with pytest.raises(UsageError, match="no LVF is known before the camera and on the sample"):
-        analyse(part_of(run, Inputs(lvf=without)))
+        analyse(part_of(run, Inputs({"lvf": without})))
     (run / "frames" / "gone").mkdir()
     frame = next(iter(part.run.frames("reflectance-sample-white"))).path
     kept = frame.read_bytes()

@@ -8,15 +8,16 @@ from typing import Any
 import pytest
 
 from labrig.analyse import Overrides
-from labrig.analyse.excitation.charge_intervals import charge_frames
-from labrig.analyse.phosphor import analyse
 from labrig.calibration import IRRADIANCE_KIND
 from labrig.compare.run import read_patches
 from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.process import process_and_report
+from labrig.protocols.excitation.analysis.charge_intervals import charge_frames
+from labrig.protocols.excitation.result import ExcitationResult
+from labrig.protocols.phosphor.analysis import analyse
 from labrig.record import RunRecord, read_run
-from labrig.results import ExcitationResult, read_fitted_decays
+from labrig.results import read_fitted_decays
 from labrig.sim.simulation import Simulation
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.analyse.selected_lights import LED_NAMES, QUICK, bench, true_light

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import read_rig_file
-from labrig.analyse.kinetic_order import compare_levels
-from labrig.analyse.saturation import analyse, charge_level, charged, compare_rates
 from labrig.analyse.series_fit import fit_series
 from labrig.bench import open_bench
 from labrig.foundation.errors import DataError
-from labrig.results import Measured, PatchSaturation, Series
-from labrig.results.saturation import Curve, SaturationResult
+from labrig.protocols.saturation.analysis import analyse, charge_level, charged, compare_rates
+from labrig.protocols.saturation.analysis.kinetic_order import compare_levels
+from labrig.protocols.saturation.result import Curve, PatchSaturation, SaturationResult
+from labrig.results import Measured, Series
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import HALF, SATURATION
 from tests.analyse.spectral_bench import record

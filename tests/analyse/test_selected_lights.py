@@ -8,7 +8,8 @@ import pytest
 from labrig.calibration import IRRADIANCE_KIND
 from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_run
-from labrig.results import ExcitationResult, IrradianceResult
+from labrig.protocols.excitation.result import ExcitationResult
+from labrig.protocols.irradiance.result import IrradianceResult
 from labrig.sim.simulation import Simulation
 from tests.analyse.lvf_calibration.room_truth import simulation_of
 from tests.analyse.recorded import part_of, record

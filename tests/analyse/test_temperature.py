@@ -9,9 +9,9 @@ from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.foundation import resources
 from labrig.material import read_material
 from labrig.process import process_run
+from labrig.protocols.decay.result import DecayResult
 from labrig.record import read_run
 from labrig.report import describe_phosphor
-from labrig.results import DecayResult
 from tests.analyse.recorded import record
 from tests.quick_yaml import read_quickly, write_quickly
 

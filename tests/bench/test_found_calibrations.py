@@ -30,10 +30,10 @@ from labrig.foundation import resources
 from labrig.foundation.errors import DataError, ProtocolError, UsageError
 from labrig.optics import Flat, Strip
 from labrig.process import process_run
-from labrig.protocols.phosphor import Phosphor
+from labrig.protocols.calibration_check.result import CalibrationCheckResult
+from labrig.protocols.phosphor.protocol import Phosphor
 from labrig.record import CALIBRATIONS_FILE, read_run
 from labrig.reduce import find_strip, read_hdr_frame, strip_profile
-from labrig.results import CalibrationCheckResult
 from tests.analyse.excitation.bench import true_irradiance
 from tests.analyse.led_bench import record as record_leds
 from tests.analyse.recorded import record

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from labrig.protocols.decay.report import decay_sections
 from labrig.report import exposure_middles_s, write_report
-from labrig.report.decay import decay_sections
 from labrig.report.report_model import PatchReport
 from labrig.results import FittedDecay
 from tests.report.made import decay_report, decay_series, page_of, patch

@@ -23,7 +23,7 @@ from labrig.acquire.values import Frame
 from labrig.foundation import resources
 from labrig.foundation.clock import VirtualClock
 from labrig.optics import SpectrometerReading
-from labrig.protocols.decay import Decay
+from labrig.protocols.decay.protocol import Decay
 from labrig.record import ActionRecord, FrameRecord, RunFolder, SpectrumRecord
 from tests.acquire.fakes import Watching
 

@@ -31,7 +31,7 @@ def test_a_rig_file_names_its_file_and_analyses_have_it(
     assert [optics.named(one) for one in kinds() if optics.named(one)] == [mine]
     assert optics.named(kind) == mine
     assert kind.name in {field.name for field in fields(Inputs)}
-    assert kind.protocol in plugins.names(plugins.ANALYSES)
+    assert kind.protocol in plugins.names(plugins.MEASUREMENTS)
 
 
 class Text(BaseModel):

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 from labrig.foundation import plugins
+from labrig.protocols.decay.result import DecayResult
 from labrig.record import RunLock, own_digest, read_run
-from labrig.results import DecayResult, read_result
+from labrig.results import read_result
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 
@@ -125,9 +126,9 @@ def test_wrong_usage(labrig: Labrig, arguments: list[str], command: str) -> None
     [("x", "expected a whole number, got 'x'"), ("9", "expected a number of at most 3, got '9'")],
 )
 def test_an_option_of_another_kind_is_told_plainly(
-    labrig: Labrig, value: str, expected: str
+    labrig: Labrig, finished: Path, value: str, expected: str
 ) -> None:
-    one_line(labrig("process", "last", "--states", value), 2, "'--states'", expected)
+    one_line(labrig("process", finished, "--states", value), 2, "--states", expected)
 
 
 @pytest.mark.parametrize("command", [["resume"], ["process"]])
@@ -319,8 +320,10 @@ def test_a_protocol_of_a_package_is_listed_and_needs_a_file_of_ones_own(
     labrig: Labrig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     registry = plugins._registry()
-    decay = EntryPoint("lamp_drift", registry[plugins.PROTOCOLS]["decay"].value, plugins.PROTOCOLS)
-    extended = {**registry, plugins.PROTOCOLS: {**registry[plugins.PROTOCOLS], "lamp_drift": decay}}
+    decay = registry[plugins.MEASUREMENTS]["decay"]
+    other = EntryPoint("lamp_drift", decay.value, decay.group)
+    registered = {**registry[plugins.MEASUREMENTS], "lamp_drift": other}
+    extended = {**registry, plugins.MEASUREMENTS: registered}
     monkeypatch.setattr(plugins, "_registry", lambda: extended)
     assert "lamp_drift" in labrig("protocol", "list").out
     one_line(labrig("plan", "lamp_drift", "--rig", "sim"), 2, "installed", "lamp_drift.yaml")
@@ -429,7 +432,7 @@ def test_a_table_has_page_figures_and_result_as_a_run_has(
     again = labrig("fit", "decay", table, "--out", tmp_path / "out")
     assert "the same result as before" in again.out
     other = labrig("fit", "decay", table, "--out", tmp_path / "out", "--from", "6 s")
-    assert "options start" in other.out
+    assert "start: none → 6 s" in other.out
     assert (tmp_path / "out" / "result-1" / "fit.json").is_file()
 
 

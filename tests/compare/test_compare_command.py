@@ -16,8 +16,8 @@ from labrig.calibration.lvf_file import CurveColumns
 from labrig.cli.exit_codes import guarded
 from labrig.foundation import resources
 from labrig.optics import read_camera
+from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.results import RunResult
-from labrig.results.phosphor import PhosphorResult
 from tests.analyse.spectral_bench import true_lvf_file
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly

@@ -29,8 +29,9 @@ from labrig.material import (
     read_material,
     write_material,
 )
+from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.reproduce import Renderer, load_scene
-from labrig.results import PhosphorResult, Series, read_result
+from labrig.results import Series, read_result
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.optics import REFLECTED, emission
 from labrig.sim.phosphor import band_cells

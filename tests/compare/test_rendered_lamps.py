@@ -13,8 +13,9 @@ from labrig.compare import LampsComparison, compare_lamps
 from labrig.material import read_any_material
 from labrig.optics import Spectrum, read_camera
 from labrig.process import process_and_report
+from labrig.protocols.validate_illuminants.result import ValidateIlluminantsResult
 from labrig.reproduce import Renderer, load_scene
-from labrig.results import ValidateIlluminantsResult, read_result
+from labrig.results import read_result
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly

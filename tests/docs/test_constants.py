@@ -5,7 +5,6 @@ import math
 import pytest
 
 from labrig.acquire.roles import camera
-from labrig.analyse.excitation import lamp_light
 from labrig.bench import execution, guard
 from labrig.fit import luminance
 from labrig.fit.decay import (
@@ -19,7 +18,9 @@ from labrig.fit.decay import (
     series,
     states,
 )
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.material.reradiation import evidence
+from labrig.protocols.excitation.analysis import lamp_light
 from labrig.setup import check
 from tests.acceptance.campaigns import ROOT
 
@@ -46,8 +47,9 @@ STATED = {
         f"$P > 1/{1 / further_state.LIKELY:.0f}$ a",
         f"$\\beta$ is more than {bend.BEND_SIGMAS:.0f} σ from zero",
         f"on a grid of {rate_spectrum.RATES} rates",
-        f"more than {selection.PREFERRED_BIC:.0f} in BIC; by more than {selection.CLEAR_BIC:.0f} "
-        f"(odds of {round(math.exp(selection.CLEAR_BIC / 2), -1):.0f} to 1)",
+        f"more than {selection.PREFERRED_BIC:.0f} in BIC; by more than "
+        f"{STRONG_EVIDENCE_DELTA_BIC:.0f} "
+        f"(odds of {round(math.exp(STRONG_EVIDENCE_DELTA_BIC / 2), -1):.0f} to 1)",
     ],
     "how-to/dark_room.md": [
         f"Its limit is {100 * check.LIGHT:g} % of the range in {camera.LONG_S:.0f} s",

@@ -46,7 +46,7 @@ CLASSES_WITH_EXAMPLE = [
     for name, member in EXPORTED.items()
     if inspect.isclass(member)
     and ">>>" in (member.__doc__ or "")
-    and not member.__module__.startswith("labrig.results")
+    and not member.__module__.startswith(("labrig.results", "labrig.protocols"))
 ]
 
 

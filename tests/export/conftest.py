@@ -14,10 +14,10 @@ from labrig.foundation import resources
 from labrig.foundation.clock import Clock
 from labrig.process import process_run
 from labrig.process.provenance import describe_run
+from labrig.protocols.decay.result import DecayResult
 from labrig.record import read_run
 from labrig.record.history import RunDescription
 from labrig.results import read_result
-from labrig.results.decay import DecayResult
 from tests.acquire.fakes import Watching
 from tests.quick_yaml import read_quickly, write_quickly
 

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 
 from labrig.fit.excitation import closure
 from labrig.foundation.errors import DataError
+from labrig.protocols.excitation.report import closure_picture
 from labrig.report import figure_style
-from labrig.report.excitation import closure_picture
 
 CHARGES_S = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])
 LAMP: dict[str, Any] = {

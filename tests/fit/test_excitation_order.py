@@ -5,23 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.analyse import Overrides
-from labrig.analyse.excitation.closure import predicted_charging
-from labrig.analyse.excitation.orders import OrderFits
+from labrig.analyse import chosen_options
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.material import becquerel_of, read_material
-from labrig.results import (
-    Charge,
-    ChargingSeries,
-    Closure,
-    EarlierCharges,
-    FittedExcitation,
-    PatchCharging,
-    Series,
-)
+from labrig.protocols.excitation.analysis.closure import predicted_charging
+from labrig.protocols.excitation.analysis.orders import OrderFits
+from labrig.protocols.excitation.options import ExcitationOptions
+from labrig.protocols.excitation.result import PatchCharging
+from labrig.results import Charge, ChargingSeries, Closure, EarlierCharges, FittedExcitation, Series
 from labrig.sim.kinetics_settings import KineticsSettings
 from labrig.sim.simulation import LampSettings
 from tests.fit.charged_samples import BARE, LVF, Bench, lvf_windows, two_states
@@ -174,7 +168,7 @@ def test_a_slow_state_that_may_be_none_does_not_mislead_the_orders() -> None:
 @pytest.mark.parametrize("text", ["second", "0.5", "5", "nan"])
 def test_what_is_no_order_is_one_line(text: str) -> None:
     with pytest.raises(UsageError, match=f"--order: expected auto, free or .* got '{text}'"):
-        Overrides.parse([], [], order=text)
+        chosen_options(ExcitationOptions, {"order": text})
 
 
 def test_closure_predicts_the_bent_charge() -> None:

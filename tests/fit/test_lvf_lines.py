@@ -18,7 +18,7 @@ from labrig.optics import (
     read_spectrum,
     signal_through,
 )
-from labrig.results.lvf_calibration import LocatedLines
+from labrig.results.strip_profile import LocatedLines
 from tests.fit import lvf_pictures as made
 
 PIXELS = np.arange(0.0, 1001.0, 2.0)

@@ -29,7 +29,7 @@ CONTENTS: dict[str, list[Content]] = {
 }
 FILES: list[tuple[type[BaseModel], Content]] = [
     *(
-        (plugins.load(plugins.PROTOCOLS, content["protocol"], "test"), content)
+        (plugins.measurement(content["protocol"], "test").load("protocol"), content)
         for content in CONTENTS["protocols"]
     ),
     *((RigFile, content) for content in CONTENTS["config"]),
@@ -54,7 +54,9 @@ ODD: st.SearchStrategy[Any] = st.sampled_from(
 
 def refusal(content: dict[str, Any], model: type[BaseModel] | None = None) -> str:
     with pytest.raises(UsageError) as caught:
-        validate(content, model or plugins.load(plugins.PROTOCOLS, "decay", "test"), "mine.yaml")
+        validate(
+            content, model or plugins.measurement("decay", "test").load("protocol"), "mine.yaml"
+        )
     return str(caught.value)
 
 

@@ -13,7 +13,7 @@ from labrig.acquire import changes_with_absolute_paths
 from labrig.bench import with_frame_size
 from labrig.foundation.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
 from labrig.optics import read_light
-from labrig.protocols.luminance import Luminance
+from labrig.protocols.luminance.protocol import Luminance
 
 LAB = Path("/lab")
 

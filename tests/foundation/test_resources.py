@@ -20,12 +20,14 @@ import labrig
 from labrig.foundation import resources
 from labrig.bench import opening as bench
 from labrig.foundation import plugins
-import labrig.drivers.numato, labrig.protocols.decay, labrig.sim
+import labrig.drivers.numato, labrig.protocols.decay.protocol, labrig.sim
 for module in (labrig.drivers, labrig.protocols, labrig.sim):
     assert "trap" not in vars(module), module
-for group in (plugins.DRIVERS, plugins.PROTOCOLS):
-    for name in plugins.names(group):
-        plugins.load(group, name, "test")
+for name in plugins.names(plugins.DRIVERS):
+    plugins.load(plugins.DRIVERS, name, "test")
+for _, registered in plugins.measurements():
+    for part in ("protocol", "analysis", "result", "report", "calibration"):
+        registered.load(part)
 path = resources.find("config", "rig", "sim")
 assert path.read_text().startswith("# The simulated rig"), path
 import sim, config

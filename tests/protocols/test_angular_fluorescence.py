@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from labrig.foundation.errors import DeviceError
-from labrig.protocols.angular_fluorescence import AngularFluorescence, AngularFrames
+from labrig.protocols.angular_fluorescence.protocol import AngularFluorescence, AngularFrames
 from labrig.record import read_run
 from tests.analyse.angular_bench import record_angular
 from tests.analyse.recorded import cut_off_and_resumed

@@ -8,7 +8,7 @@ from labrig.acquire import Plan, read_protocol
 from labrig.fit.lvf import most_informative_filters
 from labrig.foundation import resources
 from labrig.optics import read_transmittance
-from labrig.protocols.calibration import Calibration
+from labrig.protocols.calibration.protocol import Calibration
 from tests.protocols.protocol_files import (
     assert_one_clear_line,
     assert_timeline_as_agreed,

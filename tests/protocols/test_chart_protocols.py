@@ -7,8 +7,8 @@ import pytest
 
 from labrig.acquire import read_rig_file
 from labrig.foundation import resources
-from labrig.protocols.camera_curves import CameraCurves
-from labrig.protocols.colour_check import ColourCheck
+from labrig.protocols.camera_curves.protocol import CameraCurves
+from labrig.protocols.colour_check.protocol import ColourCheck
 from tests.protocols.protocol_files import (
     assert_one_clear_line,
     assert_timeline_as_agreed,

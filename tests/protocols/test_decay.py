@@ -16,11 +16,7 @@ from tests.quick_yaml import write_quickly
 
 GOLDEN = Path(__file__).parent / "decay.timeline.txt"
 #: A calibration's check is planned where there is a calibration: `tests.test_found_calibrations`.
-PROTOCOLS = sorted(
-    path.stem
-    for path in resources.folder("protocols").glob("*.yaml")
-    if path.stem != "calibration_check"
-)
+PROTOCOLS = sorted(name for name in resources.names("protocols") if name != "calibration_check")
 
 
 def planned(protocol: Path, rig: str | Path = "sim") -> Plan:

@@ -8,9 +8,9 @@ import pytest
 
 from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.process import process_run
-from labrig.protocols.direct_bispectral import DirectBispectral
+from labrig.protocols.direct_bispectral.protocol import DirectBispectral
+from labrig.protocols.direct_bispectral.result import DirectBispectralResult
 from labrig.record import read_run
-from labrig.results import DirectBispectralResult
 from tests.analyse.direct_bench import write_bench
 from tests.conftest import Ended
 from tests.protocols.protocol_files import (

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from labrig.foundation.errors import LabrigError
-from labrig.protocols.led_fluorescence import LedFluorescence
+from labrig.protocols.led_fluorescence.protocol import LedFluorescence
 from tests.protocols.protocol_files import (
     assert_one_clear_line,
     assert_timeline_as_agreed,

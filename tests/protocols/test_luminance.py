@@ -7,7 +7,7 @@ import pytest
 
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.foundation.errors import UsageError
-from labrig.protocols.luminance import PRESETS, Luminance
+from labrig.protocols.luminance.protocol import PRESETS, Luminance
 from tests.analyse.luminance_bench import write_rig
 from tests.protocols.protocol_files import (
     assert_one_clear_line,

@@ -15,9 +15,9 @@ from labrig.foundation import resources
 from labrig.foundation.clock import Clock, Interrupted
 from labrig.foundation.errors import UsageError
 from labrig.process import process_run
+from labrig.protocols.lvf_calibration.result import LvfCalibrationResult
 from labrig.record import read_run
 from labrig.results import read_result
-from labrig.results.lvf_calibration import LvfCalibrationResult
 from tests.acquire.fakes import Watching
 from tests.analyse.lvf_calibration.room_truth import (
     FINE_NM,

@@ -6,7 +6,7 @@ import pytest
 
 from labrig.acquire import read_protocol
 from labrig.foundation.errors import LabrigError
-from labrig.protocols.validate_illuminants import ValidateIlluminants
+from labrig.protocols.validate_illuminants.protocol import ValidateIlluminants
 from tests.protocols.protocol_files import (
     assert_one_clear_line,
     assert_timeline_as_agreed,

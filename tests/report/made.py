@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import tifffile
 
-from labrig.analyse.decay import noise_budget
 from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import LabrigError
 from labrig.optics import read_camera
+from labrig.protocols.decay.analysis import noise_budget
+from labrig.protocols.decay.report import decay_sections
 from labrig.record.frames import FrameRecord
 from labrig.record.history import DeviceLine, RunDescription
 from labrig.report import Report
-from labrig.report.decay import decay_sections
 from labrig.report.report_model import DecayReport, GlowPhotograph, PatchReport
 from labrig.results import Series
 

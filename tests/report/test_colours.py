@@ -169,7 +169,7 @@ def test_the_misfit_is_what_the_docstring_says() -> None:
 def test_numpy_prints_as_before() -> None:
     """In a process of its own: other tests import colour-science themselves."""
     program = (
-        "import numpy as np; from labrig import colour_science; colour_science.load(); "
+        "import numpy as np; from labrig.foundation import colour_science; colour_science.load(); "
         "print(repr(np.array([1.0, 2.0])))"
     )
     command = [sys.executable, "-c", program]

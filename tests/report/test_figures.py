@@ -8,6 +8,11 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit
+from labrig.protocols.decay.report.periodogram_figure import (
+    periodogram_figure,
+    residual_periodogram,
+)
+from labrig.protocols.decay.report.residual_figures import residual_figure, residuals
 from labrig.report.chart import Chart, Points
 from labrig.report.chart_figure import chart_figure
 from labrig.report.decay_figures import (
@@ -21,8 +26,6 @@ from labrig.report.decay_figures import (
 )
 from labrig.report.figure_files import FigureFiles
 from labrig.report.figure_style import CARET_DOWN, figure_style
-from labrig.report.periodogram_figure import periodogram_figure, residual_periodogram
-from labrig.report.residual_figures import residual_figure, residuals
 from labrig.report.sections import Picture
 from labrig.report.timing import FrameTiming
 from labrig.results import Series

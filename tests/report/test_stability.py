@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit
-from labrig.report.decay import repeats, steady
+from labrig.protocols.decay.report import repeats, steady
 from labrig.report.decay_figures import fitted_curve
 from labrig.report.timing import FrameTiming, frame_lateness
 from labrig.results import Series

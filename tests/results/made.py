@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from labrig.export import tree_of
-from labrig.results import DecayState, FittedDecay, PhosphorResult, RunResult
+from labrig.protocols.phosphor.result import PhosphorResult
+from labrig.results import DecayState, FittedDecay, RunResult
 
 
 def decay_result(

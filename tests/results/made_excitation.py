@@ -7,13 +7,13 @@ import numpy as np
 
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation
 from labrig.material import read_material
-from labrig.results import Series
-from labrig.results.excitation import (
+from labrig.protocols.excitation.result import (
     ExcitationResult,
     LightScatter,
     PatchCharging,
     PatchExcitation,
 )
+from labrig.results import Series
 from tests.analyse.excitation.bench import true_irradiance
 from tests.fit.charged_samples import Bench, lvf_windows
 from tests.results.made import decay_result

@@ -9,20 +9,10 @@ from hypothesis import given, strategies as st
 
 from labrig.fit import fit_luminance
 from labrig.foundation import plugins
+from labrig.protocols.fade.result import FittedShape, LampChange, SwitchedFrames
+from labrig.protocols.isotropy.result import AngularGlow, IsotropyResult
 from labrig.report.budgets import budget_lines
-from labrig.results import (
-    AngularGlow,
-    Budget,
-    DensityBasis,
-    FittedShape,
-    IsotropyResult,
-    LampChange,
-    LayerEffect,
-    LuminanceDecay,
-    Measured,
-    RunResult,
-    SwitchedFrames,
-)
+from labrig.results import Budget, DensityBasis, LayerEffect, LuminanceDecay, Measured, RunResult
 from tests.results.made_excitation import excitation_result
 
 PARTS = st.none() | st.floats(0.0, 1e6)
@@ -153,7 +143,7 @@ CALIBRATIONS = (
 
 @pytest.mark.parametrize("kind", CALIBRATIONS)
 def test_every_calibration_has_budgets(kind: str) -> None:
-    result_type = plugins.load(plugins.RESULTS, kind, "")
+    result_type = plugins.measurement(kind).load("result")
     assert result_type.budgets is not RunResult.budgets
 
 

@@ -8,15 +8,13 @@ from typing import cast
 import numpy as np
 import pytest
 
-from labrig.analyse.excitation.material import excited_material
 from labrig.foundation.errors import DiskError
 from labrig.material import read_material
+from labrig.protocols.excitation.analysis.material import excited_material
+from labrig.protocols.excitation.report import render
+from labrig.protocols.excitation.result import ExcitationResult
 from labrig.report import Source
-from labrig.report.excitation import render
 from labrig.results import ExcitationModel
-from labrig.results.excitation import (
-    ExcitationResult,
-)
 from tests.results.made import assert_read_back
 from tests.results.made_excitation import excitation_result
 
@@ -40,9 +38,9 @@ def test_files_lie_in_folders_of_the_patches(result: ExcitationResult, tmp_path:
         np.testing.assert_array_equal(covariance, np.where(known, patch.fit.covariance, np.nan))
         assert len(fit["covariance_parameters"]) == len(fit["covariance"])
         assert fit["covariance_parameters"][0] == "k_r_per_s 1"
-    assert result.provides() == {
-        "materials": {name: patch.material for name, patch in result.patches.items()}
-    }
+    provided = result.provides()
+    assert provided["materials"] == {name: each.material for name, each in result.patches.items()}
+    assert provided["excitations"] == {name: each.fit for name, each in result.patches.items()}
 
 
 def test_one_patch_alone_has_no_folder(result: ExcitationResult, tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from labrig.fit.charge.result import ChargeCandidate, ChargeFit, FittedReadings,
 from labrig.fit.least_squares import LeastSquaresFit, least_squares
 from labrig.fit.profile_likelihood import Likelihood
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.material import MAX_ORDER
 from labrig.results import Measured, OneSided
@@ -42,8 +43,6 @@ UNSATURATED = 1e-3
 #: inverse time in which the light falls by a factor e.
 START_ORDER, START_KAPPA = 1.7, 0.3
 START_SPEEDS = {1: ((1.0,),), 2: ((3.0, 0.3), (1.5, 0.7))}
-#: Difference in BIC from which a model with more parameters is preferred: odds of e^3 = 20 : 1.
-CLEAR_BIC = 6.0
 #: Gain in χ² of a step at which fits that are compared end.
 LEAST_GAIN = 0.1
 TOLERANCE = 1e-7
@@ -164,7 +163,7 @@ def _chosen(candidates: Sequence[ChargeCandidate]) -> int:
     """Return the index of the first model that no later one beats clearly."""
     chosen = 0
     for index, candidate in enumerate(candidates):
-        if candidate.bic < candidates[chosen].bic - CLEAR_BIC:
+        if candidate.bic < candidates[chosen].bic - STRONG_EVIDENCE_DELTA_BIC:
             chosen = index
     return chosen
 

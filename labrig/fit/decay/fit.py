@@ -25,12 +25,13 @@ from labrig.fit.decay.scatter import (
     with_equal_sigma,
     with_scatter_sigma,
 )
-from labrig.fit.decay.selection import CLEAR_BIC, choose_states, is_needed, law_margin
+from labrig.fit.decay.selection import choose_states, is_needed, law_margin
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.sigma_scale import sigma_scale
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.results import (
     AUTO,
@@ -334,7 +335,7 @@ def _chosen_law(
     if law == AUTO:
         margins = dict.fromkeys(bics, law_margin(n_states))
         # A spectrum contains all exponentials.
-        margins |= {EXPONENTIALS: 0.0, RATE_SPECTRUM: CLEAR_BIC}
+        margins |= {EXPONENTIALS: 0.0, RATE_SPECTRUM: STRONG_EVIDENCE_DELTA_BIC}
         return min(bics, key=lambda name: bics[name] + margins[name])
     if law not in bics:
         raise FitError(f"expected a signal that decays by the law '{law}', got none")

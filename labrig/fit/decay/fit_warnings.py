@@ -19,11 +19,11 @@ from labrig.fit.decay.further_state import HiddenState
 from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.laws import LawFit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation
-from labrig.fit.decay.selection import CLEAR_BIC
 from labrig.fit.decay.sigma_scale import SigmaScale
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.foundation.number_format import rounded
 from labrig.results import (
@@ -132,7 +132,7 @@ class Evidence:
     def is_another_better(self) -> bool:
         """Whether a law other than exponentials is clearly better."""
         laws = self.other_laws
-        return bool(laws) and laws[0].bic < self.exponentials_bic - CLEAR_BIC
+        return bool(laws) and laws[0].bic < self.exponentials_bic - STRONG_EVIDENCE_DELTA_BIC
 
 
 def student_factor(dof: float) -> float:

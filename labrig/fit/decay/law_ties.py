@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.fit.decay.selection import CLEAR_BIC
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.number_format import rounded
 from labrig.results import (
     EXPONENTIALS,
@@ -42,7 +42,7 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
     lowest = max(min(signals), np.finfo(float).tiny)
     return [
         f"the data do not tell {_name(fit, taken)} from {_names(fit, ties)} (ΔBIC below "
-        f"{CLEAR_BIC:.0f}): at {at_s:.3g} s they differ by a factor of "
+        f"{STRONG_EVIDENCE_DELTA_BIC:.0f}): at {at_s:.3g} s they differ by a factor of "
         f"{rounded(max(signals) / lowest, 2)}; record longer, or take more light at first"
     ]
 
@@ -50,7 +50,11 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
 def _is_close(fit: FittedDecay, taken: ComparedLaw, other: ComparedLaw) -> bool:
     difference = other.bic_above_best - taken.bic_above_best
     is_limit = fit.law == EXPONENTIALS and fit.n_states == 1
-    return -CLEAR_BIC < difference < (-SUPPORTED_BIC if is_limit else CLEAR_BIC)
+    return (
+        -STRONG_EVIDENCE_DELTA_BIC
+        < difference
+        < (-SUPPORTED_BIC if is_limit else STRONG_EVIDENCE_DELTA_BIC)
+    )
 
 
 def _signal(fit: FittedDecay, law: str) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from labrig.fit.decay.noise_likelihood import NoiseLikelihood
 from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states, refit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.results import Candidate
 
 #: Significance level of a further state of known rate. Searching the rate adds false positives,
@@ -27,8 +28,6 @@ F_TEST_LEVEL = 0.002
 CREEPING_GAIN, GOOD_REDUCED_CHI2 = 4.0, 1.5
 #: Gain in χ² beyond that found from which a further state is looked for at its most promising rate.
 MISSED_GAIN = 1.0
-#: Difference in BIC from which another model is clearly better: odds of e^3 = 20 : 1.
-CLEAR_BIC = 6.0
 #: Difference in BIC from which a law of one shape is taken instead of two exponentials, and three
 #: exponentials instead of a law.
 PREFERRED_BIC = 2.0
@@ -44,7 +43,7 @@ def law_margin(n_states: int) -> float:
     the shape of any law, and hardly ever is a decay of three states as smooth as a law.
     """
     if n_states <= 1:
-        return CLEAR_BIC
+        return STRONG_EVIDENCE_DELTA_BIC
     return PREFERRED_BIC if n_states == 2 else -PREFERRED_BIC
 
 

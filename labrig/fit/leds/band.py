@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import PIXEL_DETECTION_SIGMA
 from labrig.optics import Spectrum
 
 #: Width in nm over which pixels are averaged where it is decided whether there is light.
 SMOOTH_NM = 2.0
-#: Limit of detection in standard uncertainties of that average: one in 10⁵ pixels by chance.
-SEEN_SIGMA = 4.5
 #: Fraction of the peak below which wings are left out: stray light of the instrument.
 WING = 1e-3
 #: Margin on each side of the significant band, as a fraction of its width.
@@ -96,9 +95,9 @@ def led_band(
     peak = int(np.argmax(smooth))
     level = _level_beside(smooth, peak)
     smooth, value = smooth - level, value - level
-    if smooth[peak] < SEEN_SIGMA * smooth_sigma[peak]:
+    if smooth[peak] < PIXEL_DETECTION_SIGMA * smooth_sigma[peak]:
         return None
-    is_lit = smooth > np.maximum(SEEN_SIGMA * smooth_sigma, WING * smooth[peak])
+    is_lit = smooth > np.maximum(PIXEL_DETECTION_SIGMA * smooth_sigma, WING * smooth[peak])
     first, last = _run_about(is_lit, peak)
     margin = round(MARGIN * (last - first + 1)) + width
     first, last = max(first - margin, 0), min(last + margin, len(value) - 1)

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Overrides, decay as decay_analysis
+from labrig.analyse import Overrides
 from labrig.analyse.frames import intact_frames
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import BLANK_KIND
 from labrig.foundation.errors import DataError
 from labrig.process import process_run
+from labrig.protocols.decay import analysis as decay_analysis
 from labrig.record import read_run
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.analyse.small_runs import BLANK
@@ -69,7 +70,7 @@ def test_a_leak_is_found_and_reported_and_a_decay_is_warned(tmp_path: Path) -> N
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "40 s",
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
     run = record(tmp_path / "decay", decay)
-    found = decay_analysis.analyse(part_of(run, Inputs(blank=blank)))
+    found = decay_analysis.analyse(part_of(run, Inputs({"blank": blank})))
     assert any("all the time" in said for said in found.warnings)
 
 
@@ -85,11 +86,11 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
     decayed = record(tmp_path / "decay", decay)
     with pytest.raises(DataError, match="never became free"):
-        decay_analysis.analyse(part_of(decayed, Inputs(blank=blank)))
+        decay_analysis.analyse(part_of(decayed, Inputs({"blank": blank})))
     # One that is clean from the third frame on: the earlier ones are left out, and it is said.
     third = sorted(frame.t_s for frame in intact_frames(read_run(decayed), Overrides()).decay)[2]
     ends = blank.model_copy(update={"first_clean_s": third, "ambient_dn_per_s": (0.0, 0.0, 0.0)})
-    found = decay_analysis.analyse(part_of(decayed, Inputs(blank=ends)))
+    found = decay_analysis.analyse(part_of(decayed, Inputs({"blank": ends})))
     (patch,) = found.patches.values()
     assert list(patch.series.usable[:4]) == [False, False, True, True]
     assert any("before the bench is dark are left out, 2 of" in said for said in found.warnings)

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from labrig.analyse import decay as decay_analysis
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import CAMERA_KIND, CameraFile
 from labrig.foundation.errors import DataError
 from labrig.process import Processed, process_run
+from labrig.protocols.camera_calibration.result import CameraCalibrationResult
+from labrig.protocols.decay import analysis as decay_analysis
 from labrig.record import read_run
-from labrig.results.camera_calibration import CameraCalibrationResult
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
 from tests.analyse.recorded import cut_off_and_resumed, part_of, processed_once, record
@@ -162,14 +162,16 @@ def test_a_decay_uses_it_or_refuses_it(camera: CameraFile, tmp_path: Path) -> No
         return float(found.patches["corner"].series.values[0].max())
 
     left = vignetting(64, 96)[8:20, 5:15].mean()
-    assert brightest(Inputs(camera=camera)) == pytest.approx(brightest(Inputs()) / left, rel=0.006)
+    assert brightest(Inputs({"camera": camera})) == pytest.approx(
+        brightest(Inputs()) / left, rel=0.006
+    )
     others: dict[str, dict[str, Any]] = {
         "another lens or aperture": {"flats": (camera.flats[1],)},
         "another camera": {"camera": camera.camera.replace("5D", "6D")},
     }
     for said, changes in others.items():
         with pytest.raises(DataError, match=f"calibration of {said}"):
-            brightest(Inputs(camera=camera.model_copy(update=changes)))
+            brightest(Inputs({"camera": camera.model_copy(update=changes)}))
 
 
 def test_frames_of_another_lens_refuse_it(camera: CameraFile, tmp_path: Path) -> None:
@@ -180,5 +182,5 @@ def test_frames_of_another_lens_refuse_it(camera: CameraFile, tmp_path: Path) ->
              "exposure": "1 s"}  # fmt: skip
     run = record(tmp_path, decay, other_lens)
     with pytest.raises(DataError, match="calibration of another lens: expected EF75mm") as caught:
-        decay_analysis.analyse(part_of(run, Inputs(camera=camera)))
+        decay_analysis.analyse(part_of(run, Inputs({"camera": camera})))
     assert "EF50mm f/1.4 USM, 50 mm" in str(caught.value)

@@ -4,15 +4,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.analyse.camera_calibration.bend import Bend, fit_bend
-from labrig.analyse.camera_calibration.factors import CardFrame, fit_factors
-from labrig.analyse.camera_calibration.linearity import fit_linearity
-from labrig.analyse.camera_calibration.photon_transfer import Pair, measure_pair, photon_transfer
 from labrig.calibration import Noise
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.protocols.camera_calibration.analysis.bend import Bend, fit_bend
+from labrig.protocols.camera_calibration.analysis.factors import CardFrame, fit_factors
+from labrig.protocols.camera_calibration.analysis.linearity import fit_linearity
+from labrig.protocols.camera_calibration.analysis.photon_transfer import (
+    Pair,
+    measure_pair,
+    photon_transfer,
+)
+from labrig.protocols.camera_calibration.result import PhotonTransfer
 from labrig.reduce import RawFrame
-from labrig.results import PhotonTransfer
 from tests.pulls import assert_sigma_is_right
 
 GAIN, READ_E, BLACK = 2.0, 8.0, 1000.0

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Overrides, Part
-from labrig.analyse.camera_curves import analyse
 from labrig.bench_optics import camera_curves
 from labrig.fit.camera_curves import GRID_NM
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import CURVES_FILE, CameraResponse, read_camera
-from labrig.results import CameraCurvesResult
+from labrig.protocols.camera_curves.analysis import analyse
+from labrig.protocols.camera_curves.result import CameraCurvesResult
 from tests.analyse.chart_bench import record, true_curves, with_camera
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import UNKNOWN_CAMERA, curves_protocol

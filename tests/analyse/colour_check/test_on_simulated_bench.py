@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part
-from labrig.analyse.camera_curves import analyse as analyse_curves
-from labrig.analyse.colour_check import analyse
+from labrig.analyse import Inputs, Part
+from labrig.calibration import LVF_KIND
 from labrig.foundation.errors import UsageError
 from labrig.optics import CURVES_FILE
-from labrig.results import ColourCheckResult
+from labrig.protocols.camera_curves.analysis import analyse as analyse_curves
+from labrig.protocols.colour_check.analysis import analyse
+from labrig.protocols.colour_check.result import ColourCheckResult
 from tests.analyse.chart_bench import record, with_camera
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera
@@ -72,14 +73,14 @@ def test_a_wrong_lamp_and_wrong_curves_are_noticed(
 
 def test_a_filter_that_was_moved_is_noticed(run: Path) -> None:
     part = part_of(run)
-    calibrated = part.inputs.lvf
+    calibrated = part.inputs[LVF_KIND]
     assert calibrated is not None
     strip = calibrated.before_camera
     assert strip is not None
     # The filter now lies to the right of where its calibration had it.
     ends = {side: (x - 0.02, y) for side, (x, y) in (("left", strip.left), ("right", strip.right))}
     before = calibrated.model_copy(update={"before_camera": strip.model_copy(update=ends)})
-    result = analyse(replace(part, inputs=replace(part.inputs, lvf=before)))
+    result = analyse(replace(part, inputs=Inputs({**part.inputs.provided, "lvf": before})))
     assert result.filter_shift_nm == pytest.approx(0.02 / 0.88 * 324, abs=2)
     assert any("nm along itself from where it was calibrated" in line for line in result.warnings)
 
@@ -108,7 +109,7 @@ def test_curves_told_by_the_chart_make_right_colours(tmp_path: Path, name: str) 
 
 def test_what_is_missing_is_one_clear_line(run: Path) -> None:
     part = part_of(run)
-    without = replace(part, inputs=replace(part.inputs, lvf=None))
+    without = replace(part, inputs=Inputs())
     with pytest.raises(UsageError, match="needs the LVF calibrated before the camera") as caught:
         analyse(without)
     assert "\n" not in str(caught.value)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.analyse.excitation.evenness import evened, evenness
-from labrig.analyse.excitation.flicker import common_flicker
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import read_material
+from labrig.protocols.excitation.analysis.evenness import evened, evenness
+from labrig.protocols.excitation.analysis.flicker import common_flicker
 from tests.fit.charged_samples import BARE, LVF, Bench
 from tests.results.made_excitation import excitation_result
 

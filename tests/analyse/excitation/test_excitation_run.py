@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse.excitation.analysis import USUAL
-from labrig.analyse.excitation.charge_intervals import charge_frames
-from labrig.analyse.excitation.charging_series import patch_chargings
+from labrig.analyse import Inputs
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IRRADIANCE_KIND
 from labrig.foundation.errors import DataError
 from labrig.material import read_material
 from labrig.process import process_and_report, process_run
+from labrig.protocols.excitation.analysis import USUAL
+from labrig.protocols.excitation.analysis.charge_intervals import charge_frames
+from labrig.protocols.excitation.analysis.charging_series import patch_chargings
+from labrig.protocols.excitation.result import ExcitationResult
 from labrig.record import read_run
 from labrig.reduce import measure, read_raw
-from labrig.results.excitation import ExcitationResult
 from tests.analyse.excitation.bench import HEIGHT, QUICK, WIDTH, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.calibration.cameras import camera
@@ -175,6 +176,6 @@ def test_charges_are_missing(run: Path) -> None:
 
 def test_a_calibration_of_another_camera_is_refused(run: Path) -> None:
     part = part_of(run)
-    other = replace(part, inputs=replace(part.inputs, camera=camera()))
+    other = replace(part, inputs=Inputs({**part.inputs.provided, "camera": camera()}))
     with pytest.raises(DataError, match="calibration of another camera"):
         patch_chargings(other, true_irradiance(), USUAL)

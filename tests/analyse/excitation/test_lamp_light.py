@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from labrig.analyse.excitation.charge_intervals import ChargeInterval, with_warmth
-from labrig.analyse.excitation.lamp_light import (
+from labrig.protocols.excitation.analysis.charge_intervals import ChargeInterval, with_warmth
+from labrig.protocols.excitation.analysis.lamp_light import (
     SITES,
     WAVELENGTHS,
     across_sites,
@@ -12,7 +12,7 @@ from labrig.analyse.excitation.lamp_light import (
     mode_kinds,
     site_modes,
 )
-from labrig.analyse.excitation.warmth import weighted_over_mean
+from labrig.protocols.excitation.analysis.warmth import weighted_over_mean
 from tests.analyse.excitation.bench import true_irradiance
 
 

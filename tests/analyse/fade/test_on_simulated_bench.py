@@ -14,8 +14,8 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.clock import Clock
 from labrig.foundation.errors import UsageError
 from labrig.process import Processed, process_run
+from labrig.protocols.fade.result import FadeResult
 from labrig.record import read_run
-from labrig.results.fade import FadeResult
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.simulation import LampSettings
 from tests.acquire.fakes import Watching

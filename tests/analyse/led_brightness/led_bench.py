@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from labrig.analyse.led_brightness import analyse
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.yaml_file import validate
+from labrig.protocols.led_brightness.analysis import analyse
+from labrig.protocols.led_brightness.result import LedBrightnessResult
 from labrig.record import read_run
-from labrig.results import LedBrightnessResult, read_result
+from labrig.results import read_result
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.leds import led_spectrum
 from labrig.sim.opening import PIXEL_STREAM

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.analyse.led_brightness import analyse
 from labrig.bench_optics import led_exposures
 from labrig.calibration import LEDS_KIND
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
-from labrig.results import LedBrightnessResult, LedFault
+from labrig.protocols.led_brightness.analysis import analyse
+from labrig.protocols.led_brightness.result import LedBrightnessResult, LedFault
 from tests.analyse.led_brightness.led_bench import (
     Rig,
     calibrated,

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Overrides
-from labrig.analyse.led_fluorescence import analyse
-from labrig.analyse.led_fluorescence.methods import method_differences
+from labrig.acquire import read_protocol
+from labrig.analyse import Overrides, check_options
+from labrig.foundation import resources
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import (
     ReradiationMatrix,
@@ -22,7 +22,10 @@ from labrig.material import (
 )
 from labrig.optics import read_light
 from labrig.process import Processed, process_and_report
-from labrig.results import FluorescentPatch, LedFluorescenceResult
+from labrig.protocols.led_fluorescence.analysis import analyse
+from labrig.protocols.led_fluorescence.analysis.methods import method_differences
+from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
+from labrig.results import FluorescentPatch
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of, processed_once
 from tests.results.made import assert_read_back
@@ -245,7 +248,7 @@ def test_an_led_that_does_not_light_is_left_out_and_named(
 def test_the_thesis_method_that_was_asked_for_stands_before_that_of_all_leds(
     tmp_path: Path,
 ) -> None:
-    done = process_and_report(record(tmp_path, FEW), Overrides(method="per-led"))
+    done = process_and_report(record(tmp_path, FEW), Overrides(options={"method": "per-led"}))
     result = done.result
     assert isinstance(result, LedFluorescenceResult)
     for patch in result.patches.values():
@@ -303,16 +306,13 @@ def test_light_that_leaks_in_is_subtracted(tmp_path: Path) -> None:
 
 
 def test_a_method_is_refused_where_there_is_none_to_choose() -> None:
-    class Decay:
-        protocol = "decay"
-
-    with pytest.raises(
-        UsageError, match="--method: expected a protocol with several methods"
-    ) as no:
-        Overrides(method="joint").check_method(Decay())
+    decay = read_protocol(resources.find("protocols", "protocol", "decay"))
+    with pytest.raises(UsageError, match="--method: expected an option of decay, it has") as no:
+        check_options({"method": "joint"}, decay)
     assert "\n" not in str(no.value)
-    with pytest.raises(UsageError, match="expected joint or per-led, got 'thesis'"):
-        Overrides.parse([], [], method="thesis")
+    fluorescence = read_protocol(resources.find("protocols", "protocol", "led_fluorescence"))
+    with pytest.raises(UsageError, match=r"--method: .*joint.*thesis"):
+        check_options({"method": "thesis"}, fluorescence)
 
 
 @pytest.mark.campaign
@@ -336,7 +336,8 @@ def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Pat
     assert [each.light for each in yellow.under_lights] == list(result.leds[:4])
     assert yellow.under_lights[0].per_led.sigma is None
 
-    by_led = analyse(replace(part, overrides=Overrides(method="per-led"))).patches["yellow"]
+    one_by_one = Overrides(options={"method": "per-led"})
+    by_led = analyse(replace(part, overrides=one_by_one)).patches["yellow"]
     np.testing.assert_array_equal(by_led.matrix.reradiation, yellow.per_led.reradiation)
     without = part.protocol.model_copy(update={"lamps": ()})
     alone = analyse(replace(part, protocol=without)).patches["yellow"]

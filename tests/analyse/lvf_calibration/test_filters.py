@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.analyse.lvf_calibration.filters import (
+from labrig.foundation.arrays import FloatArray
+from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
+from labrig.optics.piecewise import quadrature
+from labrig.protocols.lvf_calibration.analysis.filters import (
     NO_FILTER,
     Bench,
     FilterScenes,
@@ -14,10 +17,7 @@ from labrig.analyse.lvf_calibration.filters import (
     misfits,
     residuals,
 )
-from labrig.foundation.arrays import FloatArray
-from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
-from labrig.optics.piecewise import quadrature
-from labrig.results.lvf_calibration import SliceValues
+from labrig.results.strip_profile import SliceValues
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 
 CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.analyse.lvf_calibration.lines import (
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, FitError
+from labrig.optics import Spectrum, Strip, nominal_lvf
+from labrig.protocols.lvf_calibration.analysis.lines import (
     place_on_sample,
     shifted_by_stripes,
     strip_lines,
     wavelengths_along,
 )
-from labrig.foundation.arrays import FloatArray
-from labrig.foundation.errors import DataError, FitError
-from labrig.optics import Spectrum, Strip, nominal_lvf
 from labrig.reduce.hdr import hdr_frame
 from labrig.reduce.strip import find_strip, strip_profile
 from tests.analyse.lvf_calibration.strip_pictures import (

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.analyse.led_fluorescence.lit_patches import LitPatch
-from labrig.analyse.led_fluorescence.lit_system import CARD_COURSE, CARD_SIGMA, exposure_of
-from labrig.analyse.validate_illuminants.prediction import predicted_values
+from labrig.analyse.lit_patches import LitPatch
+from labrig.analyse.lit_system import CARD_COURSE, CARD_SIGMA, exposure_of
 from labrig.bench_optics import LedExposure
 from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
 from labrig.material import ReradiationMatrix
 from labrig.optics import Transmittance, read_camera, read_light
+from labrig.protocols.validate_illuminants.analysis.prediction import predicted_values
 from tests.pulls import assert_sigma_is_right
 
 CAMERA = read_camera("canon_eos_5d_mark_ii")

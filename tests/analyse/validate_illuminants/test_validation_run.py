@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Part
-from labrig.analyse.validate_illuminants import analyse
 from labrig.foundation.errors import DataError, UsageError
+from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
+from labrig.protocols.validate_illuminants.analysis import analyse
+from labrig.protocols.validate_illuminants.result import ValidateIlluminantsResult
 from labrig.reduce import find_colour_chart
-from labrig.results import (
-    LedFluorescenceResult,
-    RunResult,
-    ValidateIlluminantsResult,
-    write_result,
-)
+from labrig.results import RunResult, write_result
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import VALIDATE_ONE

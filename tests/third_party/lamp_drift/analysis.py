@@ -24,7 +24,7 @@ def analyse(part: Part) -> LampDriftResult:
     (slope, _), covariance = np.polyfit(time_s, relative, 1, cov=True)
     drift = Measured(float(slope), float(np.sqrt(covariance[0, 0])), "1/s")
     change_sigmas = None
-    earlier = part.inputs.calibration(DRIFT_KIND)
+    earlier = part.inputs[DRIFT_KIND]
     if earlier is not None:
         sigma_per_s = np.hypot(drift.sigma, earlier.drift_sigma_per_s)
         change_sigmas = float((drift.value - earlier.drift_per_s) / sigma_per_s)

@@ -1,11 +1,12 @@
 """The calibration that the protocol makes: the drift of one lamp, in a file."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.calibration import CalibrationKind
+from labrig.foundation.models import FrozenModel
 
 
-class DriftFile(BaseModel):
+class DriftFile(FrozenModel):
     """Content of `drift.yaml`.
 
     Attributes
@@ -14,13 +15,12 @@ class DriftFile(BaseModel):
         Change of the lamp's light relative to its mean, per second, and its standard uncertainty.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     drift_per_s: float
     drift_sigma_per_s: float = Field(gt=0)
 
 
-#: A rig file names it by `optics: {lamp_drift: …}`, an analysis has it by `Inputs.calibration`.
+#: A rig file names it by `optics: {lamp_drift: …}`;
+#: an analysis has it as `part.inputs[DRIFT_KIND]`.
 DRIFT_KIND = CalibrationKind(
     name="lamp_drift",
     protocol="lamp_drift",

@@ -1,10 +1,11 @@
 """Driver of a relay board that understands `relay on N` and `relay off N`, one line a command."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Connections
 from labrig.drivers import SerialLine
 from labrig.foundation.errors import UnclearAnswerError
+from labrig.foundation.models import FrozenModel
 
 BAUDRATE = 19200
 ANSWER_S = 1.0
@@ -13,7 +14,7 @@ ANSWER_S = 1.0
 class PlainRelay:
     """One relay of the board, switching a lamp."""
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of the device in a rig file.
 
         Attributes
@@ -21,8 +22,6 @@ class PlainRelay:
         relay
             Number of the relay on the board, 0 to 9.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         relay: int = Field(ge=0, le=9)
 

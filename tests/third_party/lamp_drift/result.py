@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from labrig.results import FloatArray, Measured, RunResult
+from labrig.foundation.arrays import FloatArray
+from labrig.results import Measured, RunResult
 from lamp_drift.calibration import DRIFT_KIND, DriftFile
 
 

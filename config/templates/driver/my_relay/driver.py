@@ -4,11 +4,12 @@ Replace what the board is told and what it answers. A board that only reads and 
 no Python: see the driver `serial_relay` in labrig's guide "Use boards of your own".
 """
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from labrig.acquire import Connections
 from labrig.drivers import SerialLine
 from labrig.foundation.errors import UnclearAnswerError
+from labrig.foundation.models import FrozenModel
 
 BAUDRATE = 19200
 ANSWER_S = 1.0
@@ -20,7 +21,7 @@ class MyRelay:
     Other roles are LedBank, Door, Shield, Camera, Thermometer and Changer.
     """
 
-    class Settings(BaseModel):
+    class Settings(FrozenModel):
         """Keys of the device in a rig file; editors show what stands here.
 
         Attributes
@@ -28,8 +29,6 @@ class MyRelay:
         relay
             Number of the relay on the board, 0 to 9.
         """
-
-        model_config = ConfigDict(frozen=True, extra="forbid")
 
         relay: int = Field(ge=0, le=9)
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from labrig.results import FloatArray, Measured, RunResult
+from labrig.foundation.arrays import FloatArray
+from labrig.results import Measured, RunResult
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

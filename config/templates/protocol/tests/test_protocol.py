@@ -11,7 +11,7 @@ FOLDER = Path(__file__).parents[1]
 
 
 def test_a_run_on_the_simulated_bench(tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "labrig", "run", FOLDER / "my_protocol.yaml"]
+    words = [sys.executable, "-m", "labrig", "run", "my_protocol"]
     subprocess.run([*words, "--rig", FOLDER / "rig.yaml", "--runs", tmp_path], check=True)
     (run,) = tmp_path.iterdir()
     result = labrig.read_result(run)

@@ -1,0 +1,228 @@
+"""Whether card and samples show the lights that were to be lit, and only these."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.analyse.lit_patches import LightKind, LitPatch, mean_of
+from labrig.analyse.lit_warnings import exchanged_warnings, one_of
+from labrig.fit.leds import ChannelMatch, match_channels
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
+from labrig.optics import CameraResponse, Spectrum, Transmittance
+
+#: Part of the brightest LED's signal from which the camera is expected to see an LED.
+VISIBLE = 0.01
+#: Part of what a card gives under the other LEDs that it cannot give under one that the camera is
+#: not expected to see.
+TOO_BRIGHT = 0.2
+#: Part of the light with the LED on that has to go when it goes off: flicker is less.
+GOES_OFF = 0.02
+
+
+@dataclass(frozen=True)
+class UnusedLed:
+    """An LED, or a lamp, whose frames are left out.
+
+    Attributes
+    ----------
+    led
+        Its name.
+    reason
+        What card or samples show, and what to do.
+    light
+        The one that is lit in its place, None if none is known.
+    """
+
+    led: str
+    reason: str
+    light: str | None = None
+
+
+@dataclass(frozen=True)
+class UsableLights:
+    """Lights of a kind of which there are frames that can be used.
+
+    Attributes
+    ----------
+    by_row
+        The light that was lit, which need not be the one that was to be, by the row of its frames.
+    left_out
+        A line for each reason to leave others out.
+    exchanged
+        Lines on lights that have only changed places.
+    light_of
+        The light that is lit in the place of each of these.
+    """
+
+    by_row: Mapping[int, str]
+    left_out: Sequence[str]
+    exchanged: Sequence[str]
+    light_of: Mapping[str, str]
+
+    @property
+    def warnings(self) -> list[str]:
+        """All lines."""
+        return [*self.left_out, *self.exchanged]
+
+
+def usable_lights(
+    names: Sequence[str],
+    spectra: Mapping[str, Spectrum],
+    camera: CameraResponse,
+    white: Transmittance,
+    cards: Mapping[str, LitPatch],
+    samples: Mapping[str, LitPatch],
+    kind: LightKind = "LED",
+) -> UsableLights:
+    """Return the lights of a kind that can be used; parameters are those of `unused_leds`."""
+    unused = list(unused_leds(names, spectra, camera, white, cards, samples, kind))
+    light_of = exchanged(unused)
+    unused = [one for one in unused if one.led not in light_of]
+    out = {one.led for one in unused}
+    return UsableLights(
+        {row: light_of.get(name, name) for row, name in enumerate(names) if name not in out},
+        lines_of(unused),
+        list(exchanged_warnings(light_of, kind)),
+        light_of,
+    )
+
+
+def lines_of(unused: Sequence[UnusedLed]) -> list[str]:
+    """Return a line for each reason, with the LEDs that have it."""
+    leds: dict[str, list[str]] = {}
+    for one in unused:
+        leds.setdefault(one.reason, []).append(one.led)
+    return [f"{', '.join(names)}: left out, {reason}" for reason, names in leds.items()]
+
+
+def exchanged(unused: Sequence[UnusedLed]) -> dict[str, str]:
+    """Return the LED that is lit in the place of each, where LEDs have only changed places."""
+    light = {one.led: one.light for one in unused if one.light is not None}
+    while lost := {led for led in light if light[led] not in light}:
+        light = {led: other for led, other in light.items() if led not in lost}
+    return light if len(set(light.values())) == len(light) else {}
+
+
+def unused_leds(
+    leds: Sequence[str],
+    spectra: Mapping[str, Spectrum],
+    camera: CameraResponse,
+    white: Transmittance,
+    cards: Mapping[str, LitPatch],
+    samples: Mapping[str, LitPatch],
+    kind: LightKind = "LED",
+) -> Iterator[UnusedLed]:
+    """Yield the lights of a kind that cannot be used, by card and samples under each.
+
+    Parameters
+    ----------
+    leds
+        Names of the lights, in the order of the patches' rows.
+    spectra
+        Their spectra.
+    camera, white
+        Curves of the camera, and reflectance of the card.
+    cards, samples
+        Values of the card in the place of each patch, and of the patches.
+    kind
+        What the lights are called in messages.
+    """
+    card = mean_of(cards)
+    lit = card.without_rest()
+    expected = np.array([_expected(spectra[led], camera, white) for led in leds])
+    is_visible = expected.sum(axis=1) > VISIBLE * expected.sum(axis=1).max()
+    brightest = lit.value.max(axis=1)
+    usual = float(np.median(brightest[is_visible]))
+    visible = [led for led, seen in zip(leds, is_visible, strict=True) if seen]
+    of_visible = {led: spectra[led] for led in visible}
+
+    def at(row: int) -> tuple[FloatArray, FloatArray]:
+        return lit.value[row], lit.variance[row]
+
+    matches: dict[str, ChannelMatch] = {}
+    for row, led in enumerate(leds):
+        needs_light = bool(is_visible[row])
+        reason = _unlit(row, "card", cards, kind, needs_light=needs_light)
+        reason = reason or _unlit(row, "samples", samples, kind, needs_light=needs_light)
+        if reason is not None:
+            yield UnusedLed(led, reason)
+        elif not is_visible[row]:
+            if lit.is_seen[row] and brightest[row] > TOO_BRIGHT * usual:
+                match = match_channels(visible[0], *at(row), of_visible, camera, white)
+                best = min(match.chi2, key=lambda name: match.chi2[name])
+                yield _odd(led, None if match.is_odd(best) else best, None, kind)
+        else:
+            matches[led] = match_channels(led, *at(row), spectra, camera, white)
+    odd = {led: match.other(led) for led, match in matches.items() if match.is_odd(led)}
+    for led, other in odd.items():
+        yield _odd(led, other, matches[led].pair, kind)
+        if other in matches and other not in odd and _is_rather(matches[other], led, other):
+            yield _odd(other, led, None, kind)
+
+
+def _unlit(
+    row: int, what: str, patches: Mapping[str, LitPatch], kind: LightKind, *, needs_light: bool
+) -> str | None:
+    """Return what is amiss with a light on the patches, None if nothing is."""
+    if any(patch.is_clipped[row] for patch in patches.values()):
+        return (
+            f"frames of the {what} clip at the shortest exposure; dim the {kind}, lower camera.iso "
+            "or close the aperture"
+        )
+    if any(patch.is_off_clipped[row] for patch in patches.values()):
+        return (
+            f"frames of the {what} clip with all {kind}s off; {one_of(kind)} stays lit, or another "
+            f"light is on: check the {kind}s' relays, darken the room"
+        )
+    if not needs_light:
+        return None
+    if not any(patch.is_seen[row] for patch in patches.values()):
+        return f"frames of the {what} are dark; the {kind} did not light: check its plug"
+    if not any(_goes_off(patch, row) for patch in patches.values()):
+        return (
+            f"frames of the {what} are as bright with all {kind}s off; the {kind} did not light or "
+            "stays lit: check its plug and its relay"
+        )
+    return None
+
+
+def _goes_off(patch: LitPatch, row: int) -> bool:
+    light = patch.without_rest()
+    part = light.value[row] > GOES_OFF * patch.value[row]
+    return bool((part & (light.value[row] > DETECTION_SIGMA * np.sqrt(light.variance[row]))).any())
+
+
+def _is_rather(match: ChannelMatch, led: str, named: str) -> bool:
+    """Return whether a light is that of an LED rather than of the one named, if not clearly so.
+
+    Broadband lamps differ by less than the errors of a camera's curves, but one whose light is seen
+    elsewhere is not in its own place.
+    """
+    return match.chi2.get(led, math.inf) < match.chi2[named]
+
+
+def _odd(led: str, other: str | None, pair: str | None, kind: LightKind) -> UnusedLed:
+    if other is not None:
+        reason = (
+            f"the card has the colour of {other}; correct the order of the {kind}s in the rig file"
+        )
+    elif pair is not None:
+        reason = f"the card has the colour of two {kind}s, {pair} is lit, too; check their relays"
+    else:
+        keys = "'centre' and 'fwhm'" if kind == "LED" else "'spectrum' and 'filter'"
+        reason = (
+            f"the card has another colour than under this {kind}; correct its {keys} in the rig "
+            "file"
+        )
+    return UnusedLed(led, reason, other)
+
+
+def _expected(spectrum: Spectrum, camera: CameraResponse, white: Transmittance) -> FloatArray:
+    """Return the card's value in each channel under a light, shape (k,)."""
+    nm = camera.wavelength_nm
+    light = spectrum.at(nm) * white.at(nm)
+    power = np.trapezoid(spectrum.value, spectrum.wavelength_nm)
+    return np.asarray(np.trapezoid(light * camera.sensitivity.T, nm, axis=1) / power)

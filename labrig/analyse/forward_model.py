@@ -1,0 +1,243 @@
+"""Forward model of a frame through the LVF: filter, camera curves, white reference.
+
+Camera curves from another laboratory are off by some per cent, and so is every spectrum obtained
+with them. A grey card under a known lamp, seen through the same filter, measures the deviation in
+every position and channel, and constrains the model's errors.
+"""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labrig.analyse.combined_frames import CombinedFrame, combined
+from labrig.analyse.inputs import Part
+from labrig.analyse.strip import StripPatch, slice_strip, strip_regions
+from labrig.analyse.strip_model import (
+    ANY_BRIGHTNESS,
+    LAMP_SIGMA,
+    channel_cameras,
+    channel_positions,
+    conditioned_on_white,
+    strip_system,
+)
+from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
+from labrig.calibration import LVF_KIND
+from labrig.fit.spectrum import SpectralSystem
+from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.region import Region
+from labrig.optics import (
+    CameraResponse,
+    Lvf,
+    Spectrum,
+    Strip,
+    Transmittance,
+    read_monochrome_camera,
+    signal_through,
+)
+from labrig.reduce import SeriesFrame, sensor_layout
+from labrig.results import FilterFrames
+
+#: Range in which the holder is read, in heights of the strip from its middle; the filter's own
+#: blurred edges end at 0.7.
+HOLDER = (0.8, 1.1)
+#: Knots of the fitted spectrum: finer than the filter's 25 nm, and beyond the grid of results.
+KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ForwardModel:
+    """Model of a frame's values by the spectrum of one patch.
+
+    Attributes
+    ----------
+    slices, holder
+        Regions in which the filter is read, and those of its opaque holder beside it.
+    camera
+        Curves of the camera.
+    system
+        Linear model of the values by a spectrum, and its error modes.
+    white_reference
+        Whether the curves were corrected by a grey card under the known lamp.
+    """
+
+    slices: Mapping[str, Region]
+    holder: Mapping[str, Region]
+    camera: CameraResponse
+    system: SpectralSystem
+    white_reference: bool = False
+
+    @property
+    @abstractmethod
+    def centre_nm(self) -> FloatArray:
+        """Middle of the band in which each value is read in nm, place by place, (m,)."""
+
+    @abstractmethod
+    def expected_of(self, light: Spectrum) -> FloatArray:
+        """Return the values of a light by the model, shape (m,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LvfModel(ForwardModel):
+    """Model of a frame through the variable filter.
+
+    Attributes
+    ----------
+    lvfs
+        The filter at the middle of each slice's own pixels, for every channel.
+    """
+
+    lvfs: tuple[Lvf, ...] = ()
+
+    @property
+    def centre_nm(self) -> FloatArray:
+        """Centre of the band in which each value is read in nm, shape (positions · channels,)."""
+        return np.stack([lvf.bands.centre_nm for lvf in self.lvfs], axis=1).ravel()
+
+    def expected_of(self, light: Spectrum) -> FloatArray:
+        """Return the values of a light by the model, shape (positions · channels,)."""
+        columns = [
+            signal_through(lvf, channel, light)[:, 0]
+            for lvf, channel in zip(self.lvfs, channel_cameras(self.camera), strict=True)
+        ]
+        return np.stack(columns, axis=1).ravel()
+
+
+def forward_models(
+    part: Part, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
+) -> tuple[dict[StripPatch, LvfModel], tuple[str, ...]]:
+    """Return the model of every patch of a part, and the reasons for patches without one.
+
+    Parameters
+    ----------
+    part
+        Part of a run.
+    frame
+        Any of the part's frames, for the camera's pixels and channels.
+    patches
+        The patches; None for those of the part's protocol.
+
+    Raises
+    ------
+    UsageError
+        There is no LVF calibrated for this place, or there are no camera curves.
+    DataError
+        No patch lies below the filter.
+    """
+    calibration = part.inputs[LVF_KIND]
+    if calibration is None or calibration.before_camera is None:
+        raise UsageError(
+            "a spectrum needs the LVF calibrated before the camera: run the protocol "
+            "lvf_calibration, and name its run in the rig file (optics: {lvf: …}) or to labrig "
+            "process --optics"
+        )
+    layout, strip, lvf = sensor_layout(frame), calibration.before_camera, calibration.lvf
+    camera, holder = channel_curves(part, layout.channels), _holder_regions(strip)
+    asked = strip_regions(part) if patches is None else patches
+    sliced, refused = slice_strip(asked, strip, layout)
+    models: dict[StripPatch, LvfModel] = {}
+    for patch, slices in sliced.items():
+        # At either end pixels reach a little beyond the places that were calibrated.
+        seen = channel_positions(layout, strip, slices)
+        places = np.clip(seen, lvf.position[0], lvf.position[-1])
+        lvfs = tuple(lvf.at(positions) for positions in places)
+        system = strip_system(lvfs, camera, KNOTS_NM)
+        models[patch] = LvfModel(slices, holder, camera, system, lvfs=lvfs)
+    return models, refused
+
+
+def with_white_reference(
+    model: ForwardModel, part: Part, white: FilterFrames | None
+) -> tuple[ForwardModel, tuple[str, ...]]:
+    """Condition the model on frames of the grey card, if there are any; return it with warnings.
+
+    Raises
+    ------
+    UsageError
+        The files of lamp or grey card are malformed.
+    """
+    if white is None:
+        return model, ()
+    optics = part.rig.optics
+    if optics.lamp is None or optics.grey_card is None:
+        return model, (
+            "the white picture says nothing, since the spectra of lamp and grey card are not "
+            "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
+        )
+    light = card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
+    white_frame = combined(white)
+    if not white_frame.shows_light:
+        return model, ("the white picture is dark or clips throughout; the spectrum does without",)
+    system = conditioned_on_white(
+        model.system, white_frame.value, white_frame.sigma, light, model.expected_of(light)
+    )
+    return replace(model, system=system, white_reference=True), ()
+
+
+def card_misfit(model: ForwardModel, frame: CombinedFrame, light: Spectrum) -> float:
+    """Return the root of χ² per degree of freedom of a frame of a known light, its brightness free.
+
+    Parameters
+    ----------
+    model
+        Model that is not conditioned on the frame.
+    frame
+        Frame of the light.
+    light
+        Spectrum of the light.
+    """
+    used = np.isfinite(frame.value) & np.isfinite(frame.sigma)
+    expected = model.expected_of(light)[used]
+    gain = float(expected @ frame.value[used] / (expected @ expected))
+    residual = frame.value[used] / gain - expected
+    modes = model.system.modes[:, used] @ light.at(model.system.knots_nm)
+    modes = np.vstack([modes, ANY_BRIGHTNESS * expected])
+    noise = np.square(frame.sigma[used] / gain) + np.square(LAMP_SIGMA * expected)
+    covariance = modes.T @ modes + np.diag(noise)
+    chi2 = float(residual @ np.linalg.solve(covariance, residual))
+    return float(np.sqrt(chi2 / max(int(used.sum()) - 1, 1)))
+
+
+def _holder_regions(strip: Strip) -> dict[str, Region]:
+    """Return dark stripes above and below the strip, as far as they lie in the frame."""
+    (left, left_y), (right, right_y) = strip.left, strip.right
+    upper, lower = min(left_y, right_y), max(left_y, right_y)
+    near, far = (fraction * strip.height for fraction in HOLDER)
+    stripes = {"above": (upper - far, upper - near), "below": (lower + near, lower + far)}
+    return {
+        name: (left, top, right - left, bottom - top)
+        for name, (top, bottom) in stripes.items()
+        if top >= 0 and bottom <= 1
+    }
+
+
+def card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
+    """Return the spectrum of the lamp's light that the card reflects."""
+    inside = (card.wavelength_nm > lamp.wavelength_nm[0]) & (
+        card.wavelength_nm < lamp.wavelength_nm[-1]
+    )
+    fine = np.union1d(lamp.wavelength_nm, card.wavelength_nm[inside])
+    return Spectrum(lamp.name, fine, lamp.at(fine) * card.at(fine))
+
+
+def channel_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
+    """Return the curves of the camera, in the order of a frame's channels.
+
+    Raises
+    ------
+    DataError
+        The camera has other channels.
+    """
+    if len(channels) == 1:
+        name = part.overrides.camera or part.rig.optics.camera
+        if name is not None:
+            return read_monochrome_camera(name)
+    camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
+    if camera.channels != channels:
+        raise DataError(
+            f"expected frames with the channels {', '.join(camera.channels)} or one alone, got "
+            f"{', '.join(channels)}"
+        )
+    return camera

@@ -1,0 +1,234 @@
+"""Values of patches under LEDs or lamps, from brackets of frames with and without light."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from labrig.analyse.frames import require_calibrated_camera, steady_frames
+from labrig.analyse.inputs import Part
+from labrig.analyse.series_fit import TYPICAL_FLICKER
+from labrig.calibration import CAMERA_KIND
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.detection import DETECTION_SIGMA
+from labrig.foundation.errors import DataError
+from labrig.foundation.region import Region
+from labrig.protocols.steps.led_scenes import AGAIN
+from labrig.record import FrameRole
+from labrig.reduce import reduce_patches
+from labrig.results import Measured, Series
+
+#: What lights are called in messages; both kinds together are lights.
+LightKind = Literal["LED", "lamp", "light"]
+
+#: Least part of a variance that channels do not have in common: each frame weighs a little
+#: differently in them.
+LEAST_OWN = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class LitPatch:
+    """Values of one patch under m lights, LEDs or lamps, in k channels.
+
+    Attributes
+    ----------
+    value, variance
+        Values in DN/s and their variances, with the frames' flicker, shape (m, k).
+    flicker
+        Relative σ by flicker that all channels and all patches have in common, shape (m,).
+    off, off_sigma
+        Values in DN/s just after each light, and their σ, shape (m, k).
+    is_clipped, is_off_clipped
+        Whether even the shortest exposures were clipped, and whether those without the light were,
+        shape (m,).
+    bleaching
+        Value under the first light at the end of the run over that at its begin; None if it was not
+        lit again.
+    """
+
+    value: FloatArray
+    variance: FloatArray
+    off: FloatArray
+    off_sigma: FloatArray
+    is_clipped: BoolArray
+    is_off_clipped: BoolArray
+    flicker: FloatArray
+    bleaching: Measured | None = None
+
+    @property
+    def own_variance(self) -> FloatArray:
+        """Variances of the values without the flicker that is common, shape (m, k)."""
+        own = self.variance - np.square(self.flicker[:, np.newaxis] * self.value)
+        return np.maximum(own, LEAST_OWN * self.variance)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the channels under each light, shape (m, k, k)."""
+        common = self.flicker[:, np.newaxis] * self.value
+        own = self.own_variance[:, :, np.newaxis] * np.eye(self.value.shape[1])
+        return np.asarray(own + common[:, :, np.newaxis] * common[:, np.newaxis, :])
+
+    @property
+    def is_left(self) -> BoolArray:
+        """Whether light is left when the light is off, shape (m, k)."""
+        return np.asarray(self.off > DETECTION_SIGMA * self.off_sigma)
+
+    @property
+    def is_seen(self) -> BoolArray:
+        """Whether some channel sees light, shape (m,)."""
+        return np.asarray((self.value > DETECTION_SIGMA * np.sqrt(self.variance)).any(axis=1))
+
+    def without_rest(self) -> "LitPatch":
+        """Return the values without what is left when the light is off, if there is any."""
+        return replace(
+            self,
+            value=np.where(self.is_left, self.value - self.off, self.value),
+            variance=np.where(self.is_left, self.variance + self.off_sigma**2, self.variance),
+        )
+
+    def under(self, rows: Sequence[int]) -> "LitPatch":
+        """Return the values under some of the lights."""
+        return LitPatch(
+            self.value[rows],
+            self.variance[rows],
+            self.off[rows],
+            self.off_sigma[rows],
+            self.is_clipped[rows],
+            self.is_off_clipped[rows],
+            self.flicker[rows],
+            self.bleaching,
+        )
+
+    def times(self, factor: FloatArray, relative_variance: FloatArray) -> "LitPatch":
+        """Return the values under each light times a factor with an error, each shape (m,)."""
+        by = factor[:, np.newaxis]
+        value = self.value * by
+        variance = self.variance * by**2 + value**2 * relative_variance[:, np.newaxis]
+        off, off_sigma = self.off * by, self.off_sigma * by
+        return replace(self, value=value, variance=variance, off=off, off_sigma=off_sigma)
+
+
+def lit_patches(
+    part: Part,
+    role: str,
+    begin: str,
+    lights: Sequence[str],
+    first: str | None = None,
+    patches: Mapping[str, Region] | None = None,
+) -> dict[str, LitPatch]:
+    """Return each patch under all lights, in their order.
+
+    Parameters
+    ----------
+    part
+        The run.
+    role
+        Role of the frames with a light on; `-off` is added for those with all lights off.
+    begin
+        Begin of the names of the units, which end with the light.
+    lights
+        Names of the lights.
+    first
+        Light under which the patches were photographed once more at the end; None for none.
+    patches
+        Regions of the patches; None for those of the protocol.
+
+    Raises
+    ------
+    DataError
+        Frames are missing, damaged, or of another camera than the calibrated one.
+    """
+    camera = part.inputs[CAMERA_KIND]
+    flicker = TYPICAL_FLICKER if camera is None else camera.flicker
+    lit, left = (_series(part, each, patches) for each in (role, f"{role}-off"))
+    units = [f"{begin}{light}" for light in lights]
+    again = None if first is None else (f"{begin}{first}", f"{AGAIN}{first}")
+    return {
+        name: _lit_patch(part, series, left[name], units, again, flicker)
+        for name, series in lit.items()
+    }
+
+
+def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
+    """Return the mean of some patches, with the variance of one: neighbours share their light."""
+    each = list(patches.values())
+    return LitPatch(
+        np.mean([patch.value for patch in each], axis=0),
+        np.mean([patch.variance for patch in each], axis=0),
+        np.mean([patch.off for patch in each], axis=0),
+        np.mean([patch.off_sigma for patch in each], axis=0),
+        np.any([patch.is_clipped for patch in each], axis=0),
+        np.any([patch.is_off_clipped for patch in each], axis=0),
+        np.min([patch.flicker for patch in each], axis=0),
+    )
+
+
+def _series(part: Part, role: str, patches: Mapping[str, Region] | None) -> dict[str, Series]:
+    run, camera = part.run, part.inputs[CAMERA_KIND]
+    frames = steady_frames(run, part.overrides, role)
+    if not frames:
+        raise DataError(
+            f"{run.folder}: there are no complete '{role}' frames; go on with: labrig resume "
+            f"{run.folder}"
+        )
+    require_calibrated_camera(camera, run, run.frames(role))
+    darks = steady_frames(run, part.overrides, FrameRole.DARK)
+    regions = part.overrides.patches(part.protocol) if patches is None else patches
+    return reduce_patches(frames, regions, darks, camera=camera)
+
+
+def _lit_patch(
+    part: Part,
+    series: Series,
+    left: Series,
+    units: Sequence[str],
+    again: tuple[str, str] | None,
+    flicker: float,
+) -> LitPatch:
+    lit = {unit.unit[0]: _merged(unit, flicker) for unit in series.by_unit()}
+    off = {
+        unit.unit[0]: (unit.values[0], unit.sigma[0], not unit.usable[0]) for unit in left.by_unit()
+    }
+    if missing := [unit for unit in units if unit not in lit or unit not in off]:
+        raise DataError(
+            f"{part.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
+            f"resume {part.run.folder}"
+        )
+    columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
+    offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
+    value, variance, is_clipped, common = columns
+    dark, dark_sigma, is_off_clipped = offs
+    bleaching = None
+    if again is not None and again[1] in lit:
+        bleaching = _ratio(lit[again[1]], lit[again[0]])
+    return LitPatch(
+        value, variance, dark, dark_sigma, is_clipped, is_off_clipped, common, bleaching
+    )
+
+
+def _merged(unit: Series, flicker: float) -> tuple[FloatArray, FloatArray, bool, float]:
+    """Merge a bracket: values (k,), variances (k,), whether all frames are clipped, and flicker."""
+    usable = unit.usable
+    if not usable.any():
+        return unit.values[0], np.square(unit.sigma[0]), True, 0.0
+    value, variance = unit.values[usable], np.square(unit.sigma[usable])
+    # Flicker is that of the mean: of each value itself, it would prefer the low ones.
+    mean = (value / variance).sum(axis=0) / (1 / variance).sum(axis=0)
+    weight = 1 / (variance + np.square(flicker * mean))
+    mean = (weight * value).sum(axis=0) / weight.sum(axis=0)
+    # Channels weigh the frames differently: common is what the one with least flicker has.
+    common = flicker * np.linalg.norm(weight, axis=0) / weight.sum(axis=0)
+    return mean, 1 / weight.sum(axis=0), False, float(common.min())
+
+
+def _ratio(
+    after: tuple[FloatArray, FloatArray, bool, float],
+    before: tuple[FloatArray, FloatArray, bool, float],
+) -> Measured:
+    """Return the ratio of two brackets, of the channels together."""
+    weight = before[0] / before[1]
+    numerator, denominator = weight @ after[0], weight @ before[0]
+    relative = weight**2 @ after[1] / numerator**2 + weight**2 @ before[1] / denominator**2
+    ratio = numerator / denominator
+    return Measured(float(ratio), float(abs(ratio) * np.sqrt(relative)))

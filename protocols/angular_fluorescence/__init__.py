@@ -1,0 +1,1 @@
+"""Measurement of fluorescence by the angle of view."""

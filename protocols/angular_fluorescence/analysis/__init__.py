@@ -1,0 +1,56 @@
+"""Analysis of an angular run: a yarn, or a sphere."""
+
+import math
+from collections.abc import Iterator
+
+from labrig.analyse.inputs import Part
+from labrig.protocols.angular_fluorescence.analysis.sphere import sphere_views
+from labrig.protocols.angular_fluorescence.analysis.yarn import yarn_views
+from labrig.protocols.angular_fluorescence.result import (
+    AngularFluorescenceResult,
+    SphereViews,
+    YarnViews,
+)
+
+#: Fraction of reflected light in the signal from which a warning is given.
+MUCH_REFLECTED = 0.1
+
+
+def analyse(part: Part) -> AngularFluorescenceResult:
+    """Test whether re-radiation depends on angle.
+
+    Raises
+    ------
+    DataError
+        Frames are damaged, no sphere is found, or there are too few views.
+    UsageError
+        The channels cannot be chosen.
+    """
+    if part.protocol.shape == "sphere":
+        spheres, warnings = sphere_views(part)
+        result = AngularFluorescenceResult(spheres=spheres)
+    else:
+        yarns, warnings = yarn_views(part)
+        result = AngularFluorescenceResult(yarns=yarns)
+    lines = (*warnings, *dict.fromkeys(_warnings(result)))
+    return AngularFluorescenceResult(
+        yarns=result.yarns, spheres=result.spheres, warnings=tuple(lines)
+    )
+
+
+def _warnings(result: AngularFluorescenceResult) -> Iterator[str]:
+    reradiated = [views for views in result.spheres if views.part == "re-radiated"]
+    measured: list[YarnViews | SphereViews] = [*result.yarns, *reradiated]
+    for views in measured:
+        if math.isnan(views.reflected_at_most):
+            yield (
+                f"{views.led}: how much of the signal in {', '.join(views.channels)} is reflected "
+                "light, which does depend on angle, is unknown; name centre and fwhm of the LED "
+                "and the camera's curves in the rig file"
+            )
+        if views.reflected_at_most > MUCH_REFLECTED:
+            yield (
+                f"{views.led}: up to {views.reflected_at_most:.0%} of the signal in "
+                f"{', '.join(views.channels)} may be reflected light, which does depend on angle; "
+                "take an LED of a shorter wavelength"
+            )

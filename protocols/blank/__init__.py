@@ -1,0 +1,1 @@
+"""Measurement of stray light of a blank."""

@@ -1,0 +1,1 @@
+"""Measurement of a bench's calibration, as a chain."""

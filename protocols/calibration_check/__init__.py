@@ -1,0 +1,1 @@
+"""The check that a calibrated bench is as it was."""

@@ -1,0 +1,45 @@
+"""Analysis of a calibration's check, from its frames to what changed on the bench."""
+
+from pathlib import Path
+
+from labrig.acquire import CalibrationRules
+from labrig.analyse.inputs import Part
+from labrig.calibration import REFERENCE_KIND
+from labrig.foundation.errors import DataError
+from labrig.protocols.calibration_check.protocol import (
+    CheckFrames,
+    broken_rules,
+    picture_change,
+    picture_of,
+)
+from labrig.protocols.calibration_check.result import CalibrationCheckResult
+
+
+def analyse(part: Part) -> CalibrationCheckResult:
+    """Compare the card through the filter with the picture of the calibration.
+
+    Raises
+    ------
+    DataError
+        The frames are missing, or show no strip.
+    UsageError
+        The calibration is no longer there.
+    """
+    protocol = part.protocol
+    frames = [
+        frame for frame in part.run.frames(CheckFrames.CARD) if not part.overrides.excludes(frame)
+    ]
+    if not frames:
+        raise DataError(
+            f"{part.run.folder}: no picture of the card through the filter is complete; go on "
+            f"with: labrig resume {part.run.folder}"
+        )
+    reference = REFERENCE_KIND.read(Path(protocol.reference))
+    change = picture_change(frames, picture_of(reference, protocol.reference))
+    rules = protocol.rules or CalibrationRules()
+    return CalibrationCheckResult(
+        calibration=reference.run or protocol.reference,
+        age_h=reference.age_s(frames[0].start_time) / 3600,
+        change=change,
+        warnings=tuple(text for _, text in broken_rules(change, rules)),
+    )

@@ -1,0 +1,1 @@
+"""Measurement of the calibration of a camera."""

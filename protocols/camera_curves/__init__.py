@@ -1,0 +1,1 @@
+"""Measurement of the spectral curves of a camera."""

@@ -1,0 +1,1 @@
+"""The check of colours by a chart."""

@@ -1,0 +1,12 @@
+"""Registration of the measurement `decay`."""
+
+from labrig.foundation.plugins import Measurement
+
+DECAY = Measurement(
+    package=__package__,
+    protocol=".protocol:Decay",
+    result=".result:DecayResult",
+    options=".options:DecayOptions",
+    table_report=".report:table_sections",
+    is_per_patch=True,
+)

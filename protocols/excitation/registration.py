@@ -1,0 +1,13 @@
+"""Registration of the measurement `excitation`."""
+
+from labrig.foundation.plugins import Measurement
+
+EXCITATION = Measurement(
+    package=__package__,
+    protocol=".protocol:Excitation",
+    result=".result:ExcitationResult",
+    options=".options:ExcitationOptions",
+    is_per_patch=True,
+    needs_checked_bench=True,
+    has_short_charges=True,
+)

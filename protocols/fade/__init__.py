@@ -1,0 +1,1 @@
+"""Measurement of the fade of a lamp."""

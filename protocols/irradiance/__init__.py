@@ -1,0 +1,1 @@
+"""Measurement of the irradiance on a sample."""

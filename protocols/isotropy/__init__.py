@@ -1,0 +1,1 @@
+"""Measurement of the isotropy of a glow."""

@@ -1,0 +1,1 @@
+"""Measurement of the brightness of LEDs."""

@@ -1,0 +1,1 @@
+"""Measurement of a phosphor, as a chain."""

@@ -1,0 +1,7 @@
+"""Options of `labrig process` for a saturation test."""
+
+from labrig.analyse.process_options import RateOption, StatesOption
+
+
+class SaturationOptions(StatesOption, RateOption):
+    """How the decays are fitted."""

@@ -1,0 +1,11 @@
+"""Registration of the measurement `saturation`."""
+
+from labrig.foundation.plugins import Measurement
+
+SATURATION = Measurement(
+    package=__package__,
+    protocol=".protocol:Saturation",
+    result=".result:SaturationResult",
+    options=".options:SaturationOptions",
+    is_per_patch=True,
+)
