@@ -7,10 +7,10 @@ product instead of one for each band and vertex before it. The picture is that o
 rounding.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -162,8 +162,8 @@ def colour_fold(
         )  # fmt: skip
         return light
 
-    run: Callable[..., Any] = map
-    if threads < 2:
-        return np.concatenate(list(run(part, range(len(paths)))))
+    # A thread takes longer to start than a small part to fold.
+    if threads < 2 or len(paths) < 2:
+        return np.concatenate([part(number) for number in range(len(paths))])
     with ThreadPoolExecutor(threads, thread_name_prefix="fold") as pool:
         return np.concatenate(list(pool.map(part, range(len(paths)))))

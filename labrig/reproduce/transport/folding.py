@@ -1,9 +1,9 @@
 """Light along kept paths, from the far end: L = glow + M (direct · lamps + L of the next)."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,8 +125,11 @@ def fold(
         )  # fmt: skip
         return light
 
-    run: Callable[..., Any] = map
     if threads < 2:
-        return np.concatenate(list(run(part, paths)))
+        return np.concatenate([part(own) for own in paths])
+    paths = list(paths)
+    # A thread takes longer to start than a small part to fold.
+    if len(paths) < 2:
+        return np.concatenate([part(own) for own in paths])
     with ThreadPoolExecutor(threads, thread_name_prefix="fold") as pool:
         return np.concatenate(list(pool.map(part, paths)))
