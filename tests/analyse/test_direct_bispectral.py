@@ -12,7 +12,6 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.material import read_reradiation
 from labrig.optics import SpectrometerReading, read_spectrometer_reading
-from labrig.process import process_and_report
 from labrig.protocols.direct_bispectral.analysis import analyse
 from labrig.protocols.direct_bispectral.protocol import DirectSpectra
 from labrig.protocols.direct_bispectral.result import DirectBispectralResult
@@ -25,7 +24,7 @@ from tests.analyse.direct_bench import (
     true_light,
     true_reflectance,
 )
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import DIRECT
 from tests.results.made import assert_read_back
 
@@ -119,7 +118,7 @@ def test_what_the_light_itself_covers_is_told_by_another_light_or_not_at_all(qui
 
 
 def test_the_files_are_read_back_and_the_report_says_what_it_is(quick: Path) -> None:
-    processed = process_and_report(quick)
+    processed = processed_once(quick)
     assert isinstance(processed.result, DirectBispectralResult)
     assert_read_back(processed.result)
     (columns,) = processed.result.samples.values()

@@ -12,11 +12,10 @@ from labrig.bench_optics import camera_curves
 from labrig.fit.camera_curves import GRID_NM
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import CURVES_FILE, CameraResponse, read_camera
-from labrig.process import process_and_report
 from labrig.protocols.camera_curves.analysis import analyse
 from labrig.protocols.camera_curves.result import CameraCurvesResult
 from tests.analyse.chart_bench import record, true_curves, with_camera
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import UNKNOWN_CAMERA, curves_protocol
 from tests.fit.unknown_cameras import rms_of_curves
 from tests.results.made import assert_read_back
@@ -55,7 +54,7 @@ def test_an_unknown_camera_is_told_by_its_chart(by_chart: CameraCurvesResult) ->
 
 
 def test_the_filter_halves_the_error(run: Path, by_chart: CameraCurvesResult) -> None:
-    done = process_and_report(run)
+    done = processed_once(run)
     assert isinstance(done.result, CameraCurvesResult)
     assert done.result.through_filter
     assert error_of(done.result, UNKNOWN_CAMERA) < 0.6 * error_of(by_chart, UNKNOWN_CAMERA)

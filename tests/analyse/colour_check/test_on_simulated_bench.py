@@ -11,12 +11,11 @@ from labrig.analyse import AnalysisContext, Inputs
 from labrig.calibration import LVF_KIND
 from labrig.foundation.errors import UsageError
 from labrig.optics import CURVES_FILE
-from labrig.process import process_and_report
 from labrig.protocols.camera_curves.analysis import analyse as analyse_curves
 from labrig.protocols.colour_check.analysis import analyse
 from labrig.protocols.colour_check.result import ColourCheckResult
 from tests.analyse.chart_bench import record, with_camera
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera
 from tests.results.made import assert_read_back
 
@@ -33,7 +32,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_colours_are_right_end_to_end(run: Path) -> None:
-    done = process_and_report(run)
+    done = processed_once(run)
     result = done.result
     assert isinstance(result, ColourCheckResult)
     assert result.plain.mean < 2
