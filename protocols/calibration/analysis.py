@@ -1,8 +1,7 @@
 """Analysis of a bench's calibration, to the results of its parts and the bench they belong to."""
 
 from labrig.analyse.bench_reference import bench_reference, card_picture
-from labrig.analyse.chain import analyse_parts
-from labrig.analyse.inputs import AnalysisContext
+from labrig.analyse.inputs import AnalysisContext, analyse_parts
 from labrig.calibration import (
     LVF_KIND,
 )

@@ -8,12 +8,12 @@ from importlib.metadata import version
 import numpy as np
 
 from labrig.analyse.frames import (
+    glare_warning,
     intact_frames,
     require_calibrated_camera,
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.surface import with_layer, with_reflectance

@@ -55,7 +55,7 @@ class LinesUnit(SceneUnit):
         session.decide("mercury", lambda: self._lines(session), when_planned="lines found")
 
     def _lines(self, session: Session) -> str:
-        from labrig.protocols.steps.strip_checks import lines_found
+        from labrig.protocols.steps.strip_scenes import lines_found
 
         return lines_found(self.own(session), frames_of(session, *self.strip), self.rising)
 
@@ -89,7 +89,7 @@ class FilterUnit(SceneUnit):
         return filter_unit(self.previous)
 
     def _is_like_previous(self, session: Session) -> bool:
-        from labrig.protocols.steps.strip_checks import look_alike
+        from labrig.protocols.steps.strip_scenes import look_alike
 
         previous = frames_of(session, self.role, self._unit_before)
         strip = frames_of(session, self.role, filter_unit(None))

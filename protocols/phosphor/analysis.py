@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-from labrig.analyse.chain import analyse_parts
-from labrig.analyse.inputs import AnalysisContext, Inputs
+from labrig.analyse.inputs import AnalysisContext, Inputs, analyse_parts
 from labrig.analyse.surface import with_reflectances
 from labrig.calibration import REFLECTANCE_KIND
 from labrig.material import Material

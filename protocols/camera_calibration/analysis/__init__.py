@@ -13,11 +13,14 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.number_format import exposure_text, plus_minus
 from labrig.foundation.region import Region
-from labrig.protocols.camera_calibration.analysis.bend import Bend, fit_bend
 from labrig.protocols.camera_calibration.analysis.factors import CardFrame, Factors, fit_factors
-from labrig.protocols.camera_calibration.analysis.flat_field import fit_flat
-from labrig.protocols.camera_calibration.analysis.glare import measure_glare
-from labrig.protocols.camera_calibration.analysis.linearity import deviation, fit_linearity
+from labrig.protocols.camera_calibration.analysis.flat_field import fit_flat, measure_glare
+from labrig.protocols.camera_calibration.analysis.linearity import (
+    Bend,
+    deviation,
+    fit_bend,
+    fit_linearity,
+)
 from labrig.protocols.camera_calibration.analysis.photon_transfer import (
     MeasurePair,
     Pair,

@@ -1,4 +1,8 @@
-"""Analysis of an excitation run, from its frames to rates and a material of every patch."""
+"""Analysis of an excitation run, from its frames to rates and a material of every patch.
+
+A decay of a dozen photographs tells the flicker to a quarter of itself; the photographs after all
+charges are ten times as many.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -21,21 +25,21 @@ from labrig.calibration import (
     Warming,
 )
 from labrig.fit.excitation import RelativeSigmas
+from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.protocols.excitation.analysis.charge_intervals import GLOWING
-from labrig.protocols.excitation.analysis.charging_series import patch_chargings
+from labrig.protocols.excitation.analysis.charging_series import evened, patch_chargings
 from labrig.protocols.excitation.analysis.closure import predicted_charging
-from labrig.protocols.excitation.analysis.density import largest_density
-from labrig.protocols.excitation.analysis.evenness import evened
-from labrig.protocols.excitation.analysis.flicker import common_flicker
 from labrig.protocols.excitation.analysis.lamp_light import (
     LAMP_SIGMA,
     LARGEST_FACTOR,
     band_sigma,
     light_scatter,
+    remembered_warmth,
     scale_sigma,
+    scatter_by_warmth,
 )
-from labrig.protocols.excitation.analysis.material import excited_material
+from labrig.protocols.excitation.analysis.material import excited_material, largest_density
 from labrig.protocols.excitation.analysis.orders import ChosenOrders, OrderFits
 from labrig.protocols.excitation.analysis.radiometric_scale import (
     RadiometricScale,
@@ -46,11 +50,59 @@ from labrig.protocols.excitation.analysis.selected_light import (
     with_doubt,
     within_bands,
 )
-from labrig.protocols.excitation.analysis.warmth import remembered_warmth, scatter_by_warmth
 from labrig.protocols.excitation.options import ExcitationOptions
 from labrig.protocols.excitation.result import ExcitationResult, PatchCharging, PatchExcitation
 from labrig.record import FrameRole
 from labrig.results import ChargingSeries, Closure, EmissionSpectrum, FittedDecay, FittedExcitation
+
+
+def common_flicker(
+    fit: FittedExcitation, series: Sequence[ChargingSeries], dark_sigma: Sequence[float]
+) -> float:
+    """Return the relative flicker of all photographs by the method of moments.
+
+    A photograph is f times as bright as the fit says: f² has the mean of the squared flicker and of
+    the variance that noise and dark level give it. Every charge's lamp and the rates follow some of
+    the flicker, which so many photographs fewer tell.
+
+    Parameters
+    ----------
+    fit, series
+        A fit, and its series.
+    dark_sigma
+        Scatter of the dark level in the values' unit, shape (C,).
+    """
+    parts = [
+        _deviations(charging, residuals, np.array(dark_sigma))
+        for charging, residuals in zip(series, fit.residuals, strict=True)
+    ]
+    deviation, variance = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    weight = 1 / (TYPICAL_FLICKER**2 + variance) ** 2
+    lamp = sum(sum(len(charge.start_s) > 0 for charge in charging.charges) for charging in series)
+    # As many photographs as there are weights of the largest size.
+    effective = weight.sum() ** 2 / np.square(weight).sum()
+    free = effective - lamp - 3 * len(fit.states)
+    if free < 1:
+        return TYPICAL_FLICKER
+    mean_square = weight @ (deviation**2 * effective / free - variance) / weight.sum()
+    return float(np.sqrt(max(mean_square, 0.0)))
+
+
+def _deviations(
+    charging: ChargingSeries, residuals: FloatArray, dark_sigma: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the relative deviation of every measured photograph, and its variance by noise."""
+    signal = charging.values - residuals * charging.sigma
+    is_measured = np.isfinite(residuals)
+    scaled = np.where(is_measured, signal / charging.sigma, 0.0)
+    power = np.square(scaled).sum(axis=(1, 2))
+    along_dark = np.where(is_measured, scaled / charging.sigma, 0.0).sum(axis=1)
+    glows = power > 0
+    power, along_dark = power[glows], along_dark[glows]
+    deviation = (scaled * np.nan_to_num(residuals)).sum(axis=(1, 2))[glows] / power
+    variance = 1 / power + np.square(along_dark * dark_sigma).sum(axis=1) / power**2
+    return deviation, variance
+
 
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)

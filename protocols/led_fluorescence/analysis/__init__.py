@@ -7,16 +7,16 @@ from typing import Literal
 
 import numpy as np
 
-from labrig.analyse.card_checks import UsableLights, usable_lights
-from labrig.analyse.inputs import AnalysisContext
-from labrig.analyse.lit_patches import LightKind, LitPatch, lit_patches, mean_of
-from labrig.analyse.lit_system import lit_system
-from labrig.analyse.lit_warnings import (
+from labrig.analyse.card_checks import (
+    UsableLights,
     bleaching_warnings,
     fact_warnings,
     left_warnings,
     per_led_warnings,
+    usable_lights,
 )
+from labrig.analyse.inputs import AnalysisContext
+from labrig.analyse.lit_patches import LightKind, LitPatch, lit_patches, lit_system, mean_of
 from labrig.bench_optics import (
     LedExposure,
     camera_curves,
@@ -38,12 +38,13 @@ from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import appearance, read_emissions
 from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
-from labrig.protocols.led_fluorescence.analysis.direct import direct_measurement, missing_samples
 from labrig.protocols.led_fluorescence.analysis.methods import (
+    direct_measurement,
     method_differences,
+    missing_samples,
+    mixture_of,
     reradiation_under_lights,
 )
-from labrig.protocols.led_fluorescence.analysis.mixture import mixture_of
 from labrig.protocols.led_fluorescence.options import LedFluorescenceOptions
 from labrig.protocols.led_fluorescence.protocol import SAMPLE, LedFrames
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult

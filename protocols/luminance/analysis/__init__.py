@@ -13,6 +13,7 @@ import numpy as np
 
 from labrig.analyse.frames import (
     IntactFrames,
+    glare_warning,
     intact_frames,
     require_calibrated_camera,
     steady_frames,
@@ -20,7 +21,6 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.glare import glare_warning
 from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import (
     bare_lamp_spectrum,

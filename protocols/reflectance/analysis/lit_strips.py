@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.acquire import DOOR
+from labrig.analyse.forward_model import channel_positions, conditioned_on_white, strip_system
 from labrig.analyse.frames import intact_frames
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import Slices, StripFrames, StripPatch, slice_strip, strip_regions
-from labrig.analyse.strip_model import channel_positions, conditioned_on_white, strip_system
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CAMERA_KIND, LvfFile
 from labrig.fit.reflectance import (

@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from labrig.analyse.card_checks import UsableLights, usable_lights
-from labrig.analyse.colours import camera_matrix
+from labrig.analyse.card_checks import UsableLights, left_warnings, usable_lights
+from labrig.analyse.chart_scene import camera_matrix
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.lit_patches import LitPatch, lit_patches
-from labrig.analyse.lit_warnings import left_warnings
 from labrig.bench_optics import (
     LedExposure,
     camera_curves,
@@ -22,15 +21,16 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import CameraResponse, is_narrow
 from labrig.protocols.steps.led_scenes import CARD
-from labrig.protocols.validate_illuminants.analysis.chart import ODD_CHART, chart_values
 from labrig.protocols.validate_illuminants.analysis.colours import (
+    ODD_CHART,
     ColourScale,
     chart_matrix,
+    chart_values,
     difference,
 )
-from labrig.protocols.validate_illuminants.analysis.materials import matrices_of
 from labrig.protocols.validate_illuminants.analysis.prediction import (
     PredictedValues,
+    matrices_of,
     predicted_values,
     with_scales_of_samples,
 )
